@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import bywire
-from bywire.core.author_lines import said_with_line
+from bywire.core.brake import said_with_line
 from bywire.core.errors import BywireError
 from bywire.simulation.compiler import find_compiler
 

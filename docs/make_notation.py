@@ -23,10 +23,8 @@ from bywire.bench.kpis.families import FAMILIES
 from bywire.bench.stimulus import STIMULI
 from bywire.brakes.wedge import elements, laws
 from bywire.core.catalog import PARAMETER_SETS
-from bywire.core.field_notes import field_notes
-from bywire.core.leaf import Leaf
 from bywire.core.model import ASSEMBLIES
-from bywire.core.parameters import ParameterSet, leaf_fields
+from bywire.core.parameters import Leaf, ParameterSet, field_notes, leaf_fields
 from bywire.core.quantities import display_unit
 from bywire.core.signals import merged_signals, places_of
 from bywire.report.wording import amount, range_text, unit_text

@@ -14,7 +14,7 @@ import numpy as np
 from benchmarks.result import Result, at_most
 from benchmarks.suite import Part
 from benchmarks.timing import interleaved, ratio, timed
-from bywire.core.extras import how_to_install
+from bywire.core.libraries import how_to_install
 from bywire.data.measurement import read_measurement
 
 RATE, CHANNELS = 10_000, 20

@@ -13,7 +13,7 @@ from benchmarks.commands import environment
 from benchmarks.result import Result, at_most, failed
 from benchmarks.suite import Part
 from bywire.core.child_process import python_command
-from bywire.core.extras import how_to_install
+from bywire.core.libraries import how_to_install
 
 COLD, WARM = 180.0, 20.0
 """goals [s]"""

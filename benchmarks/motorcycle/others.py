@@ -22,7 +22,7 @@ from benchmarks.suite import Part
 from benchmarks.timing import timed
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.core.catalog import parameters
-from bywire.core.extras import how_to_install
+from bywire.core.libraries import how_to_install
 from bywire.simulation.run import simulate
 
 

@@ -16,7 +16,7 @@ from benchmarks.judging import simulated_and_judged
 from benchmarks.result import Result, at_least, at_most
 from benchmarks.suite import Part
 from bywire.core.child_process import python_command
-from bywire.core.unneeded import allow_dask
+from bywire.core.libraries import allow_dask
 from bywire.data.file_format import library
 from bywire.studies.executor import CLUSTER_MEMORY, CLUSTER_SETTINGS, Cluster, Executor, Pool
 from bywire.studies.plan import CHUNK, StudyPlan

@@ -17,8 +17,8 @@ from bywire.campaigns.residual import CAMPAIGNS
 from bywire.core.brake import brakes
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.model import ASSEMBLIES
-from bywire.identification.fitting.question import BENCH_METHODS
 from bywire.identification.method import METHODS
+from bywire.identification.question import BENCH_METHODS
 from bywire.life.declaration import LIVES
 from bywire.report.schematic import schematic_blocks
 from bywire.synthesis.study import STUDIES

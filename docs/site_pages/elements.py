@@ -13,8 +13,7 @@ from types import ModuleType
 from bywire import control, plant
 from bywire.core.brake import brakes
 from bywire.core.faults import ParameterFault
-from bywire.core.field_notes import field_notes
-from bywire.core.parameters import ParameterSet, leaf_fields
+from bywire.core.parameters import ParameterSet, field_notes, leaf_fields
 from bywire.core.signals import signals_of
 from bywire.report.wording import range_text, unit_text
 

@@ -33,7 +33,7 @@ from bywire.data.measurement import read_measurement as read_measurement
 from bywire.data.netcdf import read_recording as read_recording
 from bywire.data.netcdf import write_recording as write_recording
 from bywire.data.writing import write_measurement as write_measurement
-from bywire.identification.fitting.question import Question as Question
+from bywire.identification.question import Question as Question
 from bywire.server.serving import serve as serve
 from bywire.simulation.ensemble import Ensemble as Ensemble
 from bywire.simulation.run import Run as Run

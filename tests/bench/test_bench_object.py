@@ -202,6 +202,11 @@ def test_run_takes_the_path_of_a_bench_file_too(path):
     assert bywire.run("seal-stribeck").bench.parameters == SET
 
 
+def test_a_bare_name_of_nothing_is_answered_with_the_nearest_experiment():
+    with pytest.raises(UnknownNameError, match="'seal-stribek': did you mean seal-stribeck"):
+        bywire.run("seal-stribek")
+
+
 def test_numbers_are_si_in_python_and_need_a_unit_in_files(tmp_path):
     content = {"experiment": "hard-braking", "parameters": SET, "options": {"p_to": 30e5}}
     assert bywire.Bench("hard-braking", SET, options=content["options"]).chosen_options.p_to == 30e5

@@ -233,6 +233,12 @@ def test_names_and_units_are_checked_against_the_model(
     assert text in str(caught.value)
 
 
+def test_an_option_without_default_is_a_mistake_of_its_author() -> None:
+    experiment = replace(GENERIC_EXPERIMENTS.find("stribeck"), defaults={"speed_max": 1.0})
+    with raises(ModelError, name="levels"):
+        experiment.bound(ASSEMBLIES.find("spring-axis")(), {"levels": "0 mm"})
+
+
 def test_stimuli_are_checked_too() -> None:
     with pytest.raises(UnknownNameError, match="stimulus beside step 'lod': did you mean 'load'"):
         bench("step", stimulus={"lod": STEP})

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from bywire.bench.rows import Rows
+from bywire.bench.recording import Rows
 
 TIME = np.array([-0.1, 0.0, 0.1, 0.2])
 SIGNALS = {"x": np.array([1.0, 2.0, 3.0, 5.0]), "y": np.array([0.0, 1.0, 0.0, -1.0])}

@@ -7,8 +7,7 @@ from pathlib import Path
 import pytest
 
 import bywire
-from bywire.bench.bench import Bench
-from bywire.bench.effects import parameters_read, switches_of
+from bywire.bench.bench import Bench, parameters_read, switches_of
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.errors import ParameterError
 from bywire.core.model import ASSEMBLIES

@@ -258,7 +258,7 @@ def test_nothing_of_a_library_runs_when_all_is_said_and_tidied_up(entry, status)
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == status
     if status == 0:
-        assert done.stdout.splitlines()[-1] == "tidy None"  # see `core.unneeded`
+        assert done.stdout.splitlines()[-1] == "tidy None"  # see `core.libraries`
 
 
 def test_interrupt_while_graphs_are_built_is_not_lost(

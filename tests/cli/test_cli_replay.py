@@ -117,6 +117,6 @@ def test_refusals(bywire: Bywire, stop: Path) -> None:
     refused(bywire(*moment, "--tolerance", "nrmse"), "nrmse <= 5 %")
     refused(bywire(*moment, "--tolerance", "nmrse <= 5 %"), "nrmse")
     refused(bywire(*moment, "--track", "alpha"), "wedge.mu_B")
-    refused(bywire(*base, "motor-open-loop"), "nothing measured drives the model")
+    refused(bywire(*base, "motor-open-loop"), "no measured signal drives the model")
     refused(bywire(*base, "hard-braking"), "i_set, v_set and one of M_set, ")
     refused(bywire("replay", "none.csv", "--bench", "moment-pulses"), "none.csv")

@@ -23,6 +23,10 @@ def test_element_keeps_its_contracts(name: str) -> None:
     assert [str(f) for f in findings if f.outcome != "holds"] == []
 
 
+def test_a_name_may_have_hyphens() -> None:
+    assert bywire.check("pressure-sensor").findings == bywire.check("pressure_sensor").findings
+
+
 def test_no_element_is_overlooked() -> None:
     package = Path(bywire.__path__[0])
     folders = [package / "plant", package / "control"]

@@ -10,11 +10,20 @@ from typing import get_args
 import pytest
 
 import bywire
-from bywire.core.catalog import PARAMETER_SETS, CitedSet, outdated_values
+from bywire.core.catalog import (
+    PARAMETER_SETS,
+    Cited,
+    CitedSet,
+    Origin,
+    calibrated,
+    chosen,
+    derived,
+    outdated_values,
+    paper,
+)
 from bywire.core.errors import ModelError, ParameterError, UnknownNameError
 from bywire.core.model import ASSEMBLIES
 from bywire.core.parameters import ParameterSet, choice_fields, leaf_fields
-from bywire.core.provenance import Cited, Kind, calibrated, chosen, derived, paper
 from bywire.core.quantities import Force, Length, Torque
 
 NAMES = sorted(PARAMETER_SETS.all())
@@ -24,7 +33,7 @@ def check_provenance(found: CitedSet) -> None:
     """Refuse an entry with a value that does not say where it comes from."""
     for name, cited in found.values.items():
         assert isinstance(cited, Cited), name
-        assert cited.kind in get_args(Kind), name
+        assert cited.kind in get_args(Origin), name
         assert len(cited.where.strip()) > 3, name
         if cited.kind == "paper":
             # A place in the source, so that it can be looked up.
@@ -100,7 +109,7 @@ def test_unknown_set():
 def test_kinds_of_provenance():
     made = [paper(1, "a"), derived(1, "a"), chosen(1, "a"), calibrated(1, "a")]
     assert [cited.kind for cited in made] == ["paper", "derived", "chosen", "calibrated"]
-    assert set(get_args(Kind)) == {cited.kind for cited in made}
+    assert set(get_args(Origin)) == {cited.kind for cited in made}
 
 
 class Lever(ParameterSet):

@@ -14,7 +14,7 @@ from bywire.core.parameters import ParameterSet
 from bywire.core.parts import Integral, Part, Shown, Wire
 from bywire.core.quantities import Length
 from bywire.core.signals import Role, Signal, signals_of
-from bywire.core.wiring_check import check_wiring
+from bywire.core.wiring import check_wiring
 from bywire.plant import ball_screw_gear, dc_motor, end_stop
 from bywire.simulation.program import check_model
 

@@ -148,6 +148,17 @@ def test_a_package_keeps_each_kind_in_its_own_module(write: Write) -> None:
                 'm: Annotated[float, Unit("kg")]',
             ],
         ),
+        (
+            "valueless.py",
+            f"{HEAD}from bywire.core.parameters import ParameterSet\n"
+            "from bywire.core.quantities import Duration\n\n\nclass Options(ParameterSet):\n"
+            "    t_hold: Duration\n    t_rest: Duration\n\n\nOPTIONS = Options()\n",
+            ModelError,
+            [
+                "valueless.py, line 11: t_hold, t_rest: give a value here, or a default in the "
+                "class Options",
+            ],
+        ),
     ],
 )
 def test_what_is_wrong_with_a_file_is_said_with_its_line(

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from bywire.core.blas import VARIABLES
 from bywire.core.copies import processes
+from bywire.core.libraries import VARIABLES
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="of Linux alone")
 

@@ -11,8 +11,7 @@ import pytest
 from pydantic import Field, field_validator, model_validator
 
 from bywire.core.errors import ParameterError, UnknownNameError
-from bywire.core.field_notes import field_notes
-from bywire.core.parameters import ParameterSet, choice_fields, leaf_fields, leaf_table
+from bywire.core.parameters import ParameterSet, choice_fields, field_notes, leaf_fields, leaf_table
 from bywire.core.quantities import Fraction, Length, Resistance, Unit
 from bywire.core.units import Written
 from bywire.report.wording import range_text

@@ -15,11 +15,11 @@ from bywire.bench.recording import record
 from bywire.contracts.model_contracts import closes_its_energy
 from bywire.contracts.trial import Start, Trial
 from bywire.core.assembly import Assembly
-from bywire.core.connections import Node, network
 from bywire.core.parameters import ParameterSet
+from bywire.core.parts import Sub
 from bywire.core.quantities import Stiffness
 from bywire.core.signals import signals_of, zeros
-from bywire.core.subassembly import Sub
+from bywire.core.wiring import Node, network
 from bywire.simulation.compiler import find_compiler
 from bywire.simulation.program import check_model
 from bywire.simulation.run import Run, simulate

@@ -9,7 +9,7 @@ import pytest
 
 LINES = """
 import warnings
-from bywire.core.heard_warnings import heard_warnings
+from bywire.core.callers import heard_warnings
 with heard_warnings() as heard:
     for _ in range(2):
         warnings.warn("the step is coarse")

@@ -81,7 +81,7 @@ def test_frictions_and_limits_name_states(declared: str, text: str, tmp_path: An
 
 
 def test_a_misspelled_attribute_is_named_with_the_nearest() -> None:
-    from bywire.core.author_lines import said_with_line
+    from bywire.core.brake import said_with_line
 
     with pytest.raises(AttributeError) as raised:
         bywire.Bench("hard-braking").par.motor.R_n  # noqa: B018 - it is misspelled

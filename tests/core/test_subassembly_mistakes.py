@@ -9,10 +9,9 @@ import pytest
 from bywire.core import ops
 from bywire.core.assembly import Assembly
 from bywire.core.errors import ModelError
-from bywire.core.parts import Wire
+from bywire.core.parts import Sub, Wire
 from bywire.core.signals import zeros
-from bywire.core.subassembly import Sub
-from bywire.core.wiring_check import check_wiring
+from bywire.core.wiring import check_wiring
 from systems.ram_pair import BOTH, PAR, Held, Pair, PairParameters, Ram
 
 

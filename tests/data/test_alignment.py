@@ -8,7 +8,7 @@ from bywire.core.errors import ParameterError, UnknownNameError
 from bywire.data import alignment
 from bywire.data.alignment import METHODS, resample
 from bywire.data.channel_quality import quality
-from bywire.data.lag import estimate_lag
+from bywire.identification.replay_fit import estimate_lag
 
 
 def measurement(**channels):
@@ -137,13 +137,13 @@ def test_jitter_is_the_largest_distance_from_the_median_step():
         (
             {"interval": 0.1, "signals": ["high"], "exclude": ["clipped"]},
             ParameterError,
-            "high has no value that is not excluded .clipped.: check its limits",
+            "high has no value left after excluding clipped: check its limits",
         ),
         ({"interval": 1, "max_gap": -1}, ParameterError, "max_gap = -1"),
         ({"interval": 1, "method": "linaer"}, UnknownNameError, "did you mean 'linear'"),
         ({"interval": 1, "exclude": ["gap"]}, UnknownNameError, "did you mean 'gaps'"),
         ({"interval": 1, "signals": ["q"]}, UnknownNameError, "unknown signal 'q'"),
-        ({"interval": 5}, ParameterError, "nothing of 5 s fits"),
+        ({"interval": 5}, ParameterError, "no interval of 5 s fits"),
         ({"interval": 1, "signals": ["a", "late"]}, ParameterError, "start of late at 5 s"),
         ({"interval": 1, "signals": ["none"]}, ParameterError, "none has 1 measured values"),
     ],

@@ -19,8 +19,7 @@ import bywire
 from bywire.cli.main import main
 from bywire.core.errors import FileError
 from bywire.data import limited_source
-from bywire.data.measurement import read_measurement
-from bywire.data.trace import read_trace, trace_names
+from bywire.data.measurement import read_measurement, read_trace, trace_names
 
 SECONDS = 0.25
 PEDAL = """

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from bywire.campaigns import campaign_file
-from bywire.data import file_kinds
-from bywire.data.file_kinds import CAMPAIGN, HEADS, LIFE, STUDY
+from bywire.data import toml_file
+from bywire.data.toml_file import CAMPAIGN, HEADS, LIFE, STUDY
 from bywire.life import life_file
 from bywire.studies import study_file
 
@@ -17,8 +17,8 @@ KEYS = {
 
 def test_keys_of_studies_and_of_campaigns_alone_are_known():
     """One that a reader newly takes, and that the list here does not have, would mistake files."""
-    assert KEYS[CAMPAIGN] - KEYS[STUDY] == file_kinds._NEVER_IN_STUDIES
-    assert KEYS[STUDY] - KEYS[CAMPAIGN] == file_kinds._NEVER_IN_CAMPAIGNS
+    assert KEYS[CAMPAIGN] - KEYS[STUDY] == toml_file._NEVER_IN_STUDIES
+    assert KEYS[STUDY] - KEYS[CAMPAIGN] == toml_file._NEVER_IN_CAMPAIGNS
 
 
 def test_readers_know_what_their_files_cannot_do_without():

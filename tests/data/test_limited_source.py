@@ -12,8 +12,8 @@ from measurement_files import NEEDS, file_of, measurement
 from misbehaving_format import FORMAT
 
 from bywire.core.errors import FileError, UnitError
+from bywire.core.typing import silent
 from bywire.data import limited_source
-from bywire.data.file_format import no_progress
 from bywire.data.limited_source import limited
 from bywire.data.measurement import read_measurement
 
@@ -23,7 +23,7 @@ def read(tmp_path):
     """Return a function that reads a file by a reader that misbehaves as it says."""
     path = tmp_path / "a.odd"
 
-    def run(wish, seconds=20.0, progress=no_progress):
+    def run(wish, seconds=20.0, progress=silent):
         path.write_text(wish)
         with limited(path, FORMAT, seconds) as source:
             return source.read(["y", "t"], progress)
@@ -35,9 +35,9 @@ def read(tmp_path):
 @pytest.mark.parametrize(
     ("wish", "text"),
     [
-        ("crash", r"a\.odd: the library that reads an odd file broke down on it \(SIGSEGV\)"),
-        ("abort", r"broke down on it \(SIGABRT\): it is damaged, or takes more than .* GiB"),
-        ("killed", r"broke down on it \(SIGKILL\)"),
+        ("crash", r"a\.odd: the library that reads an odd file failed on it \(SIGSEGV\)"),
+        ("abort", r"failed on it \(SIGABRT\): it is damaged, or needs more than .* GiB"),
+        ("killed", r"failed on it \(SIGKILL\)"),
         ("memory", "takes more than .* GiB of memory to read: .* choose fewer signals"),
         ("raise", r"a\.odd is damaged, as an odd file .* \(its parts do not fit together\)"),
         ("refuse", "refused"),
@@ -76,7 +76,7 @@ def test_a_reader_without_an_end_is_ended(read, when, wish):
 
 
 def test_numbers_that_do_not_come_are_missed(read):
-    with pytest.raises(FileError, match="'y' has 1000 numbers as it says, and 500 were read"):
+    with pytest.raises(FileError, match="'y' has 1000 numbers by its own count, and 500 were read"):
         read("late cut")
 
 
@@ -99,7 +99,7 @@ def test_other_systems_get_a_time_limit_and_a_warning(read, monkeypatch, tmp_pat
     monkeypatch.setattr(limited_source, "_idle", {})
     with pytest.warns(UserWarning, match="memory that reading an odd file takes is not limited"):
         assert read("")["y"].size == 1000
-    for wish, text in {"crash": r"broke down on it \(SIGSEGV\)", "hang": "longer than 1 s"}.items():
+    for wish, text in {"crash": r"failed on it \(SIGSEGV\)", "hang": "longer than 1 s"}.items():
         with pytest.warns(UserWarning, match="not limited"), pytest.raises(FileError, match=text):
             read(f"late {wish}", seconds=1.0 if wish == "hang" else 20.0)
     assert not any(limited_source._idle.values())  # one for each file

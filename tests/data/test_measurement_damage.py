@@ -185,7 +185,7 @@ def test_hdf5_arrays_that_were_never_written(tmp_path):
     with h5py.File(tmp_path / "a.h5", "w") as file:
         for key in ("time", "y"):
             file.create_dataset(key, (HUGE,), "f8", chunks=(1000,)).attrs["unit"] = "s"
-    with pytest.raises(FileError, match=r"holds 1.49e\+07 GiB"):
+    with pytest.raises(FileError, match=r"declares 1.49e\+07 GiB"):
         read_measurement(tmp_path / "a.h5")
     with pytest.raises(FileError, match="'y' some were never written"):
         read_measurement(tmp_path / "a.h5", {"rate": "1 Hz"}, signals=["y"], largest=9 * HUGE)
@@ -245,7 +245,7 @@ def mdf_with(tmp_path, block, offset, layout, value):
         (b"##DG", 24, "<Q", "itself", "longer than 0.5 s without getting further|of memory"),
         (b"##CN", 24, "<Q", "itself", "longer than 0.5 s without getting further|of memory"),
         (b"##DG", 32, "<Q", 2**40, "is damaged, as an MDF file"),
-        (b"##CG", 24 + 48 + 8, "<Q", HUGE, "and 8 GiB are read at most"),
+        (b"##CG", 24 + 48 + 8, "<Q", HUGE, "and 8 GiB are the limit"),
         (b"##CG", 24 + 48 + 8, "<Q", 401, "401 records .* and 400 could be read"),
         (b"##CN", 24 + 64 + 4, "<I", 2**20, "reaches to byte 1048584 of records of"),
         (b"##CN", 24 + 64 + 4, "<I", 20, "reaches to byte 28 of records of 24"),

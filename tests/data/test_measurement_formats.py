@@ -96,7 +96,7 @@ def test_missing_library_names_the_extra(tmp_path, name, monkeypatch):
 
 def test_files_are_not_replaced_unasked(tmp_path):
     path = file_of(tmp_path, "csv")
-    with pytest.raises(FileError, match="is there already"):
+    with pytest.raises(FileError, match="exists already"):
         write_measurement(measurement(), path)
     with pytest.raises(FileError, match=r"belongs to no format: use \.csv"):
         write_measurement(measurement(), tmp_path / "a.xyz")

@@ -98,7 +98,7 @@ def test_rows_as_to_file_writes_them(tmp_path, rows):
     np.testing.assert_array_equal(found["y"], (rows - 1) * FIRST)
     assert "its first one increases, and is read as the time in s" in notes[0]
     savemat(tmp_path / "a.mat", {"ans": np.stack([FIRST * 0, SECOND])})
-    with pytest.raises(FileError, match="does not say when it was measured"):
+    with pytest.raises(FileError, match="does not state when it was measured"):
         read_with_notes(tmp_path / "a.mat", {"signals": {"y": {"column": "ans(2,:)", "unit": "m"}}})
 
 

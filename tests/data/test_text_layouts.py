@@ -240,7 +240,7 @@ def test_a_mapping_names_further_marks(tmp_path):
     np.testing.assert_allclose(found["q"], [1e5, np.nan, 3e5, 32767e5])
     assert any(note.startswith("p: missing samples: 2 (1 x -999, 1 x 32767") for note in notes)
     with pytest.raises(
-        FileError, match=r"'off scale' is no finite number.*missing = \['off scale'\]"
+        FileError, match=r"'off scale' is not a finite number.*missing = \['off scale'\]"
     ):
         read_measurement(path)
 

@@ -7,7 +7,7 @@ import pytest
 from measurement_files import FORMATS, NEEDS, file_of, measurement
 
 from bywire.core.errors import FileError, ParameterError, UnitError
-from bywire.data.trace import read_trace, trace_names
+from bywire.data.measurement import read_trace, trace_names
 
 HEADER = "time [s], pedal [mm]\n"
 ROWS = "".join(f"{k / 100:.2f},1\n" for k in range(20))
@@ -57,10 +57,10 @@ def test_without_names_every_column_comes_in_si(tmp_path):
     [
         ("", r"is empty \(0 bytes\)"),
         ("0,1\n1,2\n", "no column 'pedal' .*its columns are 1, 2"),
-        (HEADER + "0,1\n0.01,fast\n", "line 3, column 'pedal': 'fast' is no finite number"),
-        (HEADER + "0,1\n0.01,1_000\n", "line 3, column 'pedal': '1_000' is no finite number"),
-        (HEADER + "0,1\n0.01,1e999\n", "line 3, column 'pedal': '1e999' is no finite number"),
-        (HEADER + "0,1\n\n0.01,NaN\n", "line 4, column 'pedal': .*NaN is no measured value"),
+        (HEADER + "0,1\n0.01,fast\n", "line 3, column 'pedal': 'fast' is not a finite number"),
+        (HEADER + "0,1\n0.01,1_000\n", "line 3, column 'pedal': '1_000' is not a finite number"),
+        (HEADER + "0,1\n0.01,1e999\n", "line 3, column 'pedal': '1e999' is not a finite number"),
+        (HEADER + "0,1\n\n0.01,NaN\n", "line 4, column 'pedal': .*NaN is not a measured value"),
         (HEADER + "0,1\n0.01,\n0.02,1\n", "line 3, column 'pedal': blank .*: fill it in"),
         (HEADER + "0,1\n0.02,1\n0.01,1\n", "column 'time', line 4: 0.01 s comes after 0.02: "),
         (HEADER + "0,1\n0.02,1\n0.02,1\n", "column 'time', line 4: 0.02 s is repeated"),
@@ -69,8 +69,11 @@ def test_without_names_every_column_comes_in_si(tmp_path):
         (HEADER + "0,1\n", "too few rows, 1"),
         ("time [s];pedal [mm]\n0;1,5\n0.1;2\n", "line 3, column 'time': '0.1' mixes decimal"),
         ("time [s], pedl [mm]\n0,1\n1,2\n", r"no column 'pedal'.* is it 'pedl'"),
-        ("clock [s], pedal [mm]\n0,1\n1,2\n", r"does not say when .*: call a column 'time \[s\]'"),
-        ("time [s], pedal [mm], Pedal [mm]\n0,1,1\n1,2,1\n", "'pedal': the name stands twice"),
+        (
+            "clock [s], pedal [mm]\n0,1\n1,2\n",
+            r"does not state when .*: call a column 'time \[s\]'",
+        ),
+        ("time [s], pedal [mm], Pedal [mm]\n0,1,1\n1,2,1\n", "'pedal': the name occurs twice"),
         (b"time [s], pedal [mm]\n0,1\n1,2 \xb5\n", "line 3: it is not UTF-8: name its encoding"),
     ],
 )

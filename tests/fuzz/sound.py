@@ -8,12 +8,10 @@ from dataclasses import dataclass
 from functools import cache
 from random import Random
 
-from bywire.bench.bench import Bench
-from bywire.bench.effects import switches_of
+from bywire.bench.bench import Bench, switches_of
 from bywire.bench.experiment import EXPERIMENTS
 from bywire.core.catalog import PARAMETER_SETS, parameters
-from bywire.core.leaf import Leaf
-from bywire.core.parameters import leaf_fields
+from bywire.core.parameters import Leaf, leaf_fields
 from bywire.core.units import convert
 
 Entries = dict[str, str]

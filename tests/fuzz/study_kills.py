@@ -50,7 +50,7 @@ DESIGNS = {
 }
 _CLUSTER = """
 import sys
-from bywire.core.unneeded import allow_dask
+from bywire.core.libraries import allow_dask
 allow_dask()
 from distributed import LocalCluster
 if __name__ == "__main__":

@@ -6,8 +6,14 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from bywire.identification.measured import NOISE_OF_SAMPLES, as_even
-from bywire.identification.noise import is_told, noise_of, outliers, robust_scale
+from bywire.identification.measured import (
+    NOISE_OF_SAMPLES,
+    as_even,
+    is_told,
+    noise_of,
+    outliers,
+    robust_scale,
+)
 
 
 @pytest.mark.parametrize("count", [30, 130, 1300])

@@ -11,6 +11,7 @@ import xarray as xr
 from bywire.core.errors import ParameterError, UnitError, UnknownNameError
 from bywire.data.writing import write_measurement
 from bywire.identification.measured import joined, measured, split
+from raising import raises
 
 
 def record(count: int, level: float, interval: float = 0.01) -> xr.Dataset:
@@ -63,7 +64,7 @@ def test_missing_signals_samples_and_wrong_units_are_refused(tmp_path: Path) -> 
     path = write_measurement(data, tmp_path / "m.nc")
     with pytest.raises(UnknownNameError, match="p_mc"):
         measured([path], None, {"p_mc": "Pa"})
-    with pytest.raises(UnitError, match="p is in Pa, but A is wanted"):
+    with raises(UnitError, name="p", value="Pa", valid="A"):
         measured([path], None, {"p": "A"})
     data["p"][7] = np.nan
     path = write_measurement(data, tmp_path / "gap.nc")

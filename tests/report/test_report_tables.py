@@ -6,8 +6,8 @@ import math
 from typing import NamedTuple
 
 from bywire.api.run_faults import Quantity, record_data, record_table
+from bywire.core.catalog import chosen, paper
 from bywire.core.parameters import ParameterSet
-from bywire.core.provenance import chosen, paper
 from bywire.core.quantities import Fraction, Length, Resistance
 from bywire.report.answer import frame_of
 from bywire.report.page import table_html

@@ -8,9 +8,9 @@ from typing import Annotated
 import pytest
 
 from bywire.bench.stated import StatedFigure, StatedLevel, StatedRange
+from bywire.core.catalog import chosen
 from bywire.core.errors import InputError
 from bywire.core.parameters import ParameterSet
-from bywire.core.provenance import chosen
 from bywire.core.quantities import Unit
 from bywire.reproduction.item import Allowance, Fact, compared
 from bywire.reproduction.source_file import SourceFile

@@ -13,14 +13,7 @@ from numpy.typing import NDArray
 from bywire.simulation.c_runtime import SCALAR
 from bywire.simulation.compiler import SINGLE, compile_library, find_compiler
 from bywire.simulation.emit_rare import PROJECTION
-from bywire.simulation.set_valued import (
-    FITTING,
-    NEVER,
-    NOTHING,
-    RESIDUAL,
-    project_exact,
-    project_fast,
-)
+from bywire.simulation.scheme import FITTING, NEVER, NOTHING, RESIDUAL, project_exact, project_fast
 
 Array = NDArray[np.float64]
 COUNT = 5000

@@ -8,7 +8,7 @@ from scipy import stats
 from scipy.stats import qmc
 
 from bywire.core.errors import ParameterError
-from bywire.core.leaf import Leaf
+from bywire.core.parameters import Leaf
 from bywire.core.quantities import Unit
 from bywire.studies.designs import SAMPLED, Sampled, spanned
 from bywire.studies.distribution import read_distribution

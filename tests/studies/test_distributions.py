@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bywire.core.errors import InputError
-from bywire.core.leaf import Leaf
+from bywire.core.parameters import Leaf
 from bywire.core.quantities import Unit
 from bywire.studies.distribution import read_choice, read_distribution
 

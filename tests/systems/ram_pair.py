@@ -7,10 +7,9 @@ from typing import Annotated, Any, NamedTuple
 from bywire.core.assembly import Assembly
 from bywire.core.model import Task
 from bywire.core.parameters import ParameterSet
-from bywire.core.parts import Integral, Part, Wire
+from bywire.core.parts import Integral, Part, Sub, Wire
 from bywire.core.quantities import Length, Stiffness, Torque
 from bywire.core.signals import Role, Signal, zeros
-from bywire.core.subassembly import Sub
 from bywire.core.wires import Port
 from bywire.plant import ball_screw_gear, current_sensor, dc_motor, end_stop
 

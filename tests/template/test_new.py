@@ -144,7 +144,7 @@ def test_bad_names_are_refused(name: str, reason: str, tmp_path: Path) -> None:
 
 def test_existing_folders_stay_as_they_are(tmp_path: Path) -> None:
     (tmp_path / NAME).mkdir()
-    with pytest.raises(FileError, match="exists already"):
+    with pytest.raises(FileError, match="already exists"):
         new(NAME, tmp_path)
     assert os.listdir(tmp_path / NAME) == []
     (tmp_path / "file").touch()

@@ -38,11 +38,11 @@ LABELS = {NOTHING: "nothing, small amplitude", LIMITS: "limits", EVERYTHING: "ev
 STEP = "step (computed)"
 """what a reader calls the error of the simulation's step"""
 LEGEND = (
-    "Nonlinear response less the exact linear one, by what is left on; all rows but the first "
-    "with the large amplitude, at which limits of currents, voltages and rates act too. "
-    "-: the output sticks or does not settle. Largest: what has no number, else the cause that "
-    "moves the response most, limits alone, others by what they add to the limits. "
-    "Step: linear model of the simulation's midpoint rule less the exact one."
+    "Nonlinear response minus the exact linear one, by the causes that are switched on. All rows "
+    "but the first have the large amplitude, at which limits of currents, voltages and rates also "
+    "act. -: the output sticks or does not settle. Largest: the cause without a number, else the "
+    "cause that changes the response most, limits alone, others by what they add to the limits. "
+    "Step: linear model of the simulation's midpoint rule minus the exact one."
 )
 """how to read the table"""
 

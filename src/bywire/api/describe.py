@@ -12,8 +12,7 @@ from bywire.api.things import Object, group_meaning, signals, thing_kinds
 from bywire.core.arguments import checked
 from bywire.core.catalog import PARAMETER_SETS, main_set
 from bywire.core.errors import UnknownNameError, quoted, unknown_name
-from bywire.core.field_notes import field_notes
-from bywire.core.parameters import ParameterSet, leaf_fields
+from bywire.core.parameters import ParameterSet, field_notes, leaf_fields
 from bywire.core.quantities import display_unit
 from bywire.report.answer import Answer
 from bywire.report.document import Document, Flat, Paragraph, Section, TableBlock

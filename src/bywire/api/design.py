@@ -162,7 +162,7 @@ class Probability:
     def verdict(self) -> str:
         """Whether all requirements are met as probably as wanted, in words."""
         wanted = "" if self.wanted is None else f" with {100.0 * self.wanted:.10g} %"
-        return f"all requirements{wanted}: {self.outcome or 'no probability is wanted'}"
+        return f"all requirements{wanted}: {self.outcome or 'no probability is required'}"
 
     def _words(self, told: Share) -> tuple[str, str, str]:
         return (

@@ -321,7 +321,7 @@ def _kept_lines(design: Design) -> list[str]:
     if not design.kept:
         return []
     texts = ", ".join(str(requirement) for requirement in design.kept)
-    return [f"kept besides: {texts} (require another limit of the same figure to change it)"]
+    return [f"also kept: {texts} (require another limit of the same figure to change it)"]
 
 
 def _unsound_lines(design: Design) -> list[str]:

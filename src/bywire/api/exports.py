@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 from bywire.bench.bench import Bench
 from bywire.bench.experiment import Case
+from bywire.core.catalog import Cited
 from bywire.core.errors import CompilerError, FileError, ModelError
-from bywire.core.provenance import Cited
 from bywire.core.scratch import made_folder
 from bywire.core.units import shown
 from bywire.report.answer import Answer

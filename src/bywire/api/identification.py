@@ -22,13 +22,13 @@ from bywire.core.callers import is_command_line, option
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.errors import FileError, InputError, ParameterError, unknown_name, unknown_of_few
 from bywire.core.parameters import ParameterSet, leaf_fields
+from bywire.core.typing import Progress, silent
 from bywire.core.values import parsed
-from bywire.data.file_format import Progress, no_progress
 from bywire.data.named_columns import NamedColumns
 from bywire.identification.estimate import Estimate, as_object
-from bywire.identification.fitting.question import BENCH_METHODS, BenchMethod, Question, find_method
 from bywire.identification.measured import Measured, measured, name_of, require_signals
 from bywire.identification.method import Effort, Identified
+from bywire.identification.question import BENCH_METHODS, BenchMethod, Question, find_method
 from bywire.identification.trust import displaced, put_in
 from bywire.report.answer import Answer
 from bywire.report.document import (
@@ -114,7 +114,7 @@ def choose(
     measurements: Sequence[Source] = (),
     mapping: str | Path | None = None,
     time: str = "",
-    progress: Progress = no_progress,
+    progress: Progress = silent,
 ) -> ChosenMethod:
     """Return the method of a name with what it needs.
 

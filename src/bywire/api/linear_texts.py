@@ -64,7 +64,7 @@ def left_out(model: LinearModel) -> list[str]:
         parts.append(f"{still} at 0 (not driven, or not brought back)")
     if dead:
         parts.append(f"{dead} over within a sample")
-    return [f"poles besides these: {', '.join(parts)}"] if parts else []
+    return [f"other poles: {', '.join(parts)}"] if parts else []
 
 
 # --- Words and JSON

@@ -134,7 +134,7 @@ def module_name(name: str) -> str:
     package = name.replace("-", "_")
     reason = ""
     if not _ALLOWED.fullmatch(name):
-        reason = "small letters and digits are wanted, with single dashes between, a letter first"
+        reason = "a name has small letters and digits, single dashes between, and a letter first"
     elif len(name) > _LONGEST:
         reason = f"a name has at most {_LONGEST} characters"
     elif keyword.iskeyword(package) or keyword.issoftkeyword(package):

@@ -20,10 +20,16 @@ from bywire.core.errors import ParameterError
 from bywire.core.model import Model
 from bywire.core.signals import signals_of
 from bywire.data.named_columns import NamedColumns
-from bywire.identification.replaying.bench_replay import Replayed
-from bywire.identification.replaying.fit import SegmentFit, undefined
-from bywire.identification.replaying.segments import Segment, found_in, read_segments, whole_record
-from bywire.identification.replaying.tracking import Track
+from bywire.identification.bench_replay import Replayed
+from bywire.identification.replay_fit import (
+    Segment,
+    SegmentFit,
+    found_in,
+    read_segments,
+    undefined,
+    whole_record,
+)
+from bywire.identification.tracking import Track
 from bywire.report.answer import Answer
 from bywire.report.document import (
     Attachment,

@@ -173,7 +173,7 @@ class FaultCampaign(Answer):
             f"{len(plan.faults)} faults, {plan.total} runs of {subject.line}",
             sections=lambda: [
                 Section("Faults", [table]),
-                Section("What else to know", [known]),
+                Section("Notes", [known]),
                 Section("Figures", self._figures()),
                 Section("Residuals", [residuals]),
                 Section("Criteria", [TableBlock(self._criteria_table())]),
@@ -366,7 +366,7 @@ def _coverage_class(coverage: float) -> str:
 
     Examples
     --------
-    >>> coverage_class(0.993), coverage_class(0.61), coverage_class(0.2)
+    >>> _coverage_class(0.993), _coverage_class(0.61), _coverage_class(0.2)
     ('high', 'low', 'none')
     """
     return next((name for least, name in _CLASSES if coverage >= least), "none")

@@ -202,8 +202,8 @@ def study_figures(findings: Findings, recordings: _Recordings) -> list[Block]:
         blocks.append(
             FigureBlock(
                 partial(_convergence, findings),
-                "Probability that a requirement is met, as the cases came in; dotted, what is "
-                f"wanted.{_on_others(findings)}",
+                "Probability that a requirement is met, over the number of cases; dotted, the "
+                f"required one.{_on_others(findings)}",
                 "convergence",
             )
         )

@@ -44,7 +44,7 @@ from bywire.bench.running import Result
 from bywire.core.brake import loaded_files
 from bywire.core.callers import is_command_line
 from bywire.core.errors import FileError, InputError, ParameterError, unknown_name
-from bywire.core.field_notes import field_notes
+from bywire.core.parameters import field_notes
 from bywire.core.typing import Progress, silent
 from bywire.core.units import shown
 from bywire.report.answer import Answer
@@ -551,7 +551,7 @@ class StudyRun(Answer):
             sections=lambda: [
                 *([Section("Requirements", judged)] if judged else []),
                 tested_section(self.nominal, plan.tested, subject),
-                *([Section("What else to know", [Listing(remarks)])] if remarks else []),
+                *([Section("Notes", [Listing(remarks)])] if remarks else []),
                 *([Section("Key figures", figures)] if figures else []),
                 *(
                     [Section("What drives them", [*drivers, *unexplained])]

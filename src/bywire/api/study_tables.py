@@ -374,8 +374,8 @@ def rare_notes(findings: Findings) -> list[str]:
         )
     if unjudged := [str(each) for each in plan.demands if each not in plan.judged_demands]:
         notes.append(
-            f"not judged, for no probability is wanted of it: {'; '.join(unjudged)}; cases that go "
-            "where failures are say nothing of all cases"
+            f"not judged, because it requires no probability: {'; '.join(unjudged)}; cases that "
+            "search for failures do not represent all cases"
         )
     notes += [
         f"{each.demand.figure}: failure is less probable than a thousandth of what is admitted: it "

@@ -22,15 +22,13 @@ from bywire.contracts.elements import Element, elements_by_name, every_element, 
 from bywire.core.brake import brakes, loaded_files
 from bywire.core.catalog import PARAMETER_SETS, CitedSet, main_set
 from bywire.core.errors import unknown_name
-from bywire.core.field_notes import field_notes
-from bywire.core.leaf import Leaf
 from bywire.core.model import ASSEMBLIES
-from bywire.core.parameters import ParameterSet, leaf_fields
+from bywire.core.parameters import Leaf, ParameterSet, field_notes, leaf_fields
 from bywire.core.quantities import display_unit
 from bywire.core.registry import Kind
 from bywire.core.signals import merged_signals, places_of, signals_of
-from bywire.identification.fitting.question import BENCH_METHODS, BenchMethod
 from bywire.identification.method import METHODS, Method
+from bywire.identification.question import BENCH_METHODS, BenchMethod
 from bywire.life.declaration import LIVES, Life
 from bywire.report.tables import value_text
 from bywire.report.wording import amount, range_text, readable_units, unit_text
@@ -421,7 +419,15 @@ def _given_by(cls: type[ParameterSet]) -> Mapping[str, Any]:
     return {name: info.default for name, info in fields if not info.is_required()}
 
 
+_PLACES = {"input": "the input", "output": "the output", "level": "the signal"}
+"""units of levels that belong to no signal yet: of generic experiments, and of stimuli"""
+
+
 def _range(leaf: Leaf) -> str:
+    place, _, per = leaf.unit.symbol.partition("/")
+    if place in _PLACES:
+        numbers = range_text(leaf).replace(f" {leaf.unit.symbol}", "")
+        return f"{numbers} in the unit of {_PLACES[place]}{per and f' per {per}'}"
     bounded = math.isfinite(leaf.low) or math.isfinite(leaf.high)
     unit = unit_text(display_unit(leaf.unit.symbol))
     return range_text(leaf) + ("" if bounded or not unit else f" in {unit}")

@@ -12,11 +12,11 @@ from typing import Any
 
 from bywire.api import identification
 from bywire.api.identification import ChosenMethod, choose
-from bywire.core.blas import on_one_thread
-from bywire.data.file_format import Progress, no_progress
+from bywire.core.libraries import on_one_thread
+from bywire.core.typing import Progress, silent
 from bywire.identification import trust as trusted
-from bywire.identification.fitting.question import Question
 from bywire.identification.method import Effort
+from bywire.identification.question import Question
 from bywire.identification.trust import Trust
 from bywire.report.answer import Answer
 from bywire.report.answering import answering
@@ -150,7 +150,7 @@ def trust(
     KeyboardInterrupt
         When interrupted.
     """
-    shown = no_progress if progress is None else progress
+    shown = silent if progress is None else progress
     chosen = choose(method, parameters, overrides, options, question, progress=shown)
     store = None
     if folder is not None:

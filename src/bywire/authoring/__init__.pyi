@@ -40,6 +40,10 @@ from bywire.core import validity as validity
 from bywire.core.assembly import Assembly as Assembly
 from bywire.core.brake import Brake as Brake
 from bywire.core.catalog import CitedSet as CitedSet
+from bywire.core.catalog import calibrated as calibrated
+from bywire.core.catalog import chosen as chosen
+from bywire.core.catalog import derived as derived
+from bywire.core.catalog import paper as paper
 from bywire.core.catalog import parameters as parameters
 from bywire.core.errors import ModelError as ModelError
 from bywire.core.errors import ParameterError as ParameterError
@@ -56,11 +60,8 @@ from bywire.core.parts import Integral as Integral
 from bywire.core.parts import Part as Part
 from bywire.core.parts import Port as Port
 from bywire.core.parts import Shown as Shown
+from bywire.core.parts import Sub as Sub
 from bywire.core.parts import Wire as Wire
-from bywire.core.provenance import calibrated as calibrated
-from bywire.core.provenance import chosen as chosen
-from bywire.core.provenance import derived as derived
-from bywire.core.provenance import paper as paper
 from bywire.core.quantities import Area as Area
 from bywire.core.quantities import BreakawayFactor as BreakawayFactor
 from bywire.core.quantities import Conductance as Conductance
@@ -105,7 +106,6 @@ from bywire.core.signals import Role as Role
 from bywire.core.signals import Signal as Signal
 from bywire.core.signals import Speed as Speed
 from bywire.core.signals import zeros as zeros
-from bywire.core.subassembly import Sub as Sub
 from bywire.core.typing import Array as Array
 from bywire.core.typing import Progress as Progress
 from bywire.identification.differentiation import differentiated as differentiated
@@ -121,8 +121,8 @@ from bywire.identification.method import Effort as Effort
 from bywire.identification.method import Identified as Identified
 from bywire.identification.method import Method as Method
 from bywire.identification.output_error import moved_run as moved_run
-from bywire.identification.replaying.tracking import track as track
 from bywire.identification.residuals import lack_of_fit as lack_of_fit
+from bywire.identification.tracking import track as track
 from bywire.identification.unknown import Unknown as Unknown
 from bywire.identification.unknown import parameters_of as parameters_of
 from bywire.life.declaration import Effects as Effects

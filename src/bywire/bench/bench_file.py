@@ -19,12 +19,11 @@ from bywire.bench.stimulus import STIMULI, stimulus_sections
 from bywire.core.arguments import checked
 from bywire.core.callers import option
 from bywire.core.catalog import PARAMETER_SETS, sets_of_loaded
-from bywire.core.errors import InputError, ParameterError, unknown_name
+from bywire.core.errors import InputError, ParameterError, UnknownNameError, quoted, unknown_name
 from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.section import Hint, Section, Table, table_of
 from bywire.core.values import parsed, require_unit, require_units
-from bywire.data.file_kinds import BENCH, first_there, near_files, require_kind
-from bywire.data.toml_file import read_toml
+from bywire.data.toml_file import BENCH, first_there, near_files, read_toml, require_kind
 
 PATHS = ("trace", "trace_map", "file")
 """keys of options and stimuli that name files: bench files contain them as absolute paths"""
@@ -362,8 +361,13 @@ def content_of_experiment(file: Path, changes: Mapping[str, str]) -> dict[str, s
     ------
     ParameterError
         For an experiment of any brake, if ``changes`` do not name a parameter set.
+    UnknownNameError
+        For a bare name of neither an experiment nor a file.
     """
     name = str(file)
+    if not file.exists() and _NAME.fullmatch(name) and not names_experiment(name):
+        text = f"there is no experiment and no bench file {quoted(name)}: {meant_by(file)}"
+        raise UnknownNameError(text, name="experiment", value=name)
     if file.is_file() or not names_experiment(name):
         return {}
     chosen = {} if "parameters" in changes else {"parameters": usual_set(name)}

@@ -18,8 +18,7 @@ from bywire.bench.energy_ledger import are_surely_sound, energy_doubts_of_cases,
 from bywire.bench.experiment import Case, check_memory
 from bywire.bench.kpis.families import FamilyJudge, of_cases
 from bywire.bench.kpis.kpi import Kpi, KpiOfCases
-from bywire.bench.recording import ends_of_group, rows_of_group, watch_cases
-from bywire.bench.rows import Rows
+from bywire.bench.recording import Rows, ends_of_group, rows_of_group, watch_cases
 from bywire.bench.running import (
     Progress,
     Result,
@@ -34,8 +33,7 @@ from bywire.bench.running import (
 from bywire.bench.step_error import MOST_WORK, NO_ESTIMATE, abandoned, steps_of, unestimated
 from bywire.core.arguments import checked
 from bywire.core.errors import InputError, ParameterError, unknown_name
-from bywire.core.leaf import Leaf
-from bywire.core.parameters import ParameterSet, choice_fields, choices_of, leaf_fields
+from bywire.core.parameters import Leaf, ParameterSet, choice_fields, choices_of, leaf_fields
 from bywire.core.typing import Array
 from bywire.simulation import ensemble
 from bywire.simulation.engine import CUDA

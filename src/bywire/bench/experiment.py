@@ -19,7 +19,7 @@ from bywire.bench.kpis.kpi import Kpi
 from bywire.core import units
 from bywire.core.arguments import checked
 from bywire.core.errors import ModelError, StepError, not_valid, quoted
-from bywire.core.machine_memory import machine_memory as _memory
+from bywire.core.machine import machine_memory as _memory
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.quantities import display_unit
@@ -30,7 +30,7 @@ from bywire.simulation.run import Run
 from bywire.simulation.schedule import plan
 
 _WORD = 32  # bits
-_POOL = 4  # words of a seed, at least, before what tells its children apart
+_POOL = 4  # least number of words of a seed before those of its child
 
 
 def put_noise(samples: NDArray[np.float64], seed: Sequence[int], child: int) -> None:

@@ -33,9 +33,6 @@ from bywire.core.typing import Array
 Course = Callable[[Array], Array]
 
 InputLevel = Annotated[float, Unit("input"), Field(allow_inf_nan=False)]
-InputAmplitude = Annotated[float, Unit("input"), Field(gt=0, allow_inf_nan=False)]
-InputRate = Annotated[float, Unit("input/s"), Field(gt=0, allow_inf_nan=False)]
-OutputLevel = Annotated[float, Unit("output"), Field(allow_inf_nan=False)]
 
 _TOTALS = {"effort": effort.Setting(), "occupation": occupation.Setting()}
 
@@ -213,9 +210,16 @@ class GenericExperiment:
         places = tuple((key, s.unit, s.nominal) for key, (_, s) in known.items())
         options = with_units(self.options, places)
         names = {key: name for key, (name, _) in known.items()}
-        defaults = options.create({**self._levels(options), **names})
+        defaults = {**self._levels(options), **names}
+        for key, info in options.model_fields.items():
+            if info.is_required() and key not in defaults:
+                raise ModelError(
+                    f"the experiment {self.name!r} declares no default of its option {key!r}: add "
+                    "one to its defaults, or give the field of its class one",
+                    name=key,
+                )
         units = {key: signal.unit for key, (_, signal) in known.items()}
-        return self.build(TestedModel(self, model, names, units, options, defaults))
+        return self.build(TestedModel(self, model, names, units, options, options.create(defaults)))
 
     def _levels(self, options: type[ParameterSet]) -> dict[str, Any]:
         """Return the defaults, levels in SI."""

@@ -1,21 +1,24 @@
-"""Recordings of trajectories: datasets with units, labels and their origin."""
+"""Recordings of runs: as datasets with units and origin, and as plain rows for many runs."""
 
 from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Mapping, Sequence
-from functools import cache
+import math
+from collections.abc import Callable, Collection, ItemsView, Iterator, Mapping, Sequence
+from functools import cache, cached_property
+from numbers import Number
 from typing import Any, cast
 
 import numpy as np
 import pandas as pd
 import xarray as xr
+from numpy.lib.mixins import NDArrayOperatorsMixin
 
 from bywire.bench.energy_ledger import energy_doubts, energy_signals, role_attributes
-from bywire.bench.rows import Rows
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import Signal, signals_of
+from bywire.core.typing import Array
 from bywire.core.version import __version__
 from bywire.simulation.advance import put_in_signals
 from bywire.simulation.ensemble import RunGroup
@@ -166,3 +169,305 @@ def energy_doubts_of(run: Run, trajectory: Trajectory) -> list[str]:
     energies = {name: trajectory[name] for name in energy_signals(run)}
     rows = Rows(trajectory.time, energies, {name: attributes[name] for name in energies})
     return energy_doubts(cast(xr.Dataset, rows), [run])
+
+
+# --- Rows in place of a recording, for many runs without plots
+# Building a Dataset of thirty signals takes longer than simulating them. Key figures, warnings and
+# energy balances need only signals, windows of time, sums and products of signals, and their
+# extremes and means. For any other operation in a brake's code, the Dataset, or the DataArray of a
+# signal, is built on demand.
+
+TIME = "time"
+
+
+class Row(NDArrayOperatorsMixin):
+    """Signal of `Rows`, or their time.
+
+    Parameters
+    ----------
+    rows
+        Rows to which it belongs.
+    name
+        Name in these rows.
+    values
+        Values, shape (time,).
+    attrs
+        Unit, label and role, as in a recording.
+    """
+
+    dims = (TIME,)
+    ndim = 1
+
+    def __init__(self, rows: Rows, name: str, values: Array, attrs: Mapping[str, Any]) -> None:
+        self._rows, self._name = rows, name
+        self.values, self.attrs = values, attrs
+
+    @property
+    def size(self) -> int:
+        """Number of rows."""
+        return self.values.size
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> Array:
+        return np.array(self.values, dtype=dtype, copy=copy)
+
+    def __array_ufunc__(self, function: np.ufunc, method: str, *inputs: Any, **given: Any) -> Any:
+        is_plain = method == "__call__" and not given and function.nout == 1
+        if is_plain and all(map(self._fits, inputs)):
+            plain = (each.values if isinstance(each, Row) else each for each in inputs)
+            return Row(self._rows, "", function(*plain), {})
+        arrays = [each._array if isinstance(each, Row) else each for each in inputs]
+        return getattr(function, method)(*arrays, **given)
+
+    def _fits(self, other: Any) -> bool:
+        if isinstance(other, Row):
+            return other._time is self._time and other.values.shape == self.values.shape
+        return isinstance(other, Number)
+
+    def max(self, *asked: Any, **given: Any) -> Any:
+        """Return the largest value, like a DataArray."""
+        return self._reduced("max", *asked, **given)
+
+    def min(self, *asked: Any, **given: Any) -> Any:
+        """Return the smallest value, like a DataArray."""
+        return self._reduced("min", *asked, **given)
+
+    def mean(self, *asked: Any, **given: Any) -> Any:
+        """Return the mean, like a DataArray."""
+        return self._reduced("mean", *asked, **given)
+
+    def _reduced(self, how: str, *asked: Any, **given: Any) -> Any:
+        is_plain = not asked and not given and self.values.ndim == 1 and self.values.size
+        value = getattr(self.values, how)() if is_plain else math.nan
+        return getattr(self._array, how)(*asked, **given) if np.isnan(value) else value
+
+    def sel(self, *asked: Any, **given: Any) -> Any:
+        """Return the rows in a window of time, ``time=slice(begin, end)``, like a DataArray."""
+        window = _window(self._time, asked, given)
+        if window is None:
+            return self._array.sel(*asked, **given)
+        rows = Rows(self._time[window], {}, {})
+        return Row(rows, self._name, self.values[window], self.attrs)
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        return getattr(self._array, name)
+
+    def __getitem__(self, key: Any) -> Any:
+        return self._array[key]
+
+    @property
+    def _time(self) -> Array:
+        return self._rows._values[TIME]
+
+    @property
+    def _array(self) -> xr.DataArray:
+        axis = (TIME, self._time, dict(self._rows._attributes[TIME]))
+        return xr.DataArray(
+            self.values, {TIME: axis}, (TIME,), self._name or None, dict(self.attrs)
+        )
+
+
+def _window(time: Array, asked: tuple[Any, ...], given: Mapping[str, Any]) -> slice | None:
+    """Return the slice of rows for a window of time as in `sel`; None for other arguments."""
+    wanted = given.get(TIME)
+    if asked or len(given) != 1 or not isinstance(wanted, slice) or wanted.step is not None:
+        return None
+    begin = 0 if wanted.start is None else int(np.searchsorted(time, wanted.start, "left"))
+    end = time.size if wanted.stop is None else int(np.searchsorted(time, wanted.stop, "right"))
+    return slice(begin, max(begin, end))
+
+
+class Rows:
+    """Recorded rows of a run, or of several runs side by side.
+
+    Rows of several runs serve families of key figures and energy balances only; use `case` for
+    others.
+
+    Parameters
+    ----------
+    time
+        Times [s], shape (time,).
+    signals
+        Values by name, shape (time,) each; for several runs (runs, time).
+    attributes
+        Unit, label and role of each signal, as in a recording.
+    notes
+        ``notes()``: attributes of the whole recording, computed on demand.
+    par
+        Parameters of the run, if known.
+    """
+
+    def __init__(
+        self,
+        time: Array,
+        signals: Mapping[str, Array],
+        attributes: Mapping[str, Mapping[str, Any]],
+        notes: Callable[[], Mapping[str, Any]] = dict,
+        par: ParameterSet | None = None,
+    ) -> None:
+        self._notes, self.par = notes, par
+        self._values = {**signals, TIME: time}
+        self._attributes = {**attributes, TIME: {"units": "s", "long_name": "time"}}
+        self._signals = tuple(signals)
+        self.silent: frozenset[str] = frozenset()  # parts of the model without warnings
+        self.sizes = {TIME: time.size}
+
+    @classmethod
+    def of(cls, recording: xr.Dataset) -> xr.Dataset:
+        """Return rows in place of a recording, which are faster, or the recording itself.
+
+        A static characteristic, for instance, has no rows over time.
+        """
+        if set(recording.dims) != {TIME} or set(recording.coords) != {TIME}:
+            return recording
+        each = {str(name): one for name, one in recording.variables.items() if name != TIME}
+        rows = cls(
+            recording.variables[TIME].values,
+            {name: one.values for name, one in each.items()},
+            {name: one.attrs for name, one in each.items()},
+            lambda: recording.attrs,
+        )
+        rows.__dict__["dataset"] = recording  # available already
+        return cast(xr.Dataset, rows)  # it has the same interface
+
+    def case(
+        self,
+        k: int,
+        notes: Callable[[], Mapping[str, Any]] = dict,
+        par: ParameterSet | None = None,
+    ) -> Rows:
+        """Return the rows of one run of several."""
+        signals = {name: self._values[name][k] for name in self._signals}
+        rows = Rows(self._values[TIME], signals, self._attributes, notes, par)
+        rows.silent = self.silent
+        return rows
+
+    def sel(self, *asked: Any, **given: Any) -> Any:
+        """Return the rows in a window of time, ``time=slice(begin, end)``, like a Dataset."""
+        window = _window(self._values[TIME], asked, given)
+        return self.dataset.sel(*asked, **given) if window is None else self._within(window)
+
+    def isel(self, *asked: Any, **given: Any) -> Any:
+        """Return the rows of an index range, ``time=slice(begin, end)``, like a Dataset."""
+        window = given.get(TIME)
+        if asked or len(given) != 1 or not isinstance(window, slice):
+            return self.dataset.isel(*asked, **given)
+        return self._within(window)
+
+    def _within(self, window: slice) -> Rows:
+        signals = {name: self._values[name][window] for name in self._signals}
+        return self._like(signals, self._attributes, self._values[TIME][window])
+
+    def _like(
+        self,
+        signals: Mapping[str, Array],
+        attributes: Mapping[str, Mapping[str, Any]],
+        time: Array | None = None,
+    ) -> Rows:
+        """Return other signals of the same run."""
+        here = self._values[TIME] if time is None else time
+        rows = Rows(here, signals, attributes, lambda: self.attrs, self.par)
+        rows.silent = self.silent
+        return rows
+
+    def assign(self, signals: Mapping[str, Any] | None = None, **named: Any) -> Any:
+        """Return the rows with added or replaced signals, like a Dataset."""
+        given = {**(signals or {}), **named}
+        plain = {name: _plain(each, self._values[TIME]) for name, each in given.items()}
+        if any(each is None for each in plain.values()):
+            return self.dataset.assign(given)
+        known = {name: each for name, each in plain.items() if each is not None}
+        every = {name: self._values[name] for name in self._signals}
+        return self._like(
+            every | {name: values for name, (values, _) in known.items()},
+            {**self._attributes, **{name: attrs for name, (_, attrs) in known.items()}},
+        )
+
+    def with_signals(
+        self, signals: Mapping[str, Array], attributes: Mapping[str, Mapping[str, Any]]
+    ) -> Rows:
+        """Return the rows with further signals; see `Rows` for both."""
+        every = {name: self._values[name] for name in self._signals}
+        return Rows(self._values[TIME], {**every, **signals}, {**self._attributes, **attributes})
+
+    def drop_vars(self, names: str | Collection[str]) -> Rows:
+        """Return the rows without some signals."""
+        left_out = {names} if isinstance(names, str) else set(names)
+        kept = {name: self._values[name] for name in self._signals if name not in left_out}
+        return self._like(kept, self._attributes)
+
+    @property
+    def data_vars(self) -> Mapping[str, Row]:
+        """The signals by name."""
+        return _Named(self, self._signals)
+
+    @property
+    def variables(self) -> Mapping[str, Row]:
+        """The signals and their time, by name."""
+        return _Named(self, tuple(self._values))
+
+    def items(self) -> ItemsView[str, Row]:
+        """Return the signals with their names, like a Dataset."""
+        return self.data_vars.items()
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._signals)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._values
+
+    def __getitem__(self, name: Any) -> Any:
+        if not isinstance(name, str):
+            return self.dataset[name]
+        # No cache: rows and their signals would form a cycle, which delays freeing their memory.
+        return Row(self, name, self._values[name], self._attributes[name])
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        return getattr(self.dataset, name)
+
+    @cached_property
+    def attrs(self) -> dict[str, Any]:
+        """Attributes of the whole recording."""
+        return dict(self._notes())
+
+    @cached_property
+    def dataset(self) -> xr.Dataset:
+        """Rows as a Dataset."""
+        each = {
+            name: (TIME, values, dict(self._attributes[name]))
+            for name, values in self._values.items()
+        }
+        time = each.pop(TIME)
+        return xr.Dataset(each, coords={TIME: time}, attrs=self.attrs)
+
+
+def _plain(given: Any, time: Array) -> tuple[Array, Mapping[str, Any]] | None:
+    """Return values and attributes of a signal for `Rows.assign`; None for other arguments."""
+    if isinstance(given, Row):
+        return (given.values, given.attrs) if given._time is time else None
+    if isinstance(given, tuple) and given[0] == TIME and np.shape(given[1]) == time.shape:
+        return np.asarray(given[1]), given[2] if len(given) > 2 else {}
+    return None
+
+
+class _Named(Mapping[str, Row]):
+    """Signals of rows by name."""
+
+    def __init__(self, rows: Rows, names: tuple[str, ...]) -> None:
+        self._rows, self._names = rows, names
+
+    def __getitem__(self, name: str) -> Row:
+        row: Row = self._rows[name]
+        return row
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        return len(self._names)

@@ -15,9 +15,8 @@ import xarray as xr
 from bywire.bench.bench import Bench
 from bywire.bench.experiment import Case, as_run, check_extent, check_recordings
 from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.recording import record, rows_of, run_notes, watch
+from bywire.bench.recording import Rows, record, rows_of, run_notes, watch
 from bywire.bench.requirements import Verdict, judge, status_of
-from bywire.bench.rows import Rows
 from bywire.bench.step_error import (
     MOST_WORK,
     NO_ESTIMATE,

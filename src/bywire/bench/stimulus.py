@@ -26,9 +26,6 @@ from bywire.core.values import nodes, number
 
 Level = Annotated[float, Unit("level"), Field(allow_inf_nan=False)]
 Amplitude = Annotated[float, Unit("level"), Field(ge=0, allow_inf_nan=False)]
-LevelRate = Annotated[float, Unit("level/s"), Field(gt=0, allow_inf_nan=False)]
-Phase = Annotated[float, Unit("rad"), Field(allow_inf_nan=False)]
-Count = Annotated[int, Unit("1", 16.0), Field(ge=1, le=10_000)]
 
 TOLERANCE = 1e-9  # s: the rounding errors of ticks at k * T are far smaller
 
@@ -201,7 +198,7 @@ def with_nodes(values: Mapping[str, Any], level_unit: str) -> dict[str, Any]:
     if "file" not in values:
         return dict(values)
     from bywire.data.mapping import mapping_from, signal_mapping  # most benches have no file
-    from bywire.data.trace import read_trace, trace_names
+    from bywire.data.measurement import read_trace, trace_names
 
     keys = ("file", "max_gap", *_FILE, *_CLOCK, *_SIGNAL)
     rest = {key: value for key, value in values.items() if key not in keys}

@@ -31,8 +31,7 @@ from bywire.core.quantities import TimeConstant, Unit
 from bywire.core.section import Name, Names, Section, Table
 from bywire.core.signals import signals_of
 from bywire.core.values import number, written
-from bywire.data.file_kinds import CAMPAIGN, require_kind
-from bywire.data.toml_file import read_toml
+from bywire.data.toml_file import CAMPAIGN, read_toml, require_kind
 from bywire.studies.study_file import BenchName, read_bench
 from bywire.studies.vary_section import MeasuredSection, read_all_varied
 

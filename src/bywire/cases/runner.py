@@ -9,7 +9,7 @@ from itertools import islice
 from typing import TypeVar
 
 from bywire.core.interrupts import thread_pool
-from bywire.core.workers import worker_count
+from bywire.core.machine import worker_count
 
 K = TypeVar("K")
 T = TypeVar("T")

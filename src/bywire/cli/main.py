@@ -18,12 +18,11 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from bywire.cli.output import INTERRUPTED, flush, message, open_streams
-from bywire.core.blas import keep_one_thread
 from bywire.core.child_process import leave_out_working_folder
 from bywire.core.errors import BywireError, ModelError, ParameterError
 from bywire.core.interrupts import interrupts_noted
-from bywire.core.machine_memory import address_space
-from bywire.core.unneeded import leave_out_dask, silence_matplotlib
+from bywire.core.libraries import keep_one_thread, leave_out_dask, silence_matplotlib
+from bywire.core.machine import address_space
 
 FAILED = 3
 GARBAGE = 50_000

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from bywire.cli import output
+from bywire.core.callers import heard_warnings
 from bywire.core.errors import BywireError, FileError
-from bywire.core.heard_warnings import heard_warnings
 from bywire.core.interrupts import interrupt_heard
 from bywire.core.scratch import made_folder
 

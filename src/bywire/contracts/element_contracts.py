@@ -38,8 +38,7 @@ from bywire.contracts.evidence import (
     place_of,
 )
 from bywire.core.errors import ParameterError
-from bywire.core.leaf import Leaf
-from bywire.core.parameters import ParameterSet, leaf_fields
+from bywire.core.parameters import Leaf, ParameterSet, leaf_fields
 from bywire.core.typing import Array
 
 NODES = 4  # of every table

@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 
 from bywire.bench.experiment import EXPERIMENTS, Case, Experiment
+from bywire.bench.kpis.families import FAMILIES
 from bywire.bench.stimulus import create
 from bywire.contracts import element_contracts, model_contracts
 from bywire.contracts.elements import Element, elements_of, every_element
@@ -18,7 +19,7 @@ from bywire.contracts.evidence import Contract, Demand, Demands, Evidence, NotCh
 from bywire.contracts.trial import Trial, start_of, start_of_a_rig
 from bywire.core.brake import Brake, brakes
 from bywire.core.catalog import PARAMETER_SETS, CitedSet, main_set
-from bywire.core.errors import BywireError, UnknownNameError, unknown_name
+from bywire.core.errors import BywireError, ModelError, UnknownNameError, unknown_name
 from bywire.core.model import ASSEMBLIES
 from bywire.core.signals import signals_of
 
@@ -57,11 +58,14 @@ def demands_on(name: str | None, figures: Collection[str]) -> Iterator[Demand]:
 
 
 def _element(name: str) -> Element:
-    """Return an element by its dotted name, or by the last part of it where that is enough."""
-    known = every_element()
-    ends = [full for full in known if full.rpartition(".")[2] == name]
-    if name in known or len(ends) == 1:
-        return known[name if name in known else ends[0]]
+    """Return an element by its dotted name, or by the last part of it where that is enough.
+
+    Hyphens count as underscores: names of modules have none.
+    """
+    known, module = every_element(), name.replace("-", "_")
+    ends = [full for full in known if full.rpartition(".")[2] == module]
+    if module in known or len(ends) == 1:
+        return known[module if module in known else ends[0]]
     every = {*known, *brakes(), *ASSEMBLIES.all(), *PARAMETER_SETS.all(), *EXPERIMENTS.all()}
     every |= {full.rpartition(".")[2] for full in known}
     raise unknown_name("brake, model, experiment, element or parameter set", name, ends or every)
@@ -73,6 +77,7 @@ def _on_elements(elements: Iterable[Element]) -> Iterator[Demand]:
 
 
 def _on_brake(brake: Brake, figures: Collection[str]) -> Iterator[Demand]:
+    FAMILIES.of(brake.module)  # rejects a key figure that has no translation to C
     for entry in PARAMETER_SETS.of(brake.module).values():
         yield from _on_set(entry)
     for model in ASSEMBLIES.of(brake.module).values():
@@ -207,8 +212,8 @@ def judges_what_is_recorded(rehearsal: Rehearsal) -> Evidence:
     experiment, options = rehearsal.experiment, rehearsal.experiment.defaults
     try:
         given = {kpi.name: kpi.unit for kpi in experiment.judge(rehearsal.recordings(), options)}
-    except (KeyError, AttributeError, UnknownNameError):
-        raise  # it names what is not there
+    except (KeyError, AttributeError, UnknownNameError, ModelError):
+        raise  # it names something that is missing, or a key figure that has no translation to C
     except Exception as error:
         raise NotCheckedError(f"no recorded signal moves: {error}") from error
     declared = experiment.kpis_with(options)

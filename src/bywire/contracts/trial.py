@@ -15,11 +15,10 @@ from bywire.analysis.loop import LOOPS
 from bywire.bench.experiment import EXPERIMENTS
 from bywire.contracts.evidence import NotCheckedError, Place, place_of
 from bywire.core.errors import BywireError, InputError, ParameterError, RunError
-from bywire.core.model import Bounds, Model, Task
+from bywire.core.model import Bounds, Model, Task, Wrapping
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import Signal, signals_of, zeros
 from bywire.core.typing import Array
-from bywire.core.wrapping import Wrapping
 from bywire.simulation.engine import prepare
 from bywire.simulation.ensemble import simulate_ensemble
 from bywire.simulation.run import Run, Trajectory, simulate

@@ -104,7 +104,10 @@ def whole_number(name: str, value: object, least: int, most: int) -> int:
     """
     if not _is_whole(value) or not least <= operator.index(value) <= most:  # type: ignore[arg-type]
         raise ParameterError(
-            f"{name} = {quoted(value)}: a whole number from {least} to {most} is wanted"
+            f"{name} = {quoted(value)}: a whole number from {least} to {most} is wanted",
+            name=name,
+            value=quoted(value),
+            valid=f"from {least} to {most}",
         )
     return operator.index(value)  # type: ignore[arg-type]
 

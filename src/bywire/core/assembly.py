@@ -1,70 +1,190 @@
 """Models by parts and wires: what follows from the elements is not written a second time.
 
-An assembly names its elements and writes down, once and in the order of the physics, what each
-of them feels. States, masses, balances, contacts, stored energies, plain losses and recorded
-signals follow from the elements. Causal on purpose: acausal connections would need index
-reduction and would fight the diagonal mass form of ``core.model``, which stays below this for
-those who want it.
+An assembly names its elements and writes down, once and in the order of the physics, the inputs of
+each of them. States, masses, balances, contacts, stored energies, plain losses and recorded signals
+follow from the elements. Connections are causal on purpose: acausal ones need index reduction, and
+that does not fit the diagonal mass form of ``core.model``. Models of that form can be written
+without assemblies.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import types
+from collections.abc import Callable, Iterator, Mapping
 from functools import cache
-from itertools import chain
-from typing import Any, ClassVar, Generic, NamedTuple, Self, TypeVar
+from itertools import chain, islice, repeat
+from typing import Annotated, Any, ClassVar, Generic, NamedTuple, Self, TypeVar, cast
 
 from bywire.core.errors import ModelError, unknown_name
-from bywire.core.gathering import AnyPart, contacts, gather, stores
-from bywire.core.instants import Evaluated
 from bywire.core.model import Bounds, Matrix, Task
-from bywire.core.signals import zeros
-from bywire.core.subassembly import Sub
+from bywire.core.parts import KINDS, Part, Sub
+from bywire.core.signals import Role, Signal, signals_of, zeros
 from bywire.core.watching import Watching
-from bywire.core.wires import Instant, Port, Wired, instant_of
+from bywire.core.wires import Instant, Integral, Port, Shown, Wire, Wired, instant_of, line
 
+AnyPart = Part[Any, Any, Any, Any]
 
-def known(
-    model: Any, method: str, values: Mapping[str, Any], names: tuple[str, ...]
-) -> dict[str, Any]:
-    """Return what a method gives.
-
-    Raises
-    ------
-    ModelError
-        When it gives what is none of the names.
-    """
-    for name in values:
-        if name not in names:
-            raise ModelError(
-                f"{type(model).__name__}.{method}: {unknown_name('signal', name, names)}"
-            )
-    return dict(values)
-
-
-def filled(model: Any, method: str, kind: Any, values: Mapping[str, Any]) -> Any:
-    """Return a signal tuple of what a method and the parts give.
-
-    Raises
-    ------
-    ModelError
-        When a field is given by neither.
-    """
-    for name in kind._fields:
-        if name not in values:
-            raise ModelError(
-                f"{type(model).__name__}.{method} does not return {name!r}, and no part gives it: "
-                f"add it to what {method} returns"
-            )
-    return kind(**{name: values[name] for name in kind._fields})
-
-
-# --- Assemblies
-
+_STORED = Signal("J", "stored energy", role=Role("sink", "stored", returns="any"))
+"""what every assembly can record as ``E_stored``"""
 ParT = TypeVar("ParT")
 MemoryT = TypeVar("MemoryT")
 
 _NAN = float("nan")
+
+
+# --- An assembly at an instant: what its equations read there, and how those within are wired
+
+
+class Evaluated(Generic[ParT, MemoryT]):
+    """An assembly as it is evaluated at an instant, alone or within another one."""
+
+    shared: ClassVar[tuple[str, ...]]
+    subs: ClassVar[dict[str, Sub[Any]]]
+    reaction_places: ClassVar[dict[str, tuple[int, ...]]]
+
+    def wire(self, w: Self) -> None:
+        """Set every input and every wire once, in the order of the physics."""
+
+    # What it reads at an instant.
+
+    @property
+    def x(self) -> Any:
+        """State that enters the implicit solve."""
+        return instant_of(self, "x").x
+
+    @property
+    def xe(self) -> Any:
+        """State, value-only."""
+        return instant_of(self, "xe").xe
+
+    @property
+    def m(self) -> MemoryT:
+        """What the controllers hold."""
+        return instant_of(self, "m").memory  # type: ignore[no-any-return]
+
+    @property
+    def par(self) -> ParT:
+        """Parameters."""
+        return instant_of(self, "par").par  # type: ignore[no-any-return]
+
+    @property
+    def reaction(self) -> tuple[float, ...]:
+        """Forces of its own frictions, then of its limits; in ``power`` and ``record``."""
+        every = instant_of(self, "reaction").reaction
+        return tuple(every[k] for k in self.reaction_places[""]) if every and self.subs else every
+
+    @property
+    def rate(self) -> Any:
+        """Derivative of the state; in ``power``."""
+        return instant_of(self, "rate").rate
+
+    @property
+    def flow(self) -> Any:
+        """Integrals since the start; in ``record``."""
+        return instant_of(self, "flow").flow
+
+    def at(
+        self,
+        state: Any,
+        memory: MemoryT,
+        par: ParT,
+        contact: tuple[float, ...] | None = None,
+        **more: Any,
+    ) -> Self:
+        """Return the assembly at an instant, wired: its parts, typed, have values there.
+
+        Parameters
+        ----------
+        contact
+            Contact forces; not known by default.
+        more
+            Further fields of `Instant`: ``xe`` where it is not the state, for instance.
+        """
+        here = vars(self).get("_instant")
+        if here is not None and here.is_held:
+            return self._as_held(here, state)
+        w = self._unwired(state, memory, par, contact, **more)
+        self.wire(w)
+        _settled(w)
+        return w
+
+    def _as_held(self, here: Instant, state: Any) -> Self:
+        """Return itself at the instant where its holder is evaluated, wired."""
+        if state is not here.x:
+            raise ModelError(
+                f"{type(self).__name__} is asked for another state than its holder's: within an "
+                "assembly its equations hold at that instant alone"
+            )
+        here.settle()
+        return self
+
+    def held_at(
+        self, x: Any, memory: Any, par: Any, contact: tuple[float, ...] | None, **more: Any
+    ) -> Self:
+        """Return the assembly at the instant of one that holds it; it is wired once it is read."""
+        w = self._unwired(x, memory, par, contact, is_held=True, **more)
+
+        def wire() -> None:
+            w.wire(w)
+            _settled(w)
+
+        instant_of(w, "wire").wiring = wire
+        return w
+
+    def _unwired(
+        self, x: Any, memory: Any, par: Any, contact: tuple[float, ...] | None, **more: Any
+    ) -> Self:
+        each: dict[str, Any] = {}
+        left = iter(contact) if contact is not None else repeat(_NAN)
+        for part in _contacts(type(self)):
+            count = sum(part.group_sizes(par))
+            unknown = (_NAN,) * len(part.element.Forces._fields)  # where a choice leaves them out
+            each[part.name] = tuple(islice(left, count)) or unknown
+        for name, sub in self.subs.items():
+            count = contact_count(sub.assembly, sub.parameters(par))
+            each[name] = tuple(islice(left, count)) if contact is not None else None
+        fields = {"x": x, "xe": x, "memory": memory, "par": par, "shared": self.shared}
+        fields |= {"contact": each, "forces": contact}
+        w: Self = object.__new__(_at_an_instant(cast(Any, type(self))))
+        vars(w).update(vars(self) | {"_instant": Instant(**fields | more)})
+        return w
+
+
+@cache
+def _at_an_instant(cls: type[Any]) -> type[Any]:
+    """Return what stands for an assembly at an instant: it takes wires and no other names."""
+    kinds = (Part, Wire, Integral, Shown, Sub)
+    every = {k: v for base in cls.__mro__ for k, v in vars(base).items()}
+    known = frozenset(name for name, value in every.items() if isinstance(value, kinds))
+
+    def refuse(self: Any, name: str) -> Any:
+        there = known | {n for n, v in vars(Evaluated).items() if isinstance(v, property)}
+        error = unknown_name("part or wire", name, there)
+        raise ModelError(f"{cls.__name__}: {line()} names an {error}")
+
+    def assign(self: Any, name: str, value: Any) -> None:
+        if name not in known:
+            refuse(self, name)
+        object.__setattr__(self, name, value)
+
+    body = {"__getattr__": refuse, "__setattr__": assign, "__module__": cls.__module__}
+    return types.new_class(
+        cls.__name__, (cls,), {"at_an_instant": True}, lambda names: names.update(body)
+    )
+
+
+def _settled(w: Any) -> None:
+    """Wire what an assembly holds, as far as nothing has read it yet, and what nobody has set."""
+    cls: Any = type(w)
+    for name in cls.subs:
+        instant_of(getattr(w, name), name).settle()
+    instant = instant_of(w, "wire")
+    for port in cls.ports:
+        if port.name not in instant.wires:
+            port.unset(instant)
+
+
+# --- Assemblies
 
 
 class Assembly(Evaluated[ParT, MemoryT], Watching, Generic[ParT, MemoryT]):
@@ -98,7 +218,7 @@ class Assembly(Evaluated[ParT, MemoryT], Watching, Generic[ParT, MemoryT]):
         super().__init_subclass__(**options)
         holds = any(isinstance(each, Sub) for base in cls.__mro__ for each in vars(base).values())
         if not at_an_instant and (isinstance(cls.Memory, type) or holds):  # else more is to come
-            gather(cls)
+            _gather(cls)
 
     # What an assembly writes.
 
@@ -120,7 +240,7 @@ class Assembly(Evaluated[ParT, MemoryT], Watching, Generic[ParT, MemoryT]):
         """Return the factor of each state's derivative."""
         w = self.at(xe, self._nothing(), par)
         rows: list[float] = []
-        for part in stores(type(self)):
+        for part in _stores(type(self)):
             count = len(part.element.State._fields)
             if part.has("mass"):
                 rows += _row(_wired(w, part).call(part.element.mass))
@@ -136,7 +256,7 @@ class Assembly(Evaluated[ParT, MemoryT], Watching, Generic[ParT, MemoryT]):
         """Return the smooth right-hand sides."""
         w = self.at(x, memory, par, contact, xe=xe)
         rows: list[float] = []
-        for part in stores(type(self)):
+        for part in _stores(type(self)):
             name = "balance" if part.has("balance") else "rate"
             rows += _row(_wired(w, part).call(part.function(name)))
         for _, inner, here in _held(w):
@@ -158,7 +278,7 @@ class Assembly(Evaluated[ParT, MemoryT], Watching, Generic[ParT, MemoryT]):
         state = self.State._make(_NAN for _ in self.State._fields)
         w = self._unwired(state, self._nothing(), par, None)
         groups: list[Matrix] = []
-        for part in contacts(type(self)):
+        for part in _contacts(type(self)):
             wired, sizes = _wired(w, part), part.group_sizes(par)
             if not any(sizes):
                 groups += ((),) * len(sizes)
@@ -175,7 +295,7 @@ class Assembly(Evaluated[ParT, MemoryT], Watching, Generic[ParT, MemoryT]):
         """Return the damped overlaps, group by group."""
         w = self.at(x, self._nothing(), par, xe=xe)
         groups: list[tuple[float, ...]] = []
-        for part in contacts(type(self)):
+        for part in _contacts(type(self)):
             sizes = part.group_sizes(par)
             if not any(sizes):
                 groups += ((),) * len(sizes)
@@ -191,7 +311,7 @@ class Assembly(Evaluated[ParT, MemoryT], Watching, Generic[ParT, MemoryT]):
         """Per contact group, whether it rarely touches."""
         own = tuple(
             part.rarely
-            for part in contacts(type(self))
+            for part in _contacts(type(self))
             for _ in range(1 if part.has("matrix") else len(part.element.Forces._fields))
         )
         return sum((sub.assembly.usually_open for sub in self.subs.values()), start=own)
@@ -221,8 +341,8 @@ class Assembly(Evaluated[ParT, MemoryT], Watching, Generic[ParT, MemoryT]):
                     here.x, here.xe, here.rate, here.memory, here.par, here.forces, here.reaction
                 ),
             )
-        values |= known(self, "power", self.power(w), self.Flow._fields)
-        return filled(self, "power", self.Flow, values)
+        values |= _known(self, "power", self.power(w), self.Flow._fields)
+        return _filled(self, "power", self.Flow, values)
 
     def output(
         self,
@@ -248,8 +368,8 @@ class Assembly(Evaluated[ParT, MemoryT], Watching, Generic[ParT, MemoryT]):
                 "Output",
                 inner.output(here.x, here.memory, here.par, here.forces, here.reaction, here.flow),
             )
-        values |= known(self, "record", self.record(w), self.Output._fields)
-        return filled(self, "record", self.Output, values)
+        values |= _known(self, "record", self.record(w), self.Output._fields)
+        return _filled(self, "record", self.Output, values)
 
     def stored(self, w: Self) -> Any:
         """Return the energy that the parts store at an instant [J]; contacts are added up apart."""
@@ -367,3 +487,194 @@ def _held(w: Any) -> Iterator[tuple[Sub[Any], Any, Instant]]:
     for name, sub in w.subs.items():
         inner = getattr(w, name)
         yield sub, inner, instant_of(inner, name)
+
+
+def _known(
+    model: Any, method: str, values: Mapping[str, Any], names: tuple[str, ...]
+) -> dict[str, Any]:
+    """Return what a method gives.
+
+    Raises
+    ------
+    ModelError
+        When it gives what is none of the names.
+    """
+    for name in values:
+        if name not in names:
+            raise ModelError(
+                f"{type(model).__name__}.{method}: {unknown_name('signal', name, names)}"
+            )
+    return dict(values)
+
+
+def _filled(model: Any, method: str, kind: Any, values: Mapping[str, Any]) -> Any:
+    """Return a signal tuple of what a method and the parts give.
+
+    Raises
+    ------
+    ModelError
+        When a field is given by neither.
+    """
+    for name in kind._fields:
+        if name not in values:
+            raise ModelError(
+                f"{type(model).__name__}.{method} does not return {name!r}, and no part gives it: "
+                f"add it to what {method} returns"
+            )
+    return kind(**{name: values[name] for name in kind._fields})
+
+
+# --- State, Flow and Output, from the declarations
+
+
+def _gather(cls: type[Any]) -> None:
+    """Derive State, Flow and Output of an assembly from its declarations."""
+    declared = {k: v for base in reversed(cls.__mro__) for k, v in vars(base).items()}
+    cls.parts = {k: v for k, v in declared.items() if isinstance(v, Part)}
+    cls.subs = {k: v for k, v in declared.items() if isinstance(v, Sub)}
+    cls.ports = tuple(v for v in declared.values() if isinstance(v, Port))
+    states: dict[str, Signal] = {}
+    for part in _stores(cls):
+        if part.has("balance") and not part.has("mass"):
+            raise ModelError(
+                f"{part.where}: {part.kind} has states and a balance, but no mass: define mass "
+                "there, or name the function rate where it returns derivatives"
+            )
+        if not (part.has("balance") or part.has("rate")):
+            raise ModelError(f"{part.where}: {part.kind} has states, but no balance and no rate")
+        for name, signal in part.states().items():
+            if name in states:
+                raise ModelError(
+                    f"{part.where}: another part has a state {name!r} too: give this one a suffix "
+                    "or another name, Part(..., suffix='_2') or Part(..., state={...})"
+                )
+            states[name] = signal
+    flows: dict[str, Signal] = {}
+    shown: dict[str, Signal] = {}
+    for name, value in declared.items():
+        if isinstance(value, Part):
+            flows |= {k: s for k, s in value.energies.items() if k not in flows}
+            shown |= value.outputs() | value.kept
+        elif isinstance(value, Integral):
+            flows[name] = value.signal
+        elif isinstance(value, (Wire, Shown)):
+            shown[name] = value.signal
+    _take_over(cls, states, flows, shown)
+    for kind, signals in (("State", states), ("Flow", flows)):
+        if _derives(declared.get(kind)):
+            setattr(cls, kind, _named_tuple(cls, kind, signals))
+    for name in signals_of(cls.Memory):
+        if name in states or name in flows or name in shown:
+            raise ModelError(
+                f"{cls.__name__}.Memory has a field {name!r}, and so has the recording from a part "
+                "or a wire: it would show the one in place of the other; rename the field"
+            )
+    if _derives(declared.get("Output")):
+        known = signals_of(cls.State) | signals_of(cls.Memory) | signals_of(cls.Flow)
+        known |= {"E_stored": _STORED} | shown
+        names = cls.records or tuple(known)
+        for name in names:
+            if name not in known:
+                raise ModelError(f"{cls.__name__}.records: {unknown_name('signal', name, known)}")
+        cls.Output = _named_tuple(cls, "Output", {name: known[name] for name in names})
+
+
+def _take_over(
+    cls: type[Any], states: dict[str, Signal], flows: dict[str, Signal], shown: dict[str, Signal]
+) -> None:
+    """Add the signals, frictions and limits of the assemblies within, by their names there."""
+    own = {kind: getattr(cls, kind, None) for kind in ("Memory", "Stimulus")}
+    own = {kind: getattr(each, "own", each) for kind, each in own.items()}
+    own = {kind: each if isinstance(each, type) else _Nothing for kind, each in own.items()}
+    known = {"State": states, "Flow": flows, "Output": shown}
+    known |= {kind: dict(signals_of(each)) for kind, each in own.items()}
+    for sub in cls.subs.values():
+        recorded = {name for kind in _RECORDED for name in known[kind]}
+        there: set[str] = set()
+        for kind in KINDS:
+            taken = recorded if kind in _RECORDED else set(known[kind])
+            new = {name: each for name, each in sub.signals(kind).items() if name not in there}
+            for name in new:
+                if name in taken:
+                    raise ModelError(
+                        f"{sub.where}: there is a signal {name!r} already: give it another prefix"
+                    )
+            known[kind].update(new)
+            there |= set(new) if kind in _RECORDED else set()  # what it records of these, once
+    if cls.subs:
+        for kind, each in own.items():
+            joined = _named_tuple(cls, kind, known[kind])
+            joined.own = each
+            setattr(cls, kind, joined)
+        for sub in cls.subs.values():
+            for name, source in sub.feeds.items():
+                fields = {**known["Memory"], **known["Stimulus"]}
+                if source not in fields:
+                    error = unknown_name("signal", source, fields)
+                    raise ModelError(f"{sub.where}: {name} is fed by an {error}")
+    _number_reactions(cls)
+
+
+_RECORDED = ("State", "Memory", "Flow", "Output")
+_REACTING = ("frictions", "limits")
+
+
+class _Nothing(NamedTuple):
+    """Neither memory nor stimulus."""
+
+
+def _number_reactions(cls: type[Any]) -> None:
+    """Append the frictions and limits of the assemblies within, and say where whose stand."""
+    inner = {
+        name: [tuple(map(sub.named, _names(type(sub.assembly), kind))) for kind in _REACTING]
+        for name, sub in cls.subs.items()
+    }
+    taken = {name for both in inner.values() for names in both for name in names}
+    own = [tuple(each for each in _names(cls, kind) if each not in taken) for kind in _REACTING]
+    every = [sum((both[k] for both in inner.values()), start=own[k]) for k in range(2)]
+    if cls.subs:
+        cls.frictions, cls.limits = every
+    places = {name: k for k, name in enumerate((*every[0], *every[1]))}
+    cls.reaction_places = {
+        name: tuple(places[each] for each in (*frictions, *limits))
+        for name, (frictions, limits) in {"": own, **inner}.items()
+    }
+
+
+def _names(cls: type[Any], kind: str) -> tuple[str, ...]:
+    """Return the names of frictions or limits that a class declares; none by default."""
+    names = getattr(cls, kind)
+    return names if isinstance(names, tuple) else ()
+
+
+def _derives(kind: Any) -> bool:
+    """Tell whether a signal tuple follows from the parts: the class has none of its own."""
+    return not isinstance(kind, type) or hasattr(kind, "derived")
+
+
+def _named_tuple(owner: type, kind: str, signals: Mapping[str, Signal]) -> Any:
+    """Return a signal tuple that can be pickled as an attribute of its assembly."""
+    make: Callable[..., Any] = NamedTuple
+    gathered = make(kind, [(name, Annotated[float, signal]) for name, signal in signals.items()])
+    gathered.__module__, gathered.__qualname__ = owner.__module__, f"{owner.__qualname__}.{kind}"
+    gathered.__doc__ = f"{kind} of {owner.__name__}, gathered from its parts."
+    gathered.derived = True
+    return gathered
+
+
+def _stores(cls: type[Any]) -> Iterator[AnyPart]:
+    """Yield the parts of an assembly that have states."""
+    yield from (part for part in cls.parts.values() if part.has("State"))
+
+
+def _contacts(cls: type[Any]) -> Iterator[AnyPart]:
+    """Yield the parts of an assembly that have contact forces."""
+    yield from (part for part in cls.parts.values() if part.has("Forces"))
+
+
+def contact_count(model: Any, par: Any) -> int:
+    """Return how many contact forces an assembly has, those of assemblies within included."""
+    own = sum(sum(part.group_sizes(par)) for part in _contacts(type(model)))
+    return own + sum(
+        contact_count(sub.assembly, sub.parameters(par)) for sub in model.subs.values()
+    )

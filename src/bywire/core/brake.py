@@ -1,11 +1,11 @@
-"""Brakes: how one declares itself, and how the ones that are there are found.
+"""Brakes: how one declares itself, and how the installed and loaded ones are found.
 
 A brake is a package or a single file with one declaration::
 
     BRAKE = Brake("servo-axis", "a motor that turns a lever against a spring", __name__)
 
-Installed brakes are found by entry points of the group ``bywire.brakes``, others by `load_system`.
-Ours are found the same way as anybody's. Bench files never load a brake: they are untrusted.
+bywire finds installed brakes by entry points of the group ``bywire.brakes``, ours among them, and
+others by `load_system`. Bench files never load a brake: they are untrusted.
 """
 
 from __future__ import annotations
@@ -14,18 +14,20 @@ import importlib
 import importlib.util
 import sys
 import traceback
+import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from difflib import get_close_matches
 from functools import cache
 from html import escape
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 from bywire.core.arguments import checked
-from bywire.core.author_lines import said_with_line, warn_at_line
-from bywire.core.errors import FileError, ModelError
-from bywire.core.unneeded import allow_dask
+from bywire.core.errors import BywireError, FileError, ModelError
+from bywire.core.libraries import allow_dask
 
 GROUP = "bywire.brakes"
 """entry points whose values name modules with a ``BRAKE``"""
@@ -125,7 +127,7 @@ def foreign_line(error: BaseException) -> str:
     The innermost frame counts: what our own code raises for it is told as our own.
     """
     folders = [
-        str(Path(brake.file).parent if is_package(brake) else brake.file)
+        str(Path(brake.file).parent if _is_package(brake) else brake.file)
         for brake in brakes().values()
         if brake.module.partition(".")[0] != "bywire"
     ]
@@ -135,7 +137,7 @@ def foreign_line(error: BaseException) -> str:
     return said_with_line(error, *folders)
 
 
-def is_package(brake: Brake) -> bool:
+def _is_package(brake: Brake) -> bool:
     """Return whether a brake is a package and not a single file."""
     return hasattr(importlib.import_module(brake.module), "__path__")
 
@@ -181,7 +183,8 @@ def load_system(path: str | Path) -> Brake:
     if not source.is_file() or source.suffix != ".py":
         raise FileError(
             f"{path} is no brake: give a Python file, a folder with an __init__.py, or a project "
-            "with one such folder in src, that declares BRAKE = bywire.Brake(...)"
+            "with one such folder in src, that declares BRAKE = bywire.Brake(...)",
+            name=str(path),
         )
     known = next((b for b in _loaded.values() if Path(b.file).resolve() == source), None)
     if known is not None:
@@ -309,3 +312,66 @@ def _attempted(name: str) -> ModuleType:
             raise
         folder = Path(getattr(sys.modules.get(root), "__file__", None) or "").parent
         raise ModelError(said_with_line(error, str(folder))) from error
+
+
+# --- Errors and warnings of a brake's own code, with the line that its author wrote
+
+
+def said_with_line(error: BaseException, *inside: str) -> str:
+    """Return an error with the innermost line at which it happened in files of these folders."""
+    text = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+    text = str(error) if isinstance(error, BywireError) else text
+    if isinstance(error, SyntaxError) and error.filename:
+        text = f"{type(error).__name__}: {error.msg}"
+    if isinstance(error, AttributeError) and error.name and error.obj is not None:
+        near = get_close_matches(error.name, dir(error.obj), n=1)
+        text += f": did you mean {near[0]!r}?" if near else ""
+    if type(error).__name__ == "ValidationError":
+        text = _of_pydantic(error)
+    if "truth value of a CasADi" in text:
+        text = "an if, and, or, min or max on a number of the model: use bywire.core.ops.where"
+    line = _innermost(error, *inside)
+    return f"{line[0]}, line {line[1]}: {text}" if line else text
+
+
+def _of_pydantic(error: Any) -> str:
+    """Return an error of pydantic in one line."""
+    lacking = [str(each["loc"][0]) for each in error.errors() if each["type"] == "missing"]
+    wrong = [
+        f"{'.'.join(map(str, each['loc']))}: {each['msg']}"
+        for each in error.errors()
+        if each["type"] != "missing"
+    ]
+    if lacking:
+        names = ", ".join(lacking)
+        wrong.insert(0, f"{names}: give a value here, or a default in the class {error.title}")
+    return "; ".join(wrong)
+
+
+def warn_at_line(text: str, kind: type[Warning], error: BaseException, *inside: str) -> None:
+    """Warn at the line of an author's file that raised an error, and not at one of ours.
+
+    Parameters
+    ----------
+    text, kind
+        What is said, and its category.
+    error
+        What went wrong; of an error that was put in other words, what it came from.
+    inside
+        Folders or files of the author's; the first line of the last one where the error came up
+        nowhere in them.
+    """
+    line = _innermost(error.__cause__ or error, *inside)
+    warnings.warn_explicit(text, kind, *(line or (inside[-1], 1)))
+
+
+def _innermost(error: BaseException, *inside: str) -> tuple[str, int] | None:
+    """Return file and line at which an error came up in files of some folders; None for nowhere."""
+    if isinstance(error, SyntaxError) and error.filename:
+        return error.filename, error.lineno or 1
+    lines = [
+        (frame.filename, frame.lineno or 1)
+        for frame in traceback.extract_tb(error.__traceback__)
+        if frame.filename.startswith(inside) and not frame.filename.startswith("<")
+    ]
+    return lines[-1] if lines else None

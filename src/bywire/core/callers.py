@@ -1,12 +1,14 @@
 """Messages in the words of their reader: flags of a command, or arguments of a Python function.
 
-A message names an argument by `option`. Which flag stands for it, the declaration of the use case
-says; see `bywire.usecases`.
+A message names an argument by `option`. The use case declares which flag stands for it; see
+`bywire.usecases`.
 """
 
 from __future__ import annotations
 
 import json
+import sys
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -79,3 +81,27 @@ def option(argument: str, value: str | bool | dict[str, str] | None = None) -> s
     if value is None:
         return argument
     return f"{argument}={value if value is True else json.dumps(value)}"
+
+
+# --- Warnings, which a command, a job or a process of a study tells in its own words
+
+_FOR_DEVELOPERS = (
+    DeprecationWarning,
+    PendingDeprecationWarning,
+    ImportWarning,
+    ResourceWarning,
+)
+"""hidden by Python by default, because a user can do nothing about them"""
+
+
+@contextmanager
+def heard_warnings() -> Iterator[list[warnings.WarningMessage]]:
+    """Yield a list to which every warning is added until the block ends, each time it is given.
+
+    Those for developers are left out, unless whoever started Python asked for warnings.
+    """
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        for category in () if sys.warnoptions else _FOR_DEVELOPERS:
+            warnings.simplefilter("ignore", category)
+        yield caught

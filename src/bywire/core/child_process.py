@@ -46,7 +46,7 @@ _ELSEWHERE = sys.prefix
 """where children start: what runs this process stands there, and no folder of somebody else"""
 
 
-def trusted_folders(
+def _trusted_folders(
     entries: Iterable[str], untrusted: Sequence[str | Path] = (), *, keep: str = ""
 ) -> list[str]:
     """Return the absolute folders of a list but the working folder and further ones.
@@ -67,11 +67,11 @@ def trusted_folders(
 
 
 def import_path(untrusted: Sequence[str | Path] = ()) -> list[str]:
-    """Return where this process and its children may import from; see `trusted_folders`.
+    """Return where this process and its children may import from; see `_trusted_folders`.
 
     The folder that bywire itself was imported from stays.
     """
-    return trusted_folders(sys.path, untrusted, keep=_ROOT)
+    return _trusted_folders(sys.path, untrusted, keep=_ROOT)
 
 
 def leave_out_working_folder() -> None:
@@ -113,16 +113,16 @@ def find_program(name: str) -> str | None:
     if os.path.dirname(name):
         found = shutil.which(name)
         return None if found is None else os.path.abspath(found)
-    folders = trusted_folders(os.environ.get("PATH", os.defpath).split(os.pathsep))
+    folders = _trusted_folders(os.environ.get("PATH", os.defpath).split(os.pathsep))
     return next(filter(None, (shutil.which(os.path.join(each, name)) for each in folders)), None)
 
 
 def environment(untrusted: Sequence[str | Path] = ()) -> dict[str, str]:
-    """Return the environment of a child: lists of folders are absolute, see `trusted_folders`."""
+    """Return the environment of a child: lists of folders are absolute, see `_trusted_folders`."""
     made = dict(os.environ)
     for name in _LISTS:
         if name in made:
-            kept = trusted_folders(made.pop(name).split(os.pathsep), untrusted)
+            kept = _trusted_folders(made.pop(name).split(os.pathsep), untrusted)
             made |= {name: os.pathsep.join(kept)} if kept else {}  # an empty one is the folder
     return {**made, SAFE_PATH: "1"}
 
@@ -170,7 +170,7 @@ def start_python(
     further
         Further variables of its environment.
     untrusted
-        See `trusted_folders`.
+        See `_trusted_folders`.
     stderr, bufsize
         As `subprocess.Popen` has them.
     """

@@ -19,11 +19,11 @@ from multiprocessing.reduction import ForkingPickler
 from types import ModuleType
 from typing import Any
 
-from bywire.core.blas import keep_one_thread
 from bywire.core.brake import load_brakes, loaded_files
 from bywire.core.callers import flags, is_command_line, speak_in
 from bywire.core.child_process import safe_start
 from bywire.core.errors import RunError
+from bywire.core.libraries import keep_one_thread
 
 _ENDING = 0.05  # s for which a thread that was joined may still be there
 

@@ -11,7 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from types import FrameType
 
-from bywire.core.workers import worker_count
+from bywire.core.machine import worker_count
 
 _PAUSE = 0.2  # seconds until an interrupt that may have been swallowed is raised again
 

@@ -20,7 +20,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from types import ModuleType
-from typing import Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from bywire.core.errors import ModelError, place_of, unknown_name
 from bywire.core.registry import Kind
@@ -263,3 +263,99 @@ def _declared(module: ModuleType) -> Iterator[type[Any]]:
 
 ASSEMBLIES: Kind[Any] = Kind("assembly", ("model", "models", "rigs"), _declared)
 """the complete models of every brake, rigs included: classes, by their ``name``"""
+
+
+# --- A model around another one
+
+_PROTOCOL = frozenset(name for name in vars(Model) if not name.startswith("_"))
+if TYPE_CHECKING:
+    _Protocol = Model
+else:
+    _Protocol = object  # the defaults of the protocol must not hide the model inside
+
+
+class Wrapping(_Protocol):
+    """A model around another one, with another memory where a subclass says so.
+
+    Parameters
+    ----------
+    inner
+        The model inside; every member of the protocol that is not defined here is its own.
+    """
+
+    def __init__(self, inner: Model) -> None:
+        self.inner = inner
+
+    def __getattr__(self, name: str) -> Any:
+        if name not in _PROTOCOL:
+            raise AttributeError(name)
+        return getattr(self.inner, name)
+
+    @property
+    def name(self) -> str:
+        """Name of the model inside."""
+        return self.inner.name
+
+    @property
+    def State(self) -> type[NamedTuple]:
+        """States of the model inside."""
+        return self.inner.State
+
+    @property
+    def Memory(self) -> type[NamedTuple]:
+        """Memory of the model inside."""
+        return self.inner.Memory
+
+    @property
+    def Flow(self) -> type[NamedTuple]:
+        """Integrals of the model inside."""
+        return self.inner.Flow
+
+    @property
+    def Output(self) -> type[NamedTuple]:
+        """Recorded signals of the model inside."""
+        return self.inner.Output
+
+    def mass(self, xe: Any, par: Any) -> Any:
+        """Return the masses of the model inside."""
+        return self.inner.mass(xe, par)
+
+    def memory_inside(self, memory: Any) -> Any:
+        """Return the memory as the plant inside feels it."""
+        return memory
+
+    def balance(self, x: Any, xe: Any, memory: Any, par: Any, contact: tuple[float, ...]) -> Any:
+        """Return the smooth right-hand side."""
+        return self.inner.balance(x, xe, self.memory_inside(memory), par, contact)
+
+    def bounds(
+        self, x: Any, xe: Any, memory: Any, par: Any, contact: tuple[float, ...]
+    ) -> tuple[Bounds, ...]:
+        """Return the bounds of the frictions."""
+        return self.inner.bounds(x, xe, self.memory_inside(memory), par, contact)
+
+    def powers(
+        self,
+        x: Any,
+        xe: Any,
+        rate: Any,
+        memory: Any,
+        par: Any,
+        contact: tuple[float, ...],
+        reaction: tuple[float, ...],
+    ) -> Any:
+        """Return the rates of the integrals."""
+        felt = self.memory_inside(memory)
+        return self.inner.powers(x, xe, rate, felt, par, contact, reaction)
+
+    def output(
+        self,
+        x: Any,
+        memory: Any,
+        par: Any,
+        contact: tuple[float, ...],
+        reaction: tuple[float, ...],
+        flow: Any,
+    ) -> Any:
+        """Return what is recorded."""
+        return self.inner.output(x, self.memory_inside(memory), par, contact, reaction, flow)

@@ -31,9 +31,18 @@ def named(texts: Iterable[str] | None, flag: str) -> dict[str, str]:
     for text in texts or ():
         name, equals, value = (part.strip() for part in text.partition("="))
         if not name or (equals and not value):
-            raise ParameterError(f"{flag} {text}: write NAME, or NAME=TEXT")
+            raise ParameterError(
+                f"{flag} {text}: write NAME, or NAME=TEXT",
+                name=flag,
+                value=text,
+                valid="NAME, or NAME=TEXT",
+            )
         if name in values:
-            raise ParameterError(f"{flag} {text}: {name} is given twice: leave one of them out")
+            raise ParameterError(
+                f"{flag} {text}: {name} is given twice: leave one of them out",
+                name=flag,
+                value=text,
+            )
         values[name] = value
     return values
 
@@ -54,9 +63,13 @@ def changes(texts: Iterable[str] | None, flag: str = "--set") -> dict[str, str]:
         if flag in _INPUT and not equals:
             value = equals = key
         if not equals or not key or not value:
-            raise ParameterError(f"{flag} {text}: write {_FORMS.get(flag, _CHANGE)}")
+            raise ParameterError(
+                f"{flag} {text}: write {_FORMS.get(flag, _CHANGE)}", name=flag, value=text
+            )
         if key in values:
-            raise ParameterError(f"{flag} {text}: {key} is set twice: leave one of them out")
+            raise ParameterError(
+                f"{flag} {text}: {key} is set twice: leave one of them out", name=flag, value=text
+            )
         values[key] = value
     return values
 

@@ -1,19 +1,15 @@
-"""Parameter sets: frozen, validated trees of physical values and structural choices.
-
-A *leaf* is a number with a unit; its dotted name (``motor.R_m``) is the same in Python, in
-bench files, in recordings and on the command line. A *choice* is a field that selects
-equations (``gear.law = "directional"``); it takes part in what is compiled, never in a value.
-
-Studies and searches make thousands of sets a second that differ from one in the same few names.
-"""
+"""Parameter sets: frozen, validated trees of physical values and structural choices."""
 
 from __future__ import annotations
 
+import ast
 import inspect
 import math
 import re
+import sys
 import typing
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import cache, cached_property, lru_cache
 from itertools import chain
@@ -36,12 +32,58 @@ from bywire.core.errors import (
     quoted,
     unknown_name,
 )
-from bywire.core.leaf import Leaf
 from bywire.core.quantities import Unit
-from bywire.core.units import Written, split
+from bywire.core.units import Written, convert, split
 
 if TYPE_CHECKING:
     from pydantic import ValidationError
+
+
+@dataclass(frozen=True)
+class Leaf:
+    """What is known about one number of a parameter set."""
+
+    name: str
+    unit: Unit
+    low: float
+    high: float
+    low_open: bool
+    high_open: bool
+    is_whole: bool = False
+    """whether only whole numbers are admissible"""
+
+    def admits(self, value: float) -> bool:
+        """Return whether a value [SI] lies in the admissible range."""
+        above = value > self.low if self.low_open else value >= self.low
+        return above and (value < self.high if self.high_open else value <= self.high)
+
+    @property
+    def range_text(self) -> str:
+        """Admissible range as a user reads it, for instance ``> 0 ohm``."""
+        return self.range_in(self.unit.symbol)
+
+    def range_in(self, symbol: str) -> str:
+        """Return the admissible range in a unit of the same dimension."""
+        unit = "" if symbol == "1" else f" {symbol}"
+        low, high = self.low, self.high
+        if low == high:
+            return f"exactly {convert(low, self.unit.symbol, symbol):g}{unit}"
+        parts = []
+        if not math.isinf(low):
+            low = convert(low, self.unit.symbol, symbol)
+            parts.append(f"{'>' if self.low_open else '>='} {low:g}{unit}")
+        if not math.isinf(high):
+            high = convert(high, self.unit.symbol, symbol)
+            parts.append(f"{'<' if self.high_open else '<='} {high:g}{unit}")
+        return " and ".join(parts) or f"any finite number{unit and ' in' + unit}"
+
+
+# --- Parameter sets
+# A *leaf* is a number with a unit; its dotted name (``motor.R_m``) is the same in Python, in
+# bench files, in recordings and on the command line. A *choice* is a field that selects
+# equations (``gear.law = "directional"``); it takes part in what is compiled, never in a value.
+#
+# Studies and searches make thousands of sets a second that differ from one in the same few names.
 
 S = TypeVar("S", bound=BaseModel)
 
@@ -555,3 +597,75 @@ def _validated(cls: type[T], tree: dict[str, Any], values: Mapping[str, Any]) ->
         return cls.model_validate(tree)
     except ValidationError as error:
         raise refusal(error, cls.__name__, leaf_fields(cls), texts) from None
+
+
+# --- Notes: the texts below the fields of a class
+# Read when somebody asks and not when a class is built: reading sources took a tenth of the
+# start-up of every command.
+
+
+@cache
+def field_notes(cls: type[ParameterSet], prefix: str = "") -> Mapping[str, str]:
+    """Return the meaning of every number and choice of a parameter class, by dotted name.
+
+    Parameters
+    ----------
+    cls
+        Its fields carry a string right below them; a field without one has the note ``""``.
+    prefix
+        Put before every name.
+    """
+    written: dict[str, str] = {}
+    for base in reversed(cls.__mro__):
+        if issubclass(base, ParameterSet) and base is not ParameterSet:
+            written |= _written_under_fields(base)
+    notes: dict[str, str] = {}
+    for name, info in cls.model_fields.items():
+        inner = info.annotation
+        if isinstance(inner, type) and issubclass(inner, ParameterSet):
+            notes |= field_notes(inner, f"{prefix}{name}.")
+        else:
+            notes[f"{prefix}{name}"] = written.get(name, "")
+    return MappingProxyType(notes)
+
+
+def _written_under_fields(cls: type) -> Mapping[str, str]:
+    try:
+        source = inspect.getsource(sys.modules[cls.__module__])
+    except (KeyError, OSError, TypeError):  # typed into a console: no source to read
+        return {}
+    return _written_in(source).get(cls.__qualname__, {})
+
+
+@cache
+def _written_in(source: str) -> Mapping[str, Mapping[str, str]]:
+    """Return what stands under the fields of all classes of a file, by qualified name.
+
+    Read at once: `inspect` parses a whole file for the source of each class.
+    """
+    return {name: _texts(definition) for name, definition in _classes(ast.parse(source))}
+
+
+def _classes(node: ast.AST, prefix: str = "") -> Iterator[tuple[str, ast.ClassDef]]:
+    """Yield the classes below a node with their qualified names."""
+    for child in ast.iter_child_nodes(node):
+        if isinstance(child, ast.ClassDef):
+            yield f"{prefix}{child.name}", child
+            yield from _classes(child, f"{prefix}{child.name}.")
+        elif isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef):
+            yield from _classes(child, f"{prefix}{child.name}.<locals>.")
+        elif not isinstance(child, ast.expr):  # a class may stand in a condition
+            yield from _classes(child, prefix)
+
+
+def _texts(definition: ast.ClassDef) -> Mapping[str, str]:
+    """Return the strings right below the fields of a class, by field."""
+    notes: dict[str, str] = {}
+    for field, below in zip(definition.body, definition.body[1:], strict=False):
+        match field, below:
+            case (
+                ast.AnnAssign(target=ast.Name(id=name)),
+                ast.Expr(value=ast.Constant(value=str(text))),
+            ):
+                notes[name] = inspect.cleandoc(text)
+    return notes

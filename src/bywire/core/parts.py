@@ -1,15 +1,16 @@
-"""Parts of an assembly: elements by their modules, typed by what these define."""
+"""Parts of an assembly: elements by their modules, and assemblies within it."""
 
 from __future__ import annotations
 
 import typing
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, Generic, Protocol, Self, TypedDict, TypeVar, Unpack, overload
 
 from bywire.core.errors import ModelError, unknown_name
-from bywire.core.signals import Signal, signal_in, signals_of
+from bywire.core.model import Task
+from bywire.core.signals import Role, Signal, signal_in, signals_of
 from bywire.core.wires import F, Instant, Integral, P, Port, Shown, U, Wire, Wired, X, instant_of
 
 __all__ = ["OPTIONS", "Integral", "Part", "PartOptions", "Port", "Shown", "Wire"]
@@ -102,7 +103,7 @@ class PartOptions(TypedDict, total=False):
 OPTIONS = tuple(PartOptions.__annotations__)
 
 
-def parameters_at(path: str, par: Any, where: str, declaration: str) -> Any:
+def _parameters_at(path: str, par: Any, where: str, declaration: str) -> Any:
     """Return the parameters at a dotted path of those of an assembly.
 
     ``where``: whose they are; ``declaration``: how one says where they stand.
@@ -291,7 +292,7 @@ class Part(Generic[X, U, F, P]):
         ModelError
             When there are none where it looks for them.
         """
-        return parameters_at(self.path, par, self.where, f"Part({self.kind}, par='...')")
+        return _parameters_at(self.path, par, self.where, f"Part({self.kind}, par='...')")
 
     def state_at(self, instant: Instant, fixed: tuple[str, ...] | None) -> Any:
         """Return its state; ``fixed`` are those taken value-only, None for all."""
@@ -309,3 +310,257 @@ class Part(Generic[X, U, F, P]):
             raise ModelError(f"{self.where}: {self.kind} has no contact forces")
         forces = self.element.Forces(*instant.contact[self.name])
         return self.element.bent(forces, par) if self.has("bent") else forces
+
+
+# --- Assemblies within another one: names get a prefix, equations never see it
+# What an assembly holds is evaluated where the holder is, by slices of the holder's state, memory
+# and forces; its parameters stand in a group of the holder's. So the same assembly can be held
+# twice.
+
+
+class Seen:
+    """What an assembly recorded within another one, by its own names.
+
+    Parameters
+    ----------
+    recording
+        The holder's: an xarray.Dataset, or what stands for one.
+    names
+        Names in there by own names.
+    place
+        What stands before its parts where those that are silent are named.
+    """
+
+    def __init__(self, recording: Any, names: Mapping[str, str], place: str) -> None:
+        self._recording = recording
+        self._names = {own: there for own, there in names.items() if there in recording}
+        every: Iterable[str] = getattr(recording, "silent", ())
+        self.silent = frozenset(
+            name.removeprefix(place) for name in every if name.startswith(place)
+        )
+
+    def __contains__(self, name: str) -> bool:
+        return name in self._names
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
+
+    def __getitem__(self, name: str) -> Any:
+        return self._recording[self._names.get(name, name)]
+
+    def __getattr__(self, name: str) -> Any:
+        """Return what a Dataset has: it is made when it is asked for."""
+        if name.startswith("_"):
+            raise AttributeError(name)
+        there = self._recording[list(self._names.values())]
+        return getattr(there.rename({there: own for own, there in self._names.items()}), name)
+
+
+A = TypeVar("A")
+KINDS = ("State", "Memory", "Flow", "Output", "Stimulus")
+"""signal tuples of an assembly, which the holder takes over"""
+_HEADS = ("E_", "W_", "t_", "noise_")  # say what a signal is, and stay in front
+
+
+class Sub(Generic[A]):
+    """An assembly within another one, with all it has, tasks included.
+
+    Parameters
+    ----------
+    assembly
+        Its class; or what makes one with options of its own, such as ``partial(Rig, side=2)``.
+    prefix
+        Put before the names of its signals and tasks: ``"rear_"`` makes ``rear_i`` of ``i``.
+        What their beginning tells stays in front: ``E_rear_copper``, ``noise_rear_p``.
+    par
+        Where its parameters stand in those of the holder; the name of the attribute by default.
+    label
+        What labels, books and warnings call it; the prefix in words by default.
+    feeds
+        Fields of its stimulus that the holder gives, with where these come from: fields of the
+        holder's memory or stimulus. The others become fields of the holder's stimulus.
+
+    Raises
+    ------
+    ModelError
+        For what is no assembly, a prefix that makes no names, and unknown fields.
+    """
+
+    name: str
+    where: str
+
+    def __init__(
+        self,
+        assembly: Callable[[], A],
+        *,
+        prefix: str,
+        par: str = "",
+        label: str = "",
+        feeds: Mapping[str, str] | None = None,
+    ) -> None:
+        made: Any = assembly if isinstance(assembly, type) else assembly()
+        kind: Any = made if isinstance(made, type) else type(made)
+        self.path, self.prefix = par, prefix
+        self.label = label or prefix.replace("_", " ").strip()
+        self.feeds = dict(feeds or {})
+        if not hasattr(kind, "parts"):
+            raise ModelError(
+                f"Sub({kind.__name__}): it is no assembly with a memory: hold a class that "
+                "inherits from Assembly and declares Memory"
+            )
+        if not f"{prefix}x".isidentifier() or prefix.startswith("_"):
+            raise ModelError(
+                f"Sub({kind.__name__}): the prefix {prefix!r} makes no names: take a word and an "
+                "underscore, like 'rear_'"
+            )
+        for name in self.feeds:
+            if name not in kind.Stimulus._fields:
+                raise ModelError(
+                    f"Sub({kind.__name__}): feeds names an "
+                    f"{unknown_name('stimulus', name, kind.Stimulus._fields)}"
+                )
+        self.assembly: Any = kind() if made is kind else made
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.name, self.where = name, f"{owner.__name__}.{name}"
+        self.path = self.path or name
+
+    @overload
+    def __get__(self, instance: None, owner: type) -> Self: ...
+    @overload
+    def __get__(self, instance: Any, owner: type) -> A: ...
+    def __get__(self, instance: Any, owner: type) -> Any:
+        """Return what is declared, or of a holder at an instant the assembly at that instant."""
+        if instance is None:
+            return self
+        instant = instant_of(instance, self.where)
+        if self.name not in instant.held:
+            instant.held[self.name] = self._at(instant, type(instance))
+        return instant.held[self.name]
+
+    def __set__(self, instance: Any, value: Any) -> None:
+        raise ModelError(f"{self.where} is an assembly: set its ports, w.{self.name}.PORT = ...")
+
+    def _at(self, instant: Instant, holder: Any) -> Any:
+        """Return the assembly at the holder's instant, not wired yet."""
+        reaction = instant.reaction
+        places = holder.reaction_places[self.name] if reaction else ()
+        x = self.inside("State", instant.x)
+        return self.assembly.held_at(
+            x,
+            self.inside("Memory", instant.memory),
+            self.parameters(instant.par),
+            instant.contact[self.name],
+            xe=x if instant.xe is instant.x else self.inside("State", instant.xe),
+            rate=self.inside("State", instant.rate),
+            flow=self.inside("Flow", instant.flow),
+            reaction=tuple(reaction[k] for k in places),
+            lines=None if instant.lines is None else {},
+            mark=None if instant.mark is None else partial(self._marked, instant.mark),
+        )
+
+    def _marked(self, mark: Callable[[str, Any], Any], name: str, value: Any) -> Any:
+        return mark(f"{self.name}/{name}", value)
+
+    # Names.
+
+    def named(self, name: str) -> str:
+        """Return the name in the holder of a signal, or of a task."""
+        head = next((each for each in _HEADS if name.startswith(each)), "")
+        return f"{head}{self.prefix}{name.removeprefix(head)}"
+
+    def signals(self, kind: str) -> dict[str, Signal]:
+        """Return the signals of one of `KINDS` by their names in the holder."""
+        every = signals_of(getattr(type(self.assembly), kind))
+        if kind == "Stimulus":
+            every = {name: each for name, each in every.items() if name not in self.feeds}
+        return {self.named(name): self._signal(name, each) for name, each in every.items()}
+
+    @property
+    def records(self) -> tuple[str, ...]:
+        """What it records, by the names in the holder."""
+        return tuple(map(self.named, type(self.assembly).Output._fields))
+
+    def _signal(self, name: str, signal: Signal) -> Signal:
+        role = self._role(name, signal)
+        if role is not None:
+            whole, rest = (self.named(each) if each else "" for each in (role.whole, role.rest))
+            book = f"{self.label}: {role.book}" if role.book else self.label
+            role = replace(role, book=book, whole=whole, rest=rest)
+        target = signal.set_point_of
+        return replace(
+            signal,
+            label=f"{signal.label}, {self.label}",
+            role=role,
+            set_point_of=self.named(target) if target else "",
+        )
+
+    def _role(self, name: str, signal: Signal) -> Role | None:
+        """Return the role of a signal; that which its name tells, where books go by names."""
+        if signal.role is not None or not name.startswith("E_"):
+            return signal.role
+        others = signals_of(type(self.assembly).Output).values()
+        if name == "E_source":
+            is_said = any(each.role and each.role.side == "source" for each in others)
+            return None if is_said else Role("source", "source")
+        return Role("sink", signal.label)
+
+    # Tuples, inside and out.
+
+    @cached_property
+    def _places(self) -> dict[str, tuple[str, ...]]:
+        kinds = {kind: getattr(type(self.assembly), kind)._fields for kind in KINDS}
+        return {kind: tuple(map(self.named, names)) for kind, names in kinds.items()}
+
+    def inside(self, kind: str, values: Any) -> Any:
+        """Return its own tuple of one of `KINDS` out of the holder's; None where that is None."""
+        if values is None:
+            return None
+        tuple_type = getattr(type(self.assembly), kind)
+        return tuple_type._make(getattr(values, name) for name in self._places[kind])
+
+    def outside(self, kind: str, values: Any) -> dict[str, Any]:
+        """Return the values of its own tuple of one of `KINDS` by their names in the holder."""
+        return dict(zip(self._places[kind], values, strict=True))
+
+    def parameters(self, par: Any) -> Any:
+        """Return its parameters, of those of the holder.
+
+        Raises
+        ------
+        ModelError
+            When there are none where it looks for them.
+        """
+        declaration = f"Sub({type(self.assembly).__name__}, par='...')"
+        return _parameters_at(self.path, par, self.where, declaration)
+
+    # Tasks.
+
+    def tasks(self, par: Any) -> Iterator[Task]:
+        """Yield its tasks as tasks of the holder; ``par``: parameters of the holder."""
+        for task in self.assembly.tasks(self.parameters(par)):
+            yield Task(self.named(task.name), task.period, partial(self._tick, task.tick))
+
+    def _tick(self, tick: Callable[..., Any], x: Any, m: Any, u: Any, par: Any) -> Any:
+        after = tick(
+            self.inside("State", x),
+            self.inside("Memory", m),
+            self._stimulus(m, u),
+            self.parameters(par),
+        )
+        return m._replace(**self.outside("Memory", after))
+
+    def _stimulus(self, m: Any, u: Any) -> Any:
+        kind = type(self.assembly).Stimulus
+        given: list[Any] = []
+        for name in kind._fields:
+            source = self.feeds.get(name, self.named(name))
+            given.append(getattr(m if name in self.feeds and source in m._fields else u, source))
+        return kind._make(given)
+
+    # Recordings.
+
+    def seen(self, recording: Any) -> Seen:
+        """Return a recording, or rows of one, as the assembly knows it: by its own names."""
+        names = dict(zip(type(self.assembly).Output._fields, self.records, strict=True))
+        return Seen(recording, names, f"{self.name}.")

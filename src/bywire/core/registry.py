@@ -21,7 +21,6 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, Generic, Protocol, TypeVar
 
-from bywire.core.author_lines import warn_at_line
 from bywire.core.brake import (
     Brake,
     BrakeWarning,
@@ -30,12 +29,13 @@ from bywire.core.brake import (
     loaded_files,
     modules_below,
     modules_of,
+    warn_at_line,
 )
 from bywire.core.callers import is_command_line
 from bywire.core.errors import ModelError, UnknownNameError, unknown_name
 
 
-def declared_at(module: ModuleType, thing: object) -> str:
+def _declared_at(module: ModuleType, thing: object) -> str:
     """Return file and line of what a module declares; the file alone where nobody knows the line.
 
     Parameters
@@ -45,12 +45,12 @@ def declared_at(module: ModuleType, thing: object) -> str:
     thing
         Object, or class.
     """
-    line = declared_line(module, thing)
+    line = _declared_line(module, thing)
     file = module.__file__ or module.__name__
     return f"{file}, line {line}" if line else file
 
 
-def declared_line(module: ModuleType, thing: object) -> int:
+def _declared_line(module: ModuleType, thing: object) -> int:
     """Return the line on which a module declares a thing; 0 where nobody knows."""
     try:
         tree = ast.parse(inspect.getsource(module))
@@ -245,7 +245,7 @@ class Kind(Generic[T]):
         module = self.owner(name)
         brake = next((each for each in brakes().values() if each.module == module), None)
         things = [(t, where) for t, where in _declared(self, brake) if t.name == name]
-        lines = ((where.__file__ or "", declared_line(where, thing)) for thing, where in things)
+        lines = ((where.__file__ or "", _declared_line(where, thing)) for thing, where in things)
         return max(lines, key=lambda place: place[1], default=("", 0))
 
 
@@ -361,8 +361,8 @@ def _require_new(
         first, place = seen.setdefault(thing.name, (thing, module))
         if first is not thing:
             raise ModelError(
-                f"{declared_at(module, thing)}: the {kind.name} {thing.name!r} is declared in "
-                f"{declared_at(place, first)} already: give this one another name"
+                f"{_declared_at(module, thing)}: the {kind.name} {thing.name!r} is declared in "
+                f"{_declared_at(place, first)} already: give this one another name"
             )
 
 

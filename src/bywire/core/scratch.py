@@ -172,7 +172,8 @@ def require_finished(folder: Path) -> None:
     if (folder / UNFINISHED).exists():
         raise FileError(
             f"{folder} holds a result that was not written to its end: run the command that wrote "
-            "it again"
+            "it again",
+            name=str(folder),
         )
 
 

@@ -115,13 +115,13 @@ def _value(info: FieldInfo, value: Any, name: str, key: str) -> Any:
 def table_of(value: Any, where: str) -> dict[str, Any]:
     """Return the keys and values of a section, or refuse what is none."""
     if not isinstance(value, Mapping):
-        raise ParameterError(f"{where} must be a section with key = value lines")
+        raise ParameterError(f"{where} must be a section with key = value lines", name=where)
     return dict(value)
 
 
 def _sections(kind: type[Section], value: Any, where: str) -> tuple[Section, ...]:
     if not isinstance(value, list) or not all(isinstance(each, Mapping) for each in value):
-        raise ParameterError(f"write {where} with two brackets, once for each of them")
+        raise ParameterError(f"write {where} with two brackets, once for each of them", name=where)
     return tuple(kind.read(each, where) for each in value)
 
 
@@ -134,7 +134,7 @@ def _refused(
     """
     hint = _hint(info)
     if key not in content:
-        return ParameterError(f"{place}{key} is missing: {hint or 'give it a value'}")
+        return ParameterError(f"{place}{key} is missing: {hint or 'give it a value'}", name=key)
     name, value, kind, unit = f"{place}{key}", content[key], _kind(info.annotation), _unit(info)
     if kind is Mapping:
         name, value, kind = f"[{key}] {inner[0]}", value[inner[0]], get_args(info.annotation)[-1]
@@ -142,12 +142,20 @@ def _refused(
         leaf = leaf_of(name, unit, info)
         in_percent = isinstance(value, str) and value.rstrip().endswith("%")
         wanted = leaf.range_in("%") if in_percent else leaf.range_text
-        return ParameterError(f"{name} = {quoted(value)} must be {wanted}")
+        return ParameterError(
+            f"{name} = {quoted(value)} must be {wanted}",
+            name=name,
+            value=quoted(value),
+            valid=wanted,
+        )
     if kind is int and not hint:
         least = next(note.ge for note in info.metadata if isinstance(note, Ge))
         most = next(note.le for note in info.metadata if isinstance(note, Le))
         return ParameterError(
-            f"{name} = {quoted(value)}: a whole number from {least} to {most} is wanted"
+            f"{name} = {quoted(value)}: a whole number from {least} to {most} is wanted",
+            name=name,
+            value=quoted(value),
+            valid=f"from {least} to {most}",
         )
     if kind is Literal and not hint:
         return unknown_name(name, str(value), get_args(info.annotation))

@@ -86,7 +86,9 @@ def parse(value: str | float, symbol: str, name: str, nominal: float = 1.0) -> f
     if isinstance(value, bool) or not isinstance(value, (str, int, float)):
         raise UnitError(
             f"{name} = {quoted(value)}: one number is wanted, for instance "
-            f"{example(symbol, nominal)!r}"
+            f"{example(symbol, nominal)!r}",
+            name=name,
+            value=quoted(value),
         )
     try:
         number = _number(value, symbol, name, nominal) if isinstance(value, str) else float(value)

@@ -46,7 +46,11 @@ def parsed(cls: type[ParameterSet], values: Mapping[str, Any], kind: str) -> dic
 def number(value: Any, symbol: str, name: str, nominal: float = 1.0) -> float:
     """Return one value in an SI unit; see `bywire.core.units.parse`. Zero needs no unit."""
     if isinstance(value, (Mapping, Sequence)) and not isinstance(value, str):
-        raise ParameterError(f"{name} = {quoted(value)}: one value is wanted, not several")
+        raise ParameterError(
+            f"{name} = {quoted(value)}: one value is wanted, not several",
+            name=name,
+            value=quoted(value),
+        )
     return _quantity(value, symbol, name, nominal)
 
 
@@ -123,7 +127,7 @@ def require_unit(value: Any, symbol: str, name: str, nominal: float = 1.0) -> No
     except OverflowError:  # a whole number of 309 digits or more
         return
     if is_plain:
-        units.parse(plain_text(value), symbol, name, nominal)
+        units.parse(_plain_text(value), symbol, name, nominal)
 
 
 class _Unquoted(str):
@@ -135,14 +139,14 @@ class _Unquoted(str):
         return str(self)
 
 
-def plain_text(value: float) -> str:
+def _plain_text(value: float) -> str:
     """Return a plain number of a file as a text, which errors quote as it stands there.
 
     Texts are refused where a unit is missing, and numbers are taken as SI.
 
     Examples
     --------
-    >>> quoted(plain_text(37)), quoted("37")
+    >>> quoted(_plain_text(37)), quoted("37")
     ('37', "'37'")
     """
     return _Unquoted(repr(value))

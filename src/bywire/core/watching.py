@@ -36,7 +36,7 @@ class Watching(Model):
             for sub in self.subs.values()
             for text in sub.assembly.watch(sub.seen(recording), sub.parameters(par))
         )
-        return [*warnings_of(self, recording, par), *within]
+        return [*_warnings_of(self, recording, par), *within]
 
     def watched(self, par: Any) -> tuple[str, ...] | None:
         """Return the signals that ``watch`` looks at; None where it is written by hand."""
@@ -81,11 +81,11 @@ class Watching(Model):
         return all(name in rows.silent for name in watching)
 
 
-Felt = tuple[tuple[Any, dict[str, Any]], ...]
-_KNOWN: dict[Any, Felt] = {}
+_Felt = tuple[tuple[Any, dict[str, Any]], ...]
+_KNOWN: dict[Any, _Felt] = {}
 
 
-def warnings_of(model: Any, recording: Any, par: Any) -> list[str]:
+def _warnings_of(model: Any, recording: Any, par: Any) -> list[str]:
     """Return the warnings of an assembly's elements; see `Assembly.watch`."""
     silent = getattr(recording, "silent", ())
     felt = tuple(each for each in _felt(model, par) if each[0].name not in silent)
@@ -127,7 +127,7 @@ def _joined(pars: Sequence[Any]) -> Any:
 
 
 def _said(
-    model: Any, felt: Felt, rows: Any, par: Any, is_joined: bool = False
+    model: Any, felt: _Felt, rows: Any, par: Any, is_joined: bool = False
 ) -> Iterator[tuple[Any, list[str]]]:
     """Yield parts that watch and what they say of rows.
 
@@ -148,7 +148,7 @@ def watched_by_elements(model: Any, par: Any) -> tuple[str, ...]:
     return tuple(name for name in names_in(felt) if not name.startswith(_PARAMETER))
 
 
-def _felt(model: Any, par: Any) -> Felt:
+def _felt(model: Any, par: Any) -> _Felt:
     """Return the parts that watch, and how what each looks at follows from signals."""
     # What an instance holds of its own may stand in the equations.
     key = None if vars(model) else (type(model), tuple(par.choices().items()))

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from bywire.core import units
 from bywire.core.arguments import checked
-from bywire.core.errors import ParameterError, unknown_name
+from bywire.core.errors import ParameterError, not_valid, unknown_name
 from bywire.data.channel_quality import (
     AlignedChannel,
     AlignmentReport,
@@ -21,7 +21,7 @@ from bywire.data.channel_quality import (
     Stretch,
     quality,
 )
-from bywire.data.room import room
+from bywire.data.file_format import room
 
 METHODS = ("linear", "previous", "nearest", "average")
 """how values between samples are found"""
@@ -184,7 +184,7 @@ def resample(
     return Aligned(dataset, report)
 
 
-def instants_of(measurement: xr.Dataset, name: str) -> NDArray[np.float64]:
+def _instants_of(measurement: xr.Dataset, name: str) -> NDArray[np.float64]:
     """Return the instants of a signal [s]."""
     (dim,) = measurement[name].dims
     return np.asarray(measurement[dim].values, dtype=np.float64)
@@ -193,7 +193,7 @@ def instants_of(measurement: xr.Dataset, name: str) -> NDArray[np.float64]:
 def _positive(value: str | float, name: str) -> float:
     number = units.parse(value, "s", name)
     if not number > 0.0:
-        raise ParameterError(f"{name} = {value!r} is not valid: it must be > 0 s")
+        raise not_valid(name, repr(value), "> 0 s")
     return number
 
 
@@ -209,39 +209,45 @@ def _quality(measurement: xr.Dataset, name: str, longest: float | None) -> Chann
     signal = measurement[name]
     if signal.ndim != 1:
         raise ParameterError(
-            f"{name} has the dimensions {', '.join(map(str, signal.dims))}: choose one case"
+            f"{name} has the dimensions {', '.join(map(str, signal.dims))}: choose one case",
+            name=name,
+            value=", ".join(map(str, signal.dims)),
         )
     low, high = signal.attrs.get("valid_min"), signal.attrs.get("valid_max")
     limits = (float(low), float(high)) if low is not None and high is not None else None
     try:
         return quality(
-            instants_of(measurement, name), signal.values, max_gap=longest, limits=limits
+            _instants_of(measurement, name), signal.values, max_gap=longest, limits=limits
         )
     except ValueError as error:
-        raise ParameterError(f"{name} has {error}: two at least are needed") from None
+        raise ParameterError(f"{name} has {error}: at least two are needed", name=name) from None
 
 
 def _axis(qualities: dict[str, ChannelQuality], step: float, method: str) -> NDArray[np.float64]:
     """Return the multiples of the step that lie in all channels."""
     margin = step / 2.0 if method == "average" else 0.0
     if not qualities:
-        raise ParameterError("no signal was chosen: name one at least")
+        raise ParameterError("no signal was chosen: name at least one", name="signals")
     last_start = max(qualities, key=lambda name: qualities[name].start)
     first_stop = min(qualities, key=lambda name: qualities[name].stop)
     start, stop = qualities[last_start].start + margin, qualities[first_stop].stop - margin
     first, last = math.ceil(start / step - _SLACK), math.floor(stop / step + _SLACK)
     if last - first < 1:
         raise ParameterError(
-            f"nothing of {step:g} s fits between the start of {last_start} at "
+            f"no interval of {step:g} s fits between the start of {last_start} at "
             f"{qualities[last_start].start:g} s and the end of {first_stop} at "
-            f"{qualities[first_stop].stop:g} s: choose a smaller interval, or signals that overlap"
+            f"{qualities[first_stop].stop:g} s: choose a smaller interval, or signals that overlap",
+            name="interval",
+            value=f"{step:g} s",
         )
     size = 8 * (last - first + 1) * (len(qualities) + 1)
     if size > room():
         raise ParameterError(
             f"interval = {step:g} s would make {last - first + 1:.3g} samples of each signal, "
             f"{size / 2**30:.3g} GiB, and {room() / 2**30:.3g} GiB are made at most: choose a "
-            "larger one, or fewer signals"
+            "larger one, or fewer signals",
+            name="interval",
+            value=f"{step:g} s",
         )
     axis = np.arange(first, last + 1, dtype=np.float64)
     axis *= step
@@ -258,7 +264,7 @@ def _on_axis(
     left_out: tuple[str, ...],
 ) -> tuple[NDArray[np.float64], int]:
     """Return a signal on the axis, and how many of its values are NaN there."""
-    time, values = instants_of(measurement, name), measurement[name].values
+    time, values = _instants_of(measurement, name), measurement[name].values
     there = ~np.isnan(values)
     if not there.all():
         time, values = time[there], values[there]
@@ -270,8 +276,9 @@ def _on_axis(
             flawed[_inside(stretch, axis, step, reach, ends=flaw == "clipped")] = True
     if flawed.all():
         raise ParameterError(
-            f"{name} has no value that is not excluded ({', '.join(left_out)}): check its limits, "
-            "or exclude less"
+            f"{name} has no value left after excluding {', '.join(left_out)}: check its limits, "
+            "or exclude less",
+            name=name,
         )
     result[flawed] = np.nan
     return result, int(flawed.sum())

@@ -50,7 +50,7 @@ class MissingUnitsError(UnitError):
 
 
 class NoClockError(FileError):
-    """A file that does not say when it was measured.
+    """A file that does not state when it was measured.
 
     Parameters
     ----------
@@ -189,7 +189,8 @@ def choose(
     if not wanted:
         why = "; ".join(left_out_note(source.left_out))
         raise FileError(
-            f"{file} holds no signal: {_listing(source.columns)}" + (f"; {why}" if why else "")
+            f"{file} contains no signal: {_listing(source.columns)}" + (f"; {why}" if why else ""),
+            name=str(file),
         )
     chosen: list[Chosen] = []
     lacking: dict[str, str] = {}
@@ -282,7 +283,10 @@ def _require_same(signal: SignalMapping, column: Column, where: str) -> None:
     raise UnitError(
         f"{where}: the file says {column.unit!r} and the mapping {signal.unit!r}: leave "
         f"signals.{signal.name}.unit out, or give signals.{signal.name}.scale, which tells how "
-        f"many {signal.unit} the number 1 is"
+        f"many {signal.unit} the number 1 is",
+        name=signal.name,
+        value=str(signal.unit),
+        valid=column.unit,
     )
 
 
@@ -300,8 +304,8 @@ def _clock(file: Path, source: Source, column: Column, given: Clock | None) -> C
             )
             why = "; ".join(("", *left_out_note(source.left_out)))
             raise NoClockError(
-                f"{file} does not say when it was measured: call a column 'time [s]', or write in "
-                "a mapping "
+                f"{file} does not state when it was measured: call a column 'time [s]', or write "
+                "in a mapping "
                 'time = { column = "t", unit = "ms" } or rate = "1 kHz"; '
                 + _listing(source.columns)
                 + (before if len(source.columns) == 1 or source.remarks else "")
@@ -314,7 +318,11 @@ def _clock(file: Path, source: Source, column: Column, given: Clock | None) -> C
     if not unit:
         raise _missing_units(file, {}, clock.name)
     if not measures(_known_unit(unit, where), "s"):
-        raise UnitError(f"{where}: {unit!r} is no unit of time: choose another column")
+        raise UnitError(
+            f"{where}: {unit!r} is not a unit of time: choose another column",
+            name=clock.name,
+            value=unit,
+        )
     if given is not None and given.unit and clock.unit:
         _require_same(SignalMapping("time", clock.name, given.unit), clock, where)
     return Clock(clock.name, unit)
@@ -345,7 +353,12 @@ def _column(file: Path, source: Source, name: str, key: str, number: int = 0) ->
         number = int(title[:9])
     if number:
         if number > len(order):
-            raise FileError(f"{file} has no column {number} ({key}): it has {len(order)} columns")
+            raise FileError(
+                f"{file} has no column {number} ({key}): it has {len(order)} columns",
+                name=key,
+                value=str(number),
+                valid=str(len(order)),
+            )
         name = order[number - 1]
     title = split_title(name)[0]
     column = columns.get(name) or columns.get(title)
@@ -354,11 +367,18 @@ def _column(file: Path, source: Source, name: str, key: str, number: int = 0) ->
         return column
     reason = source.left_out.get(name) or source.left_out.get(title)
     if reason is not None:
-        raise FileError(f"{file}: the column {quoted(name)} ({key}) is not read: {reason}")
+        raise FileError(
+            f"{file}: the column {quoted(name)} ({key}) is not read: {reason}", name=key, value=name
+        )
     many = [other for other in columns if other.rpartition("@")[0] == name]
     near = many or get_close_matches(name, columns, n=3, cutoff=0.5)
     hint = f"is it {' or '.join(map(repr, near))}? " if near else ""
-    raise FileError(f"{file} has no column {quoted(name)} ({key}): {hint}{_listing(columns)}")
+    raise FileError(
+        f"{file} has no column {quoted(name)} ({key}): {hint}{_listing(columns)}",
+        name=key,
+        value=name,
+        valid=", ".join(near),
+    )
 
 
 def left_out_note(left_out: Mapping[str, str]) -> list[str]:

@@ -1,9 +1,9 @@
-"""What a file format offers: how to tell it, to read columns of it, and to write it."""
+"""File formats: how one is recognized, read and written, and how much memory data may take."""
 
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,13 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bywire.core.errors import FileError
-from bywire.core.extras import how_to_install
+from bywire.core.libraries import how_to_install
+from bywire.core.machine import machine_memory
+from bywire.core.typing import Progress
 
 if TYPE_CHECKING:
     import xarray as xr
-
-Progress = Callable[[str, float], None]
-"""called with a label and the finished share, 0 to 1"""
 
 
 @dataclass(frozen=True)
@@ -198,5 +197,41 @@ def library(name: str, what: str, extra: str = "measurements") -> ModuleType:
         ) from None
 
 
-def no_progress(label: str, share: float) -> None:
-    """Show nothing."""
+# --- Limit of memory
+
+_MOST = 8 * 2**30  # bytes
+_SHARE = 0.5  # of the machine's memory: what is read is turned over once
+
+
+def room() -> int:
+    """Return the bytes of numbers that are held at most: 8 GiB, or half the machine's memory."""
+    return min(_MOST, int(_SHARE * machine_memory()))
+
+
+def require_room(
+    file: Path, source: Source, names: Collection[str] | None = None, largest: int | None = None
+) -> None:
+    """Refuse what would not fit, before anything is read.
+
+    Parameters
+    ----------
+    names
+        Columns that are to be read; all by default.
+    largest
+        Most bytes of numbers; `room` by default.
+
+    Raises
+    ------
+    FileError
+        When the columns say that they hold more.
+    """
+    wanted = source.columns if names is None else names
+    most = room() if largest is None else largest
+    size = 8 * sum(source.columns[name].length or 0 for name in wanted)
+    if size > most:
+        raise FileError(
+            f"{file} declares {size / 2**30:.3g} GiB of numbers in {len(wanted)} columns,"
+            f" and {most / 2**30:.3g} GiB are the limit: choose fewer signals, or check the "
+            "file where it is much smaller",
+            name=str(file),
+        )

@@ -53,14 +53,18 @@ def format_to_read(path: Path, name: str = "") -> FileFormat:
     wanted = [FORMATS.find(name)] if name else _of_ending(path, to_read=True)
     head = head_of(path)
     if not head:
-        raise FileError(f"{path} is empty (0 bytes): was the recording stopped or the copy cut?")
+        raise FileError(
+            f"{path} is empty (0 bytes): was the recording stopped or the copy cut?", name=str(path)
+        )
     _require_readable(path, head)
     holds = [kind for kind in FORMATS.all().values() if kind.recognizes(head)]
     for kind in wanted or holds:
         if kind in holds:
             return kind
     if not wanted:
-        raise FileError(f"{path} holds no known format: known are {_names()}")
+        raise FileError(
+            f"{path} is in no known format: known are {_names()}", name=str(path), valid=_names()
+        )
     said = f"format = {name!r}" if name else f"its ending {path.suffix!r}"
     if holds:
         content, hint = holds[0].title, f"rename it, or say format = {holds[0].name!r}"
@@ -69,18 +73,21 @@ def format_to_read(path: Path, name: str = "") -> FileFormat:
         hint = "export it again from the program that measured"
         if wanted[0].name == "mat":
             hint = "if it is a MAT file of version 4, save it with '-v7' in MATLAB"
-    raise FileError(f"{path} holds {content}, not {wanted[0].title} as {said} says: {hint}")
+    raise FileError(
+        f"{path} holds {content}, not {wanted[0].title} as {said} says: {hint}", name=str(path)
+    )
 
 
 def _require_readable(path: Path, head: bytes) -> None:
     """Refuse what is no measurement that bywire reads, with the way out."""
     for mark, what, way in _NOT_READ:
         if head.startswith(mark):
-            raise FileError(f"{path} is {what}, which bywire does not read: {way}")
+            raise FileError(f"{path} is {what}, which bywire does not read: {way}", name=str(path))
     if head[:5].lower() in _ASC_OF_VECTOR and b"base hex" in head.lower():
         raise FileError(
             f"{path} is an ASC log of bus messages, whose signals are not decoded: export its "
-            "signals as MDF 4 with the program that recorded it"
+            "signals as MDF 4 with the program that recorded it",
+            name=str(path),
         )
 
 
@@ -99,7 +106,12 @@ def format_to_write(path: Path, name: str = "") -> FileFormat:
     for kind in _of_ending(path):
         return kind
     endings = ", ".join(dict.fromkeys(e for kind in FORMATS.all().values() for e in kind.endings))
-    raise FileError(f"{path}: the ending {path.suffix!r} belongs to no format: use {endings}")
+    raise FileError(
+        f"{path}: the ending {path.suffix!r} belongs to no format: use {endings}",
+        name=str(path),
+        value=path.suffix,
+        valid=endings,
+    )
 
 
 def _of_ending(path: Path, *, to_read: bool = False) -> list[FileFormat]:
@@ -125,11 +137,13 @@ def head_of(path: Path) -> bytes:
     """
     try:
         if path.exists() and not path.is_file():
-            raise FileError(f"{path} is not a file: give the path of a measurement file")
+            raise FileError(
+                f"{path} is not a file: give the path of a measurement file", name=str(path)
+            )
         with path.open("rb") as stream:
             return stream.read(_HEAD)
     except (OSError, ValueError) as error:  # ValueError: a null character in the path
         reason = error.strerror if isinstance(error, OSError) else NULL_CHARACTER
         raise FileError(
-            f"{path} cannot be read ({reason}): check the path and its permissions"
+            f"{path} cannot be read ({reason}): check the path and its permissions", name=str(path)
         ) from None

@@ -25,13 +25,13 @@ from typing import IO, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from bywire.core.blas import one_thread_variables
 from bywire.core.child_process import start_python
 from bywire.core.errors import FileError
-from bywire.core.extras import how_to_install
-from bywire.core.machine_memory import address_space, machine_memory
+from bywire.core.libraries import how_to_install, one_thread_variables
+from bywire.core.machine import address_space, machine_memory
 from bywire.core.scratch import process_folder
-from bywire.data.file_format import Column, FileFormat, Progress
+from bywire.core.typing import Progress
+from bywire.data.file_format import Column, FileFormat
 from bywire.data.reading_child import NUMBERS, fill, receive, send
 
 SECONDS = 60.0
@@ -216,14 +216,17 @@ class LimitedSource:
             self._child.state = "open" if {"columns", "end"} & set(answer) else "idle"
         if "error" in answer:
             limit = address_space() if answer.get("is_of_library") else 0
-            raise FileError(answer["error"] + (_limited_to(limit) if limit else ""))
+            raise FileError(
+                answer["error"] + (_limited_to(limit) if limit else ""), name=str(self._path)
+            )
         if "memory" in answer:
             if limit := address_space():
                 raise self._too_small(limit)
             raise FileError(
                 f"{self._path} takes more than {self._memory / 2**30:.3g} GiB of memory to read: "
                 "it is damaged or was made to exhaust it; where it is sound, choose fewer signals, "
-                "or write it again in smaller pieces"
+                "or write it again in smaller pieces",
+                name=str(self._path),
             )
         if "ended" in answer:
             raise self._ended(_ending(answer["ended"]))
@@ -236,25 +239,29 @@ class LimitedSource:
             return FileError(
                 f"{self._path}: {'reading' if self._is_open else 'opening'} it took longer than "
                 f"{most:g} s without getting further: it is damaged or was made to take so long; "
-                "where it is sound, copy it to a local disk or choose fewer signals"
+                "where it is sound, copy it to a local disk or choose fewer signals",
+                name=str(self._path),
             )
         if limit := address_space():
             return self._too_small(limit)
         return FileError(
-            f"{self._path}: the library that reads {self._kind.title} broke down on it ({reason}): "
-            f"it is damaged, or takes more than {self._memory / 2**30:.3g} GiB of memory: copy or "
-            "export it again"
+            f"{self._path}: the library that reads {self._kind.title} failed on it ({reason}): "
+            f"it is damaged, or needs more than {self._memory / 2**30:.3g} GiB of memory: copy or "
+            "export it again",
+            name=str(self._path),
         )
 
     def _too_small(self, limit: int) -> FileError:
         return FileError(
-            f"{self._path}: reading {self._kind.title} ran out of memory" + _limited_to(limit)
+            f"{self._path}: reading {self._kind.title} ran out of memory" + _limited_to(limit),
+            name=str(self._path),
         )
 
     def _torn(self, name: str, size: int, declared: int) -> FileError:
         return FileError(
-            f"{self._path} is damaged: {name!r} has {declared} numbers as it says, and {size} were "
-            "read: copy it again, or export it again from where it was made"
+            f"{self._path} is damaged: {name!r} has {declared} numbers by its own count, and "
+            f"{size} were read: copy it again, or export it again from where it was made",
+            name=name,
         )
 
 
@@ -289,7 +296,8 @@ def limited(path: Path, kind: FileFormat, seconds: float | None = None) -> Itera
         if find_spec(library) is None:
             raise FileError(
                 f"{path}: {kind.title} needs the library {library}, which is not installed: "
-                f"{how_to_install('measurements')}"
+                f"{how_to_install('measurements')}",
+                name=library,
             )
     memory = min(MOST_MEMORY, int(machine_memory() / 2))
     if not _IS_LINUX:

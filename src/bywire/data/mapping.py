@@ -14,6 +14,7 @@ from bywire.core.errors import (
     InputError,
     ParameterError,
     UnitError,
+    not_valid,
     quoted,
     unknown_of_few,
 )
@@ -130,7 +131,7 @@ class MeasurementMapping:
 
 # --- Mapping files: strict about keys and values, and nothing is executed
 
-_SIGN = "it must be 1 or -1"
+_SIGNS = "1 or -1"
 _Column = Annotated[
     str | Annotated[int, Field(ge=1, le=100_000)],
     Hint("write its title in quotation marks, or its number: columns are counted from 1"),
@@ -177,7 +178,7 @@ class SignalSection(_Marked):
     column: _Column = ""
     unit: _Quoted = ""
     scale: Annotated[float | None, Unit("1")] = None
-    sign: Annotated[int, Field(ge=-1, le=1), Hint(_SIGN)] = 1
+    sign: Annotated[int, Field(ge=-1, le=1), Hint(f"it must be {_SIGNS}")] = 1
     offset: Any = None
     delay: Annotated[float, Unit("s")] = 0.0
     limits: Any = None
@@ -259,11 +260,12 @@ def _signal(name: str, section: SignalSection, place: str) -> SignalMapping:
     symbol = si_symbol(unit_of(unit)) if unit else ""
     needs_unit = [key for key in ("offset", "limits") if key in section.given and not symbol]
     if needs_unit:
-        raise UnitError(f"{where}{needs_unit[0]} needs to know what is measured: give its unit")
+        text = f"{where}{needs_unit[0]} needs a unit: give the unit of the signal"
+        raise UnitError(text, name="unit")
     if section.scale == 0.0:
-        raise ParameterError(f"{where}scale = 0: every value would be the same")
+        raise not_valid(f"{where}scale", "0", "another number", "or every value is the same")
     if section.sign == 0:
-        raise ParameterError(f"{where}sign = 0: {_SIGN}")
+        raise not_valid(f"{where}sign", "0", _SIGNS)
     number, column = _numbered(section.column)
     return SignalMapping(
         name=name,
@@ -283,10 +285,10 @@ def _signal(name: str, section: SignalSection, place: str) -> SignalMapping:
 
 def _limits(pair: Any, symbol: str, where: str) -> tuple[float, float]:
     if not isinstance(pair, list) or len(pair) != 2:
-        raise ParameterError(f'{where}limits = {quoted(pair)}: write two, as ["0 bar", "250 bar"]')
+        raise not_valid(f"{where}limits", quoted(pair), 'two values, such as ["0 bar", "250 bar"]')
     low, high = (written(value, symbol, f"{where}limits") for value in pair)
     if not low < high:
-        raise ParameterError(f"{where}limits = {quoted(pair)}: the lower one first")
+        raise not_valid(f"{where}limits", quoted(pair), "in order, the lower value first")
     return low, high
 
 
@@ -295,7 +297,12 @@ def _difference(value: Any, symbol: str, where: str) -> float:
     number = written(value, symbol, f"{where}offset")
     unit = units.split(value)[1] if isinstance(value, str) else ""
     if unit and units.has_own_zero(unit, symbol):
-        raise UnitError(f"{where}offset = {quoted(value)}: give the difference in {symbol}")
+        raise UnitError(
+            f"{where}offset = {quoted(value)}: give the difference in {symbol}",
+            name="offset",
+            value=quoted(value),
+            valid=symbol,
+        )
     return number
 
 
@@ -312,15 +319,20 @@ def _clock(
     if bool(column) == (rate is not None):
         raise ParameterError(
             f"{where}time.column or {where}rate: give one of them, as "
-            'time = { column = "t", unit = "ms" } or rate = "1 kHz"'
+            'time = { column = "t", unit = "ms" } or rate = "1 kHz"',
+            name="time",
         )
     unit = _unit(time.unit, f"{where}time.")
     if unit and si_symbol(unit_of(unit)) != "s":
         raise UnitError(
-            f"{where}time.unit = {quoted(unit)} is no unit of time: write for instance 'ms'"
+            f"{where}time.unit = {quoted(unit)} is not a unit of time: write for instance 'ms'",
+            name="time.unit",
+            value=quoted(unit),
         )
     if column and start is not None:
-        raise ParameterError(f"{where}start goes with a rate: a column has its own instants")
+        raise ParameterError(
+            f"{where}start goes with a rate: a column has its own instants", name="start"
+        )
     return Clock(column, unit, rate or 0.0, start or 0.0, number)
 
 

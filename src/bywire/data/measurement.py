@@ -11,7 +11,7 @@ import warnings
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, cast
 
@@ -20,21 +20,23 @@ import pandas as pd
 import xarray as xr
 from numpy.typing import NDArray
 
+from bywire.core import units
 from bywire.core.arguments import checked
-from bywire.core.errors import FileError, InputError, ParameterError, quoted
-from bywire.data.column_choice import Chosen, choose, left_out_note
-from bywire.data.column_units import convert_in_place, unit_of
-from bywire.data.file_format import Progress, ReadOptions, Source, no_progress
-from bywire.data.format_registry import format_to_read
+from bywire.core.errors import FileError, InputError, ParameterError, UnitError, not_valid, quoted
+from bywire.core.quantities import display_unit
+from bywire.core.typing import Progress, silent
+from bywire.data.column_choice import Chosen, choose, every_signal, left_out_note
+from bywire.data.column_units import convert_in_place, measures, unit_of, unit_of_symbol
+from bywire.data.file_format import ReadOptions, Source, require_room, room
+from bywire.data.format_registry import FORMATS, format_to_read, head_of
 from bywire.data.limited_source import limited
-from bywire.data.mapping import Clock, MeasurementMapping, mapping_from, read_mapping
-from bywire.data.room import require_room, room
+from bywire.data.mapping import Clock, MeasurementMapping, SignalMapping, mapping_from, read_mapping
 
 _BLOCK = 1 << 20  # instants that are looked at together: their differences take memory
 
 
 @dataclass(frozen=True)
-class AxisKey:
+class _AxisKey:
     """What tells one time axis from another.
 
     Parameters
@@ -53,7 +55,7 @@ class AxisKey:
 
 
 def instants(
-    file: Path, source: Source, key: AxisKey, column: NDArray[np.float64] | None
+    file: Path, source: Source, key: _AxisKey, column: NDArray[np.float64] | None
 ) -> NDArray[np.float64]:
     """Return the instants of an axis [s], shape ``(sample,)``; they increase.
 
@@ -88,7 +90,11 @@ def instants(
         if key.delay:
             time -= key.delay
     if time.size < 2:
-        raise FileError(f"{file} has too few rows, {time.size}: two at least are needed")
+        raise FileError(
+            f"{file} has too few rows, {time.size}: two at least are needed",
+            name=str(file),
+            value=str(time.size),
+        )
     return time
 
 
@@ -97,7 +103,7 @@ def _measured(
 ) -> NDArray[np.float64]:
     # A slower clock beside a faster one ends earlier; what follows is blank.
     time = column[: _filled(column)]
-    bad = first_not_increasing(time)
+    bad = _first_not_increasing(time)
     if bad is not None:
         where = f"{file}, column {clock.column!r}, {source.place(clock.column, bad)}"
         now, before = float(time[bad]), float(time[bad - 1]) if bad else np.nan
@@ -123,7 +129,7 @@ def _filled(column: NDArray[np.float64]) -> int:
     return 0
 
 
-def first_not_increasing(time: NDArray[np.float64]) -> int | None:
+def _first_not_increasing(time: NDArray[np.float64]) -> int | None:
     """Return the first index whose instant does not come after the one before, None if all do."""
     if time.size and not np.isfinite(time[0]):
         return 0
@@ -148,7 +154,7 @@ def read_measurement(
     mapping: MeasurementMapping | Mapping[str, Any] | str | Path | None = None,
     *,
     signals: Sequence[str] | None = None,
-    progress: Progress = no_progress,
+    progress: Progress = silent,
     largest: int | None = None,
 ) -> xr.Dataset:
     """Read a measurement file.
@@ -200,7 +206,7 @@ def read_with_notes(
     mapping: MeasurementMapping | Mapping[str, Any] | str | Path | None = None,
     *,
     signals: Sequence[str] | None = None,
-    progress: Progress = no_progress,
+    progress: Progress = silent,
     largest: int | None = None,
 ) -> tuple[xr.Dataset, tuple[str, ...]]:
     """Read a measurement file, and return what the user should know of it too.
@@ -258,10 +264,14 @@ def opened(file: Path, meaning: MeasurementMapping) -> Iterator[Source]:
     except InputError:
         raise
     except MemoryError:
-        raise FileError(f"{file} does not fit into memory: read fewer signals at a time") from None
+        raise FileError(
+            f"{file} does not fit into memory: read fewer signals at a time", name=str(file)
+        ) from None
     except OSError as error:
         reason = error.strerror or str(error)
-        raise FileError(f"{file} cannot be read ({reason}): it may be damaged or cut") from None
+        raise FileError(
+            f"{file} cannot be read ({reason}): it may be damaged or cut", name=str(file)
+        ) from None
 
 
 def mapping_of(
@@ -281,7 +291,7 @@ def _dataset(
     clocks = [c.clock.column for c in chosen if c.clock.column]
     names = list(dict.fromkeys([*clocks, *(c.column for c in chosen)]))
     values = source.read(names, progress)
-    keys = [AxisKey(c.clock, len(values[c.column]), c.mapping.delay) for c in chosen]
+    keys = [_AxisKey(c.clock, len(values[c.column]), c.mapping.delay) for c in chosen]
     dims = _dimensions(chosen, keys)
     # Numbers are turned into SI where they lie, unless they are needed once more as they are.
     uses = Counter([c.column for c in chosen] + [k.clock.column for k in dims])
@@ -322,21 +332,184 @@ def _timed(
     if not np.isnan(numbers[count:]).all():
         raise FileError(
             f"{file}, column {signal.column!r}: it has numbers after the last instant of "
-            f"{signal.clock.column!r}: give the signal its own time in a mapping"
+            f"{signal.clock.column!r}: give the signal its own time in a mapping",
+            name=signal.column,
         )
     return numbers[:count]
 
 
-def _dimensions(chosen: Sequence[Chosen], keys: Sequence[AxisKey]) -> dict[AxisKey, str]:
+def _dimensions(chosen: Sequence[Chosen], keys: Sequence[_AxisKey]) -> dict[_AxisKey, str]:
     """Return the dimension of every time axis; that of most signals is ``time``."""
     main = Counter(keys).most_common(1)[0][0]
-    dimensions: dict[AxisKey, str] = {main: "time"}
+    dimensions: dict[_AxisKey, str] = {main: "time"}
     for signal, key in zip(chosen, keys, strict=True):
         dimensions.setdefault(key, f"time_{signal.mapping.name}")
     for signal in chosen:
         if signal.mapping.name in dimensions.values():
             raise ParameterError(
                 f"signal {quoted(signal.mapping.name)} has the name of the instants of signals: "
-                "give it another one in a mapping"
+                "give it another one in a mapping",
+                name=signal.mapping.name,
             )
     return dimensions
+
+
+# --- A single trace, for instance of a rider's pedal
+# A trace drives a model, so it has to be whole: where nothing was measured, or for longer than a
+# pause that is allowed, it is refused, never bridged in silence. In a text table a first row
+# ``time [s], pedal [mm]`` says names and units; a mapping says them for other files.
+
+_GAP = 10.0  # median steps: a pause must be longer to count as a gap
+
+Meaning = MeasurementMapping | Mapping[str, Any] | str | Path | None
+"""what columns mean: a mapping, its tables, the path of a mapping file, or nothing"""
+
+
+def read_trace(
+    path: str | Path,
+    signals: Mapping[str, str] | None = None,
+    *,
+    max_gap: str | float = 0.1,
+    mapping: Meaning = None,
+) -> xr.Dataset:
+    """Return columns of a measurement file as signals over time, SI inside.
+
+    Parameters
+    ----------
+    path
+        The file.
+    signals
+        Needed signals and the SI unit of each, for instance ``{"pedal": "m"}``: those of the
+        mapping, or else columns, capitals or not. Without it all are read, each in the SI unit of
+        its quantity.
+    max_gap
+        Longest pause between two instants, text with a unit or [s]. A longer one is refused when
+        it is longer than ten median steps too.
+    mapping
+        What the columns mean, where the file does not say it.
+
+    Returns
+    -------
+    xarray.Dataset
+        As of `read_measurement`; every number is there.
+
+    Raises
+    ------
+    FileError
+        When the file cannot be read or understood: with file, line, column, value, next step.
+    UnitError
+        When a unit is missing, unknown, or measures something else.
+    ParameterError
+        When ``max_gap`` is not a positive duration.
+    """
+    longest = units.parse(max_gap, "s", "max_gap")
+    if not longest > 0:
+        raise not_valid("max_gap", repr(max_gap), "> 0 s")
+    file = Path(path)
+    meaning = _meaning(file, mapping)
+    with opened(file, meaning) as source:
+        names = tuple(signals) if signals is not None else _names(file, source, meaning)
+        chosen = {n: _chosen(file, source, meaning, n) for n in names}
+        whole, notes = dataset_of(
+            file, source, replace(meaning, signals=chosen), None, silent, room()
+        )
+        for name, symbol in (signals or {}).items():
+            _require_quantity(file, source, whole[name], symbol)
+        for signal in whole.data_vars.values():
+            _require_whole(file, source, signal, longest)
+    whole.attrs["source"] = file.name
+    for note in notes:
+        warnings.warn(f"{file.name}: {note}", MeasurementWarning, stacklevel=2)
+    return whole
+
+
+def trace_names(path: str | Path, mapping: Meaning = None) -> tuple[str, ...]:
+    """Return the names of a trace's signals, time left out; numbers are not looked at.
+
+    Raises
+    ------
+    FileError
+        When the file cannot be read.
+    """
+    file = Path(path)
+    meaning = _meaning(file, mapping)
+    with opened(file, meaning) as source:
+        return _names(file, source, meaning)
+
+
+def _meaning(file: Path, mapping: Meaning) -> MeasurementMapping:
+    """Return what a mapping says; a trace may be a text table whatever its name ends with."""
+    meaning = mapping_of(mapping)
+    if not meaning.format and FORMATS.find("csv").recognizes(head_of(file)):
+        return replace(meaning, format="csv")
+    format_to_read(file, meaning.format)
+    return meaning
+
+
+def _names(file: Path, source: Source, meaning: MeasurementMapping) -> tuple[str, ...]:
+    """Return the names of the mapping's signals, or of columns with a title."""
+    if meaning.signals:
+        return tuple(meaning.signals)
+    columns = every_signal(file, source, meaning)
+    names = tuple(n for n in columns if not (n.isdecimal() and not source.columns[n].unit))
+    if not names:
+        there = ", ".join(source.columns)
+        raise FileError(
+            f"{file}: none of its columns {quoted(there)} beside time has a name: add a first row, "
+            "as 'time [s], pedal [mm]', or say in a mapping what they are",
+            name=str(file),
+        )
+    return names
+
+
+def _chosen(file: Path, source: Source, meaning: MeasurementMapping, name: str) -> SignalMapping:
+    """Return what a signal's column means, whose name may be in other capitals."""
+    said = meaning.signals.get(name) or SignalMapping(name, name.strip())
+    if said.column in source.columns and meaning.signals:
+        return said
+    near = [c for c in source.columns if c.casefold() == said.column.casefold()]
+    if len(near) > 1:
+        raise FileError(
+            f"{file}, column {quoted(said.column)}: the name occurs twice, capitals or not: rename "
+            "one of them",
+            name=said.column,
+        )
+    return replace(said, column=near[0]) if near else said
+
+
+def _require_quantity(file: Path, source: Source, signal: xr.DataArray, symbol: str) -> None:
+    if not measures(unit_of_symbol(signal.attrs["units"]), symbol):
+        column = signal.attrs["column"]
+        unit = source.columns[column].unit or signal.attrs["units"]
+        raise UnitError(
+            f"{file}, column {quoted(column)}: {quoted(unit)} has the wrong unit, it cannot be "
+            f"{symbol}: choose a column in {display_unit(symbol)} or a unit like it",
+            name=column,
+            value=unit,
+            valid=symbol,
+        )
+    signal.attrs["units"] = symbol
+
+
+def _require_whole(file: Path, source: Source, signal: xr.DataArray, longest: float) -> None:
+    """Refuse numbers that are missing, and pauses that are too long."""
+    column = signal.attrs["column"]
+    missing = np.flatnonzero(np.isnan(signal.values))
+    if missing.size:
+        raise FileError(
+            f"{file}, {source.place(column, int(missing[0]))}, column {quoted(column)}: blank or "
+            "NaN is not a measured value: fill it in or remove the row"
+        )
+    time = signal[signal.dims[0]].values
+    steps = np.diff(time)
+    gaps = np.flatnonzero((steps > _GAP * np.median(steps)) & (steps > longest))
+    if gaps.size:
+        k = int(gaps[0])
+        most = float(np.max(steps[gaps]))
+        raise FileError(
+            f"{file}, {source.place(column, k + 1)}: a gap of {steps[k]:.4g} s after "
+            f"{time[k]:.6g} s ({gaps.size} in the file, the longest {most:.4g} s; max_gap is "
+            f"{longest:g} s): fill it in, or, if a straight line across it is what you want, allow "
+            f'it with max_gap="{1.01 * most:.3g} s"',
+            name=column,
+        )

@@ -12,6 +12,7 @@ import xarray as xr
 from bywire.core.callers import is_command_line, option
 from bywire.core.errors import FileError, InputError, ParameterError, UnitError, unknown_name
 from bywire.core.quantities import display_unit
+from bywire.core.typing import Progress
 from bywire.core.units import parse
 from bywire.data.column_choice import (
     MissingUnitsError,
@@ -20,10 +21,9 @@ from bywire.data.column_choice import (
     left_out_note,
 )
 from bywire.data.column_units import split_title
-from bywire.data.file_format import Progress
+from bywire.data.file_format import room
 from bywire.data.mapping import Clock, MeasurementMapping, SignalMapping
 from bywire.data.measurement import dataset_of, opened
-from bywire.data.room import room
 
 _BRACKETS = "each with the unit of its own column in the brackets, or 1 for a pure number"
 
@@ -127,7 +127,9 @@ def renamed(data: xr.Dataset, named: NamedColumns) -> xr.Dataset:
         When instants are named, which signals in memory have already.
     """
     if named.time:
-        raise ParameterError(f"{option('time')} is for measurement files: leave it out")
+        raise ParameterError(
+            f"{option('time')} is for measurement files: leave it out", name="time"
+        )
     for name, column in named.signals.items():
         if column not in data:
             raise unknown_name("signal", column, [str(each) for each in data.data_vars])

@@ -19,11 +19,11 @@ from bywire.core.arguments import checked
 from bywire.core.errors import FileError
 from bywire.core.interrupts import interrupts_deferred
 from bywire.core.scratch import replacing
-from bywire.data.file_format import Column, FileFormat, ReadOptions, no_progress
+from bywire.core.typing import silent
+from bywire.data.file_format import Column, FileFormat, ReadOptions, require_room
 from bywire.data.format_registry import head_of
 from bywire.data.formats.netcdf import FORMAT as NETCDF
 from bywire.data.limited_source import limited
-from bywire.data.room import require_room
 
 if TYPE_CHECKING:
     from bywire.data.limited_source import LimitedSource
@@ -62,7 +62,8 @@ def write_recording(recording: xr.Dataset, path: str | Path) -> Path:
         reason = getattr(error, "strerror", None) or str(error)
         raise FileError(
             f"cannot write {path}: {reason}: make room there, or choose a folder that you may "
-            "write to"
+            "write to",
+            name=str(path),
         ) from None
     return path
 
@@ -89,8 +90,9 @@ def read_recording(path: str | Path) -> xr.Dataset:
     file = Path(path)
     if not NETCDF.recognizes(head_of(file)):
         raise FileError(
-            f"cannot read recording {file}: it is no NetCDF file: bywire convert, or "
-            "read_measurement, reads other formats"
+            f"cannot read recording {file}: it is not a NetCDF file: bywire convert, or "
+            "read_measurement, reads other formats",
+            name=str(file),
         )
     with limited(file, FORMAT) as source:
         require_room(file, source)
@@ -164,7 +166,7 @@ def _attributes(plain: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _dataset(source: LimitedSource) -> xr.Dataset:
-    columns = source.read(list(source.columns), no_progress)
+    columns = source.read(list(source.columns), silent)
     variables = {}
     for name, said in source.notes["variables"].items():
         kind = np.dtype(said["kind"])

@@ -14,7 +14,8 @@ from bywire.core.arguments import checked
 from bywire.core.callers import option
 from bywire.core.errors import FileError, InputError
 from bywire.core.scratch import replacing
-from bywire.data.file_format import FileFormat, Progress, no_progress
+from bywire.core.typing import Progress, silent
+from bywire.data.file_format import FileFormat
 from bywire.data.format_registry import format_to_write
 
 
@@ -25,7 +26,7 @@ def write_measurement(
     *,
     format: str = "",
     overwrite: bool = False,
-    progress: Progress = no_progress,
+    progress: Progress = silent,
 ) -> Path:
     """Write signals as a measurement file, in SI, every number exactly.
 
@@ -51,7 +52,7 @@ def write_measurement(
     Raises
     ------
     FileError
-        When the format cannot hold the signals, a file is there already, or it cannot be
+        When the format cannot hold the signals, a file exists already, or it cannot be
         written.
     UnknownNameError
         When there is no such format.
@@ -70,14 +71,16 @@ def write_measurement(
     except MemoryError:
         raise FileError(
             f"cannot write {target}: {kind.title} of this size does not fit into memory: write "
-            "fewer signals at a time"
+            "fewer signals at a time",
+            name=str(target),
         ) from None
     except Exception as error:  # libraries fail in as many ways as there are
         reason = getattr(error, "strerror", None) or " ".join(str(error).split())[:200]
         reason = reason or type(error).__name__
         raise FileError(
             f"cannot write {target}: {reason}: make room there, or choose a folder that you may "
-            "write to"
+            "write to",
+            name=str(target),
         ) from None
     return target
 
@@ -102,39 +105,56 @@ def require_free(target: Path, *, overwrite: bool) -> None:
     """
     with contextlib.suppress(OSError, ValueError):  # writing to it will say what is wrong
         if target.is_dir():
-            raise FileError(f"{target} is a folder: name a file in it")
+            raise FileError(f"{target} is a folder: name a file in it", name=str(target))
         if target.exists() and not overwrite:
             raise FileError(
-                f"{target} is there already: name another file, or use {option('force', True)}"
+                f"{target} exists already: name another file, or use {option('force', True)}",
+                name=str(target),
             )
         if not target.parent.is_dir():
-            raise FileError(f"cannot write {target}: there is no folder {target.parent}: make it")
+            raise FileError(
+                f"cannot write {target}: there is no folder {target.parent}: make it",
+                name=str(target),
+            )
 
 
 def _require_fit(dataset: xr.Dataset, target: Path, kind: FileFormat) -> None:
     if not dataset.data_vars:
-        raise FileError(f"cannot write {target}: there is no signal")
+        raise FileError(f"cannot write {target}: there is no signal", name=str(target))
     for name, signal in dataset.data_vars.items():
         if signal.ndim != 1 or signal.dims[0] not in dataset.coords:
             dims = ", ".join(map(str, signal.dims)) or "none"
             raise FileError(
                 f"cannot write {target}: {name} has the dimensions {dims}: a measurement file "
-                "holds signals over time; choose one case of each"
+                "holds signals over time; choose one case of each",
+                name=str(name),
             )
         if not np.issubdtype(signal.dtype, np.number) and signal.dtype != np.bool_:
-            raise FileError(f"cannot write {target}: {name} holds {signal.dtype}, no numbers")
+            raise FileError(
+                f"cannot write {target}: {name} contains {signal.dtype} and not numbers",
+                name=str(name),
+            )
         unit = dataset[signal.dims[0]].attrs.get("units", "s")
         if unit != "s":
-            raise FileError(f"cannot write {target}: the instants of {name} are in {unit!r}, not s")
+            raise FileError(
+                f"cannot write {target}: the instants of {name} are in {unit!r}, not s",
+                name=str(name),
+                value=unit,
+                valid="s",
+            )
     axes = sorted({str(signal.dims[0]) for signal in dataset.data_vars.values()})
     if kind.has_many_axes or axes == ["time"]:
         return
     if len(axes) == 1:
         raise FileError(
-            f"cannot write {target}: the signals' dimension is {axes[0]!r}: rename it 'time'"
+            f"cannot write {target}: the signals' dimension is {axes[0]!r}: rename it 'time'",
+            name=str(target),
+            value=str(axes[0]),
+            valid="time",
         )
     raise FileError(
         f"cannot write {target}: the signals were measured at different instants "
         f"({', '.join(axes)}), and a {kind.name} file has one time: bring them to one time axis "
-        "(bywire convert --rate, or resample), or write mat, mdf4 or netcdf"
+        "(bywire convert --rate, or resample), or write mat, mdf4 or netcdf",
+        name=str(target),
     )

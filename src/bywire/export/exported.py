@@ -18,9 +18,7 @@ from bywire.bench.bench import Bench
 from bywire.bench.experiment import Case
 from bywire.bench.running import run_of
 from bywire.core.errors import BywireError, ParameterError, unknown_name
-from bywire.core.field_notes import field_notes
-from bywire.core.leaf import Leaf
-from bywire.core.parameters import leaf_fields
+from bywire.core.parameters import Leaf, field_notes, leaf_fields
 from bywire.core.signals import ranges_of, signals_of
 from bywire.simulation.emit_single import EXPORTED, emit_single
 from bywire.simulation.engine import prepare

@@ -1,11 +1,10 @@
 """From measurements to parameters: estimators, their confidence, and named methods."""
 
-from bywire.identification.confidence import MisfitWarning
+from bywire.identification.bench_fit import Prediction, predict
+from bywire.identification.confidence import Disagreement, MisfitWarning, disagreements
 from bywire.identification.differentiation import differentiated
 from bywire.identification.equation import Equation, inverse_dynamics
 from bywire.identification.estimate import Estimate
-from bywire.identification.fitting.worth import Prediction, predict
-from bywire.identification.homogeneity import Disagreement, disagreements
 from bywire.identification.least_squares import Problem, estimate
 from bywire.identification.model_choice import Candidate, choose
 from bywire.identification.multistart import multistart

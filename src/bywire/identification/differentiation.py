@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from bywire.core.arguments import checked
-from bywire.core.errors import ParameterError
+from bywire.core.errors import ParameterError, not_valid
 from bywire.core.typing import Array
 from bywire.identification.measured import require_signals
 from bywire.identification.output_error import even_interval
@@ -42,14 +42,16 @@ def low_passed(values: Array, interval: float, cutoff: float) -> Array:
 
     nyquist = 0.5 / interval
     if not 0.0 < cutoff < nyquist:
-        raise ParameterError(
-            f"cutoff = {cutoff:g} Hz is not valid: it must be > 0 Hz and < {nyquist:g} Hz, "
-            "half the sample rate"
-        )
+        valid = f"> 0 Hz and < {nyquist:g} Hz"
+        raise not_valid("cutoff", f"{cutoff:g} Hz", valid, "half the sample rate")
     sos = signal.butter(_ORDER, cutoff / nyquist, output="sos")
     pad = min(int(3.0 / (cutoff * interval)) + 1, len(values) - 1)
     if pad < _ORDER:
-        raise ParameterError(f"{len(values)} samples are too few for a low-pass filter")
+        raise ParameterError(
+            f"{len(values)} samples are too few for a low-pass filter",
+            name="samples",
+            value=str(len(values)),
+        )
     return np.asarray(signal.sosfiltfilt(sos, values, axis=0, padlen=pad))
 
 

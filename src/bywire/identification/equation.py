@@ -63,7 +63,10 @@ class EquationError:
         if equation.state not in model.State._fields:
             raise ModelError(
                 f"{model.name} has no state {equation.state}: it has "
-                f"{', '.join(model.State._fields)}"
+                f"{', '.join(model.State._fields)}",
+                name="state",
+                value=equation.state,
+                valid=", ".join(model.State._fields),
             )
         k = model.State._fields.index(equation.state)
         leaves = par.leaves()
@@ -245,15 +248,17 @@ def _require_told(W: Array, unknowns: Sequence[Unknown]) -> None:
     silent = [u.label for u, s in zip(unknowns, size, strict=True) if s == 0.0]
     if silent:
         raise ParameterError(
-            f"the data does not tell {', '.join(silent)}: nothing that it acts on moves; "
-            "excite it, or take it as known"
+            f"the data do not determine {', '.join(silent)}: nothing that it acts on moves; "
+            "excite it, or take it as known",
+            name=", ".join(silent),
         )
     _, s, V = np.linalg.svd(W / size, full_matrices=False)  # U would have samples squared
     if s[-1] < 1e-10 * s[0]:
         together = [u.label for u, v in zip(unknowns, V[-1], strict=True) if abs(v) > 0.1]
         raise ParameterError(
-            f"the data tells only a combination of {', '.join(together)}: take one of them as "
-            "known, or excite them apart"
+            f"the data determine only a combination of {', '.join(together)}: take one of them as "
+            "known, or excite them apart",
+            name=", ".join(together),
         )
 
 

@@ -19,13 +19,13 @@ from bywire.core.units import difference_unit, shown
 from bywire.identification.confidence import (
     MisfitWarning,
     advice,
+    between_records,
     misfit,
     notes_of,
     uncertainty,
     untold,
 )
 from bywire.identification.estimate import Estimate, Kept, Part
-from bywire.identification.homogeneity import between_records
 from bywire.identification.unknown import Unknown
 
 Loss = Literal["linear", "soft_l1", "huber", "cauchy"]
@@ -64,7 +64,7 @@ def rho(z: Array, loss: Loss) -> Array:
     return np.stack((np.log1p(z), 1.0 / (1.0 + z), -1.0 / (1.0 + z) ** 2))
 
 
-def of_data_alone(loss: Loss, apart: int) -> Any:
+def _of_data_alone(loss: Loss, apart: int) -> Any:
     """Return the loss for SciPy; the last rows, what is known beforehand, count by their squares.
 
     Parameters
@@ -94,7 +94,7 @@ def influence(r: Array, loss: Loss) -> tuple[Array, Array]:
     return r * first, first + 2.0 * r**2 * second
 
 
-def bread(slopes: Array, unknowns: int) -> float:
+def _bread(slopes: Array, unknowns: int) -> float:
     r"""Return what divides an M-estimate's scores, :math:`E[\psi'] / K`.
 
     :math:`K = 1 + (p/n) \operatorname{var}(\psi') / E[\psi']^2` corrects for few residuals; the
@@ -171,7 +171,7 @@ class Problem:
         return replace(self, unknowns=rest, evaluate=partial(without, self.evaluate), finer=finer)
 
 
-def with_priors(problem: Problem, values: Array) -> tuple[Array, Array]:
+def _with_priors(problem: Problem, values: Array) -> tuple[Array, Array]:
     """Return residuals and Jacobian with one more row for every prior."""
     r, J = problem.evaluate(values)
     rows = [(k, u.prior) for k, u in enumerate(problem.unknowns) if u.prior is not None]
@@ -184,9 +184,9 @@ def with_priors(problem: Problem, values: Array) -> tuple[Array, Array]:
     return np.concatenate((r, more)), np.vstack((J, slopes))
 
 
-def cost_of(problem: Problem, values: Array, loss: Loss = "linear") -> float:
+def _cost_of(problem: Problem, values: Array, loss: Loss = "linear") -> float:
     """Return half the sum of the residuals' losses, priors included."""
-    r, _ = with_priors(problem, values)
+    r, _ = _with_priors(problem, values)
     data = r.size - sum(u.prior is not None for u in problem.unknowns)
     return 0.5 * float(np.sum(rho(r[:data] ** 2, loss)[0]) + np.sum(r[data:] ** 2))
 
@@ -199,7 +199,7 @@ def cost_of(problem: Problem, values: Array, loss: Loss = "linear") -> float:
 _SMALL = 1e-6  # of an unknown's scale: less matters to nobody
 
 
-def with_step_share(
+def _with_step_share(
     problem: Problem, best: Estimate, J: Array, loss: Loss
 ) -> tuple[Estimate, tuple[str, ...]]:
     """Return an estimate with the errors that its values have from the step, and what exceeds.
@@ -327,7 +327,7 @@ def solve(
         key = z.tobytes()
         if key not in cache:
             cache.clear()
-            r, J = with_priors(problem, z * scale)
+            r, J = _with_priors(problem, z * scale)
             if not (np.isfinite(r).all() and np.isfinite(J).all()):
                 raise SolverError("a residual, or how it changes, is not defined at these values")
             cache[key] = (r, J * scale)
@@ -351,7 +351,7 @@ def solve(
         inner,
         jacobian,
         bounds=(low, high),
-        loss=of_data_alone(loss, priors),
+        loss=_of_data_alone(loss, priors),
         x_scale="jac",
         xtol=max(1e-9, problem.resolved),
         ftol=max(share, problem.resolved),
@@ -372,7 +372,7 @@ def _at_bounds(problem: Problem, solution: Solution, loss: Loss) -> Solution:
             values = solution.values.copy()
             values[k] = end
             try:
-                cost = cost_of(problem, values, loss)
+                cost = _cost_of(problem, values, loss)
             except SolverError:
                 continue
             if cost <= solution.cost:
@@ -389,7 +389,7 @@ def _solved(problem: Problem, begin: Array, loss: Loss) -> Solution:
     low, high = (np.array([getattr(u, end) for u in problem.unknowns]) for end in ("low", "high"))
     values, most = solution.values, (1.0 + _WORSE) * solution.cost
     for _ in range(_NEWTON):
-        r, J = with_priors(problem, values)
+        r, J = _with_priors(problem, values)
         cost = 0.5 * float(r @ r)
         if cost > most:
             return solution
@@ -420,7 +420,7 @@ def estimate(
     Raises
     ------
     ParameterError
-        When the data tells none of the unknowns.
+        When the data determine none of the unknowns.
     """
     kept: tuple[Kept, ...] = ()
     origin = problem
@@ -432,7 +432,7 @@ def estimate(
         if worst is None:
             records = between_records(best, J) if loss == "linear" else ()
             apart = tuple(str(record) for record in records[:1])
-            best, coarse = with_step_share(problem, best, J, loss)
+            best, coarse = _with_step_share(problem, best, J, loss)
             for wrong in filter(None, (misfit(best), *apart, *coarse)):
                 warnings.warn(wrong, MisfitWarning, stacklevel=2)
             return replace(best, kept=kept, notes=(*notes_of(best), *apart, *coarse))
@@ -446,27 +446,31 @@ def estimate(
         problem = problem.held(index)
         if not problem.unknowns:
             raise ParameterError(
-                f"the data tells none of {', '.join(k.unknown.label for k in kept)}: of "
+                f"the data determine none of {', '.join(k.unknown.label for k in kept)}: of "
                 f"{kept[0].unknown.label}, {kept[0].reason}; "
-                f"{advice(best, kept[0].unknown.name in problem.silent)}"
+                f"{advice(best, kept[0].unknown.name in problem.silent)}",
+                name=", ".join(k.unknown.label for k in kept),
             )
 
 
 def _at_minimum(problem: Problem, solution: Solution, loss: Loss) -> tuple[Estimate, Array]:
     """Return the estimate, and the Jacobian per unknown's scale."""
-    r, J = with_priors(problem, solution.values)
+    r, J = _with_priors(problem, solution.values)
     priors = sum(u.prior is not None for u in problem.unknowns)
     data = r.size - priors
     if data <= len(problem.unknowns):
         raise ParameterError(
-            f"{data} measured values cannot tell {len(problem.unknowns)} unknowns: measure more"
+            f"{data} measured values cannot determine {len(problem.unknowns)} unknowns: "
+            "measure more",
+            name="unknowns",
+            value=str(len(problem.unknowns)),
         )
     scale = np.array([u.scale for u in problem.unknowns])
     known = priors + problem.apart
     # What is known beforehand is no outlier; only what was measured is weighted by the loss.
     psi, slopes = influence(r[: r.size - known], loss)
     rows = J.copy()
-    rows[: r.size - known] *= bread(slopes, len(problem.unknowns))
+    rows[: r.size - known] *= _bread(slopes, len(problem.unknowns))
     sure = uncertainty(
         rows * scale, np.concatenate((psi, r[r.size - known :])), J * scale, prior_rows=known
     )

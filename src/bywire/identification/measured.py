@@ -1,10 +1,4 @@
-"""Measured records as a method or a replay takes them: SI, one even time axis, all signals.
-
-Several records of one experiment follow one another in one measurement. The signal ``record``
-numbers them, 0, 1, ...; its attribute ``flag_meanings`` names them, as the Climate and Forecast
-conventions write it; ``begins`` says when each began on its own clock, while they are in memory.
-Time goes on from one record to the next, so that any file can hold them.
-"""
+"""Measured records as a method or a replay takes them: SI, one even time axis, all signals."""
 
 from __future__ import annotations
 
@@ -16,18 +10,91 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import xarray as xr
+from numpy.typing import NDArray
 
 from bywire.core.arguments import checked
 from bywire.core.callers import option
 from bywire.core.errors import ParameterError, UnitError, unknown_name
-from bywire.core.typing import Array
+from bywire.core.typing import Array, Progress, silent
 from bywire.data.alignment import resample
 from bywire.data.channel_quality import AlignmentReport
 from bywire.data.column_units import measures, unit_of_symbol
-from bywire.data.file_format import Progress, no_progress
 from bywire.data.mapping import MeasurementMapping, read_mapping
 from bywire.data.named_columns import NamedColumns, read_named, renamed
-from bywire.identification.noise import noise_of
+
+_ROUNDED = 0.05  # of the samples equal the one before: a converter, not the signal
+_LARGER = 1.5  # times the noise
+_SURE = 2.5  # standard errors of a correlation
+FAR = 4.0  # standard deviations: of white noise 1 in 16 000 lies beyond
+
+
+def noise_of(values: Array) -> float:
+    """Return the standard deviation of a measured signal's noise, quantization included.
+
+    From differences of the third order, which a slow signal has not, by their median: slips do
+    not count.
+    """
+    third = np.diff(values, 3) / np.sqrt(20.0)
+    scatter = 1.4826 * float(np.median(np.abs(third)))
+    steps = np.abs(np.diff(values))
+    steps = steps[steps > 0]
+    step = float(steps.min()) if steps.size else 0.0
+    repeated = float(np.mean(np.diff(values) == 0.0))
+    quantized = step / np.sqrt(12.0) if _ROUNDED < repeated < 1.0 and step > 3.0 * scatter else 0.0
+    return max(scatter, quantized)
+
+
+def is_told(values: Array) -> bool:
+    """Return whether the third differences of a signal look like those of noise.
+
+    Their neighbors have a correlation of -3/4 where the noise is white. Where it tends to 1, the
+    signal itself is seen; where it tends to -1, it alternates from one sample to the next: a
+    coarse record, or dither near half the sample rate. What is measured is how often neighbors
+    have the same sign, so that slips do not count. The noise is not told where such a signal would
+    make it come out half as large again.
+
+    Parameters
+    ----------
+    values
+        Shape (n,). A signal that a converter has rounded repeats itself, and is not judged.
+    """
+    if float(np.mean(np.diff(values) == 0.0)) > _ROUNDED:
+        return True
+    third = np.diff(values, 3)
+    product = np.sign(third[1:] * third[:-1])
+    correlation = np.sin(0.5 * np.pi * float(np.mean(product)))  # of Gaussian neighbors
+    reach = _SURE / np.sqrt(product.size)
+    # Noise of share 1 - a, and a signal of correlation 1 or -1, make it 1 / sqrt(1 - a) times.
+    a = 1.0 - 1.0 / _LARGER**2
+    low, high = -max(0.25 * a, reach), max(1.75 * a, reach)
+    return bool(low <= correlation + 0.75 <= high)
+
+
+def robust_scale(residuals: Array) -> float:
+    """Return the standard deviation that the median magnitude tells, were they Gaussian.
+
+    About zero, not about their median: an offset that a model leaves is an error of its own.
+
+    References
+    ----------
+    P. J. Huber, Robust Statistics, 1981, section 5.1 (median absolute deviation).
+    """
+    return 1.4826 * float(np.median(np.abs(residuals)))
+
+
+def outliers(residuals: Array) -> NDArray[np.bool_]:
+    """Return which residuals, of size one where the noise is as assumed, are none of noise.
+
+    Shape (n,); where all are larger than assumed, those that stand out from the others.
+    """
+    return np.asarray(np.abs(residuals) > FAR * max(robust_scale(residuals), 1.0))
+
+
+# --- Records
+# Several records of one experiment follow one another in one measurement. The signal ``record``
+# numbers them, 0, 1, ...; its attribute ``flag_meanings`` names them, as the Climate and Forecast
+# conventions write it; ``begins`` says when each began on its own clock, while they are in memory.
+# Time goes on from one record to the next, so that any file can hold them.
 
 RECORD = "record"
 """the signal that numbers the records"""
@@ -54,7 +121,7 @@ def joined(records: Mapping[str, xr.Dataset]) -> xr.Dataset:
         When there is none, or one has other signals than the first.
     """
     if not records:
-        raise ParameterError("no record is given: one at least is needed")
+        raise ParameterError("no record is given: at least one is needed")
     first, *others = records
     if not others:
         return records[first]
@@ -65,7 +132,8 @@ def joined(records: Mapping[str, xr.Dataset]) -> xr.Dataset:
             differing = ", ".join(sorted(wanted ^ set(map(str, record.data_vars))))
             raise ParameterError(
                 f"records {first} and {label} differ in their signals ({differing}): records of "
-                "one experiment have the same ones"
+                "one experiment have the same signals",
+                name=label,
             )
         t = record["time"].values - record["time"].values[0]
         times.append(start + t)
@@ -176,7 +244,7 @@ def measured(
     multiple: float | None = None,
     gaps: bool = False,
     named: NamedColumns = _NOT_NAMED,
-    progress: Progress = no_progress,
+    progress: Progress = silent,
 ) -> Measured:
     """Read one measurement, or several records of it.
 
@@ -253,7 +321,12 @@ def require(data: xr.Dataset, signals: Mapping[str, str], where: str) -> tuple[s
             raise unknown_name(kind, name, there)
         given = str(data[name].attrs.get("units", "1"))
         if unit not in ("", given) and not measures(unit_of_symbol(given), unit):
-            raise UnitError(f"{where}: {name} is in {given}, but {unit} is wanted: check the map")
+            raise UnitError(
+                f"{where}: {name} is in {given}, and must be in {unit}: check the map",
+                name=name,
+                value=given,
+                valid=unit,
+            )
     return (*signals, *(("record",) if "record" in there and "record" not in signals else ()))
 
 
@@ -309,7 +382,8 @@ def _require_whole(data: xr.Dataset, where: str, gaps: bool) -> None:
             at = float(data["time"].values[missing[0]])
             raise ParameterError(
                 f"{where}: {name} misses {missing.size} samples, the first at {at:.4g} s: cut the "
-                "record there, or fill it knowingly with 'bywire convert --exclude nothing'"
+                "record there, or fill it knowingly with 'bywire convert --exclude nothing'",
+                name=str(name),
             )
 
 

@@ -69,7 +69,7 @@ def moved_run(run: Run, values: Mapping[str, float], start: Start | None = None)
     return replace(run, par=run.par.replace(par), state=state._replace(**fixed), memory=memory)
 
 
-def start_slopes(
+def _start_slopes(
     start: Start, run: Run, unknowns: Sequence[Unknown], values: Mapping[str, float]
 ) -> tuple[Array, Array]:
     """Return derivatives of the initial state and memory, shapes (states, p) and (memories, p).
@@ -330,7 +330,9 @@ def even_interval(t: Array) -> float:
     """
     steps = np.diff(t)
     if not steps.size or not steps.min() > 0.0:
-        raise ParameterError("time does not increase from sample to sample: sort or cut the record")
+        raise ParameterError(
+            "time does not increase from sample to sample: sort or cut the record", name="time"
+        )
     mean, middle = float(t[-1] - t[0]) / steps.size, float(np.median(steps))
     usual = float(f"{middle:.9g}")
     for interval in (*(float(f"{mean:.{k}g}") for k in _DIGITS), usual, float(f"{mean:.9g}")):
@@ -342,7 +344,8 @@ def even_interval(t: Array) -> float:
     raise ParameterError(
         f"time is not evenly spaced (steps of {steps.min():g} to {steps.max():g} s, and instants "
         f"off an even grid by more than {UNEVEN:g} of the step): resample it first, as "
-        f'bywire.resample(data, "{1e3 * float(f"{middle:.3g}"):g} ms")'
+        f'bywire.resample(data, "{1e3 * float(f"{middle:.3g}"):g} ms")',
+        name="time",
     )
 
 
@@ -443,6 +446,6 @@ def _computed(
     if trial.start is None:
         answer = simulate_with_sensitivities(run, list(named), signals)
     else:
-        slopes = start_slopes(trial.start, run, unknowns, named)
+        slopes = _start_slopes(trial.start, run, unknowns, named)
         answer = simulate_with_sensitivities(run, list(named), signals, *slopes)
     return answer.trajectory.values, answer.derivatives

@@ -1,4 +1,4 @@
-"""What a fit leaves over: how much of the measurement is explained, and whether more could be."""
+"""Residuals of a fit: how much of the measurement is explained, and whether more could be."""
 
 from __future__ import annotations
 

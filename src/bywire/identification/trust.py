@@ -1,9 +1,4 @@
-"""Whether a method can be trusted: what is put into simulated experiments has to come back.
-
-Each experiment is made with a seed of its own, and identified from a start off the truth. Over
-many of them the mean estimate has to hit the truth within its own scatter, and the 95 % intervals
-have to hold it about 95 times in 100.
-"""
+"""Trust in a method: estimates from simulated experiments against the values put into them."""
 
 from __future__ import annotations
 
@@ -17,18 +12,63 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
+import xarray as xr
 
 from bywire.bench.computation import functions_digest
+from bywire.bench.experiment import Case, as_run
 from bywire.cases.runner import complete
 from bywire.cases.store import PieceLines
 from bywire.core.copies import processes_with_brakes
 from bywire.core.errors import BywireError, ParameterError
 from bywire.core.model import ASSEMBLIES
 from bywire.core.parameters import ParameterSet
+from bywire.core.signals import signals_of
 from bywire.core.typing import Progress, silent
+from bywire.data.labeled import labeled
 from bywire.identification.confidence import MisfitWarning
 from bywire.identification.method import Effort, Method
 from bywire.identification.unknown import parameters_of, scattered
+from bywire.simulation.run import simulate
+
+_STEP = 20e-6
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """What is read of a run.
+
+    ``output``: output of the model; ``sigma``: standard deviation of white noise on every sample
+    [unit of the output].
+    """
+
+    output: str
+    sigma: float = 0.0
+
+
+def sensed(case: Case, sensors: Mapping[str, Sensor], random: np.random.Generator) -> xr.Dataset:
+    """Return one run's signals from time zero on, with noise.
+
+    ``sensors``: signal -> what it reads; ``random``: where the noise comes from.
+    """
+    run = as_run(case, _STEP)
+    computed = simulate(run, tuple({s.output for s in sensors.values()}))
+    known = signals_of(run.model.Output)
+    settled = run.duration - case.duration
+    kept = computed.time >= settled - 1e-9
+    axis = pd.Index(np.round(computed.time[kept] - settled, 12), name="time")
+    rows = {}
+    for name, sensor in sensors.items():
+        values = computed[sensor.output][kept] + random.normal(0.0, sensor.sigma, int(kept.sum()))
+        signal = known[sensor.output]
+        rows[name] = (values, signal.unit, signal.label)
+    return labeled({"time": (axis, "s", "time")}, rows)
+
+
+# --- Trust
+# Each experiment is made with a seed of its own, and identified from a start off the truth. Over
+# many of them the mean estimate has to hit the truth within its own scatter, and the 95 %
+# intervals have to hold it about 95 times in 100.
 
 _TRIES = 20
 _KILLED = "what was finished is kept where there is an output folder, and the same command goes on"
@@ -81,7 +121,11 @@ def displaced(par: ParameterSet, names: Sequence[str], spread: float, seed: int)
             return par.replace({u.name: float(v) for u, v in zip(unknowns, values, strict=True)})
         except ParameterError:
             continue
-    raise ParameterError(f"no admissible parameters within {100 * spread:g} % of these: lower it")
+    raise ParameterError(
+        f"no valid parameters within {100 * spread:g} % of these: lower it",
+        name="spread",
+        value=f"{100 * spread:g} %",
+    )
 
 
 def experiments(

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bywire.core.arguments import checked
-from bywire.core.errors import ParameterError, unknown_name
+from bywire.core.errors import ParameterError, not_valid, unknown_name
 from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.typing import Array
 
@@ -50,14 +50,14 @@ class Unknown:
 
     def __post_init__(self) -> None:
         if not self.low <= self.start <= self.high:
-            raise ParameterError(
-                f"start of {self.label} = {self.start:g} {self.unit} is not valid: it must "
-                f"lie within {self.low:g} and {self.high:g} {self.unit}"
-            )
+            valid = f"within {self.low:g} and {self.high:g} {self.unit}"
+            raise not_valid(f"start of {self.label}", f"{self.start:g} {self.unit}", valid)
         if not (self.scale > 0.0 and math.isfinite(self.scale)):
-            raise ParameterError(f"scale of {self.label} = {self.scale:g} must be > 0 and finite")
+            raise not_valid(f"scale of {self.label}", f"{self.scale:g}", "> 0 and finite")
         if self.prior is not None and not self.prior[1] > 0.0:
-            raise ParameterError(f"prior of {self.label} needs a standard deviation > 0")
+            raise ParameterError(
+                f"prior of {self.label} needs a standard deviation > 0", name=self.label
+            )
 
     @property
     def label(self) -> str:

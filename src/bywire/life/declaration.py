@@ -12,8 +12,8 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
+from bywire.core.catalog import Cited
 from bywire.core.parameters import ParameterSet, require_units
-from bywire.core.provenance import Cited
 from bywire.core.quantities import Unit
 from bywire.core.registry import Kind, instances
 from bywire.core.typing import Array

@@ -21,8 +21,7 @@ from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.quantities import Unit
 from bywire.core.section import Hint, Section, Table
 from bywire.core.values import parsed, require_units
-from bywire.data.file_kinds import LIFE, require_kind
-from bywire.data.toml_file import read_toml
+from bywire.data.toml_file import LIFE, read_toml, require_kind
 from bywire.life.declaration import LIVES, Life, StopConditions
 from bywire.studies.designs import Sampled
 from bywire.studies.distribution import read_distribution

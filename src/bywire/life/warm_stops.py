@@ -13,9 +13,9 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
+from bywire.core.catalog import Cited, chosen
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
-from bywire.core.provenance import Cited, chosen
 from bywire.core.quantities import Unit
 from bywire.core.typing import Array
 from bywire.plant import pad_wear

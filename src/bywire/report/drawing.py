@@ -34,8 +34,8 @@ from matplotlib.text import Text
 
 from bywire.core.copies import may_copy, processes
 from bywire.core.errors import FileError
+from bywire.core.machine import worker_count
 from bywire.core.scratch import replacing
-from bywire.core.workers import worker_count
 from bywire.report.document import Picture
 from bywire.report.wording import clean
 

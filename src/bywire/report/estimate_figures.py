@@ -15,8 +15,8 @@ from bywire.core.units import difference_unit, display_factor
 from bywire.identification.confidence import autocorrelation
 from bywire.identification.estimate import Estimate
 from bywire.identification.method import Curve
-from bywire.identification.replaying.fit import SegmentFit
-from bywire.identification.replaying.tracking import Track
+from bywire.identification.replay_fit import SegmentFit
+from bywire.identification.tracking import Track
 from bywire.report import style
 from bywire.report.channel import channel, decimate, kept_samples
 from bywire.report.panels import Role

@@ -18,7 +18,7 @@ from itertools import pairwise
 from typing import Any, TypeVar
 
 from bywire.core.assembly import Assembly
-from bywire.core.connections import Connection, Network, Node, network
+from bywire.core.wiring import Connection, Network, Node, network
 from bywire.report.document import Details, Drawing, TableBlock
 from bywire.report.tables import Table, text_table
 

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from bywire.core.units import convert, difference_unit
-from bywire.report import style
 from bywire.report.channel import Channel
 from bywire.report.wording import amount
 
@@ -14,8 +13,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from bywire.bench.stated import StatedFigure, StatedLevel, StatedRange
+    from bywire.report.style import Dash
 
-_DASHES: tuple[style.Dash, ...] = ((0, (7, 3)), (0, (7, 2, 2, 2)), (0, (2, 2)))
+_DASHES: tuple[Dash, ...] = ((0, (7, 3)), (0, (7, 2, 2, 2)), (0, (2, 2)))
 _OPACITY = 0.15  # of a band: the curves' grid shines through
 
 
@@ -24,6 +24,8 @@ def draw_stated(axes: Axes, levels: Sequence[StatedLevel | StatedRange], shown: 
 
     They lie below the curves. ``shown``: a channel of the axes, for its unit.
     """
+    from bywire.report import style  # with Matplotlib, which words for tables do without
+
     for k, each in enumerate(levels):
         low, high, *lines = (
             convert(value, shown.symbol, shown.unit)

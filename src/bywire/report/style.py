@@ -41,7 +41,7 @@ def _averaging_time(time: Array) -> float:
 
     Examples
     --------
-    >>> averaging_time(np.array([0.0, 50.0]))
+    >>> _averaging_time(np.array([0.0, 50.0]))
     0.1
     """
     column = float(time[-1] - time[0]) / COLUMNS

@@ -9,11 +9,9 @@ from bywire.bench.bench import Bench
 from bywire.bench.bench_file import flattened
 from bywire.bench.changes import OPTION
 from bywire.bench.generic_experiment import experiment_of
-from bywire.core.catalog import PARAMETER_SETS
+from bywire.core.catalog import PARAMETER_SETS, Cited
 from bywire.core.errors import InputError
-from bywire.core.field_notes import field_notes
-from bywire.core.parameters import ParameterSet, leaf_fields
-from bywire.core.provenance import Cited
+from bywire.core.parameters import ParameterSet, field_notes, leaf_fields
 from bywire.report.document import Change, Details, Paragraph, Section, TableBlock
 from bywire.report.tables import ParameterRow, parameter_table, text_table, value_text
 from bywire.report.wording import range_text

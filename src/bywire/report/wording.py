@@ -6,7 +6,7 @@ import math
 from typing import TypeVar
 
 from bywire.core.clean_text import clean as clean
-from bywire.core.leaf import Leaf
+from bywire.core.parameters import Leaf
 from bywire.core.quantities import display_unit
 from bywire.core.units import convert, difference_unit
 from bywire.core.units import unit_text as unit_text

@@ -11,8 +11,8 @@ import xarray as xr
 
 from bywire.bench.running import Progress
 from bywire.core.interrupts import thread_pool
+from bywire.core.machine import worker_count
 from bywire.core.registry import Kind, instances
-from bywire.core.workers import worker_count
 from bywire.report.answer import Answer
 from bywire.report.document import (
     Banner,

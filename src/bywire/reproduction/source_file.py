@@ -17,11 +17,10 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TypeVar, cast, get_args
 
 from bywire.core.arguments import checked
-from bywire.core.catalog import CitedSet
+from bywire.core.catalog import Cited, CitedSet, Formula, derived
+from bywire.core.catalog import Origin as Provenance
 from bywire.core.errors import InputError, ParameterError, unknown_name
 from bywire.core.parameters import ParameterSet
-from bywire.core.provenance import Cited, Formula, derived
-from bywire.core.provenance import Kind as Provenance
 from bywire.core.registry import pick
 from bywire.core.units import convert
 from bywire.data.toml_file import read_toml

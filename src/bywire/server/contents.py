@@ -10,9 +10,8 @@ from typing import Any
 
 from bywire.bench.result_folder import RECORD
 from bywire.core.errors import FileError
-from bywire.data.file_kinds import BENCH, CAMPAIGN, HEADS, LIFE, STUDY, kind_of
 from bywire.data.format_registry import FORMATS
-from bywire.data.toml_file import LARGEST, read_toml
+from bywire.data.toml_file import BENCH, CAMPAIGN, HEADS, LARGEST, LIFE, STUDY, kind_of, read_toml
 from bywire.server.place import Place
 
 _DEEP, _MOST = 4, 5000  # folders in folders, and files, that are looked at

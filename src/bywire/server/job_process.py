@@ -21,8 +21,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from bywire.core.callers import heard_warnings
 from bywire.core.errors import BywireError
-from bywire.core.heard_warnings import heard_warnings
 from bywire.core.interrupts import interrupt_heard, interrupts_noted
 from bywire.server.study_so_far import begin_to_tell, tell
 
@@ -79,7 +79,7 @@ def _explained(error: Exception) -> str:
 def _compute(order: Mapping[str, Any]) -> None:
     from bywire.core.brake import load_system
     from bywire.core.callers import command_line
-    from bywire.core.unneeded import silence_matplotlib
+    from bywire.core.libraries import silence_matplotlib
     from bywire.report.answer import AnswerWarning, load_matplotlib, write_document
     from bywire.server.task import tasks
 

@@ -278,7 +278,7 @@ def _end(job: Job, last: Mapping[str, Any], status: int) -> None:
     else:
         how = f"signal {signal.Signals(-status).name}" if status < 0 else f"status {status}"
         job.message, job.state = (
-            f"its process ended by {how}, perhaps for want of memory: ask for less, or run the "
+            f"its process ended by {how}, probably out of memory: compute less, or run the "
             f"command 'bywire {job.task.command}' in a terminal",
             "failed",
         )

@@ -46,7 +46,7 @@ def row(task: Task, field: Field, there: Contents, chosen: str) -> str:
 def _hint(field: Field) -> str:
     said = field.hint
     if field.kind in _LINES:
-        said += " One in a line."
+        said += " One per line."
     if field.kind in _SEVERAL:
         said += " Several with Ctrl."
     return said.strip()

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from bywire.core.errors import unknown_name
+from bywire.core.machine import worker_count
 from bywire.core.typing import Array
-from bywire.core.workers import worker_count
 from bywire.simulation.compiler import IN_TURN, VECTOR, Compiler, find_compiler, load, load_library
 from bywire.simulation.engine import CUDA, Prepared, built_once, engine_names
 from bywire.simulation.native import Ends, plan_array, pointer, run_in_calls

@@ -15,8 +15,7 @@ import casadi as ca
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
 from bywire.simulation.contacts import gaps, stiffness
-from bywire.simulation.scheme import NEVER
-from bywire.simulation.set_valued import solve_small
+from bywire.simulation.scheme import NEVER, solve_small
 from bywire.simulation.symbols import SX, column, scalars, symbol_tuple
 
 

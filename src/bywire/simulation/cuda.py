@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bywire.core.errors import CompilerError, DeviceError, ParameterError, quoted
-from bywire.core.extras import how_to_install
+from bywire.core.libraries import how_to_install
 from bywire.core.pairs import read_count
 from bywire.core.scratch import scratch_folder
 from bywire.core.typing import Array

@@ -15,7 +15,7 @@ from bywire.simulation.expressions import as_number, needed
 from bywire.simulation.graph import Graph, Node
 from bywire.simulation.quadrature import Levels
 from bywire.simulation.schedule import ATTEMPTS, CAP, CLOSE, EDGE, NEAR, STILL, most_cuts
-from bywire.simulation.set_valued import FITTING, NEVER, NOTHING, RESIDUAL
+from bywire.simulation.scheme import FITTING, NEVER, NOTHING, RESIDUAL
 from bywire.simulation.stages import STATE, Stages, indented, leaf_namer, statements
 
 # The same as ``set_valued.project_exact``, which says why, in a loop: that is a tenth of the code.

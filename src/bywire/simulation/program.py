@@ -14,10 +14,9 @@ from bywire.core.errors import ModelError
 from bywire.core.model import Model, require_states
 from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.signals import Signal, signals_of
-from bywire.core.wiring_check import check_wiring
+from bywire.core.wiring import check_wiring
 from bywire.simulation.contacts import contact_forces, contact_jacobians
-from bywire.simulation.scheme import Pass, Symbols, build_pass
-from bywire.simulation.set_valued import project_exact
+from bywire.simulation.scheme import Pass, Symbols, build_pass, project_exact
 from bywire.simulation.symbols import SX, column, scalars, symbol_tuple
 
 

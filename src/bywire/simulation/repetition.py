@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from bywire.core.errors import StepError, not_valid
 from bywire.core.interrupts import thread_pool
+from bywire.core.machine import worker_count
 from bywire.core.typing import Array, Complex
-from bywire.core.workers import worker_count
 from bywire.simulation.advance import require_finite
 from bywire.simulation.case_kernels import lane_kernel
 from bywire.simulation.compiler import find_compiler

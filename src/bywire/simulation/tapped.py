@@ -15,9 +15,8 @@ from functools import cache, partial
 from typing import Annotated, Any, Literal, NamedTuple
 
 from bywire.core import ops
-from bywire.core.model import Model, Task
+from bywire.core.model import Model, Task, Wrapping
 from bywire.core.signals import Signal, ranges_of, signals_of
-from bywire.core.wrapping import Wrapping
 
 DEAD = 2.0
 """of the stimulus by which a task fails: it has lost its memory"""

@@ -18,7 +18,7 @@ from scipy import special
 
 from bywire.bench.changes import refuse_share_of_temperature, share_of
 from bywire.core.errors import ParameterError, not_valid, quoted, unknown_name
-from bywire.core.leaf import Leaf
+from bywire.core.parameters import Leaf
 from bywire.core.quantities import Unit
 from bywire.core.typing import Array
 from bywire.core.units import difference_unit, parse, shown

@@ -17,12 +17,11 @@ from typing import Any, Generic, Protocol, TypeVar
 from bywire.cases.runner import as_completed
 from bywire.core.arguments import whole_number
 from bywire.core.brake import load_brakes, loaded_files
-from bywire.core.callers import option
+from bywire.core.callers import heard_warnings, option
 from bywire.core.copies import may_copy, processes_with_brakes
 from bywire.core.errors import ParameterError, RunError
-from bywire.core.heard_warnings import heard_warnings
-from bywire.core.unneeded import allow_dask
-from bywire.core.workers import worker_count
+from bywire.core.libraries import allow_dask
+from bywire.core.machine import worker_count
 from bywire.data.file_format import library
 from bywire.simulation.engine import CUDA
 from bywire.studies.plan import StudyPlan

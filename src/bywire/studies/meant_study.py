@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 from bywire.core.errors import FileError
-from bywire.data.file_kinds import STUDY, first_there, kind_of_file, near_files
+from bywire.data.toml_file import STUDY, first_there, kind_of_file, near_files
 
 _FOLDER = Path("studies")  # where study files usually are
 _NEAR = 0.8  # resemblance of a study file that was meant

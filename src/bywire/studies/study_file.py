@@ -20,8 +20,7 @@ from bywire.core.errors import InputError, ParameterError, not_valid, quoted, un
 from bywire.core.quantities import Unit
 from bywire.core.section import Hint, Name, Names, Section, Table
 from bywire.core.units import parse
-from bywire.data.file_kinds import STUDY, require_kind
-from bywire.data.toml_file import read_toml
+from bywire.data.toml_file import STUDY, read_toml, require_kind
 from bywire.studies.designs import (
     DEFAULT_CASES,
     IMPORTANCE,

@@ -1,4 +1,4 @@
-"""What several use cases ask for."""
+"""Arguments that several use cases share."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -71,14 +71,14 @@ ExportFolder = Annotated[str | Path, Ask("Folder of the export.", is_folder=True
 Cases = Annotated[
     int | None,
     Ask(
-        "Cases in place of the file's; more extend the study, fewer take back what is not "
+        "Cases instead of the file's; more extend the study, fewer drop those that are not "
         "computed.",
         "Cases",
     ),
 ]
-Workers = Annotated[int | None, Ask("Processes; one a core by default, where it is worth it.")]
+Workers = Annotated[int | None, Ask("Processes; by default one per core, where worthwhile.")]
 ClusterAddress = Annotated[str, Ask("Dask scheduler that computes instead.", metavar="ADDRESS")]
-EngineName = Annotated[str, Ask("What computes, e.g. cuda: a GPU.")]
+EngineName = Annotated[str, Ask("Engine, e.g. cuda for a GPU.")]
 StudyFolder = Annotated[str | Path, Ask("Folder of the study.", metavar="FOLDER")]
 
 
@@ -110,7 +110,7 @@ TestBench = Annotated[
 MeaningFile = Annotated[
     str | Path | None,
     Ask(
-        "What the columns mean (TOML).",
+        "Meaning of the columns (TOML).",
         "What the columns mean",
         name="map",
         metavar="PATH",
@@ -120,7 +120,7 @@ MeaningFile = Annotated[
 Inputs = Annotated[
     Mapping[str, str],
     Ask(
-        "What drives the model, e.g. 'p_set=Demand [bar]'.",
+        "Signals that drive the model, e.g. 'p_set=Demand [bar]'.",
         "Inputs",
         name="input",
         kind="pairs",

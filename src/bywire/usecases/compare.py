@@ -25,7 +25,7 @@ Runs = Annotated[
 IsFull = Annotated[
     bool,
     Ask(
-        "Show settings and key figures that are the same, too.",
+        "Also show settings and key figures that are equal.",
         "Show what is the same, too",
         name="full",
     ),

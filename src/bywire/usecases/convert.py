@@ -24,9 +24,9 @@ Exclude = Annotated[
     Sequence[str] | None,
     Ask("Leave out gaps, missing (both by default), clipped; or nothing.", is_listing=True),
 ]
-MaxGap = Annotated[str, Ask("Longest pause that is no gap, e.g. '50 ms'; 10 steps by default.")]
+MaxGap = Annotated[str, Ask("Longest pause that is not a gap, e.g. '50 ms'; 10 steps by default.")]
 Format = Annotated[str, Ask("Format to write, e.g. mat73; else by the ending.")]
-Force = Annotated[bool, Ask("Replace a file that is there.")]
+Force = Annotated[bool, Ask("Replace an existing file.")]
 
 
 @use_case(Command("convert", writes=""))
@@ -87,13 +87,13 @@ def convert(
     """
     from bywire.api.convert import Conversion, aligned
     from bywire.core.errors import ParameterError
-    from bywire.data.file_format import no_progress
+    from bywire.core.typing import silent
     from bywire.data.format_registry import format_to_write
     from bywire.data.measurement import mapping_of
     from bywire.data.named_columns import read_wanted
     from bywire.data.writing import require_free, write_measurement
 
-    shown = no_progress if progress is None else progress
+    shown = silent if progress is None else progress
     source, target = Path(source), Path(target)
     format_to_write(target, format)
     require_free(target, overwrite=force)

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from bywire.core.blas import on_one_thread
+from bywire.core.libraries import on_one_thread
 from bywire.usecases.asks import At, Changes, LoopName, ParameterSetName, Side
 from bywire.usecases.declare import NOTHING, Ask, Command, Form, use_case
 
@@ -14,12 +14,12 @@ if TYPE_CHECKING:
 
 Required = Annotated[
     Sequence[str],
-    Ask("Requirement, e.g. 'bandwidth >= 10 Hz'; as often as needed.", "Requirements"),
+    Ask("Requirement, e.g. 'bandwidth >= 10 Hz'; may be repeated.", "Requirements"),
 ]
 RequirementsFile = Annotated[str | Path | None, Ask("TOML file with a section 'requirements'.")]
 Ranges = Annotated[
     Sequence[str],
-    Ask("Range to serve too, e.g. motor.R_m=0.2ohm:0.6ohm:5 or at=5bar:35bar:7.", "Ranges"),
+    Ask("Further range to cover, e.g. motor.R_m=0.2ohm:0.6ohm:5 or at=5bar:35bar:7.", "Ranges"),
 ]
 SineAmplitudes = Annotated[
     str, Ask("Amplitudes of the sines on the bench, e.g. '1 bar, 3 bar'.", "Amplitudes")

@@ -17,11 +17,11 @@ IsChecked = Annotated[
         "where a bit differs."
     ),
 ]
-Bus = Annotated[bool, Ask("Describe its memory for a CAN bus, too.")]
+Bus = Annotated[bool, Ask("Also describe its memory for a CAN bus.")]
 Prefix = Annotated[
     str,
     Ask(
-        "What files and symbols begin with, so that several ECUs link into one program.",
+        "Prefix of files and symbols, so that several ECUs link into one program.",
         shown_default="the model's name",
     ),
 ]

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any
 
-from bywire.core.blas import on_one_thread
+from bywire.core.libraries import on_one_thread
 from bywire.usecases.asks import (
     At,
     Changes,

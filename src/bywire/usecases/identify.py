@@ -4,9 +4,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from bywire.core.blas import on_one_thread
 from bywire.core.callers import option
 from bywire.core.errors import ParameterError
+from bywire.core.libraries import on_one_thread
 from bywire.usecases.asks import (
     CaseName,
     Changes,
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from bywire.api.identification import Identification
     from bywire.api.trust import TrustStudy
     from bywire.core.typing import Progress
-    from bywire.identification.fitting.question import Question
+    from bywire.identification.question import Question
 
 _ANY_BENCH = "Methods of any bench"
 MethodName = Annotated[str, Ask("Method, see 'bywire list'.", "Method", known=("methods",))]
@@ -90,7 +90,7 @@ NoisyOutputs = Annotated[
 Unknowns = Annotated[
     Mapping[str, str],
     Ask(
-        "What is searched, e.g. 'motor.R_m=0.1..1 ohm', offset.i_meas.",
+        "Unknown to estimate, e.g. 'motor.R_m=0.1..1 ohm', offset.i_meas.",
         "Unknowns",
         name="unknown",
         kind="names",
@@ -101,7 +101,7 @@ Unknowns = Annotated[
 Priors = Annotated[
     Mapping[str, str],
     Ask(
-        "What is known of it, e.g. 'motor.R_m=0.35 +- 0.02 ohm'.",
+        "Prior knowledge of an unknown, e.g. 'motor.R_m=0.35 +- 0.02 ohm'.",
         "Known before",
         name="prior",
         kind="pairs",
@@ -131,7 +131,7 @@ Loss = Annotated[
 Holdout = Annotated[
     Path | None,
     Ask(
-        "Measurement that is not fitted: validation.",
+        "Measurement for validation, which is not fitted.",
         "Measurement for validation",
         kind="file",
         panel=_ANY_BENCH,
@@ -168,7 +168,7 @@ def _asked(
     A command names what a `Question` holds one by one.
     """
     from bywire.api.trust import trust
-    from bywire.identification.fitting.question import Question
+    from bywire.identification.question import Question
 
     question = Question(bench, inputs, outputs, unknowns, priors, states, case, holdout, loss)
     shared: dict[str, Any] = {
@@ -306,12 +306,12 @@ def identify(
     ['A', 'F_0', 'f']
     """
     from bywire.api.identification import Source, choose, identified
-    from bywire.data.file_format import no_progress
-    from bywire.identification.fitting.question import Question
+    from bywire.core.typing import silent
+    from bywire.identification.question import Question
 
     question = Question() if question is None else question
     sources = [measurements] if isinstance(measurements, Source) else list(measurements)
-    shown = no_progress if progress is None else progress
+    shown = silent if progress is None else progress
     chosen = choose(
         method,
         parameters,

@@ -1,4 +1,4 @@
-"""A package for a brake of one's own."""
+"""A package for your own brake."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -11,7 +11,9 @@ if TYPE_CHECKING:
 BrakeName = Annotated[str, Ask("Name of the brake, e.g. my-brake.")]
 ProjectFolder = Annotated[
     str | Path,
-    Ask("Folder in which its own is made; the current one by default.", name="out", is_folder=True),
+    Ask(
+        "Parent folder of the new package; by default the current one.", name="out", is_folder=True
+    ),
 ]
 
 

@@ -25,7 +25,7 @@ LifeName = Annotated[
 ]
 CheckedStops = Annotated[
     int,
-    Ask("Stops to run one by one as well, to check the projection.", "Stops one by one", least=0),
+    Ask("Stops to run one by one too, to check the projection.", "Stops one by one", least=0),
 ]
 
 

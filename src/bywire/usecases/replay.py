@@ -28,7 +28,7 @@ ModelChanges = Annotated[Mapping[str, Any], BENCH_CHANGES]
 Outputs = Annotated[
     Sequence[str] | Mapping[str, str],
     Ask(
-        "What is compared, e.g. 'p_mc=Pressure [psi]'; by default all.",
+        "Signals to compare, e.g. 'p_mc=Pressure [psi]'; by default all.",
         "Outputs",
         name="output",
         kind="names",
@@ -51,7 +51,7 @@ Segments = Annotated[
     ),
 ]
 Tracked = Annotated[
-    Sequence[str], Ask("Track a drifting parameter as well, e.g. mu_B.", "Drifting parameters")
+    Sequence[str], Ask("Also track a drifting parameter, e.g. mu_B.", "Drifting parameters")
 ]
 
 
@@ -145,14 +145,13 @@ def replay(
         When something that is asked for does not fit, or the measurement cannot be used.
     """
     from bywire.api.replay import Replay, columns_of_bench, driven_bench, stretches_of, units_of
-    from bywire.data.file_format import no_progress
+    from bywire.core.typing import silent
+    from bywire.identification import bench_replay, tracking
+    from bywire.identification.bench_replay import case_of
     from bywire.identification.measured import measured, name_of
-    from bywire.identification.replaying import bench_replay, tracking
-    from bywire.identification.replaying.bench_replay import case_of
-    from bywire.identification.replaying.fit import judged
-    from bywire.identification.replaying.tolerances import read_tolerances
+    from bywire.identification.replay_fit import judged, read_tolerances
 
-    shown = no_progress if progress is None else progress
+    shown = silent if progress is None else progress
     driven = driven_bench(bench, overrides)
     limits = read_tolerances(tolerances)
     columns = {n: c for n, c in outputs.items() if c} if isinstance(outputs, Mapping) else {}

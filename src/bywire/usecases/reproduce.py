@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated
 
-from bywire.core.blas import on_one_thread
+from bywire.core.libraries import on_one_thread
 from bywire.usecases.declare import Ask, Form, use_case
 
 if TYPE_CHECKING:

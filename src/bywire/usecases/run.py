@@ -25,7 +25,7 @@ Faults = Annotated[
         metavar="NAME[=VALUE][@ONSET]",
     ),
 ]
-Engine = Annotated[str, Ask("What computes, e.g. sil: the ECU's compiled C in the loop.")]
+Engine = Annotated[str, Ask("Engine, e.g. sil: the ECU's compiled C in the loop.")]
 Animate = Annotated[bool, Ask("Write pages that play the runs, with --out.")]
 
 

@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from bywire.core.blas import on_one_thread
 from bywire.core.errors import UnknownNameError, unknown_name
+from bywire.core.libraries import on_one_thread
 from bywire.usecases.asks import ParameterSetName
 from bywire.usecases.declare import NOTHING, Ask, Command, Form, use_case
 

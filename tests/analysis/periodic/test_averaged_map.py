@@ -10,6 +10,7 @@ import pytest
 from bywire.analysis.loop import LOOPS, Point
 from bywire.analysis.periodic import (
     PeriodicModel,
+    Stroboscope,
     dithered_loop,
     find_orbit,
     period_of,
@@ -22,7 +23,6 @@ from bywire.brakes.motorcycle.dither.dithered_plant import dithered_plant
 from bywire.brakes.motorcycle.trim import holding_current
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.errors import ParameterError, SolverError
-from bywire.simulation.stroboscope import Stroboscope
 from systems.describing import Held
 from systems.dithered import DITHERED, Dithered, Driven, Shaken, mobility, multiplier
 

@@ -23,7 +23,7 @@ from bywire.bench.kpis import (
 from bywire.bench.kpis.families import FAMILIES, FamilyJudge, evaluate, evaluate_cases
 from bywire.bench.kpis.loop_family import NO_NUMBER
 from bywire.bench.kpis.samples import moving_average, smoothed
-from bywire.bench.rows import Rows
+from bywire.bench.recording import Rows
 from bywire.simulation.compiler import find_compiler
 
 needs_compiler = pytest.mark.skipif(find_compiler() is None, reason="there is no C compiler")

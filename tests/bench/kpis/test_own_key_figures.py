@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import bywire
 from bywire.bench.kpis.families import FAMILIES, evaluate, evaluate_cases
-from bywire.bench.rows import Rows
+from bywire.bench.recording import Rows
 from bywire.core.errors import ModelError
 from systems.loading import loaded
 
@@ -56,11 +57,12 @@ def test_the_example_of_the_page_gives_its_figures_of_one_run_and_of_many(tmp_pa
 def test_what_cannot_be_translated_is_refused_when_the_brake_is_loaded(tmp_path):
     wrong = example().replace("count += 1", "count += 2**k")
     line = 1 + wrong[: wrong.index("2**k")].count("\n")
-    with (
-        loaded(written(tmp_path, wrong, "swung_wrongly")),
-        pytest.raises(ModelError, match=f"swinging.py, line {line}, in passages: .*`2 \\*\\* k`"),
-    ):
-        FAMILIES.find("swinging")
+    sentence = f"swinging.py, line {line}, in passages: .*`2 \\*\\* k`"
+    with loaded(written(tmp_path, wrong, "swung_wrongly")):
+        with pytest.raises(ModelError, match=sentence):
+            FAMILIES.find("swinging")
+        with pytest.raises(ModelError, match=sentence):  # no experiment needs to ask for it
+            bywire.check("swung")
 
 
 def test_key_figures_without_setting_are_refused(tmp_path):

@@ -263,7 +263,7 @@ REFUSED = {
     "a counter that moves": ("for k in range(9):\n    k = 3\nreturn 0.0", 1, "counts a loop"),
     "a counter after its loop": ("for k in range(9):\n    pass\nreturn 1.0 * k", 2, "no value yet"),
     "a list in a loop": ("for k in range(9):\n    z = list(y)\nreturn 0.0", 1, "made once"),
-    "a signal that is changed": ("y[0] = 1.0\nreturn y[0]", 0, "itself makes can be changed"),
+    "a signal that is changed": ("y[0] = 1.0\nreturn y[0]", 0, "only a list of this function can be changed"),
     "a list that is changed late": (
         "z = list(y)\na = z[1:]\nz[2] = 9.0\nreturn a[1]",
         2,

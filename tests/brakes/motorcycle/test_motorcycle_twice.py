@@ -12,7 +12,7 @@ from bywire.brakes.motorcycle.model import MotorcycleBrake
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.core.assembly import Assembly
 from bywire.core.parameters import ParameterSet
-from bywire.core.subassembly import Sub
+from bywire.core.parts import Sub
 from bywire.simulation.program import check_model
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bywire.bench.rows import Rows
+from bywire.bench.recording import Rows
 from bywire.brakes.motorcycle import watch
 from bywire.core.catalog import PARAMETER_SETS
 

@@ -14,6 +14,7 @@ from bywire.identification.measured import joined, measured, split
 from bywire.identification.method import Effort
 from bywire.identification.methods.seal_friction import METHOD, velocity
 from bywire.identification.trust import trust
+from raising import raises
 
 MEASURED = Path(__file__).parents[4] / "shared" / "data" / "seal_friction"
 MAP = """time = { column = "1", unit = "ms" }
@@ -108,7 +109,7 @@ def test_force_is_shown_over_travel() -> None:
 def test_one_pressure_or_no_stroke_is_refused() -> None:
     parts = split(METHOD.synthetic(None, METHOD.defaults, 1))
     alone = joined({"a": parts["level_0"], "b": parts["level_0"]})
-    with pytest.raises(ParameterError, match=r"f cannot be told from F_0: .* bar; give"):
+    with raises(ParameterError, name="f"):
         METHOD.identify(alone, None, METHOD.defaults, Effort())
     still = METHOD.defaults.replace({"x_low": 0.1, "x_high": 0.2})
     with pytest.raises(ParameterError, match="no stroke crosses"):

@@ -12,9 +12,9 @@ import pytest
 
 import bywire
 from bywire.core.catalog import main_set
-from bywire.core.connections import STIMULUS, Network, Node, network
 from bywire.core.model import ASSEMBLIES
 from bywire.core.wires import Wire
+from bywire.core.wiring import STIMULUS, Network, Node, network
 from bywire.report.schematic import Schematic, layered, schematic, schematic_svg
 from systems.loading import loaded
 

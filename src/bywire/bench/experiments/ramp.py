@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Annotated, Any
+
+from pydantic import Field
 
 from bywire.bench.experiment import Experiment
 from bywire.bench.generic_experiment import (
     Course,
     GenericExperiment,
     InputLevel,
-    InputRate,
     TestedModel,
 )
 from bywire.bench.kpis import extremes, hysteresis
@@ -18,7 +19,9 @@ from bywire.bench.stimuli import ramp
 from bywire.bench.stimulus import Stimulus
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
-from bywire.core.quantities import Duration, TimeConstant
+from bywire.core.quantities import Duration, TimeConstant, Unit
+
+InputRate = Annotated[float, Unit("input/s"), Field(gt=0, allow_inf_nan=False)]
 
 
 class Options(ParameterSet):

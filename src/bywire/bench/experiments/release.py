@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from pydantic import Field
 
 from bywire.bench.experiment import Experiment
 from bywire.bench.generic_experiment import (
     Course,
     GenericExperiment,
     InputLevel,
-    OutputLevel,
     TestedModel,
 )
 from bywire.bench.kpis import release
 from bywire.bench.stimulus import Stimulus
 from bywire.core.parameters import ParameterSet
-from bywire.core.quantities import Duration, TimeConstant
+from bywire.core.quantities import Duration, TimeConstant, Unit
+
+OutputLevel = Annotated[float, Unit("output"), Field(allow_inf_nan=False)]
 
 
 class Options(ParameterSet):

@@ -13,7 +13,6 @@ from bywire.bench.experiment import Experiment
 from bywire.bench.generic_experiment import (
     Course,
     GenericExperiment,
-    InputAmplitude,
     InputLevel,
     TestedModel,
 )
@@ -27,6 +26,7 @@ from bywire.core.typing import Array
 Count = Annotated[int, Unit("1", 5.0), Field(ge=1, le=1000)]
 
 _LEAST_ROWS = 8  # least rows of the recording in the shortest period
+InputAmplitude = Annotated[float, Unit("input"), Field(gt=0, allow_inf_nan=False)]
 
 
 class Options(ParameterSet):

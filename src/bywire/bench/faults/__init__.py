@@ -1,1 +1,1 @@
-"""Faults of a bench: what may fail, when it does, and what that changes in its runs."""
+"""Faults of a bench: failure modes, their times, and their effects in runs."""

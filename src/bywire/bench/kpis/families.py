@@ -14,7 +14,7 @@ import xarray as xr
 from bywire.bench.kpis.kpi import Kpi, KpiOfCases, Measure
 from bywire.bench.kpis.loop_family import LoopFamily
 from bywire.bench.kpis.samples import signal
-from bywire.bench.rows import Rows
+from bywire.bench.recording import Rows
 from bywire.core.errors import ModelError
 from bywire.core.parameters import ParameterSet
 from bywire.core.registry import Kind
@@ -63,8 +63,9 @@ def _declared(module: ModuleType) -> Iterator[Family]:
                 name="Setting",
             )
         loops = None if select else LoopFamily(module)
-        if loops is not None and not module.__name__.startswith("bywire."):
-            loops.translate()  # an author sees a mistake at once, not in a study
+        if loops is not None and not module.__name__.startswith("bywire.bench."):
+            # A brake's: its author sees a mistake in the first run, and not in the first study.
+            loops.translate()
         yield Family(name, summary, module.Setting, figures, select, loops)
 
 
@@ -268,7 +269,7 @@ def evaluate_cases(name: str, rows: Rows, settings: Sequence[Any]) -> dict[str, 
     Raises
     ------
     UnknownNameError
-        When the family, or a signal that a setting asks for by name, is unknown.
+        When the family, or a signal that a setting names, is unknown.
     """
     chosen = FAMILIES.find(name)
     if chosen.loops is not None:

@@ -123,7 +123,7 @@ class LoopFamily:
         Raises
         ------
         UnknownNameError
-            When the recording does not hold a signal that the family cannot do without.
+            When the recording does not contain a signal that the family needs.
         """
         signals: dict[str, Array | None] = {}
         level = "1"

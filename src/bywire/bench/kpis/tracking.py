@@ -1,4 +1,4 @@
-"""How well a signal follows its moving set point."""
+"""Tracking errors of a signal that follows a moving set point."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from bywire.bench.kpis.samples import defect, signal, smoothed, treatment
 from bywire.core.typing import Array
 
 _LONGEST_LAG = 0.3  # s: longer delays are not looked for
-_STILL = 0.05  # of the set point's range: a signal that moves by less does not follow
+_STILL = 0.05  # of the set point's range: least motion of a signal that follows
 
 
 @dataclass(frozen=True)
 class Setting:
-    """What follows what.
+    """Set point and signal.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ class Tracking:
 
     @cached_property
     def defect(self) -> str:
-        """Why no figure is defined."""
+        """Reason why no figure is defined."""
         return defect(self.t, self.y, self.demand)
 
     @cached_property
@@ -100,7 +100,7 @@ def select(recording: xr.Dataset, setting: Setting) -> Tracking:
     Raises
     ------
     UnknownNameError
-        When the recording does not hold them.
+        When the recording does not contain them.
     """
     t, _ = signal(recording, "time")
     y, unit = signal(recording, setting.signal)
@@ -112,13 +112,13 @@ def select(recording: xr.Dataset, setting: Setting) -> Tracking:
 
 @measure("level")
 def tracking_rms(data: Tracking) -> float | Undefined:
-    """Root mean square of the signal less its set point."""
+    """Root mean square of the signal minus its set point."""
     return float(np.sqrt(np.mean((data.y - data.demand) ** 2)))
 
 
 @measure("level")
 def tracking_max(data: Tracking) -> float | Undefined:
-    """Largest magnitude of the signal less its set point."""
+    """Largest magnitude of the signal minus its set point."""
     return float(np.max(np.abs(data.y - data.demand)))
 
 
@@ -130,7 +130,7 @@ def tracking_lag(data: Tracking) -> float | Undefined:
 
 @measure("level")
 def tracking_rms_without_lag(data: Tracking) -> float | Undefined:
-    """Root mean square of the signal less the delayed set point."""
+    """Root mean square of the signal minus the delayed set point."""
     if isinstance(data.lag, Undefined):
         return data.lag
     return float(np.sqrt(np.mean((data.y - data.delayed(data.lag)) ** 2)))

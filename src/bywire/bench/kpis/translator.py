@@ -102,7 +102,7 @@ class Function:
     name
         Its name in C.
     parameters, returns
-        Types of what it takes, by name, and of what it gives.
+        Types of its parameters, by name, and of its result.
     text
         Its C.
     arrays
@@ -137,12 +137,12 @@ class Unit:
         return "\n".join([*types, *(function.text for function in self._functions.values())])
 
     def function(self, function: Callable[..., Any]) -> Function:
-        """Return a function's translation, which comes after those that it calls.
+        """Return a function's translation, after those of the functions that it calls.
 
         Raises
         ------
         ModelError
-            When it holds what has no translation, with its line.
+            When it cannot be translated, with the line.
         """
         if not isinstance(function, FunctionType):
             raise ModelError(f"{function!r} is not a function in a source file")
@@ -218,7 +218,7 @@ def fields_of(record: type) -> dict[str, Kind]:
 
 
 def _hints(of: Any) -> dict[str, Any]:
-    """Return what annotations stand for."""
+    """Return the types of annotations."""
     try:
         return typing.get_type_hints(of)
     except NameError as error:
@@ -259,7 +259,7 @@ class _Writer:
         a = node.args
         for each in (a.vararg, a.kwarg, *a.kwonlyargs, *a.posonlyargs):
             if each is not None:
-                self.refuse(each, "parameters stand in one row: name: type, ...")
+                self.refuse(each, "its parameters must be plain: name: type, ...")
         self.kinds = {each.arg: self.annotated(each, each.arg) for each in a.args}
         returns = self.annotated(node, "return")
         name = self.unit.new_name(f"k_{self.function.__name__}")
@@ -349,10 +349,10 @@ class _Writer:
     def assigned(self, node: ast.stmt, name: str, value: ast.expr, kind: Kind | None) -> list[str]:
         """Return the lines that give a variable its value, and its type with the first one."""
         if name in self.counters:
-            self.refuse(node, f"{name!r} counts a loop, whose next turn gives it another value")
+            self.refuse(node, f"{name!r} counts a loop, and the loop changes its value")
         lines, given = self.list_made(value)
         if name in self.arrays and not lines:
-            self.refuse(node, f"{name!r} is a list that is made here: give this another name")
+            self.refuse(node, f"{name!r} is a list of this function: give this another name")
         kind = kind or self.kinds.get(name) or given.kind
         if kind == _NOTHING:
             self.refuse(node, "annotate the variable: `name: float | None = None`")
@@ -367,7 +367,7 @@ class _Writer:
         match node:
             case ast.BinOp(ast.List([ast.Constant(float(start))]), ast.Mult(), count):
                 if start != 0.0:
-                    self.refuse(node, "a list begins as [0.0] * len(...)")
+                    self.refuse(node, "a list must start as [0.0] * len(...)")
                 self.made.arrays += self.array(node)
                 return [""], Value(f"bw_zeros(room, {self.length(count)})", SAMPLES)
             case ast.Call(ast.Name("list"), [copied], []):
@@ -380,7 +380,7 @@ class _Writer:
     def array(self, node: ast.AST) -> int:
         """Return 1, of a list that is made once."""
         if self.loops:
-            self.refuse(node, "a list is made once, and not in every turn of a loop")
+            self.refuse(node, "a list must not be created within a loop")
         return 1
 
     def comprehension(
@@ -441,13 +441,13 @@ class _Writer:
     def stored(self, target: ast.Subscript) -> str:
         """Return the place of a list in which a number is stored."""
         if not isinstance(target.value, ast.Name) or target.value.id not in self.arrays:
-            self.refuse(target, "only a list that the function itself makes can be changed")
+            self.refuse(target, "only a list of this function can be changed")
         return f"((double *){c_name(target.value.id)}.at)[{self.index(target.value, target.slice)}]"
 
     def loop(self, node: ast.For, name: str, over: ast.expr, body: Sequence[ast.stmt]) -> list[str]:
         """Return the lines of a loop over a range or over samples; its bounds are known at once."""
         if name in self.kinds:
-            self.refuse(node, f"{name!r} is in use: give what counts this loop a name of its own")
+            self.refuse(node, f"{name!r} is in use: give the loop's variable another name")
         k = c_name(name)
         if self.calls(over, range):
             head, self.kinds[name] = [f"{{ {self.range_head(over, k)}"], INT

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
-from bywire.bench.stimulus import Amplitude, Count, Level, reached
+from bywire.bench.stimulus import Amplitude, Level, reached
 from bywire.core.parameters import ParameterSet
-from bywire.core.quantities import Frequency, TimeConstant
+from bywire.core.quantities import Frequency, TimeConstant, Unit
+
+Count = Annotated[int, Unit("1", 16.0), Field(ge=1, le=10_000)]
 
 
 class Parameters(ParameterSet):

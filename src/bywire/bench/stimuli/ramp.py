@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
-from bywire.bench.stimulus import Level, LevelRate
+from bywire.bench.stimulus import Level
 from bywire.core.parameters import ParameterSet
-from bywire.core.quantities import TimeConstant
+from bywire.core.quantities import TimeConstant, Unit
+
+LevelRate = Annotated[float, Unit("level/s"), Field(gt=0, allow_inf_nan=False)]
 
 
 class Parameters(ParameterSet):

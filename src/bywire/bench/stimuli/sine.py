@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import math
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
-from bywire.bench.stimulus import Amplitude, Level, Phase, reached
+from bywire.bench.stimulus import Amplitude, Level, reached
 from bywire.core.parameters import ParameterSet
-from bywire.core.quantities import Frequency, TimeConstant
+from bywire.core.quantities import Frequency, TimeConstant, Unit
+
+Phase = Annotated[float, Unit("rad"), Field(allow_inf_nan=False)]
 
 
 class Parameters(ParameterSet):

@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from bywire.brakes.two_wheeler.parameters import TwoWheelerParameters
+from bywire.core.catalog import chosen, derived
 from bywire.core.parameters import ParameterSet
-from bywire.core.provenance import chosen, derived
 from bywire.core.quantities import Length, Volume
 from bywire.core.typing import Array
 from bywire.life import warm_stops

@@ -15,8 +15,8 @@ from bywire.brakes.wedge.laws.moment_control import SomeMoment
 from bywire.brakes.wedge.rigs.wedge_corner import WedgeCornerParameters
 from bywire.brakes.wedge.sets.roberts2003 import ADJUSTER
 from bywire.control import wear_adjuster
+from bywire.core.catalog import chosen
 from bywire.core.parameters import ParameterSet
-from bywire.core.provenance import chosen
 from bywire.core.quantities import Length
 from bywire.core.typing import Array
 from bywire.life import warm_stops

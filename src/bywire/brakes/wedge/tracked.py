@@ -11,7 +11,7 @@ from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.core.errors import not_valid
 from bywire.core.typing import Array
 from bywire.data.recursive_filter import filtered
-from bywire.identification.replaying.tracking import Relation, Rows
+from bywire.identification.tracking import Relation, Rows
 
 _PRESSED = 0.1  # share of the largest force below which the relation is imprecise
 _STEADY = 0.02  # largest change per sensor time constant, over the largest force

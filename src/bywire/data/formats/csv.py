@@ -1,14 +1,18 @@
-"""CSV: text tables, read block by block, of which only the chosen columns are kept."""
+"""CSV: text tables, read block by block, of which only the chosen columns are kept.
+
+The end of a table is looked at too: a number that was cut is told from one that is complete.
+"""
 
 from __future__ import annotations
 
 import csv
 import io
+import math
 import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,26 +20,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bywire.core.errors import FileError, quoted
-from bywire.data.file_format import Column, FileFormat, Progress, ReadOptions
+from bywire.core.typing import Progress
+from bywire.data.file_format import Column, FileFormat, ReadOptions
 from bywire.data.text_dialect import (
     COMMENTS,
+    END_OF_HEADER,
     HEAD,
+    NUMBER,
+    SEPARATORS,
     TEXT,
     UNCLEAR,
     Dialect,
     cells_of,
     dialect_of,
     head_of_table,
+    layout_of,
     with_mark,
 )
-from bywire.data.text_encoding import blocks_of, is_text
-from bywire.data.text_layouts import layout_of
-from bywire.data.text_rows import LOOKED_AT, Seen, require_whole_end, strict_columns
+from bywire.data.text_encoding import blocks_of, is_text, not_utf8
 from bywire.data.time_stamps import (
     CLOCK,
     DAY,
     DIGITS,
     MOMENT,
+    is_stamp,
     nanoseconds,
     of_digits,
     over_midnight,
@@ -44,6 +52,201 @@ from bywire.data.time_stamps import (
 if TYPE_CHECKING:
     import xarray as xr
 
+_LOOKED_AT = 1 << 16
+"""bytes before the end that are looked at for a number that was cut"""
+
+_LAST = 100  # rows before the last one that are looked at
+_FEWEST = 10
+_RARE = 0.05  # of them: as many numbers may be as short as one that counts as cut
+_NUMBER = re.compile(r"[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]+)?")
+
+
+@dataclass
+class _Seen:
+    """What was found in a table beside its numbers.
+
+    Parameters
+    ----------
+    marks
+        How often each cell of a column, counted from 0, says that nothing was measured.
+    comments, empty
+        How many rows were left out as comments, and as rows of separators alone.
+    origins
+        First time stamp of each column that has such [ns].
+    """
+
+    marks: Counter[tuple[int, str]] = field(default_factory=Counter)
+    comments: int = 0
+    empty: int = 0
+    origins: dict[int, int] = field(default_factory=dict)
+
+    def add(self, other: _Seen) -> None:
+        """Add what was found in a part of the table."""
+        self.marks += other.marks
+        self.comments += other.comments
+        self.empty += other.empty
+
+
+def _strict_columns(
+    path: Path, block: bytes, first_line: int, dialect: Dialect, indices: Sequence[int], seen: _Seen
+) -> list[NDArray[np.float64]]:
+    """Return columns of a block of lines; blank cells become NaN, blank lines are left out.
+
+    Parameters
+    ----------
+    path
+        What errors call the file.
+    block
+        Whole lines.
+    first_line
+        Number of the first of them.
+    dialect
+        How the table is written.
+    indices
+        Which columns.
+    seen
+        What else is found is added to it.
+
+    Raises
+    ------
+    FileError
+        For a row of another length and a cell that is no number, with line and column.
+    """
+    try:
+        text = block.decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise not_utf8(path, first_line + block[: error.start].count(b"\n")) from None
+    if dialect.separator == " ":
+        text = "\n".join(" ".join(line.split()) for line in text.split("\n"))
+    rows: list[list[float]] = []
+    reader = csv.reader(
+        io.StringIO(text, newline=""),
+        delimiter=dialect.separator,
+        strict=True,
+        skipinitialspace=True,
+    )
+    line = first_line
+    try:
+        for cells in reader:
+            cells = [cell.strip() for cell in cells]
+            if cells and cells[0].startswith(COMMENTS):
+                seen.comments += 1
+            elif any(cells):
+                _require_width(path, line, cells, dialect)
+                rows.append([_number(path, line, cells[k], k, dialect, seen) for k in indices])
+            elif cells and len(cells) > 1:
+                seen.empty += 1
+            line = first_line + reader.line_num
+    except csv.Error as error:
+        raise FileError(f"{path}, line {line}: {error}: check its quotation marks") from None
+    values = np.array(rows, dtype=np.float64).reshape(-1, len(indices))
+    return [np.ascontiguousarray(column) for column in values.T]
+
+
+def _require_width(path: Path, line: int, cells: list[str], dialect: Dialect) -> None:
+    while len(cells) > dialect.width and not cells[-1]:
+        cells.pop()  # spreadsheets end rows with bare separators
+    if dialect.is_ragged:
+        if cells[0].startswith(END_OF_HEADER) or cells[0] == "Channels":
+            raise FileError(
+                f"{path}, line {line}: another table begins here: save each in a file of its own"
+            )
+        cells += [""] * (dialect.width - len(cells))
+    if len(cells) != dialect.width:
+        fix = (
+            "complete the row: where blanks separate columns, a missing value needs a mark such as "
+            "nan"
+            if dialect.separator == " "
+            else "complete the row, or remove it if the recording was cut here; with decimal "
+            "commas, separate the columns by semicolons"
+        )
+        raise FileError(
+            f"{path}, line {line}: {len(cells)} cells, but the first row has {dialect.width} "
+            f"(separated by {SEPARATORS[dialect.separator]}): {fix}; where other lines stand "
+            "before the table, skip_lines in the mapping tells how many"
+        )
+
+
+def _number(path: Path, line: int, cell: str, column: int, dialect: Dialect, seen: _Seen) -> float:
+    if dialect.is_mark(cell):
+        if cell:
+            seen.marks[column, cell] += 1
+        return math.nan
+    kind = dialect.kinds[column]
+    where = f"{path}, line {line}, column {quoted(dialect.label(column))}: {quoted(cell)}"
+    if kind not in (NUMBER, DIGITS):
+        stamp = nanoseconds(cell, kind)
+        if stamp is None:
+            raise FileError(f"{where} is no {kind} like those above it: correct it")
+        return (stamp - seen.origins[column]) / 1e9
+    plain = cell if dialect.decimal == "." else cell.replace(",", ".")
+    ok = _NUMBER.fullmatch(plain) and (dialect.decimal == "." or "." not in cell)
+    value = float(plain) if ok else math.inf
+    if math.isfinite(value):
+        return value
+    if is_stamp(cell):
+        raise FileError(
+            f"{where} is a time stamp that bywire cannot read among these cells: times are read "
+            "as 09:12:33.5 or 2026-11-26T09:12:33.5 in all rows; seconds from the start are "
+            "read too"
+        )
+    other = "," if dialect.decimal == "." else "."
+    hint = f"; the decimal mark is {dialect.decimal!r} here" if other in cell else ""
+    raise FileError(
+        f"{where} is not a finite number{hint}: correct it; where it marks a missing value, write "
+        f"missing = [{cell!r}] in the mapping"
+    )
+
+
+def _require_whole_end(path: Path, block: bytes, last_line: int, dialect: Dialect) -> None:
+    """Refuse a table that seems to end within its last number.
+
+    Many programs end a table without a line end, and a cut there does not show by itself. It does
+    where hardly a number before it in that column is as short: counted in decimals where they
+    have as many as each other, in characters where they vary.
+
+    Parameters
+    ----------
+    path
+        What errors call the file.
+    block
+        Its last bytes.
+    last_line
+        Number of the last of them.
+    dialect
+        How the table is written.
+
+    Raises
+    ------
+    FileError
+        With the line.
+    """
+    if block.endswith((b"\n", b"\r")):
+        return
+    if dialect.kinds and dialect.kinds[-1] not in (NUMBER, DIGITS):
+        return
+    separator, mark = dialect.separator.encode(), dialect.decimal.encode()
+    lines = block.rsplit(b"\n", _LAST)[1:]
+    cells = [line.rstrip().rpartition(separator)[2].strip() for line in lines]
+    if len(cells) <= _FEWEST:
+        return
+    decimals = [len(cell.partition(mark)[2]) for cell in cells]
+    usual, uses = Counter(decimals[:-1]).most_common(1)[0]
+    is_fixed = usual > 0 and uses >= (1.0 - _RARE) * (len(cells) - 1)
+    sizes = decimals if is_fixed else [len(cell.lstrip(b"+-")) for cell in cells]
+    as_short = sum(size <= sizes[-1] for size in sizes[:-1])
+    if as_short < _RARE * (len(cells) - 1):
+        more = "have more decimals" if is_fixed else "are longer"
+        few = f"all but {as_short}" if as_short else "all"
+        cell = quoted(cells[-1].decode("utf-8", "replace"))
+        raise FileError(
+            f"{path}, line {last_line}: it ends with {cell} and without a line end, and {few} "
+            f"numbers before in that column {more}: remove the row if the recording was cut here, "
+            "or end it with a line end if it is whole"
+        )
+
+
+# --- Block by block
 
 _BLOCK = 1 << 24  # bytes
 _PIECE = 1 << 18  # bytes of a block with a flaw that are looked at together: cells take much memory
@@ -52,7 +255,7 @@ _QUOTED = rb'(?m)(?:^|%s) *"[^"\r\n]*"(?=%s|\r?$)'  # a cell, separators around 
 _COMMENTS = tuple(mark.encode() for mark in COMMENTS)
 _STAMPS = (CLOCK, MOMENT, DAY)
 
-RASTER = "X_Value"
+_RASTER = "X_Value"
 """name of the instants that a file has as a start and a step alone, as LabVIEW calls them"""
 
 
@@ -62,7 +265,7 @@ class TextSource:
     def __init__(self, path: Path, dialect: Dialect) -> None:
         self._path = path
         self._dialect = dialect
-        self._seen = Seen()
+        self._seen = _Seen()
         names = _names(dialect)
         self.order: Sequence[str] = names
         self._index = {name: k for k, name in enumerate(names)}
@@ -84,14 +287,14 @@ class TextSource:
             if name not in self.left_out
         }
         if self._dialect.raster is not None:
-            columns = {name: replace(column, clock=RASTER) for name, column in columns.items()}
-            columns[RASTER] = Column(RASTER, "s")
+            columns = {name: replace(column, clock=_RASTER) for name, column in columns.items()}
+            columns[_RASTER] = Column(_RASTER, "s")
         return columns
 
     def read(self, names: Sequence[str], progress: Progress) -> dict[str, NDArray[np.float64]]:
         """Return the numbers of some columns; blank cells become NaN."""
         raster = self._dialect.raster
-        plain = [name for name in names if raster is None or name != RASTER]
+        plain = [name for name in names if raster is None or name != _RASTER]
         indices = [self._index[name] for name in plain] or [0]
         is_dated = self._day is not None and any(self._kind(k) == CLOCK for k in indices)
         if is_dated:
@@ -113,7 +316,7 @@ class TextSource:
         self._remark()
         numbers = dict(zip(plain, columns, strict=False))
         if raster is not None:
-            numbers[RASTER] = raster[0] + raster[1] * np.arange(columns[0].size, dtype=np.float64)
+            numbers[_RASTER] = raster[0] + raster[1] * np.arange(columns[0].size, dtype=np.float64)
         return {name: numbers[name] for name in names}
 
     def place(self, name: str, row: int) -> str:
@@ -146,8 +349,8 @@ class TextSource:
                 growing = GrowingColumns(len(indices), int(expected) + 1)
             growing.append(columns)
             line += block.count(b"\n")
-            tail = tail[-LOOKED_AT:] + block[-LOOKED_AT:]
-            require_whole_end(self._path, tail, line, dialect)
+            tail = tail[-_LOOKED_AT:] + block[-_LOOKED_AT:]
+            _require_whole_end(self._path, tail, line, dialect)
             progress(f"reading {self._path.name}", min(1.0, done / max(size, 1)))
         return growing.finished()
 
@@ -194,7 +397,7 @@ class TextSource:
             self.remarks.append(f"lines of comment left out of the table: {self._seen.comments}")
         if self._seen.empty:
             self.remarks.append(f"rows of empty cells left out: {self._seen.empty}")
-        self._seen = Seen(origins=self._seen.origins)
+        self._seen = _Seen(origins=self._seen.origins)
 
 
 def _names(dialect: Dialect) -> list[str]:
@@ -252,7 +455,7 @@ def _blocks(path: Path, dialect: Dialect) -> Iterator[bytes]:
 
 
 def _fast(
-    block: bytes, dialect: Dialect, indices: Sequence[int], seen: Seen
+    block: bytes, dialect: Dialect, indices: Sequence[int], seen: _Seen
 ) -> list[NDArray[np.float64]] | None:
     """Return the columns of a block without a flaw; None where each line needs a look."""
     import pandas as pd
@@ -299,7 +502,7 @@ def _width(block: bytes, dialect: Dialect) -> int:
     return width + 1 if is_right and not rest else 0
 
 
-def _seconds(cells: Any, dialect: Dialect, column: int, seen: Seen) -> NDArray[np.float64] | None:
+def _seconds(cells: Any, dialect: Dialect, column: int, seen: _Seen) -> NDArray[np.float64] | None:
     """Return time stamps as seconds from the first one; None where one is none."""
     kind, origin = dialect.kinds[column], seen.origins[column]
     stamps = [nanoseconds(str(cell).strip(), kind) for cell in cells]
@@ -309,7 +512,7 @@ def _seconds(cells: Any, dialect: Dialect, column: int, seen: Seen) -> NDArray[n
 
 
 def _careful(
-    path: Path, block: bytes, line: int, dialect: Dialect, indices: Sequence[int], seen: Seen
+    path: Path, block: bytes, line: int, dialect: Dialect, indices: Sequence[int], seen: _Seen
 ) -> list[NDArray[np.float64]]:
     """Return the columns of a block with a flaw: line by line where it is, else by a library."""
     parts = []
@@ -319,14 +522,14 @@ def _careful(
         if columns is None:
             columns = _with_marks(plain, dialect, indices, seen)
         if columns is None:
-            columns = strict_columns(path, piece, line, dialect, indices, seen)
+            columns = _strict_columns(path, piece, line, dialect, indices, seen)
         parts.append(columns)
         line += piece.count(b"\n")
     return [np.concatenate(columns) for columns in zip(*parts, strict=True)]
 
 
 def _with_marks(
-    block: bytes, dialect: Dialect, indices: Sequence[int], seen: Seen
+    block: bytes, dialect: Dialect, indices: Sequence[int], seen: _Seen
 ) -> list[NDArray[np.float64]] | None:
     """Return the columns of lines whose only flaw is cells that say that nothing was measured."""
     import pandas as pd
@@ -347,7 +550,7 @@ def _with_marks(
     )
     if len(frame) != block.count(b"\n") + (not block.endswith(b"\n")):
         return None
-    found, columns = Seen(), []
+    found, columns = _Seen(), []
     for k in indices:
         cells = [cell.strip() for cell in frame[k]]
         marked = np.array([dialect.is_mark(cell) for cell in cells])

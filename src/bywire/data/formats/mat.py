@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bywire.core.errors import FileError, quoted
-from bywire.data.file_format import Column, FileFormat, Progress, ReadOptions
+from bywire.core.typing import Progress
+from bywire.data.file_format import Column, FileFormat, ReadOptions
 from bywire.data.matlab_layout import OBJECT, Found, Part, columns_of, described
 
 if TYPE_CHECKING:

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bywire.core.errors import FileError, quoted
-from bywire.data.file_format import Column, FileFormat, Progress, ReadOptions, library
+from bywire.core.typing import Progress
+from bywire.data.file_format import Column, FileFormat, ReadOptions, library
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from bywire.core.errors import FileError
 from bywire.core.interrupts import interrupts_deferred
-from bywire.data.file_format import Column, FileFormat, Progress, ReadOptions
+from bywire.core.typing import Progress
+from bywire.data.file_format import Column, FileFormat, ReadOptions
 
 if TYPE_CHECKING:
     import xarray as xr

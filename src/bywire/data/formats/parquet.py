@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bywire.data.file_format import Column, FileFormat, Progress, ReadOptions, library
+from bywire.core.typing import Progress
+from bywire.data.file_format import Column, FileFormat, ReadOptions, library
 
 if TYPE_CHECKING:
     import xarray as xr

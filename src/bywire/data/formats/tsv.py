@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from bywire.data.file_format import Progress
+from bywire.core.typing import Progress
 from bywire.data.formats import csv
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from bywire.core.provenance import Cited
+from bywire.core.catalog import Cited
 from bywire.export.controller import render
 from bywire.export.controller.c_text import c_name
 from bywire.export.controller.contract import INPUT, LARGEST, RESULT, CheckedInput

@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from bywire.core.catalog import PARAMETER_SETS
-from bywire.core.provenance import Cited
+from bywire.core.catalog import PARAMETER_SETS, Cited
 from bywire.export.controller.body import Statement
 from bywire.export.controller.c_text import BEGIN_C, END_C, c_name, comment, wrapped
 from bywire.export.controller.contract import INPUT, RESULT, CheckedInput

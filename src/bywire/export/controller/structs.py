@@ -7,8 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from bywire.core.field_notes import field_notes
-from bywire.core.parameters import leaf_fields
+from bywire.core.parameters import field_notes, leaf_fields
 from bywire.core.signals import signal_in
 from bywire.export.controller.c_text import Precision, c_name, unique
 from bywire.export.controller.derived import Derivations

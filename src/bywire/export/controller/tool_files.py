@@ -8,8 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bywire.core.leaf import Leaf
-from bywire.core.parameters import leaf_fields
+from bywire.core.parameters import Leaf, leaf_fields
 from bywire.core.signals import signals_of
 from bywire.export.controller.c_text import BEGIN_C, END_C, c_name, comment, wrapped
 from bywire.export.controller.contract import INPUT, RESULT

@@ -108,7 +108,7 @@ LAWS = (
 """the simplest first"""
 
 
-def laws_for(data: xr.Dataset) -> Sequence[Law]:
+def _laws_for(data: xr.Dataset) -> Sequence[Law]:
     """Return the laws that a record can tell: those with pressure where it differs enough."""
     if "pressure" in data:
         p = data["pressure"].values
@@ -117,7 +117,7 @@ def laws_for(data: xr.Dataset) -> Sequence[Law]:
     return tuple(law for law in LAWS if not law.pressure)
 
 
-def find_law(name: str) -> Law:
+def _find_law(name: str) -> Law:
     """Return a law by its name."""
     return next(law for law in LAWS if law.name == name)
 
@@ -126,7 +126,7 @@ def _product(unit: str) -> str:
     return f"({unit})" if "/" in unit else unit
 
 
-def sliding(records: Mapping[str, xr.Dataset], slowest: float) -> dict[str, xr.Dataset]:
+def _sliding(records: Mapping[str, xr.Dataset], slowest: float) -> dict[str, xr.Dataset]:
     """Return the samples that slide, by record.
 
     Parameters
@@ -165,7 +165,9 @@ def _require_both_ways(sliding: Mapping[str, xr.Dataset], slowest: float) -> Non
             f"too few samples slide {' and '.join(short)} ({said}; {_LEAST} each way are needed): "
             "record motion to and fro (speed changes its sign), or lower "
             f"{option('options')} slowest, which "
-            f"leaves out what is slower than {100 * slowest:g} % of a record's fastest speed"
+            f"leaves out what is slower than {100 * slowest:g} % of a record's fastest speed",
+            name="slowest",
+            value=f"{slowest:g}",
         )
 
 
@@ -255,17 +257,19 @@ def identify(data: xr.Dataset, par: None, options: Options, effort: Effort) -> I
     ----------
     Armstrong-Helouvry, Dupont, Canudas de Wit (1994), Automatica 30 (7), section 2: the laws.
     """
-    records = sliding(split(data), options.slowest)
+    records = _sliding(split(data), options.slowest)
     whole = xr.concat(list(records.values()), "time", combine_attrs="override")
-    known = laws_for(whole)
-    wanted = known if options.law == "choose" else (find_law(options.law),)
+    known = _laws_for(whole)
+    wanted = known if options.law == "choose" else (_find_law(options.law),)
     if wanted[0] not in known:
         raise ParameterError(
-            f"law {options.law!r} needs a measured pressure that varies by 20 % at least"
+            f"law {options.law!r} needs a measured pressure that varies by at least 20 %",
+            name="law",
+            value=options.law,
         )
     choice = choose([law.candidate() for law in wanted], records, "friction")
     best = choice.chosen
-    law = find_law(best.candidate.name)
+    law = _find_law(best.candidate.name)
     unit = str(whole["friction"].attrs.get("units", "1"))
     values = [
         best.estimate[u.label] if u.label in best.estimate.names else u.start
@@ -388,7 +392,7 @@ def synthetic(par: None, options: Options, seed: int) -> xr.Dataset:
     return joined(records)
 
 
-def known_values(par: None, options: Options) -> dict[str, float]:
+def _known_values(par: None, options: Options) -> dict[str, float]:
     """Return what simulated records are made of, under the laws' names."""
     values = options.truth.leaves()
     values.pop("noise")
@@ -418,7 +422,7 @@ METHOD = Method(
     simulated=("pressures", "v_max", "f_motion", "duration", "interval", "truth"),
     gaps=True,
     optional={"pressure": "Pa"},
-    truth=known_values,
+    truth=_known_values,
     further={
         "F_c": ("", "Coulomb friction, or F_p forward and F_n backward"),
         "f": ("", "friction over pressure"),

@@ -14,16 +14,10 @@ from bywire.bench.experiment import Case, as_run
 from bywire.core.callers import option
 from bywire.core.errors import ParameterError, unknown_name, unknown_of_few
 from bywire.core.signals import Signal, signals_of, without_noise
-from bywire.identification.fitting.bench_fit import BenchFit, noise_given
-from bywire.identification.fitting.question import (
-    BenchMethod,
-    Options,
-    Question,
-    is_parameter,
-    unknowns_of,
-)
+from bywire.identification.bench_fit import BenchFit, noise_given
+from bywire.identification.bench_replay import case_of
 from bywire.identification.method import Method
-from bywire.identification.replaying.bench_replay import case_of
+from bywire.identification.question import BenchMethod, Options, Question, is_parameter, unknowns_of
 from bywire.simulation.run import simulate
 
 _NAME = "output-error"
@@ -149,7 +143,9 @@ def _require_known(case: Case, question: Question) -> None:
     if not question.noise:
         raise ParameterError(
             f"no output is measured: give {option('outputs')} SIGNAL, once for each of the "
-            f"model's outputs that the record has, for instance {', '.join(list(outputs)[:6])}"
+            f"model's outputs that the record has, for instance {', '.join(list(outputs)[:6])}",
+            name="outputs",
+            valid=", ".join(outputs),
         )
     driven = without_noise(stimuli)
     states = case.model.State._fields

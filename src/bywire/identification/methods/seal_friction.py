@@ -66,7 +66,7 @@ def velocity(x: Array, interval: float, cutoff: float) -> Array:
     return np.gradient(low_passed(whole, interval, cutoff), interval)
 
 
-def find_strokes(x: Array, v: Array, low: float, high: float, slowest: float) -> list[Stroke]:
+def _find_strokes(x: Array, v: Array, low: float, high: float, slowest: float) -> list[Stroke]:
     """Return the strokes through a stretch of travel.
 
     Parameters
@@ -124,7 +124,7 @@ class Group:
         return f"{self.record} {way}" if self.record else way
 
 
-def grouped(
+def _grouped(
     record: xr.Dataset, stretch: tuple[float, float], slowest: float, cutoff: float, label: str = ""
 ) -> list[Group]:
     """Return the groups of a record, outward first.
@@ -145,7 +145,7 @@ def grouped(
     time = record["time"].values
     x, p, F = (record[name].values for name in ("x", "p", "F"))
     v = velocity(x, even_interval(time), cutoff)
-    strokes = find_strokes(x, v, *stretch, slowest)
+    strokes = _find_strokes(x, v, *stretch, slowest)
     groups = []
     for direction in (1, -1):
         means = np.array(
@@ -162,7 +162,7 @@ def grouped(
     return groups
 
 
-def require_told(groups: Sequence[Group]) -> None:
+def _require_told(groups: Sequence[Group]) -> None:
     """Refuse strokes that do not tell the friction from the area, or its two parts apart.
 
     Raises
@@ -173,19 +173,23 @@ def require_told(groups: Sequence[Group]) -> None:
     if not groups:
         raise ParameterError(
             "no stroke crosses the stretch x_low to x_high: move the piston to and fro through "
-            f"it, or set {option('options')} x_low and x_high to where it moves"
+            f"it, or set {option('options')} x_low and x_high to where it moves",
+            name="x_low",
         )
     if len({g.direction for g in groups}) < 2:
-        raise ParameterError("F_0 and f need strokes both ways: friction alone changes sign")
+        raise ParameterError(
+            "F_0 and f need strokes both ways: friction alone changes sign", name="F_0"
+        )
     levels = [g.p for g in groups]
     if max(levels) < _APART * min(levels) or len(groups) < 4:
         raise ParameterError(
-            f"f cannot be told from F_0: all strokes were made at {min(levels) / 1e5:.3g} to "
-            f"{max(levels) / 1e5:.3g} bar; give a record each at two pressures or more"
+            f"f cannot be separated from F_0: all strokes were made at {min(levels) / 1e5:.3g} to "
+            f"{max(levels) / 1e5:.3g} bar; give a record each at two pressures or more",
+            name="f",
         )
 
 
-def require_signs(A: float, friction: float) -> None:
+def _require_signs(A: float, friction: float) -> None:
     """Refuse an area below zero, and friction that drives.
 
     Parameters
@@ -207,20 +211,20 @@ def require_signs(A: float, friction: float) -> None:
         raise wrong_sign("F", "x", f"friction {friction:.3g} N in the mean: it would drive")
 
 
-def half_widths(groups: Sequence[Group]) -> tuple[Array, Array]:
+def _half_widths(groups: Sequence[Group]) -> tuple[Array, Array]:
     """Return mean pressure and half the loop's height of neighboring groups up and down."""
     pairs = [(a, b) for a, b in pairwise(groups) if a.direction == 1 and b.direction == -1]
     p = np.array([0.5 * (a.p + b.p) for a, b in pairs])
     return p, np.array([0.5 * (a.F - b.F) for a, b in pairs])
 
 
-def pressure_between(groups: Sequence[Group]) -> float:
+def _pressure_between(groups: Sequence[Group]) -> float:
     """Return by how much the pressure is higher outward than inward [Pa]."""
     up, down = (np.mean([g.p for g in groups if g.direction == d]) for d in (1, -1))
     return float(up - down)
 
 
-def drifting(groups: Sequence[Group], area: float) -> tuple[str, ...]:
+def _drifting(groups: Sequence[Group], area: float) -> tuple[str, ...]:
     """Return which groups' force drifts from stroke to stroke, with how much.
 
     Parameters
@@ -247,7 +251,7 @@ def drifting(groups: Sequence[Group], area: float) -> tuple[str, ...]:
     return tuple(texts)
 
 
-def misfits(groups: Sequence[Group], W: Array, F: Array) -> tuple[str, ...]:
+def _misfits(groups: Sequence[Group], W: Array, F: Array) -> tuple[str, ...]:
     """Return which records lie off what all others tell, with how far.
 
     The mean forces of each record are compared with what the fit without it predicts.
@@ -287,7 +291,7 @@ def misfits(groups: Sequence[Group], W: Array, F: Array) -> tuple[str, ...]:
 # --- Curves: the line over pressure, and the force while it slides
 
 
-def friction_line(fit: Estimate, groups: Sequence[Group]) -> Curve:
+def _friction_line(fit: Estimate, groups: Sequence[Group]) -> Curve:
     """Return friction over pressure with its band, and what each group says of it."""
     offset = fit["F_off"] if "F_off" in fit.names else 0.0
     seen = {g.p: g.direction * (g.F - fit["A"] * g.p - offset) for g in groups}
@@ -312,7 +316,7 @@ def friction_line(fit: Estimate, groups: Sequence[Group]) -> Curve:
     )
 
 
-def sliding_force(
+def _sliding_force(
     records: Mapping[str, xr.Dataset],
     fit: Estimate,
     stretch: tuple[float, float],
@@ -332,7 +336,7 @@ def sliding_force(
     )
 
 
-def force_over_travel(
+def _force_over_travel(
     records: Mapping[str, xr.Dataset],
     fit: Estimate,
     stretch: tuple[float, float],
@@ -359,7 +363,7 @@ def _sliding(
     x, p, F = (record[n].values for n in ("x", "p", "F"))
     v = velocity(x, even_interval(record["time"].values), cutoff)
     model = np.full(F.size, np.nan)
-    for stroke in find_strokes(x, v, *stretch, slowest):
+    for stroke in _find_strokes(x, v, *stretch, slowest):
         k = stroke.rows
         model[k] = fit["A"] * p[k] + stroke.direction * (fit["F_0"] + fit["f"] * p[k]) + offset
     return np.where(np.isfinite(model), F, np.nan), model
@@ -445,8 +449,8 @@ def identify(data: xr.Dataset, par: None, options: Options, effort: Effort) -> I
     """
     records = split(data)
     how = ((options.x_low, options.x_high), options.slowest, options.cutoff)
-    groups = [g for label, record in records.items() for g in grouped(record, *how, label)]
-    require_told(groups)
+    groups = [g for label, record in records.items() for g in _grouped(record, *how, label)]
+    _require_told(groups)
     s, p, F = (np.array([getattr(g, n) for g in groups]) for n in ("direction", "p", "F"))
     columns = {"A": p, "F_0": s.astype(float), "f": s * p}
     if options.zero == "free":
@@ -458,8 +462,8 @@ def identify(data: xr.Dataset, par: None, options: Options, effort: Effort) -> I
     problem = Problem(unknowns, lambda values: ((W @ values - F) / sigma, W / sigma))
     fit = estimate(problem)
     friction = float(np.mean(fit["F_0"] + fit["f"] * p))
-    require_signs(fit["A"], friction)
-    loop = np.polyfit(*half_widths(groups), 1)
+    _require_signs(fit["A"], friction)
+    loop = np.polyfit(*_half_widths(groups), 1)
     return Identified(
         estimates={"seal friction": fit},
         parameters={},
@@ -467,7 +471,7 @@ def identify(data: xr.Dataset, par: None, options: Options, effort: Effort) -> I
             "force_over_pressure": (fit["A"], "N/Pa"),
             "loop_half_width_at_0": (float(loop[1]), "N"),
             "loop_half_width_over_pressure": (float(loop[0]), "N/Pa"),
-            "pressure_between_directions": (pressure_between(groups), "Pa"),
+            "pressure_between_directions": (_pressure_between(groups), "Pa"),
         },
         checks=(
             Check(
@@ -486,17 +490,17 @@ def identify(data: xr.Dataset, par: None, options: Options, effort: Effort) -> I
             *_bore_check(fit["A"], options.bore),
         ),
         curves=(
-            friction_line(fit, groups),
-            sliding_force(records, fit, *how),
-            force_over_travel(records, fit, *how),
+            _friction_line(fit, groups),
+            _sliding_force(records, fit, *how),
+            _force_over_travel(records, fit, *how),
         ),
         notes=(
             f"{sum(len(g.strokes) for g in groups)} strokes in {len(groups)} groups of record "
             "and direction",
             "loop half widths leave out that the pressure differs between the directions",
             *(f"{label} {reason}" for label, reason in fit.vague().items()),
-            *drifting(groups, fit["A"]),
-            *misfits(groups, W, F),
+            *_drifting(groups, fit["A"]),
+            *_misfits(groups, W, F),
             *(() if options.bore else (_unchecked(),)),
         ),
     )

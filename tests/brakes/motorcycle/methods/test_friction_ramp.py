@@ -14,8 +14,8 @@ from bywire.brakes.motorcycle.methods.stick_slip.slips import Slip, cut_out, fin
 from bywire.core.catalog import parameters
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
+from bywire.identification.measured import noise_of
 from bywire.identification.method import Effort, Identified
-from bywire.identification.noise import noise_of
 from bywire.identification.trust import trust
 from bywire.identification.unknown import parameters_of
 

@@ -11,9 +11,9 @@ import xarray as xr
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.core.catalog import parameters
 from bywire.core.errors import ParameterError
-from bywire.identification.fitting.question import find_method
 from bywire.identification.measured import joined, split
 from bywire.identification.method import Effort, Identified, Method
+from bywire.identification.question import find_method
 from bywire.identification.trust import trust
 from raising import raises
 

@@ -12,7 +12,7 @@ from bywire.brakes.wedge.experiments.screw_efficiency import LOAD_SWEEP
 from bywire.brakes.wedge.rigs.shaft_rig import DrivenShaft, Load
 from bywire.core.catalog import parameters
 from bywire.identification.output_error import trial
-from bywire.identification.sensed import Sensor, sensed
+from bywire.identification.trust import Sensor, sensed
 from bywire.simulation.run import simulate
 
 STEP = 20e-6

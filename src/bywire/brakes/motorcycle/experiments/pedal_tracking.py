@@ -19,7 +19,7 @@ from bywire.core.errors import FileError, ParameterError, quoted
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import TimeConstant
 from bywire.core.units import shown
-from bywire.data.trace import read_trace, trace_names
+from bywire.data.measurement import read_trace, trace_names
 from bywire.plant import pedal
 
 _COLUMNS = {"pressure": "Pa", "force": "N", "pedal": "m"}  # of a trace, the best one first

@@ -18,11 +18,7 @@ from bywire.brakes.motorcycle.model import MotorcycleBrake
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.trim import holding_current, memory_at, state_at
 from bywire.core.quantities import Current, Pressure, Torque, Unit
-from bywire.identification.electrics.current_loop import CurrentLoop
-from bywire.identification.electrics.loop_records import (
-    LoopOptions,
-    levels,
-)
+from bywire.identification.electrics import CurrentLoop, LoopOptions, levels
 from bywire.simulation.run import simulate
 
 

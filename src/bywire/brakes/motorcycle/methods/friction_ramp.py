@@ -32,10 +32,9 @@ from bywire.core.typing import Array
 from bywire.data.labeled import labeled
 from bywire.identification.estimate import Estimate
 from bywire.identification.least_squares import Problem, estimate
-from bywire.identification.measured import wrong_sign
+from bywire.identification.measured import noise_of, wrong_sign
 from bywire.identification.method import Check, Curve, Effort, Identified, Method
 from bywire.identification.multistart import Search, nearer, search
-from bywire.identification.noise import noise_of
 from bywire.identification.output_error import even_interval, trial
 from bywire.identification.unknown import Unknown, parameters_of, scattered
 from bywire.plant import seal_friction

@@ -15,15 +15,15 @@ from bywire.brakes.motorcycle.trim import holding_current
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Current, Duration, Pressure, Unit, Voltage
 from bywire.data.labeled import labeled
-from bywire.identification.electrics.loop_records import (
+from bywire.identification.electrics import (
     as_curve,
     believable,
     checks_of,
     levels,
     noise_of_levels,
     require_steps,
+    winding_trial,
 )
-from bywire.identification.electrics.winding import winding_trial
 from bywire.identification.least_squares import estimate
 from bywire.identification.measured import split
 from bywire.identification.method import Effort, Identified, Method

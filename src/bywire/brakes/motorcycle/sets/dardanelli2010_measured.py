@@ -13,8 +13,7 @@ from pathlib import Path
 
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.sets.dardanelli2010 import ENTRIES as _OTHERS
-from bywire.core.catalog import CitedSet
-from bywire.core.provenance import Formula, calibrated, chosen, derived
+from bywire.core.catalog import CitedSet, Formula, calibrated, chosen, derived
 from bywire.reproduction.source_file import SourceFile
 
 _PRIOR = next(entry for entry in _OTHERS if entry.name == "dardanelli2010-table1")

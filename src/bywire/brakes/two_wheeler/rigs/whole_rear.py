@@ -16,8 +16,7 @@ from bywire.brakes.two_wheeler import ecu
 from bywire.brakes.two_wheeler.model import TwoWheelerByWire, awake, tick
 from bywire.brakes.two_wheeler.parameters import WholeRearParameters
 from bywire.core.model import Task
-from bywire.core.parts import Part, Wire
-from bywire.core.subassembly import Sub
+from bywire.core.parts import Part, Sub, Wire
 from bywire.plant import brake_disc, pressure_loop, wheel_encoder
 from bywire.vehicle.two_wheeler import HotBrakes, cold_start, rolling_start
 

@@ -8,8 +8,7 @@ from typing import Any
 from bywire.brakes.motorcycle.sets import dardanelli2010
 from bywire.brakes.two_wheeler.parameters import TwoWheelerParameters, WholeRearParameters
 from bywire.brakes.two_wheeler.rigs.wheel_on_drum import WheelOnDrumParameters
-from bywire.core.catalog import CitedSet
-from bywire.core.provenance import Formula, chosen, derived
+from bywire.core.catalog import CitedSet, Formula, chosen, derived
 from bywire.plant.road import SURFACES
 from bywire.reproduction.source_file import SourceFile
 

@@ -31,7 +31,7 @@ from bywire.identification.least_squares import Problem, estimate
 from bywire.identification.measured import wrong_sign
 from bywire.identification.method import Check, Curve, Effort, Identified, Method
 from bywire.identification.output_error import even_interval
-from bywire.identification.sensed import Sensor, sensed
+from bywire.identification.trust import Sensor, sensed
 from bywire.identification.unknown import Unknown
 from bywire.plant import axial_bearing, servo_motor
 from bywire.plant.axial_bearing import AngularSpeed

@@ -13,11 +13,7 @@ from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.rigs.rig_case import check_current, shaft_case
 from bywire.brakes.wedge.rigs.shaft_rig import ShaftRig
 from bywire.core.quantities import Current, Duration, Unit
-from bywire.identification.electrics.current_loop import CurrentLoop
-from bywire.identification.electrics.loop_records import (
-    LoopOptions,
-    levels,
-)
+from bywire.identification.electrics import CurrentLoop, LoopOptions, levels
 from bywire.simulation.run import simulate
 
 _CLAMPED = {"rig.load": "dummy", "rig.clamp": "closed", "rig.mode_1": "current"}

@@ -30,7 +30,7 @@ from bywire.identification.measured import wrong_sign
 from bywire.identification.method import Curve, Effort, Identified, Method
 from bywire.identification.output_error import even_interval
 from bywire.identification.residuals import lack_of_fit
-from bywire.identification.sensed import Sensor, sensed
+from bywire.identification.trust import Sensor, sensed
 from bywire.identification.unknown import Unknown
 from bywire.plant import axial_bearing, roller_screw, servo_motor
 from bywire.plant.axial_bearing import AngularSpeed

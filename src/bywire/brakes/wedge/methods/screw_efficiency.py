@@ -37,7 +37,7 @@ from bywire.identification.estimate import Estimate
 from bywire.identification.measured import wrong_sign
 from bywire.identification.method import Check, Curve, Effort, Identified, Method
 from bywire.identification.residuals import lack_of_fit
-from bywire.identification.sensed import sensed
+from bywire.identification.trust import sensed
 from bywire.identification.unknown import parameters_of
 from bywire.plant import axial_bearing, roller_screw, servo_motor
 from bywire.plant.axial_bearing import AngularSpeed

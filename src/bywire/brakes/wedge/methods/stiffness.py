@@ -39,7 +39,7 @@ from bywire.identification.least_squares import Problem
 from bywire.identification.measured import joined, split
 from bywire.identification.method import Check, Curve, Effort, Identified, Method
 from bywire.identification.residuals import lack_of_fit
-from bywire.identification.sensed import Sensor, sensed
+from bywire.identification.trust import Sensor, sensed
 from bywire.identification.unknown import Unknown, parameters_of
 from bywire.plant import shaft_encoder
 

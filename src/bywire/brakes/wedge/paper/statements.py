@@ -14,7 +14,6 @@ from bywire.brakes.wedge.panels import BRAKING
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.sets import roberts2003
 from bywire.core.catalog import PARAMETER_SETS
-from bywire.report.time_traces import time_traces
 from bywire.reproduction.source_file import SourceFile
 
 if TYPE_CHECKING:
@@ -61,6 +60,8 @@ def stacked(run: xr.Dataset, measured: xr.Dataset | None = None) -> Figure:
     measured
         Recording of a rig with the same names and units; its variables may be fewer.
     """
+    from bywire.report.time_traces import time_traces  # with Matplotlib, which runs do without
+
     return time_traces(run, panels=STACK, measured=measured)
 
 

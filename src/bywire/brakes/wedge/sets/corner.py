@@ -6,7 +6,7 @@ from pathlib import Path
 
 from bywire.brakes.wedge.rigs.wedge_corner import WedgeCornerParameters
 from bywire.brakes.wedge.sets import roberts2003
-from bywire.core.provenance import derived
+from bywire.core.catalog import derived
 from bywire.plant.road import SURFACES
 from bywire.reproduction.source_file import SourceFile
 

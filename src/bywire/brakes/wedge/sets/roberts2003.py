@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.core.provenance import Formula
+from bywire.core.catalog import Formula
 from bywire.reproduction.source_file import SourceFile
 
 _LOOP_RATE = 2.0 * math.pi * 1200.0

@@ -13,7 +13,7 @@ from bywire.brakes.motorcycle.trim import state_at
 from bywire.core.callers import option
 from bywire.core.errors import ParameterError
 from bywire.core.typing import Array
-from bywire.identification.noise import noise_of
+from bywire.identification.measured import noise_of
 
 _WINDOW = 0.02  # s: over which a change counts as motion
 _SURE = 6.0  # standard deviations of that change

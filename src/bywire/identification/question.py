@@ -16,9 +16,8 @@ from bywire.bench.bench import Bench
 from bywire.bench.experiment import Case
 from bywire.core.arguments import checked
 from bywire.core.callers import option
-from bywire.core.errors import ParameterError, quoted, unknown_name
-from bywire.core.leaf import Leaf
-from bywire.core.parameters import ParameterSet, leaf_fields
+from bywire.core.errors import ParameterError, not_valid, quoted, unknown_name
+from bywire.core.parameters import Leaf, ParameterSet, leaf_fields
 from bywire.core.quantities import Factor, Unit
 from bywire.core.registry import Kind, instances
 from bywire.core.signals import signals_of, without_noise
@@ -245,7 +244,8 @@ def unknowns_of(case: Case, known: ParameterSet, question: Question) -> tuple[Un
     if not question.ranges:
         raise ParameterError(
             f"nothing is unknown: give {option('unknowns')} PARAMETER, once for each, for instance "
-            f"{option('unknowns')} {next(iter(leaf_fields(type(case.par))))}"
+            f"{option('unknowns')} {next(iter(leaf_fields(type(case.par))))}",
+            name="unknowns",
         )
     for name in question.priors:
         if name not in question.ranges:
@@ -279,24 +279,28 @@ def _bare(name: str, case: Case, known: ParameterSet, outputs: Iterable[str]) ->
     if name.startswith("initial."):
         raise ParameterError(
             f"unknown {name}: initial values are each record's own; write "
-            f"{option('states')} {name.removeprefix('initial.')}"
+            f"{option('states')} {name.removeprefix('initial.')}",
+            name=name,
         )
     given, leaves = known.flat().get(name), leaf_fields(type(known))
     if name not in leaves and given is not None:
         raise ParameterError(
             f"unknown {name}: it is a choice, here {quoted(given)}, and no number; try each with "
-            f"{option('overrides', {name: '...'})}"
+            f"{option('overrides', {name: '...'})}",
+            name=name,
         )
     if isinstance(given, tuple):
         raise ParameterError(
-            f"unknown {name}: it is a table, of which no node can be estimated; name a number"
+            f"unknown {name}: it is a table, of which no node can be estimated; name a number",
+            name=name,
         )
     if name not in leaves:
         raise unknown_name("parameter", name, [k for k in leaves if k in known.leaves()])
     if case.par.leaves()[name] != known.leaves()[name]:
         raise ParameterError(
             f"unknown {name}: the experiment itself sets it, to "
-            f"{shown(case.par.leaves()[name], leaves[name].unit.symbol)}; name another one"
+            f"{shown(case.par.leaves()[name], leaves[name].unit.symbol)}; name another one",
+            name=name,
         )
     return parameters_of(case.par, [name])[0]
 
@@ -309,13 +313,12 @@ def _with_texts(unknown: Unknown, within: str, prior: str, leaf: Leaf | None) ->
     low, high = _pair(unknown, within, within.split(".."), "range", "..")
     if not low < high:
         raise ParameterError(
-            f"range of {unknown.name}: {quoted(within)} is empty; the lower end comes first"
+            f"range of {unknown.name}: {quoted(within)} is empty; the lower end comes first",
+            name=f"range of {unknown.name}",
+            value=quoted(within),
         )
     if leaf is not None and (low < leaf.low or high > leaf.high):
-        raise ParameterError(
-            f"range of {unknown.name}: {quoted(within)} is not valid: {unknown.name} must be "
-            f"{leaf.range_text}"
-        )
+        raise not_valid(f"range of {unknown.name}", quoted(within), leaf.range_text)
     low = low if low > unknown.low or leaf is None or not leaf.low_open else max(low, _OPEN * high)
     # Where the bench's own value lies outside, the search begins in the middle.
     start = unknown.start if low <= unknown.start <= high else 0.5 * (low + high)
@@ -325,7 +328,8 @@ def _with_texts(unknown: Unknown, within: str, prior: str, leaf: Leaf | None) ->
 def _prior(unknown: Unknown, text: str) -> tuple[float, float]:
     mean, deviation = _pair(unknown, text, BETWEEN.split(text), "prior", " +- ")
     if not deviation > 0.0:
-        raise ParameterError(f"prior of {unknown.name}: {quoted(text)} wants a deviation > 0")
+        valid = "MEAN +- DEVIATION with a deviation > 0"
+        raise not_valid(f"prior of {unknown.name}", quoted(text), valid)
     return mean, deviation
 
 
@@ -338,7 +342,9 @@ def _pair(
         raise ParameterError(
             f"{kind} of {unknown.name}: {quoted(text)} cannot be read; write for instance "
             f"'{shown(low * unknown.scale, unknown.unit)}{sign}"
-            f"{shown(high * unknown.scale, _second_unit(unknown, kind))}'"
+            f"{shown(high * unknown.scale, _second_unit(unknown, kind))}'",
+            name=f"{kind} of {unknown.name}",
+            value=quoted(text),
         )
     first, second = (part.strip() for part in parts)
     unit = split(second)[1]

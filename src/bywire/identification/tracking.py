@@ -73,7 +73,7 @@ RELATIONS = Kind("relation", ("tracked",), instances(Relation))
 """by preference: the first of a parameter whose signals are measured is taken"""
 
 
-def find_relation(name: str, data: xr.Dataset, par: Any) -> Relation:
+def _find_relation(name: str, data: xr.Dataset, par: Any) -> Relation:
     """Return the relation that tells a parameter from what is measured.
 
     Parameters
@@ -100,14 +100,17 @@ def find_relation(name: str, data: xr.Dataset, par: Any) -> Relation:
         raise unknown_name("parameter to track", name, known)
     relations = [r for r in relations if r.parameter in par.flat()]
     if not relations:
-        raise ParameterError(f"{name} is tracked on brakes that have it; the parameters lack it")
+        raise ParameterError(
+            f"{name} is not a parameter here: track it on a brake that has it", name=name
+        )
     for relation in relations:
         if all(signal in data for signal in relation.signals):
             return relation
     wanted = " or ".join(", ".join(r.signals) for r in relations)
     raise ParameterError(
         f"tracking {relations[0].parameter} needs the measured signals {wanted}; measured are "
-        f"{nearest_first(map(str, data.data_vars), relations[0].signals)}"
+        f"{nearest_first(map(str, data.data_vars), relations[0].signals)}",
+        name=relations[0].parameter,
     )
 
 
@@ -307,7 +310,9 @@ def likeliest(
     if counts.sum() < 10 * p:
         raise ParameterError(
             f"{int(counts.sum())} samples count: too few to track {p} parameters; measure longer, "
-            "or where the relation holds"
+            "or where the relation holds",
+            name="samples",
+            value=str(int(counts.sum())),
         )
     W, y = regressors[counts], targets[counts]
     rough = float(np.std(y - W @ np.linalg.lstsq(W, y, rcond=None)[0])) or 1e-9
@@ -337,7 +342,7 @@ def _require_shapes(regressors: Array, targets: Array, start: Array) -> None:
     if targets.shape != (n,) or start.shape != (p,):
         raise ParameterError(
             f"shapes do not fit: regressors {regressors.shape}, targets {targets.shape}, start "
-            f"{start.shape}; wanted are (n, p), (n,) and (p,)"
+            f"{start.shape}; they must be (n, p), (n,) and (p,)"
         )
 
 
@@ -397,7 +402,7 @@ def track(name: str, data: xr.Dataset, par: Any, block: float | None = None) -> 
     UnknownNameError, ParameterError
         When nothing tells the parameter, or too little is measured.
     """
-    relation = find_relation(name, data, par)
+    relation = _find_relation(name, data, par)
     interval = even_interval(data["time"].values)
     span = float(data["time"].values[-1] - data["time"].values[0])
     wanted = _turn(data) if block is None else block

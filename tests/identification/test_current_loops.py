@@ -13,7 +13,7 @@ from bywire.brakes.motorcycle.methods import current_loop, motor_winding
 from bywire.brakes.wedge.methods import drive_current_loop
 from bywire.core.catalog import parameters
 from bywire.core.errors import ParameterError
-from bywire.identification.electrics.loop_records import levels, noise_of_levels
+from bywire.identification.electrics import levels, noise_of_levels
 from bywire.identification.measured import joined
 from bywire.identification.method import Effort, Identified, Method
 

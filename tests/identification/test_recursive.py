@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bywire.core.errors import ParameterError
-from bywire.identification.replaying.tracking import Walk, forgetting, kalman, likeliest
+from bywire.identification.tracking import Walk, forgetting, kalman, likeliest
 
 N, T = 600, 0.1
 

@@ -11,10 +11,17 @@ import xarray as xr
 
 import bywire
 from bywire.core.errors import ParameterError, UnitError, UnknownNameError
-from bywire.identification.replaying.bench_replay import replay
-from bywire.identification.replaying.fit import fit_figures, judged, undefined
-from bywire.identification.replaying.segments import Segment, found_in, read_segments
-from bywire.identification.replaying.tolerances import judge_fit
+from bywire.identification.bench_replay import replay
+from bywire.identification.replay_fit import (
+    Segment,
+    fit_figures,
+    found_in,
+    judge_fit,
+    judged,
+    read_segments,
+    undefined,
+)
+from raising import raises
 from run_once import run_once
 
 STOP = bywire.Bench("moment-pulses", "roberts2003", options={"t_hold": 0.2, "pulses": 1})
@@ -267,11 +274,11 @@ def test_what_does_not_fit_is_refused(ramp: xr.Dataset) -> None:
         "dardanelli2010",
         stimulus={"kind": "step", "start": 0, "end": 0, "t_step": 0},
     )
-    with pytest.raises(ParameterError, match="nothing measured drives the model"):
+    with raises(ParameterError, name="inputs", valid="i_set, v_set"):
         replay(bench, ramp[["i", "p_mc"]])
     with pytest.raises(UnknownNameError, match="i_set"):
         replay(bench, ramp[["i", "p_mc"]], {"i_st": "i"})
-    with pytest.raises(UnitError, match="p_mc is measured in Pa, but A is wanted"):
+    with raises(UnitError, name="p_mc", value="Pa", valid="A"):
         replay(bench, ramp[["i", "p_mc"]], {"i_set": "p_mc"})
     gap = ramp[["i", "p_mc"]].copy(deep=True)
     gap["i"][40] = np.nan

@@ -34,7 +34,7 @@ from bywire.simulation.run import Run, Trajectory, simulate
 _ACCUMULATED = ("J", "s")  # errors of which say when something went wrong, not how well it fits
 
 
-def compared_outputs(
+def _compared_outputs(
     case: Case, data: xr.Dataset, wanted: Sequence[str] | None, driven: Mapping[str, str]
 ) -> tuple[list[str], tuple[str, ...]]:
     """Return which outputs are compared, and what the user should know of it.
@@ -63,15 +63,17 @@ def compared_outputs(
             notes = (f"left out as flags, sums or constants: {', '.join(passed)}",)
     if not wanted:
         raise ParameterError(
-            "nothing measured is an output of the model: name signals as the model does "
+            "no measured signal is an output of the model: name signals as the model does "
             f"({option('mapping')}), "
             f"for instance {', '.join(list(signals)[:6])}; measured are "
-            f"{nearest_first(there, signals)}"
+            f"{nearest_first(there, signals)}",
+            name="mapping",
+            valid=", ".join(signals),
         )
     for name in wanted:
         if name not in signals:
             raise unknown_name("output", name, signals)
-        require_measured(data, name, signals[name])
+        _require_measured(data, name, signals[name])
     return list(wanted), notes
 
 
@@ -83,7 +85,7 @@ def _tells(values: Array, unit: str) -> bool:
     return not (unit == "1" and bool(np.all(there == np.round(there))))
 
 
-def missed_samples(data: xr.Dataset, compared: Sequence[str]) -> list[str]:
+def _missed_samples(data: xr.Dataset, compared: Sequence[str]) -> list[str]:
     """Return a sentence for each compared signal that misses samples."""
     counts = {name: int(np.isnan(data[name].values).sum()) for name in compared}
     total = data.sizes["time"]
@@ -95,12 +97,17 @@ def missed_samples(data: xr.Dataset, compared: Sequence[str]) -> list[str]:
     ]
 
 
-def require_measured(data: xr.Dataset, name: str, signal: Signal) -> None:
+def _require_measured(data: xr.Dataset, name: str, signal: Signal) -> None:
     """Refuse a signal that is not measured, or in a unit of something else."""
     require_signals(data, [name])
     unit = str(data[name].attrs.get("units", "1"))
     if unit != signal.unit and not measures(unit_of_symbol(unit), signal.unit):
-        raise UnitError(f"{name} is measured in {unit}, but {signal.unit} is wanted: check the map")
+        raise UnitError(
+            f"{name} is measured in {unit}, and must be in {signal.unit}: check the map",
+            name=name,
+            value=unit,
+            valid=signal.unit,
+        )
 
 
 # --- The run, before it is computed
@@ -187,7 +194,7 @@ def measured_run(
     """
     chosen = case_of(bench, case)
     driven = _inputs(chosen, data, inputs)
-    compared, passed = compared_outputs(chosen, data, outputs, driven)
+    compared, passed = _compared_outputs(chosen, data, outputs, driven)
     bench, begun_at, notes = _started(bench, data, compared)
     chosen = case_of(bench, case)
     if not settle and chosen.settle > 0.0:
@@ -200,7 +207,8 @@ def measured_run(
             at = float(data["time"].values[missing[0]])
             raise ParameterError(
                 f"{signal} drives the model and misses {missing.size} samples, the first at "
-                f"{at:.4g} s: cut the record there"
+                f"{at:.4g} s: cut the record there",
+                name=signal,
             )
     run = _run(bench, chosen, data, driven, between)
     return MeasuredRun(
@@ -228,7 +236,11 @@ def case_of(bench: Bench, label: str) -> Case:
     """
     cases = {case.label: case for case in bench.cases()}
     if not cases:
-        raise ParameterError(f"experiment {bench.experiment!r} makes no run: take another one")
+        raise ParameterError(
+            f"experiment {bench.experiment!r} makes no run: choose another one",
+            name="experiment",
+            value=bench.experiment,
+        )
     if label and label not in cases:
         raise unknown_name(f"run of {bench.experiment}", label, cases)
     return cases[label] if label else next(iter(cases.values()))
@@ -241,14 +253,16 @@ def _inputs(case: Case, data: xr.Dataset, wanted: Mapping[str, str] | None) -> d
     driven = without_noise(stimuli)
     if not wanted:
         raise ParameterError(
-            f"nothing measured drives the model: give {option('inputs', {'STIMULUS': 'SIGNAL'})} "
+            f"no measured signal drives the model: give {option('inputs', {'STIMULUS': 'SIGNAL'})} "
             f"with one of "
-            f"{', '.join(driven)} and one of {nearest_first(there, driven)}"
+            f"{', '.join(driven)} and one of {nearest_first(there, driven)}",
+            name="inputs",
+            valid=", ".join(driven),
         )
     for stimulus, signal in wanted.items():
         if stimulus not in stimuli:
             raise unknown_of_few("stimulus", stimulus, driven)
-        require_measured(data, signal, stimuli[stimulus])
+        _require_measured(data, signal, stimuli[stimulus])
     return dict(wanted)
 
 
@@ -287,8 +301,10 @@ def _on_grid(
         even, said = as_even(data, aligned.record)
         return even, aligned, tuple(said)
     raise StepError(
-        f"neither samples every {interval:g} s nor every {case.record:g} s go with steps of "
-        f"{bench.step:g} s: resample the measurement (bywire convert --rate)"
+        f"neither samples every {interval:g} s nor every {case.record:g} s fit steps of "
+        f"{bench.step:g} s: resample the measurement (bywire convert --rate)",
+        name="step",
+        value=f"{bench.step:g} s",
     )
 
 
@@ -369,7 +385,7 @@ def replay(
     Parameters
     ----------
     bench, data, inputs, outputs, case
-        See ``bywire.identification.replaying.bench_replay``.
+        See ``bywire.identification.bench_replay``.
     estimate_error
         Whether the model runs in other steps too; see `bywire.bench.running.run`.
 
@@ -381,7 +397,9 @@ def replay(
         When nothing drives the model, nothing is compared, or an input has gaps.
     """
     if RECORD in data:
-        raise ParameterError("replay takes one record, and this measurement has several")
+        raise ParameterError(
+            "replay takes one record, and this measurement has several", name="data"
+        )
     measured = measured_run(bench, data, inputs, outputs, case)
     wanted = dict.fromkeys((*measured.compared, *energy_signals(measured.run)))
     modeled = simulate(measured.run, tuple(wanted))
@@ -400,7 +418,7 @@ def replay(
         measured.run,
         (
             *measured.notes,
-            *missed_samples(measured.data, measured.compared),
+            *_missed_samples(measured.data, measured.compared),
             *energy_doubts_of(measured.run, modeled),
             *filter(
                 None, [unestimated(failures) if failures and not others else abandoned(failures)]

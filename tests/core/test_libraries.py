@@ -1,4 +1,4 @@
-"""Linear algebra has one thread unless a user chose otherwise; programs get back theirs."""
+"""Linear algebra has one thread unless a user chose another number; a recording needs no dask."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from bywire.core.blas import VARIABLES
+from bywire.core.libraries import VARIABLES
 
 THREADS = """
 from threadpoolctl import threadpool_info
@@ -18,7 +18,7 @@ def threads():
 OVERLAPPING = """
 import scipy.linalg
 from threadpoolctl import threadpool_limits
-from bywire.core.blas import on_one_thread
+from bywire.core.libraries import on_one_thread
 threadpool_limits(3, "blas")
 with on_one_thread():
     assert threads() == {1}
@@ -78,3 +78,21 @@ def test_commands_have_one_thread():
 @pytest.mark.parametrize("name", ["OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"])
 def test_who_chooses_has_what_was_chosen(name):
     assert said_by(PROCESS, **{name: "2"}) == "{2}"
+
+
+_RECORDING = "import sys, xarray; xarray.DataArray([1.0]); "
+_LEFT_OUT = "from bywire.core.libraries import *; leave_out_dask(); "
+_AGAIN = "allow_dask(); import dask; print('again')"
+
+
+@pytest.mark.parametrize(
+    ("code", "said"),
+    [
+        (_LEFT_OUT + _RECORDING + "print('dask.array' in sys.modules); " + _AGAIN, "False\nagain"),
+        (_RECORDING + "print('dask.array' in sys.modules)", "True"),  # else it may go
+    ],
+)
+def test_a_recording_needs_no_dask(code, said):
+    pytest.importorskip("dask")
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == said

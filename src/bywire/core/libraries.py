@@ -1,0 +1,139 @@
+"""Libraries: their threads, what they do unasked, and how to install optional ones.
+
+Linear algebra runs on one thread. The systems here are small: tens of unknowns, Jacobians with a
+few columns. Threads of a BLAS then wait for each other longer than they compute, and they wait by
+spinning, which takes the cores from simulations: without them, reproducing Dardanelli et al. (2010)
+takes two thirds of the time. Sums are also the same on every number of cores.
+
+Nothing here changes a number of threads that the environment states.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from threading import Lock
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from threadpoolctl import threadpool_limits
+
+_DEFAULTS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+# Libraries that start threads as soon as they are loaded, which bywire never uses: numexpr beside
+# pandas, and the allocator of pyarrow. A process with threads cannot be copied.
+_IDLE_THREADS = {
+    "NUMEXPR_NUM_THREADS": "1",
+    "JE_ARROW_MALLOC_CONF": "background_thread:false",
+}
+VARIABLES = (*_DEFAULTS, "OMP_NUM_THREADS", "BLIS_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+"""environment variables by which a user states a number of threads"""
+
+
+def one_thread_variables() -> dict[str, str]:
+    """Environment variables of a child process whose libraries start no threads of their own."""
+    return {**dict.fromkeys(_DEFAULTS, "1"), "OMP_NUM_THREADS": "1", **_IDLE_THREADS}
+
+
+def keep_one_thread() -> None:
+    """Limit this process to one thread, whether or not its libraries are loaded."""
+    os.environ.update({k: v for k, v in _IDLE_THREADS.items() if k not in os.environ})
+    if _is_chosen():
+        return
+    os.environ.update(dict.fromkeys(_DEFAULTS, "1"))
+    if "numpy" in sys.modules:
+        from threadpoolctl import threadpool_limits
+
+        threadpool_limits(1, "blas")
+
+
+@contextmanager
+def on_one_thread() -> Iterator[None]:
+    """Compute on one thread in this block, in a process that belongs to the caller.
+
+    Blocks may overlap, also in several threads: the last that ends restores the former limits.
+    """
+    if _is_chosen():
+        yield
+        return
+    _limited.begin()
+    try:
+        yield
+    finally:
+        _limited.end()
+
+
+def _is_chosen() -> bool:
+    """Return whether the environment states a number of threads."""
+    return any(os.environ.get(name) for name in VARIABLES)
+
+
+class _Limited:
+    """The limit of threads, in force while at least one block needs it."""
+
+    def __init__(self) -> None:
+        self._lock = Lock()
+        self._count = 0
+        self._limits: threadpool_limits | None = None
+
+    def begin(self) -> None:
+        """Set the limit, unless it is set."""
+        with self._lock:
+            if self._limits is None:
+                import scipy.linalg  # noqa: F401  its own BLAS must be loaded to be limited
+                from threadpoolctl import threadpool_limits
+
+                self._limits = threadpool_limits(1, "blas")
+            self._count += 1
+
+    def end(self) -> None:
+        """Restore the former limits once the last block has ended."""
+        with self._lock:
+            self._count -= 1
+            if self._count == 0 and self._limits is not None:
+                self._limits.restore_original_limits()
+                self._limits = None
+
+
+_limited = _Limited()
+
+
+# --- Imports and messages that nobody here needs
+
+_modules: dict[str, Any] = sys.modules
+
+
+def leave_out_dask() -> None:
+    """Keep xarray from importing dask in this process.
+
+    To recognize arrays of dask, xarray imports ``dask.array`` wherever it is installed, which takes
+    as long as half a short run.
+    """
+    _modules.setdefault("dask", None)
+
+
+def allow_dask() -> None:
+    """Allow imports of dask again, before code is loaded that may need it."""
+    if "dask" in _modules and _modules["dask"] is None:
+        del _modules["dask"]
+
+
+def silence_matplotlib() -> None:
+    """Silence the note of matplotlib that its fonts are elsewhere because home is read-only."""
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)
+
+
+# --- Optional libraries
+
+
+def how_to_install(extra: str) -> str:
+    """Return the commands that install an extra, for an installed package and for a clone.
+
+    Examples
+    --------
+    >>> how_to_install("measurements")
+    "pip install 'bywire[measurements]', or in a clone pip install -e '.[measurements]'"
+    """
+    return f"pip install 'bywire[{extra}]', or in a clone pip install -e '.[{extra}]'"

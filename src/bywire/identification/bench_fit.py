@@ -1,0 +1,715 @@
+"""Output error on a bench: the question, the fit of unknowns to measured outputs, its checks."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from bywire.bench.bench import Bench
+from bywire.core.callers import option
+from bywire.core.errors import ParameterError, not_valid
+from bywire.core.parameters import ParameterSet, choice_fields, choices_of, leaf_fields
+from bywire.core.quantities import display_unit
+from bywire.core.signals import signals_of
+from bywire.core.typing import Array
+from bywire.core.units import difference_unit, shown
+from bywire.core.values import number
+from bywire.identification.bench_replay import MeasuredRun, beside, case_of, measured_run
+from bywire.identification.estimate import Estimate
+from bywire.identification.least_squares import Problem, estimate, solve
+from bywire.identification.measured import (
+    FAR,
+    NOISE_OF_SAMPLES,
+    is_told,
+    noise_of,
+    outliers,
+    robust_scale,
+    split,
+)
+from bywire.identification.method import Check, Curve, Effort, Identified
+from bywire.identification.multistart import Search, search
+from bywire.identification.output_error import Trial, initial_states, moved_run, output_error
+from bywire.identification.question import (
+    Options,
+    Question,
+    is_parameter,
+    starts_of,
+    switched_off,
+    unknowns_of,
+)
+from bywire.identification.replay_fit import Segment, fit_figures
+from bywire.identification.residuals import by_output, explained
+from bywire.identification.unknown import Unknown
+from bywire.simulation.run import simulate
+
+_OWN = ("initial.", "start.")  # what each record has for itself
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """A record beside the model with the estimates.
+
+    Parameters
+    ----------
+    label
+        Of the record; empty where there is one alone.
+    pairs
+        ``measured`` and ``modeled`` over ``time`` [s], by output.
+    """
+
+    label: str
+    pairs: Mapping[str, xr.Dataset]
+
+    def figures(self, name: str) -> dict[str, float]:
+        """Return the figures of an output over the whole record; see ``fit_figures``."""
+        time = self.pairs[name]["time"].values
+        whole = Segment("all", float(time[0]), float(time[-1]))
+        return {k.name: k.value for k in fit_figures(self.pairs[name], whole)}
+
+
+def predict(trial: Trial, estimate: Estimate) -> Prediction:
+    """Return a record beside the model with the estimates, without fitting anything.
+
+    Parameters
+    ----------
+    trial
+        A record and its model. Unknowns of a record's own, such as where it begins, are taken
+        from the estimate only where they carry this trial's label.
+    estimate
+        Of this or of other records; what the data does not tell stays where it was.
+
+    Raises
+    ------
+    SolverError
+        When the run cannot be computed.
+    """
+    modeled, time = computed(trial, estimate, tuple(trial.measured))
+    signals = signals_of(trial.run.model.Output)
+    pairs = {}
+    for name, values in trial.measured.items():
+        attrs = {"units": signals[name].unit, "long_name": signals[name].label}
+        pairs[name] = xr.Dataset(
+            {
+                "measured": ("time", np.where(trial.rows(name), values, np.nan), attrs),
+                "modeled": ("time", modeled[name], attrs),
+            },
+            {"time": ("time", time, {"units": "s"})},
+        )
+    return Prediction(trial.label, pairs)
+
+
+def computed(
+    trial: Trial, estimate: Estimate, names: tuple[str, ...]
+) -> tuple[dict[str, Array], Array]:
+    """Return outputs of a trial's run with the estimates, offsets added, and its instants [s]."""
+    values = {
+        u.name: float(v)
+        for u, v in (
+            *zip(estimate.unknowns, estimate.values, strict=True),
+            *((k.unknown, k.unknown.start) for k in estimate.kept),
+        )
+        if u.trial == trial.label or not (u.trial or u.name.startswith(_OWN))
+    }
+    moving = {name: v for name, v in values.items() if not name.startswith("offset.")}
+    run = simulate(moved_run(trial.run, moving, trial.start), names)
+    return {name: run[name] + values.get(f"offset.{name}", 0.0) for name in names}, run.time
+
+
+# --- What the fit is worth
+
+_EXPLAINED = 0.5  # of the variance: what is explained outweighs what is left
+_BETWEEN = (
+    "; outputs were measured at uneven instants and interpolated: where they move fast from sample "
+    "to sample, that leaves errors of its own"
+)
+_FEW = 0.02  # of the residuals: as many as may be outliers
+_SEVERAL, _MET = 4, 2  # starts: so many are to tell whether one alone found a minimum
+_CAPTIONS = {
+    "fit": "measured and modeled with the estimates",
+    "validation": "a record that was not fitted: measured, and modeled with the estimates",
+}
+
+
+def _curves_of(prediction: Prediction, role: str) -> tuple[Curve, ...]:
+    """Return measured beside modeled, a curve for each output."""
+    label = prediction.label
+    suffix = f"-{_file_name(label)}" if label else ""
+    said = f" in {label}" if label else ""
+    return tuple(
+        Curve(f"{role}-{name}{suffix}", f"{name}{said}, {_CAPTIONS[role]}.", pair, "time")
+        for name, pair in prediction.pairs.items()
+    )
+
+
+def _compared(measured: MeasuredRun, trial: Trial, fit: Estimate) -> Prediction:
+    """Return a record beside the model with the estimates; settling is left out.
+
+    Parameters
+    ----------
+    measured, trial
+        The record; unknowns of its own carry its label, which is empty where it was fitted alone.
+    fit
+        The estimates; what the data does not tell stays where it was.
+    """
+    modeled, _ = computed(trial, fit, measured.compared)
+    return Prediction(
+        trial.label,
+        {
+            name: beside(measured.data, name, modeled[name][measured.settled :])
+            for name in measured.compared
+        },
+    )
+
+
+def _checks_of(
+    trials: Sequence[Trial], fit: Estimate, options: Options, resampled: bool = False
+) -> tuple[Check, ...]:
+    """Return whether the model explains the records, and whether the values mean something.
+
+    Noise alone is no proof of a model: where a record is nothing but noise, noise is what any
+    model leaves. What a robust loss sets aside is left out of the residual, and counted.
+
+    Parameters
+    ----------
+    trials, fit
+        What was fitted, and how.
+    options
+        Loss and limits.
+    resampled
+        Whether outputs were measured at uneven instants.
+    """
+    vague = {n: why for n, why in fit.vague().items() if _of_bench(fit, n)}
+    said = "; ".join(f"{label} {reason}" for label, reason in vague.items())
+    untold = [k.unknown.label for k in fit.kept]
+    far = outliers(fit.residuals)
+    robust = options.loss != "linear"
+    counted = ~far if robust else np.ones_like(far)
+    left = math.sqrt(float(np.mean(fit.residuals[counted] ** 2)))
+    return (
+        Check(
+            "residual_over_noise",
+            left,
+            limit=options.most_residual,
+            note="1 where nothing but the sensors' noise is left"
+            + _few(fit.residuals, far, robust)
+            + (_BETWEEN if resampled else ""),
+            next_step=_missing(fit),
+        ),
+        *((_outliers(far, options),) if robust else ()),
+        Check(
+            "variance_explained",
+            explained(trials, fit, counted),
+            limit=_EXPLAINED,
+            at_least=True,
+            note="share of the outputs' variance, over their noise, that the model predicts",
+            next_step=f"check that {option('inputs')} is what drove the record, its unit and its "
+            "sign; 'bywire replay' draws both",
+        ),
+        Check(
+            "parameters_without_meaning",
+            float(len(vague)),
+            limit=0.0,
+            note=said or "none at its bound, none with a 95 % interval wider than +-100 %",
+            next_step=f"leave these {option('unknowns')} out, give a {option('priors')}, or record "
+            "a motion that they change",
+        ),
+        Check(
+            "not_told",
+            float(len(untold)),
+            note=", ".join(untold) or "the data tells all that was asked for",
+        ),
+    )
+
+
+def _missing(fit: Estimate) -> str:
+    """Return what to try at the output of which most is left."""
+    left = [each for each in fit.leftovers() if each.noise]
+    if not left:
+        return ""
+    worst = max(left, key=lambda each: each.rms / (each.noise or 1.0))
+    name = worst.label.rpartition(":")[2]
+    return (
+        f"look at {worst.label}, of which most is left: if its curves are shifted, add "
+        f"{option('unknowns')} offset.{name}; if they part at the beginning, "
+        f"{option('states')}; if another parameter shapes what is left, make it an "
+        f"{option('unknowns')}; if it only scatters, give its noise with "
+        f"{option('outputs')} '{name}=...'"
+    )
+
+
+def _few(r: Array, far: NDArray[np.bool_], robust: bool) -> str:
+    """Return what stands behind residuals without a robust loss: perhaps a few outliers."""
+    if robust or not 0.0 < float(far.mean()) < _FEW or robust_scale(r) > FAR:
+        return ""
+    advice = f"if they are outliers, take {option('loss', 'huber')}"
+    return f"; {far.sum()} of {far.size} stand out: {advice}"
+
+
+def _outliers(far: NDArray[np.bool_], options: Options) -> Check:
+    return Check(
+        "outliers",
+        float(far.mean()),
+        limit=options.most_outliers,
+        note=f"{far.sum()} of {far.size} residuals stand out by {FAR:g} times the noise or more: "
+        "beyond the limit they are the model's",
+        next_step="look where they stand: a stretch of them is a motion that the model lacks",
+    )
+
+
+def _noise_check(doubtful: Mapping[str, str], given: Mapping[str, str]) -> tuple[Check, ...]:
+    """Return whether each output's noise is one, where the record itself had to tell it.
+
+    Parameters
+    ----------
+    doubtful
+        Outputs whose noise comes out too large -> why.
+    given
+        Noise by output, where it was given.
+    """
+    if all(given.values()):
+        return ()
+    note = "; ".join(doubtful.values()) or "what scatters in the record is noise"
+    return (
+        Check(
+            "noise_not_told",
+            float(len(doubtful)),
+            limit=0.0,
+            note=note,
+            next_step="record it at rest, and give its standard deviation",
+        ),
+    )
+
+
+def starts_check(reached: int, starts: int) -> tuple[Check, ...]:
+    """Return whether another start met the lowest minimum too, where several were made."""
+    if starts < _SEVERAL:
+        return ()
+    note = "starts that met the lowest minimum"
+    if reached < _MET:
+        note += (
+            f": there may be a lower one; take more {option('starts')}, narrower ranges "
+            f"({option('unknowns')} "
+            "NAME=LOW..HIGH), or fewer unknowns"
+        )
+    return (
+        Check(
+            "starts_at_minimum",
+            float(reached),
+            limit=_MET,
+            at_least=True,
+            note=note,
+            next_step=f"take {option('starts')} 16, or a range for each {option('unknowns')}",
+        ),
+    )
+
+
+def _of_bench(fit: Estimate, label: str) -> bool:
+    """Return whether a label is that of a parameter; offsets and starts may be near zero."""
+    unknown = fit.unknowns[fit.names.index(label)]
+    return is_parameter(unknown.name) and not unknown.name.startswith(_OWN)
+
+
+def _believable(fit: Estimate) -> dict[str, float]:
+    """Return the parameters by name, less those whose values mean nothing."""
+    vague = fit.vague()
+    return {
+        u.name: float(v)
+        for u, v in zip(fit.unknowns, fit.values, strict=True)
+        if _of_bench(fit, u.label) and u.label not in vague
+    }
+
+
+def _validation_of(held: Prediction, options: Options) -> tuple[Check, ...]:
+    """Return how much of a held-out record is accounted for, signal by signal."""
+    checks = []
+    for name in held.pairs:
+        figures = held.figures(name)
+        vaf = figures["vaf"] / 100.0
+        still = "" if math.isfinite(vaf) else "; the measured signal does not move"
+        checks += [
+            Check(
+                f"validation.{name}.vaf",
+                vaf,
+                limit=options.least_vaf,
+                at_least=True,
+                note=f"variance accounted for in the record that was not fitted{still}",
+                next_step="fit a record that covers what the held-out one does, or fewer unknowns",
+            ),
+            Check(
+                f"validation.{name}.nrmse",
+                figures["nrmse"] / 100.0,
+                note="root mean square of the error there, over the range",
+            ),
+        ]
+    return tuple(checks)
+
+
+def _figures_of(
+    records: Sequence[Prediction], trials: Sequence[Trial]
+) -> dict[str, tuple[float, str]]:
+    """Return noise, variance accounted for and error of every output in every record."""
+    values: dict[str, tuple[float, str]] = {}
+    for compared_run, trial in zip(records, trials, strict=True):
+        for name, pair in compared_run.pairs.items():
+            key = f"{compared_run.label}:{name}" if compared_run.label else name
+            figures = compared_run.figures(name)
+            unit = str(pair["measured"].attrs.get("units", "1"))
+            values |= {
+                f"{key}.noise": (trial.noise[name], unit),
+                f"{key}.vaf": (figures["vaf"], "%"),
+                f"{key}.nrmse": (figures["nrmse"], "%"),
+            }
+    return values
+
+
+def _file_name(label: str) -> str:
+    return re.sub(r"[^\w.-]+", "_", label)
+
+
+# --- The fit
+# Where the bench closes a loop, the measured set point drives model and controller together:
+# closed-loop output error. The run begins where the experiment does with the parameters of the
+# moment, so that an equilibrium stays one while the parameters that make it are searched.
+
+_FINEST = 1.0 / 65536.0  # of a signal's range: what a converter of 16 bits resolves
+_FEWEST = 10  # samples
+_LEFT = 0.5  # of the noise: a model that leaves less was given too much
+
+
+def noise_given(name: str, text: str, unit: str) -> float:
+    """Return the standard deviation of an output's noise, written with its unit.
+
+    Raises
+    ------
+    UnitError, ParameterError
+        When it is no quantity of that unit, or not > 0.
+    """
+    noise = number(text, unit, f"noise of {name}")
+    if not noise > 0.0:
+        raise not_valid(f"noise of {name}", text, f"> 0 {unit}")
+    return noise
+
+
+def _output_noise(measured: MeasuredRun, name: str, text: str) -> float:
+    """Return the standard deviation of an output's noise, as given or of the record.
+
+    Parameters
+    ----------
+    measured
+        The record.
+    name
+        Output.
+    text
+        Its noise; empty for the record's own.
+
+    Raises
+    ------
+    ParameterError
+        When the record does not tell it: too short, or at rest.
+    """
+    if text:
+        return noise_given(name, text, signals_of(measured.case.model.Output)[name].unit)
+    there = _finite(measured.data[name])
+    if there.size < _FEWEST:
+        raise ParameterError(
+            f"{name} has {there.size} samples: at least {_FEWEST} are needed to estimate its noise",
+            name=name,
+        )
+    span = float(np.ptp(there))
+    if not span > 0.0:
+        raise ParameterError(
+            f"{name} does not move: an output at rest determines nothing; leave it out, or "
+            "excite the system",
+            name=name,
+        )
+    # Between uneven samples lie means of two, whose noise is smaller and no longer white.
+    before = measured.data[name].attrs.get(NOISE_OF_SAMPLES)
+    return max(noise_of(there) if before is None else float(before), _FINEST * span)
+
+
+def _resampled(measured: MeasuredRun) -> bool:
+    """Return whether a record's outputs lie between the samples that were measured."""
+    return any(NOISE_OF_SAMPLES in measured.data[name].attrs for name in measured.compared)
+
+
+def _overestimated(
+    records: Sequence[MeasuredRun],
+    trials: Sequence[Trial],
+    residuals: Array,
+    given: Mapping[str, str],
+) -> dict[str, str]:
+    """Return the outputs whose noise is not told by their record, with the reason.
+
+    Any model passes beside a noise that is too large.
+
+    Parameters
+    ----------
+    records, trials
+        Records, in the order of the residuals.
+    residuals
+        What the model leaves, over the noise.
+    given
+        Noise by output, where it was given.
+    """
+    runs = {trial.label: measured for measured, trial in zip(records, trials, strict=True)}
+    doubtful = {}
+    for trial, name, r in by_output(trials, residuals):
+        values = _finite(runs[trial.label].data[name])
+        if given[name] or trial.noise[name] <= 1.01 * _FINEST * float(np.ptp(values)):
+            continue
+        left = robust_scale(r)
+        even = NOISE_OF_SAMPLES not in runs[trial.label].data[name].attrs
+        if even and not is_told(values):
+            why = "changes itself from sample to sample"
+        elif left < _LEFT:
+            why = f"is met by the model within {left:.2g} of that"
+        else:
+            continue
+        unit = difference_unit(signals_of(runs[trial.label].case.model.Output)[name].unit)
+        size = shown(float(f"{trial.noise[name]:.3g}"), unit)
+        key = f"{trial.label}:{name}" if trial.label else name
+        doubtful[key] = (
+            f"{key} {why}, {size} is not its noise alone: give it, "
+            f'{option("outputs")} "{name}=NOISE {display_unit(unit)}"'
+        )
+    return doubtful
+
+
+def _finite(signal: xr.DataArray) -> Array:
+    values = np.asarray(signal.values, dtype=float)
+    return np.asarray(values[np.isfinite(values)])
+
+
+# --- The fit
+
+_ROUNDED, _EXACT = "quantized", "ideal"  # of the law of a sensor or a converter
+_ROUGH = 1e-4  # of the cost: enough to begin from
+_AT_REST = 5.0  # times the noise: a start below it is none that could be estimated
+
+
+@dataclass(frozen=True)
+class BenchFit:
+    """The fit of a bench.
+
+    Parameters
+    ----------
+    bench
+        What was measured, with the values that are known.
+    question
+        What is measured and what is unknown.
+    """
+
+    bench: Bench
+    question: Question
+
+    def identify(
+        self, data: xr.Dataset, par: ParameterSet, options: Options, effort: Effort
+    ) -> Identified:
+        """Return the unknowns from one or several records.
+
+        Parameters
+        ----------
+        data
+            Inputs and outputs over ``time`` [s], SI.
+        par
+            The bench's parameters, with the values at which the search begins.
+
+        Raises
+        ------
+        InputError
+            When a record does not fit the bench, or tells none of the unknowns.
+        """
+        bench = self.moved(par)
+        records = {
+            label: self.record(bench, signals, options)
+            for label, signals in split(data, True).items()
+        }
+        trials = [self.trial(record, label) for label, record in records.items()]
+        unknowns = list(unknowns_of(case_of(bench, self.question.case), bench.par, self.question))
+        for record, trial in zip(records.values(), trials, strict=True):
+            unknowns += self.starts(record, trial)
+        problem = replace(
+            output_error(trials, unknowns),
+            silent=switched_off(bench.par, unknowns, _exact_laws(type(bench.par))),
+        )
+        starts = starts_of(
+            unknowns, self.question.ranges, effort.starts, effort.spread, effort.seed
+        )
+        led = search(
+            problem,
+            starts,
+            options.loss,
+            effort.progress,
+            effort.store,
+            effort.threads,
+            # A loss that redescends has far minima wherever the record is missed altogether.
+            partial(_nearer, problem) if options.loss == "cauchy" else None,
+        )
+        fit = estimate(problem, options.loss, led.best.values)
+        reached = _reached(led, fit)
+        shown = [
+            _compared(record, trial, fit)
+            for record, trial in zip(records.values(), trials, strict=True)
+        ]
+        held = self._held_out(bench, fit, options)
+        uneven = any(_resampled(record) for record in records.values())
+        checks = _checks_of(trials, fit, options, uneven)
+        doubtful = (
+            {}
+            if fit.is_exact
+            else _overestimated(list(records.values()), trials, fit.residuals, self.question.noise)
+        )
+        return Identified(
+            estimates={"output error": fit},
+            parameters=_believable(fit),
+            figures=_figures_of(shown, trials),
+            checks=(
+                *checks,
+                *_noise_check(doubtful, self.question.noise),
+                *starts_check(reached, effort.starts),
+                *(() if held is None else _validation_of(held, options)),
+            ),
+            curves=(
+                *(curve for record in shown for curve in _curves_of(record, "fit")),
+                *(() if held is None else _curves_of(held, "validation")),
+            ),
+            notes=(
+                *_said(records, options, coarse=not checks[0].holds),
+                *_smoothed(bench),
+                f"{reached} of {effort.starts} starts reached the minimum",
+            ),
+        )
+
+    def moved(self, par: ParameterSet) -> Bench:
+        """Return the bench with other values of what is unknown."""
+        leaves, known = par.leaves(), self.bench.par.leaves()
+        return self.bench.with_overrides(
+            {
+                n: leaves[n]
+                for n in filter(is_parameter, self.question.ranges)
+                if leaves.get(n) != known.get(n)
+            }
+        )
+
+    def record(self, bench: Bench, data: xr.Dataset, options: Options) -> MeasuredRun:
+        """Return a record with the run that stands beside it."""
+        return measured_run(
+            bench,
+            data,
+            self.question.inputs or None,
+            list(self.question.noise),
+            self.question.case,
+            settle=not self.question.states,
+            between=options.between,
+        )
+
+    def trial(self, measured: MeasuredRun, label: str) -> Trial:
+        """Return a record beside its run; while the run settles nothing is compared."""
+        before = np.full(measured.settled, np.nan)
+        smooth = _exact_laws(type(measured.case.par))
+        values = {name: measured.data[name].values for name in measured.compared}
+        return Trial(
+            replace(measured.run, par=measured.run.par.replace(smooth)),
+            {name: np.concatenate((before, row)) for name, row in values.items()},
+            {name: _output_noise(measured, name, self.question.noise[name]) for name in values},
+            label,
+            start=None
+            if measured.bench.definition.preview
+            else partial(_begun, measured.bench, measured.case),
+        )
+
+    def starts(self, measured: MeasuredRun, trial: Trial) -> tuple[Unknown, ...]:
+        """Return a record's own unknowns: initial states, and a start told by a noisy sample."""
+        fields = leaf_fields(measured.bench.definition.options)
+        unknowns = []
+        for name, signal in measured.begun_at.items():
+            value = float(measured.bench.options[name])
+            if trial.start is not None and value > _AT_REST * trial.noise[signal]:
+                unit = fields[name].unit.symbol
+                unknowns.append(
+                    Unknown(f"start.{name}", value, 0.0, scale=value, unit=unit, trial=trial.label)
+                )
+        return (*unknowns, *initial_states(trial, self.question.states))
+
+    def _held_out(self, bench: Bench, fit: Estimate, options: Options) -> Prediction | None:
+        data = self.question.holdout
+        if data is None:
+            return None
+        if not isinstance(data, xr.Dataset):
+            raise ParameterError(
+                f"holdout = {data}: read it first, bywire.read_measurement does", name="holdout"
+            )
+        held = self.record(bench, data, options)
+        # A label that no record has: only what all records share is known of it.
+        return _compared(held, self.trial(held, "held out"), fit)
+
+
+def _nearer(problem: Problem, start: Array) -> Array:
+    """Return where a start leads with losses that have no minima of their own."""
+    return solve(problem, solve(problem, start, share=_ROUGH).values, "huber", share=_ROUGH).values
+
+
+def _reached(led: Search, fit: Estimate) -> int:
+    """Return how many starts came within 1 % of the lowest minimum, or of what noise leaves."""
+    size = 0.5 * fit.residuals.size
+    lowest = led.best.cost
+    return sum(solution.cost <= lowest + 0.01 * max(lowest, size) for solution in led.solutions)
+
+
+def _begun(bench: Bench, case: Any, values: Mapping[str, float]) -> tuple[Any, Any]:
+    """Return where the experiment begins with other parameters and options of the start."""
+    options = {n.removeprefix("start."): v for n, v in values.items() if n.startswith("start.")}
+    parameters = {n: v for n, v in values.items() if not n.startswith("start.")}
+    par, chosen = bench.par.replace(parameters), bench.chosen_options.replace(options)
+    cases = bench.cases_with(par, chosen)
+    (begun,) = (k for k in cases if k.label == case.label)
+    return begun.state, begun.memory
+
+
+def _exact_laws(cls: type[ParameterSet]) -> dict[str, str]:
+    """Return the laws of a parameter class that leave rounding out, by dotted name.
+
+    Rounding has no derivative, closed loops would look open. What rounds chooses between a law
+    that is ``"quantized"`` and one that is ``"ideal"``.
+    """
+    return {
+        name: _EXACT
+        for name in choice_fields(cls)
+        if {_ROUNDED, _EXACT} <= set(choices_of(cls, name))
+    }
+
+
+def _smoothed(bench: Bench) -> tuple[str, ...]:
+    known, exact = bench.par.choices(), _exact_laws(type(bench.par))
+    changed = [name for name, law in exact.items() if known.get(name, law) != law]
+    return tuple(
+        f"{name} = {exact[name]} in the fit: rounding has no derivative" for name in changed
+    )
+
+
+def _said(records: Mapping[str, MeasuredRun], options: Options, coarse: bool) -> list[str]:
+    """Return what the user should know of the records, and of coarse inputs where asked."""
+    said = [
+        f"{label}: {note}" if label else note
+        for label, record in records.items()
+        for note in record.notes
+    ]
+    measured = next(iter(records.values()))
+    said.append("driven by " + ", ".join(f"{name} = {v}" for name, v in measured.driven.items()))
+    case, interval = measured.case, measured.run.record
+    period = min(task.period for task in case.model.tasks(case.par))
+    if coarse and options.between == "held" and period < 0.5 * interval:
+        said.append(
+            f"inputs are held for {1e3 * interval:.4g} ms from sample to sample, but act every "
+            f"{1e3 * period:.4g} ms: if they are smooth, take "
+            f"{option('options', {'between': 'linear'})}"
+        )
+    return said

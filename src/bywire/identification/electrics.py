@@ -1,0 +1,453 @@
+"""Records of electric drives: current loops, their steps, and a winding alone."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from bywire.core.errors import ParameterError
+from bywire.core.model import Model
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Duration, Frequency
+from bywire.core.signals import Signal, zeros
+from bywire.core.typing import Array
+from bywire.data.labeled import labeled, over
+from bywire.identification.estimate import Estimate
+from bywire.identification.least_squares import estimate
+from bywire.identification.measured import require_signals, split, wrong_sign
+from bywire.identification.method import Check, Curve, Effort, Identified, Method
+from bywire.identification.output_error import (
+    Driven,
+    Trial,
+    even_interval,
+    moved_run,
+    output_error,
+    trial,
+)
+from bywire.identification.residuals import explained
+from bywire.identification.unknown import parameters_of
+from bywire.plant import anti_alias_filter, dc_motor
+from bywire.simulation.run import Run, simulate
+
+_AGAINST = -0.5  # correlation of demand and current: beyond chance
+_EXPLAINED = 0.5  # of the variance: what is explained outweighs what is left
+_MISFIT = 1.3  # a closed loop's own noise is 1.04 of the sensor's, which is known within 10 %
+
+
+def levels(
+    low: float, high: float, duration: float, dwell: float, interval: float, seed: int
+) -> Callable[[Array], Array]:
+    """Return a signal that steps between random levels, drawn from a seed.
+
+    Parameters
+    ----------
+    low, high
+        Ends of the range.
+    duration, dwell, interval
+        Length, time from step to step, sample time [s].
+    """
+    every = max(round(dwell / interval), 1)
+    count = int(np.ceil(duration / (every * interval))) + 1
+    values = np.random.default_rng(seed).uniform(low, high, count)
+    values[0] = 0.5 * (low + high)
+
+    def at(t: Array) -> Array:
+        index = np.floor(np.round(t / interval, 6) / every).astype(int)
+        return np.asarray(values[np.clip(index, 0, count - 1)])
+
+    return at
+
+
+def noise_of_levels(answer: Array, demand: Array) -> float:
+    """Return the noise of an answer [its unit], from differences while the demand rests.
+
+    Parameters
+    ----------
+    answer, demand
+        Shape (n,).
+    """
+    still = np.convolve(np.diff(demand) == 0.0, np.ones(3), mode="valid") == 3
+    second = np.diff(answer, 3)[: still.size]
+    chosen = second[still] if still.sum() > 10 else second
+    # Third differences of white noise have 20 times its variance.
+    return max(float(np.median(np.abs(chosen))) / (0.6745 * math.sqrt(20.0)), 1e-9)
+
+
+def require_steps(data: xr.Dataset, name: str, answer: str, label: str) -> None:
+    """Refuse a record whose demand does not move, or whose current goes against it.
+
+    A winding takes up power at every frequency, and a current loop follows: voltage or demand and
+    current cannot be of opposite sign on the average.
+
+    Parameters
+    ----------
+    data
+        Signals over ``time`` [s].
+    name, answer
+        What the demand and the current are called.
+    label
+        Of the record.
+
+    Raises
+    ------
+    UnknownNameError
+        When the demand is missing.
+    ParameterError
+        When it does not step, or the current has the wrong sign.
+    """
+    require_signals(data, [name])
+    demand, current = data[name].values, data[answer].values
+    if not float(np.ptp(demand)) > 0.0:
+        raise ParameterError(
+            f"{name} of record {label or '1'} does not move: an answer at rest determines neither "
+            "winding nor gains; step it between several levels, the rotor locked",
+            name=name,
+        )
+    together = float(np.corrcoef(demand, current)[0, 1]) if np.ptp(current) > 0.0 else 0.0
+    if together < _AGAINST:
+        raise wrong_sign(f"{answer} of record {label or '1'}", name, f"correlation {together:.2f}")
+
+
+def _identified_loop(
+    trials: Sequence[Trial], par: ParameterSet, names: Sequence[str]
+) -> Identified:
+    """Return a closed loop's parameters from its runs.
+
+    Parameters
+    ----------
+    trials
+        Records beside the loop's model.
+    par
+        Where the search begins.
+    names
+        Unknown parameters.
+
+    Raises
+    ------
+    ParameterError
+        When nothing can be estimated.
+    """
+    fit = estimate(output_error(trials, parameters_of(par, names)))
+    return Identified(
+        estimates={"current loop": fit},
+        parameters=believable(fit),
+        checks=checks_of(trials, fit),
+        curves=tuple(as_curve(t, fit) for t in trials),
+    )
+
+
+def believable(fit: Estimate) -> dict[str, float]:
+    """Return the parameters by name, less those whose values mean nothing."""
+    vague = fit.vague()
+    return {name: value for name, value in fit.parameters().items() if name not in vague}
+
+
+def checks_of(trials: Sequence[Trial], fit: Estimate) -> tuple[Check, ...]:
+    """Return whether the model explains the current, and whether the values mean something.
+
+    Noise alone is no proof of a model: where the record is nothing but noise, noise is what any
+    model leaves, one with an answer of zero as well.
+    """
+    vague = fit.vague()
+    said = "; ".join(f"{label} {reason}" for label, reason in vague.items())
+    return (
+        Check(
+            "variance_explained",
+            explained(trials, fit),
+            limit=_EXPLAINED,
+            at_least=True,
+            note="share of the current's variance that the model predicts: do demand and "
+            "current belong together?",
+        ),
+        Check(
+            "residual_over_noise",
+            fit.rms,
+            limit=_MISFIT,
+            note="1 where nothing but the sensor's noise is left",
+        ),
+        Check(
+            "parameters_without_meaning",
+            float(len(vague)),
+            limit=0.0,
+            note=said or "none at its bound, none with a 95 % interval wider than +-100 %",
+        ),
+    )
+
+
+def as_curve(trial: Trial, fit: Estimate) -> Curve:
+    """Return the measured current of a trial beside the modeled one."""
+    signal = next(iter(trial.measured))
+    shared = {
+        u.name: float(v)
+        for u, v in zip(fit.unknowns, fit.values, strict=True)
+        if u.trial in ("", trial.label)
+    }
+    computed = simulate(moved_run(trial.run, shared), (signal,))
+    modeled = np.where(trial.rows(signal), computed[signal], np.nan)
+    columns = {"measured": trial.measured[signal], "modeled": modeled}
+    data = over(("time", computed.time, "s", "time"), columns, "A", "current")
+    name = f"current-{trial.label}" if trial.label else "current"
+    return Curve(name, "Current: measured, and modeled where it counts.", data, "time")
+
+
+class LoopOptions(ParameterSet):
+    """What is unknown, and the steps of the synthetic experiment."""
+
+    unknowns: Literal["gains", "all"]
+    """gains alone, the winding being known; or the winding with them"""
+    lead: Duration
+    """beginning of a record that does not count: where the loop was before is not known"""
+    dwell: Duration
+    """synthetic: time from one step to the next"""
+    duration: Duration
+    """synthetic: length of the record"""
+
+    def names(self, gains: tuple[str, ...], winding: tuple[str, ...]) -> tuple[str, ...]:
+        """Return what is estimated, given the names of all."""
+        return gains if self.unknowns == "gains" else (*gains, *winding)
+
+
+def _without_lead(trial: Trial, data: xr.Dataset, lead: float) -> Trial:
+    """Return a trial of which the first seconds of its record do not count.
+
+    Parameters
+    ----------
+    trial
+        Of a whole record.
+    data
+        That record, over ``time`` [s].
+    lead
+        How long that is [s].
+    """
+    t = data["time"].values
+    return replace(trial, used=t - t[0] >= lead)
+
+
+# --- Gains of a current loop
+
+
+@dataclass(frozen=True)
+class CurrentLoop:
+    """A current loop whose gains are sought.
+
+    Parameters
+    ----------
+    model
+        The model that holds the loop, and what it drives.
+    demand, current
+        What the record calls demand and measured current; the demand is the model's stimulus.
+    computed
+        The model's signal that the measured current is compared with.
+    gains, winding
+        Names of the parameters: the controller's, and resistance and inductance.
+    held
+        ``held(par, options)``: the parameters with the rotor held.
+    rest
+        ``rest(par)``: state and memory in which a record begins; all zero where None.
+    """
+
+    model: Model
+    demand: str
+    current: str
+    computed: str
+    gains: tuple[str, ...]
+    winding: tuple[str, ...]
+    held: Callable[[Any, Any], ParameterSet]
+    rest: Callable[[Any], tuple[Any, Any]] | None = None
+
+    def identify(
+        self, data: xr.Dataset, par: ParameterSet, options: LoopOptions, effort: Effort
+    ) -> Identified:
+        """Return the gains, with the winding where the options ask for it.
+
+        The loop is run over the measured demand, the rotor held, and fitted to the measured
+        current.
+
+        Parameters
+        ----------
+        data
+            Demand and current [A], the rotor locked or stuck. One or several records.
+        par
+            Where the search begins.
+        options, effort
+            What is unknown; what the search may take.
+
+        Raises
+        ------
+        ParameterError
+            When the demand does not step, or nothing can be estimated.
+
+        Notes
+        -----
+        From demand to current only k_p V/L, k_i V/L and R/L show: with all four unknown, the one
+        that the data tells least keeps its value, and is named.
+        """
+        trials = [self._trial(record, par, options, label) for label, record in split(data).items()]
+        return _identified_loop(trials, par, options.names(self.gains, self.winding))
+
+    def _trial(
+        self, data: xr.Dataset, par: ParameterSet, options: LoopOptions, label: str
+    ) -> Trial:
+        require_steps(data, self.demand, self.current, label)
+        i = data[self.current].values
+        sigma = noise_of_levels(i, data[self.demand].values)
+        held = self.held(par, options)
+        state, memory = self.rest(held) if self.rest else (None, None)
+        beside = trial(
+            self.model,
+            held,
+            data.assign({self.computed: ("time", i)}),
+            {self.demand: self.demand},
+            {self.computed: sigma},
+            state=state,
+            memory=memory,
+            label=label,
+        )
+        return _without_lead(beside, data, options.lead)
+
+    def record(self, time: Array, demand: Array, current: Array, label: str) -> xr.Dataset:
+        """Return a record of demand and current [A]; ``label``: long name of the current."""
+        signals = {
+            self.demand: (demand, "A", "current demand"),
+            self.current: (current, "A", label),
+        }
+        return labeled({"time": (time, "s", "time")}, signals)
+
+    def method(self, **declared: Any) -> Method:
+        """Return the method that identifies the loop; ``declared``: what only its brake knows."""
+        return Method(
+            signals={self.demand: "A", self.current: "A"},
+            identify=self.identify,
+            unknowns=self.gains,
+            several=True,
+            **declared,
+        )
+
+
+# --- A winding alone
+
+Amperes = Annotated[float, Signal("A", "motor current", 5.0)]
+_SETTLED = 10.0  # time constants of the sensor's filter until the start is forgotten
+_SUBSTEPS = 4  # per sample, at least
+_LONGEST = 5e-6  # of a substep [s]: at 20 us L_m is 0.04 % off where L_m/R_m is 0.3 ms
+
+
+class Parameters(ParameterSet):
+    """Winding, and the filter in front of the converter."""
+
+    motor: dc_motor.Parameters
+    f_aa: Frequency
+    """corner of the current measurement's filter"""
+    T: Duration
+    """how long an input is held"""
+
+
+class Currents(NamedTuple):
+    """Current, and current behind the filter."""
+
+    i: Amperes
+    i_meas: Annotated[float, Signal("A", "measured current", 5.0)]
+
+
+class Inputs(NamedTuple):
+    """What was measured: held between samples."""
+
+    v: Annotated[float, Signal("V", "motor voltage", 5.0)]
+    omega: Annotated[float, Signal("rad/s", "motor speed", 20.0)]
+
+
+class Winding(Driven):
+    r"""Voltage and speed to measured current.
+
+    .. math:: L_m \frac{di}{dt} = v - R_m i - K_e \Omega
+
+    References
+    ----------
+    Dardanelli, Alli, Savaresi (2010), eq. (1).
+    """
+
+    name: ClassVar[str] = "winding"
+    State: ClassVar = Currents
+    Input: ClassVar = Inputs
+
+    def period(self, par: Parameters) -> float:
+        """Return for how long an input is held [s]."""
+        return par.T
+
+    def mass(self, xe: Currents, par: Parameters) -> Currents:
+        """Return the inductance."""
+        return Currents(dc_motor.mass(dc_motor.State(xe.i), par.motor).i, 1.0)
+
+    def balance(
+        self, x: Currents, xe: Currents, m: Inputs, par: Parameters, contact: tuple[float, ...]
+    ) -> Currents:
+        """Return the voltage across the inductance, and the filter's rate."""
+        voltage = dc_motor.balance(dc_motor.State(x.i), dc_motor.Input(m.v, m.omega), par.motor)
+        filtered = anti_alias_filter.Parameters.model_construct(f_aa=par.f_aa)
+        seen = anti_alias_filter.rate(
+            anti_alias_filter.State(x.i_meas), anti_alias_filter.Input(x.i), filtered
+        )
+        return Currents(voltage.i, seen.y)
+
+
+def winding_trial(
+    motor: dc_motor.Parameters,
+    data: xr.Dataset,
+    names: Mapping[str, str],
+    f_aa: float,
+    sigma: float,
+    label: str = "",
+) -> Trial:
+    """Return a record beside the winding.
+
+    Parameters
+    ----------
+    motor
+        Where the search begins.
+    data
+        Over ``time`` [s], evenly spaced.
+    names
+        What ``v``, ``omega`` and ``i`` are called in it.
+    f_aa
+        Corner of the current measurement's filter [Hz].
+    sigma
+        Noise of the current [A].
+
+    Raises
+    ------
+    UnknownNameError
+        When a signal is missing.
+    ParameterError
+        When time is not evenly spaced.
+    """
+    from scipy import interpolate
+
+    require_signals(data, names.values())
+    t = data["time"].values - data["time"].values[0]
+    T = even_interval(t)
+    step = T / max(_SUBSTEPS, int(np.ceil(T / _LONGEST - 1e-9)))
+    v, omega, i = (data[names[key]].values for key in ("v", "omega", "i"))
+    speed = interpolate.CubicSpline(t, omega)
+
+    def stimulus(at: Array) -> Array:
+        # Voltage is held from sample to sample; the speed goes on between them.
+        index = np.clip(np.floor(at / T + 1e-6).astype(int), 0, v.size - 1)
+        return np.column_stack((v[index], speed(at + 0.5 * step)))
+
+    run = Run(
+        Winding(),
+        Parameters(motor=motor, f_aa=f_aa, T=step),
+        Currents(float(i[0]), float(i[0])),
+        zeros(Inputs),
+        stimulus,
+        (t.size - 1) * T,
+        step,
+        T,
+    )
+    forgotten = _SETTLED / (2.0 * np.pi * f_aa)
+    return Trial(run, {"i_meas": i}, {"i_meas": sigma}, label, t >= forgotten)

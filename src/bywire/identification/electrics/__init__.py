@@ -1,1 +1,0 @@
-"""A motor's winding and its current loop."""

@@ -1,1 +1,0 @@
-"""Measured demands through the model: replay, its judgment, and parameters that drift."""
