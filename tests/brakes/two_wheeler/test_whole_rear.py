@@ -133,7 +133,7 @@ def test_warnings_of_many_stops_are_those_of_each():
 
 
 def test_two_ecus_are_not_exported_as_one(tmp_path):
-    with pytest.raises(ModelError, match=r"holds a motorcycle-brake \(rear brake\) with an ECU of"):
+    with pytest.raises(ModelError, match=r"motorcycle-brake \(rear brake\) with its own ECU"):
         bywire.export_controller("whole-rear-stop", out=tmp_path / "ecu")
 
 
