@@ -262,12 +262,8 @@ REFUSED = {
     "a narrowing": ("k = 0\nk = y[0]\nreturn 1.0 * k", 1, "it is float, and int is needed"),
     "a counter that moves": ("for k in range(9):\n    k = 3\nreturn 0.0", 1, "counts a loop"),
     "a counter after its loop": ("for k in range(9):\n    pass\nreturn 1.0 * k", 2, "no value yet"),
-    "a list in a loop": ("for k in range(9):\n    z = list(y)\nreturn 0.0", 1, "made once"),
-    "a signal that is changed": (
-        "y[0] = 1.0\nreturn y[0]",
-        0,
-        "only a list of this function can be changed",
-    ),
+    "a list in a loop": ("for k in range(9):\n    z = list(y)\nreturn 0.0", 1, "within a loop"),
+    "a signal that is changed": ("y[0] = 1.0\nreturn y[0]", 0, "a list of this function can"),
     "a list that is changed late": (
         "z = list(y)\na = z[1:]\nz[2] = 9.0\nreturn a[1]",
         2,
@@ -279,7 +275,7 @@ REFUSED = {
         "change it before",
     ),
     "a list of any length": ("z = [0.0] * 999\nreturn z[0]", 0, "a number for each sample"),
-    "a list of other numbers": ("z = [1.0] * len(y)\nreturn z[0]", 0, "begins as [0.0]"),
+    "a list of other numbers": ("z = [1.0] * len(y)\nreturn z[0]", 0, "must start as [0.0]"),
     "a text": ("return 1.0 if setting.y == 'y' else 0.0", 0, "'y' is not a field with a type"),
     "a text of parts": ("return Undefined('a' + WORDS)", 0, "a text is written out"),
     "a number without format": ("return Undefined(f'{y[0]}')", 0, "numbers in it like"),
