@@ -189,7 +189,7 @@ def test_refusals(bywire: Bywire, tmp_path: Path) -> None:
     for flag in ("--map", "--holdout"):
         refused(
             bywire("identify", "seal-friction", "--study", "5", flag, "x.csv"),
-            f"{flag} is for measurement files",
+            f"{flag} is only for measurement files",
         )
     refused(bywire("identify", "seal-friction", "--synthetic", "1", "--set", "a.b=1"), "--set")
     refused(

@@ -199,7 +199,7 @@ def test_refusals(bywire: Bywire, bench: Path, tmp_path: Path) -> None:
         bywire(
             *method, "--synthetic", "1", "--holdout", data, "--bench", bench, *OUTPUTS, *UNKNOWNS
         ),
-        "--holdout is for measurement files",
+        "--holdout is only for measurement files",
     )
     refused(
         bywire("identify", "friction-ramp", "--synthetic", "1", "--unknown", "motor.R_m"),
