@@ -186,7 +186,7 @@ def test_identical_runs_differ_in_nothing(folders):
 
 
 def test_different_brakes_share_what_they_share(results):
-    with pytest.warns(AnswerWarning, match="different brakes are compared"):
+    with pytest.warns(AnswerWarning, match="the runs are of different brakes"):
         comparison = bywire.compare(results[0], "moment-ramp")
     names = {each.name for each in comparison.settings}
     assert "motor.R_m" not in names

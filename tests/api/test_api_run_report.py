@@ -20,7 +20,7 @@ def test_what_was_changed_and_the_verdict_come_first_and_figures_before_tables()
         "Key figures",
         "Energy",
         "Schematic",
-        "How it was made",
+        "Settings",
     ]
     required, changed = [block.table for block in result.document().page[0].blocks[:2]]
     assert [row[0].text for row in required.rows] == ["overshoot"]

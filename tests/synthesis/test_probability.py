@@ -76,7 +76,7 @@ def test_gains_hold_as_probably_as_is_wanted(study, monkeypatch):
     missed = replace(found, probability=replace(beyond, drawn=replace(told.drawn, lacking=3)))
     assert not missed.holds
     assert missed.document().remarks == ["all requirements with 90 %: missed"]
-    assert "3 more that were drawn" in str(missed)
+    assert "3 more models drawn" in str(missed)
     assert beyond.outcome == "missed"
 
 

@@ -859,7 +859,7 @@ class Identification(Answer):
         chosen = Details("Options of the method", [TableBlock(parameter_table(rows))])
         if subject is None:
             changed = changes_block(self.chosen.changed, "", method.name)
-            return Section("How it was made", [Paragraph(method.summary), changed, chosen])
+            return Section("Settings", [Paragraph(method.summary), changed, chosen])
         section = subject.provenance(f"Method {method.name}: {method.summary}.")
         return Section(section.title, [*section.blocks, chosen])
 

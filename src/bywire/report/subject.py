@@ -300,7 +300,7 @@ class Subject:
         cited = PARAMETER_SETS.find(self.parameters)
         rows = parameter_rows(self.par, cited.values)
         return Section(
-            "How it was made",
+            "Settings",
             [
                 *map(Paragraph, filter(None, notes)),
                 *([self.changes_block] if has_changes else []),
