@@ -82,10 +82,10 @@ def test_a_simulated_study_has_the_shares_of_its_closed_form(axis):
         assert indices[name].first.value == pytest.approx(first, abs=0.05)
         assert holds(indices[name].total, first)  # next to nothing together
     assert study.notes == [
-        "256 cases in place of 300: they come in whole groups",
-        "sobol-indices: cases share values, so that shares of them are no probabilities",
-        "overshoot: 64 groups do not tell shares within +-0.15; name more cases in the study file, "
-        "and run it into another folder",
+        "256 cases in place of 300, because cases come in whole groups",
+        "sobol-indices: cases share values, so shares of them are not probabilities",
+        "overshoot: 64 groups do not determine shares within +-0.15; ask for more cases in the study "
+        "file, and run it into another folder",
     ]
     assert "what drives overshoot" in str(study)
     with undrawn():
