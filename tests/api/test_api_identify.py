@@ -98,7 +98,7 @@ def test_a_recording_is_replayed_from_memory(tmp_path: Path) -> None:
     assert set(found.recording) == {"x_measured", "x_modeled", "M_set"}
     difference = found.recording["x_modeled"] - found.recording["x_measured"]
     assert float(np.abs(difference).max()) < 1e-6
-    assert found.tables()["How well it fits"]["nrmse"].to_list()[0] < 2.0
+    assert found.tables()["Fit"]["nrmse"].to_list()[0] < 2.0
     assert {path.name for path in found.write(tmp_path)} == {
         "replay.nc",
         "x.png",

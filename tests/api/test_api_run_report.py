@@ -34,7 +34,9 @@ def test_what_was_changed_and_the_verdict_come_first_and_figures_before_tables()
 def test_errors_of_temperatures_are_differences():
     result = bywire.run("hard-braking", QUICK)
     tables = result.document().page[-1].blocks
-    (errors,) = [b for b in tables if getattr(b, "title", "").startswith("Error of recorded")]
+    (errors,) = [
+        b for b in tables if getattr(b, "title", "").startswith("Numerical error of recorded")
+    ]
     rows = {row[1].text: row[2].text for row in errors.blocks[0].table.rows}
     assert rows["T_winding"] == "0 K"
 

@@ -84,10 +84,10 @@ def test_a_simulated_study_has_the_shares_of_its_closed_form(axis):
     assert study.notes == [
         "256 cases in place of 300, because cases come in whole groups",
         "sobol-indices: cases share values, so shares of them are not probabilities",
-        "overshoot: 64 groups do not determine shares within +-0.15; ask for more cases in the study "
-        "file, and run it into another folder",
+        "overshoot: 64 groups do not determine shares within +-0.15; ask for more cases in the "
+        "study file, and run it into another folder",
     ]
-    assert "what drives overshoot" in str(study)
+    assert "main influences on overshoot" in str(study)
     with undrawn():
         study.write(out)
     names = {path.name for path in out.iterdir()}

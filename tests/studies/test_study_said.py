@@ -87,14 +87,16 @@ def test_what_drives_missed_requirements_comes_first(study):
     outcomes = {each.demand.figure: each.outcome for each in findings.judgments}
     assert outcomes == {"dead_time": "met", "rise_time": "undecided", "overshoot": "missed"}
     titles = [each.title.split(",")[0] for each in influence_tables(findings)]
-    assert titles == [f"what drives {name}" for name in ("overshoot", "rise_time", "dead_time")]
+    assert titles == [
+        f"main influences on {name}" for name in ("overshoot", "rise_time", "dead_time")
+    ]
 
 
 def test_a_table_of_drivers_says_how_many_it_leaves_out(found):
     findings = found("rise_time", np.linspace(0.05, 0.07, CASES), "<= 60 ms with 90 %")
     (table,) = influence_tables(findings)
     assert len(table.table.rows) == 5
-    said = "What drives rise_time, the 5 strongest, and 2 more in report.json."
+    said = "Main influences on rise_time, the 5 strongest; 2 more are in report.json."
     assert table.caption == said
 
 
@@ -112,7 +114,7 @@ def test_captions_say_who_is_drawn_and_who_misses(found):
     assert "all that have it meet the limit" in lacking["scatter-rise_time"]
     at_edge = "Triangles at the upper edge: cases without it (500), which miss the limit."
     assert lacking["scatter-rise_time"].endswith(at_edge)
-    assert lacking["parallel"].endswith("does not have a figure, its line goes to 'none'.")
+    assert lacking["parallel"].endswith("If a case lacks a figure, its line goes to 'none'.")
 
 
 def test_no_more_points_are_left_out_than_are_said(found):
