@@ -57,7 +57,7 @@ def test_signals_in_memory_are_a_measurement() -> None:
     assert again.put_in == {}
     with pytest.raises(bywire.BywireError, match="give only one of"):
         bywire.identify("seal-friction", made.data, synthetic=2)
-    with pytest.raises(bywire.BywireError, match="unknowns is for methods of any bench"):
+    with pytest.raises(bywire.BywireError, match="unknowns is only for methods of any bench"):
         bywire.identify("seal-friction", made.data, question=bywire.Question(unknowns="A"))
 
 

@@ -203,11 +203,11 @@ def test_refusals(bywire: Bywire, bench: Path, tmp_path: Path) -> None:
     )
     refused(
         bywire("identify", "friction-ramp", "--synthetic", "1", "--unknown", "motor.R_m"),
-        "--unknown is for methods of any bench (output-error)",
+        "--unknown is only for methods of any bench (output-error)",
     )
     refused(
         bywire("identify", "friction-ramp", "--synthetic", "1", "--loss", "huber"),
-        "--loss is for methods of any bench (output-error)",
+        "--loss is only for methods of any bench (output-error)",
     )
     refused(
         bywire(*given, "--holdout", tmp_path / ".." / tmp_path.name / "run.csv"),
