@@ -46,7 +46,7 @@ def test_a_failed_check_is_warned_of() -> None:
             "friction-model", synthetic=1, options={"law": "viscous", "duration": 4.0}
         )
     assert not found.holds
-    assert "Do not use it as it is" in found._repr_html_()
+    assert "Do not use this result" in found._repr_html_()
 
 
 def test_signals_in_memory_are_a_measurement() -> None:

@@ -46,7 +46,7 @@ def test_texts_and_figures(bywire, tmp_path):
 
 def test_friction_of_a_plant(bywire):
     stuck = bywire("linearize", "wedge-plant", "--friction", "stuck")
-    assert "what friction holds, rests" in stuck.out
+    assert "friction holds the plant at rest" in stuck.out
     slides = bywire(
         "linearize", "motorcycle-plant", "--friction", "sliding", "--speed", "5 rad/s", "--json"
     ).object

@@ -219,7 +219,7 @@ def test_each_requirement_in_turn_shares_the_first_level(study, tmp_path):
     first, second = found.findings.rare
     assert (first.failure.runs, second.failure.runs) == (640, 640)
     assert len(found.cases) == 640
-    assert any("not judged" in note and "overshoot" in note for note in found.notes)
+    assert any("no verdict" in note and "overshoot" in note for note in found.notes)
 
 
 @pytest.mark.parametrize(

@@ -128,6 +128,6 @@ def test_a_simulated_study_has_the_effects_of_its_closed_form(axis):
     assert {*sizes} == {"mu_star", "sigma"}
     cases = study.cases.assign(overshoot=study.cases["overshoot"].where(study.cases["case"] != 3))
     lacking = replace(study, findings=Findings(plan, cases, study.nominal.kpis))
-    (section,) = [each for each in lacking.document().sections() if "drives" in each.title]
+    (section,) = [each for each in lacking.document().sections() if "influences" in each.title]
     (block,) = section.blocks  # the sentence in place of the table
     assert block.texts == ["no indices of overshoot: not defined in 1 of 48 cases"]

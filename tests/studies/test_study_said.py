@@ -140,7 +140,7 @@ def test_histograms_of_designs_that_go_to_the_ends_count_no_frequencies(found):
     findings = found("rise_time", np.linspace(0.05, 0.07, CASES), "<= 60 ms")
     assert "90 % of them" in captions(findings)["histograms"]
     ends = replace(findings, plan=replace(findings.plan, design="corners"))
-    said = "heights count the cases of corners, and are no frequencies"
+    said = "heights count the cases of corners, and are not probabilities"
     assert said in captions(ends)["histograms"]
 
 
