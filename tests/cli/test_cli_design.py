@@ -232,7 +232,7 @@ def test_a_gain_schedule_as_a_bench_file_that_runs(bywire, tmp_path):
                 "--over",
                 "at=5 bar:30 bar:3",
             ),
-            ("the schedule follows", "--at"),
+            ("the schedule follows pressure", "--at"),
         ),
         (
             ("pressure", "--require", "bandwidth >= 5 Hz", "--over", "motor.R=0.3:0.4:2"),
