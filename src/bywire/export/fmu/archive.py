@@ -145,14 +145,15 @@ def _compiler_for(target: str) -> tuple[Compiler, tuple[str, ...]]:
         if compiler is None:
             raise CompilerError(
                 "an FMU contains a compiled model, but there is no C compiler: install one, or the "
-                "extra bywire[compiler]"
+                "extra bywire[compiler] (in your clone: pip install -e '.[compiler]')"
             )
         return compiler, ()
     command = bundled_compiler()
     if command is None:
         raise CompilerError(
             f"target {target}: this system's compiler only compiles for {this_platform()}; install "
-            "the extra bywire[compiler], which compiles for all",
+            "the extra bywire[compiler], which compiles for all systems "
+            "(in your clone: pip install -e '.[compiler]')",
             name="target",
             value=target,
             valid=this_platform(),

@@ -455,8 +455,8 @@ def _compiled(headers: Mapping[str, str], further: Mapping[str, str]) -> bytes:
     compiler = bundled_compiler()
     if compiler is None:
         raise CompilerError(
-            "WebAssembly is compiled by the extra bywire[compiler], which is not installed: "
-            "pip install 'bywire[compiler]'"
+            "WebAssembly needs the extra bywire[compiler], which is not installed: in your clone: "
+            "pip install -e '.[compiler]'"
         )
     with scratch_folder(process_folder()) as folder:
         for name in ("math.h", "string.h", "page.c"):

@@ -1,4 +1,4 @@
-"""The file that plays a scene: drawing, numbers and player inside, nothing else is loaded."""
+"""Self-contained file that plays a scene: drawing, numbers and player."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def scene_page(scene: Scene, title: str, summary: str) -> str:
     scene
         What is shown.
     title, summary
-        Its heading and what is said below, as plain text.
+        Its heading and the line below it, as plain text.
     """
     folder = files(__package__)
     script, style = (folder.joinpath(name).read_text() for name in ("player.js", "player.css"))
