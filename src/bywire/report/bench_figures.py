@@ -92,7 +92,7 @@ def _time_traces(result: Result) -> list[Shown]:
             f"time-traces-{label}" if len(result.recordings) > 1 else "time-traces",
             time_traces(recording, stated=stated_for(result.bench)),
             f"Time traces{f', {label}' if len(result.recordings) > 1 else ''}. Shaded: stuck; "
-            "faintly: again and again, with the share of the shaded time.",
+            "faintly: stuck repeatedly, with the share of the shaded time.",
         )
         for label, recording in result.recordings.items()
         if "time" in recording.dims

@@ -68,7 +68,9 @@ def estimate_table(
     for u in (kept.unknown for kept in estimate.kept):
         number, _, unit = with_interval(u.start, 0.0, u.unit)
         by_step = [] if steps is None else [Cell("-")]
-        rows.append((u, [Cell(number), Cell("not told", "bad"), *by_step, Cell("-"), Cell(unit)]))
+        rows.append(
+            (u, [Cell(number), Cell("not determined", "bad"), *by_step, Cell("-"), Cell(unit)])
+        )
     return Table(
         (
             Column("parameter"),
@@ -173,7 +175,7 @@ def trust_table(trust: Trust) -> Table:
             Column("put in", numeric=True),
             Column("count", numeric=True),
             Column("bias / standard error", numeric=True),
-            Column("intervals that hold it"),
+            Column("intervals that contain it"),
             Column("claimed / real scatter", numeric=True),
             Column("result"),
         ),

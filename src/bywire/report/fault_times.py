@@ -33,8 +33,8 @@ def fault_times(faults: Sequence[FaultTimes]) -> Figure:
     figure, (axes,) = style.new_figure(0.9 + _ROW * len(ordered))
     places = np.arange(len(ordered))[::-1]
     for label, color, marker, column in (
-        ("too much", style.VERMILLION, "s", 0),
-        ("seen", style.BLUE, "o", 1),
+        ("criterion violated", style.VERMILLION, "s", 0),
+        ("detected", style.BLUE, "o", 1),
     ):
         for place, fault in zip(places, ordered, strict=True):
             times = fault[1:][column]
