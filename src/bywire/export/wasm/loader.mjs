@@ -58,7 +58,7 @@ function rowsOf(description, given, count, interval) {
  *
  * `run(parameters, { stimulus, duration })` returns `{ time, signals, table, settled }`: signals by
  * name as Float64Array, row by row those of a bench, or all beside each other as a table of rows.
- * Parameters and stimuli that are left out are the bench's; noise is none unless it is given as rows.
+ * Omitted parameters and stimuli are the bench's; noise is zero unless it is given as rows.
  */
 export async function load(bytes, description) {
   const { exp, log, sin, cos, tan, atan, tanh, pow } = Math;
