@@ -27,12 +27,12 @@ class Channel:
     name
         Variable of the recording.
     label
-        Its ``long_name``; the name itself where the recording has none.
-    Its ``long_name``, or the name if the recording has none.
+        Its ``long_name``, or the name if the recording has none.
+    symbol
         Its SI unit.
     unit
-        The unit of ``values``, in which it is shown.
-    Display unit of ``values``.
+        Display unit of ``values``.
+    time
         Time axis [s], shape ``(n,)``.
     values
         Samples, shape ``(n,)``.

@@ -30,7 +30,7 @@ class Role(Enum):
 
 # --- Panels
 
-_NO_PANEL = ("E_", "W_", "t_", "noise_")  # beginnings of names: what only accumulates, and noise
+_NO_PANEL = ("E_", "W_", "t_", "noise_")  # prefixes of names: cumulative signals, and noise
 _LINES = 2  # line styles of different set points in a panel
 _LONGEST = 20  # characters that fit along a low panel
 

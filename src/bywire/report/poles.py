@@ -42,8 +42,8 @@ def _draw_plane(axes: Axes, radius: float, period: float, growth: float = 0.0) -
 
     Parameters
     ----------
-    Axes for the lines.
-        Where to draw.
+    axes
+        Axes for the lines.
     radius
         Largest magnitude of a visible rate [1/s].
     period

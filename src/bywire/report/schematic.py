@@ -43,10 +43,10 @@ class Layers:
 
     Parameters
     ----------
-    Nodes and passages of each layer, from top to bottom.
-        Of each layer, from top to bottom.
-    Index of the layer of each node.
-        Of each node.
+    members
+        Nodes and passages of each layer, from top to bottom.
+    layer
+        Index of the layer of each node.
     top
         Upper edge of each node and passage.
     """

@@ -98,8 +98,8 @@ class Quantile:
     ----------
     probability
         Share of the cases below it.
-    Estimate and interval; NaN where there are too few cases.
-        Estimate and interval; NaN where the cases are too few for one.
+    value, low, high
+        Estimate and interval; NaN where there are too few cases.
     """
 
     probability: float

@@ -223,14 +223,14 @@ def _write_chunk(
 
     Parameters
     ----------
-    Path of its file.
-        Its file.
+    path
+        Path of its file.
     columns
         Values of each quantity and figure, shape (cases,) each; texts as objects.
-    Units of the columns that have one.
-        Unit of those that have one.
-    What distinguishes the file from any other.
-        What tells the file from any other.
+    units
+        Units of the columns that have one.
+    marks
+        What distinguishes the file from any other.
 
     Raises
     ------
@@ -492,8 +492,9 @@ def with_cases(plan: StudyPlan, store: StudyStore, cases: int | None) -> StudyPl
 
     Raises
     ------
-    For fewer cases than are computed, too few, too many, and for a design with a fixed number of
-    cases.
+    ParameterError
+        For fewer cases than are computed, too few, too many, and for a design with a fixed number
+        of cases.
     """
     if cases is not None:
         cases = whole_number("cases", cases, 1, MOST)
@@ -516,7 +517,7 @@ def with_cases(plan: StudyPlan, store: StudyStore, cases: int | None) -> StudyPl
             extended.sought.require_budget()
         return extended
     given = plan if cases is None else replace(plan, cases=cases)
-    given.points  # noqa: B018 - refuses too few before anything runs
+    given.points  # noqa: B018 - rejects too few cases before any run
     return given
 
 

@@ -217,7 +217,7 @@ def _require_agreement(plan: StudyPlan) -> None:
             )
         plan.sought.require_budget()
         return
-    plan.points  # noqa: B018 - refuses what is too large, or too small for indices
+    plan.points  # noqa: B018 - rejects invalid numbers of cases
 
 
 def _require_rare(plan: StudyPlan, design: SoughtDesign) -> None:

@@ -149,7 +149,7 @@ def _listed(values: Array, unit: str) -> str:
 # 2011).
 
 LIBRARY = ("surrogates of studies", "studies")
-_FEWEST = 30  # cases of which a surrogate may be made
+_FEWEST = 30  # designs whose cases allow a surrogate
 _LARGEST = 4  # degree: with five quantities the fifth gains little, and takes ten times as long
 _FOLDS = 5  # cross-validation: each fifth of the cases is predicted from the others
 _LACKING = ("one-at-a-time", "corners", "morris", *SOUGHT)  # designs that visit only a few points

@@ -210,8 +210,8 @@ def loop_gain(
 
     Parameters
     ----------
-    The loop, and the parameters and operating point of the measurement.
-        Loop, and the parameters and operating point it was measured with.
+    loop, par, value
+        The loop, and the parameters and operating point of the measurement.
     closed, frequencies
         Response and frequencies [Hz], shape (n,).
 

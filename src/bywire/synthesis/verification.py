@@ -234,7 +234,7 @@ Measure = Callable[
 ``worth(k, known figures)`` was false"""
 
 _ENOUGH = 0.02  # worst slack at which the search ends
-_NEAR = 0.03  # near the best worst slack: these are always measured in full
+_NEAR = 0.03  # distance to the best worst slack below which all is measured
 _MEMBERS = 36
 GENERATIONS = 60
 """largest number of generations of a search"""

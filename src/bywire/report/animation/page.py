@@ -22,7 +22,7 @@ def scene_page(scene: Scene, title: str, summary: str) -> str:
     Parameters
     ----------
     scene
-        What is shown.
+        The scene.
     title, summary
         Its heading and the line below it, as plain text.
     """

@@ -10,7 +10,7 @@ from bywire.bench.bench import Bench
 from bywire.core.arguments import checked
 from bywire.core.registry import Kind, instances
 
-_COUNT = 6  # that stand first where no brake chooses
+_COUNT = 6  # at the top if no brake chooses
 
 
 @checked
@@ -35,7 +35,7 @@ class Sliders:
 
 
 SLIDERS = Kind("choice of sliders", ("sliders",), instances(Sliders), declared="a Sliders")
-"""every brake's choice of parameters that stand first in its pages"""
+"""every brake's choice of parameters at the top of its pages"""
 
 
 def first_sliders(bench: Bench, names: Sequence[str]) -> list[str]:
