@@ -156,7 +156,7 @@ def test_a_step_of_no_height_is_refused() -> None:
 def test_stuck_phases_and_saturation_are_named(recording: xr.Dataset) -> None:
     drawn = time_traces(recording)
     # under dither, which shakes it loose
-    again = "shaft stuck again and again, 11 % of the shade"
+    again = "shaft stuck repeatedly, 11 % of the shaded time"
     assert again in legend_of(drawn.axes[0])
     assert "saturated" in legend_of(drawn.axes[1])
 
