@@ -143,7 +143,7 @@ class Stroboscope:
         """Return one period from a carried vector, shape (n,)."""
         vector, tangents = self._loaded(start)
         values, _ = self._segment(vector, tangents, self._seeds(()), 0, self._schedule.frames)
-        require_finite(self._layout, vector, "the period left the numbers")
+        require_finite(self._layout, vector, "the period diverged")
         return Period(vector[self._carried], values)
 
     def derivatives(self, start: Array) -> Derivatives:

@@ -71,8 +71,8 @@ def rests_exactly(trial: Trial) -> Iterator[Evidence]:
     for name in sorted(waiting):  # what else loads it may move it later, as a disc's run-out does
         first = float(run[1, names.index(name)])
         text = (
-            f"{name} is {first:.2g} after a sample time at {SLOW_SHARES[-1]:g} of the controllers' "
-            f"moves, where {holds[name]:.2g} of its friction would hold it"
+            f"{name} is {first:.2g} after one sample time at {SLOW_SHARES[-1]:g} of the "
+            f"controllers' moves, where {holds[name]:.2g} of its friction would hold it"
         )
         yield Evidence(first == 0.0, text, place=place)
 

@@ -23,7 +23,7 @@ class Parameters(ParameterSet):
 
 FAULTS = (
     ParameterFault("under-voltage", "weak battery", replaced="V_bat", value=6.0),
-    ParameterFault("bad-contact", "more resistance in battery and leads", ("R_bat",), 10.0),
+    ParameterFault("bad-contact", "higher resistance of battery and leads", ("R_bat",), 10.0),
 )
 
 

@@ -31,7 +31,7 @@ class Parameters(ParameterSet):
 
 
 FAULTS = (
-    ParameterFault("glazed", "less friction of the pads", ("mu_pad",), 0.7),
+    ParameterFault("glazed", "lower pad friction", ("mu_pad",), 0.7),
     ParameterFault(
         "dragging",
         "a piston sticks in its caliper: pads drag, by the torque",

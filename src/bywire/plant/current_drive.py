@@ -45,9 +45,9 @@ class Parameters(ParameterSet):
 
 
 FAULTS = (
-    ParameterFault("under-voltage", "less voltage at the power stage", ("V_dc",), 0.5),
-    ParameterFault("scale", "current measurement shows a multiple", ("G_sense",), 0.5),
-    ParameterFault("derated", "less current than demanded", ("i_max",), 0.5),
+    ParameterFault("under-voltage", "lower voltage at the power stage", ("V_dc",), 0.5),
+    ParameterFault("scale", "current measurement is scaled by a factor", ("G_sense",), 0.5),
+    ParameterFault("derated", "lower current limit", ("i_max",), 0.5),
 )
 
 

@@ -40,7 +40,7 @@ class Parameters(ParameterSet):
     """amplitude of the run-out that the floating caliper does not follow"""
 
 
-FAULTS = (ParameterFault("run-out", "the disc runs out of true, by a multiple", ("runout",), 5.0),)
+FAULTS = (ParameterFault("run-out", "disc run-out larger by a factor", ("runout",), 5.0),)
 
 
 class State(NamedTuple):

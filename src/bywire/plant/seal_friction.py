@@ -43,7 +43,7 @@ class Parameters(ParameterSet):
 FAULTS = (
     ParameterFault(
         "swollen",
-        "more friction, the same multiple everywhere",
+        "more friction, by the same factor in both directions",
         ("T_pr", "f_cfr_p", "f_cfr_n"),
         1.9,
     ),

@@ -308,7 +308,7 @@ class _Carried:
             require_finite(
                 self._kernel.layout,
                 self._vector,
-                f"one of {self._count} runs left the numbers before t = {end * schedule.frame:g} s",
+                f"one of {self._count} runs diverged before t = {end * schedule.frame:g} s",
             )
             require_work(work_of(schedule, self._kernel.layout, end, self._vector), self._most)
             watch.piece()
@@ -514,7 +514,7 @@ def simulate_ensemble(
         rows = values[cases[0] : cases[-1] + 1]
         kernel.advance(schedule, columns, stimulus, vector, rows, schedule.frames)
         last = min(cases[-1], count - 1)
-        require_finite(kernel.layout, vector, f"one of cases {first} to {last} left the numbers")
+        require_finite(kernel.layout, vector, f"one of cases {first} to {last} diverged")
         counters[:, cases] = vector[kernel.layout.start["counters"] :]
 
     with thread_pool(threads or kernel.at_once) as pool:

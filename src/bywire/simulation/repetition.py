@@ -283,7 +283,7 @@ def repeat(
             counted = sorted(taken.seen)
             which = ", ".join(str(taken.case[lane]) for lane in counted)
             ends = taken.vector[:, counted]
-            require_finite(layout, ends, f"one of cases {which} left the numbers")
+            require_finite(layout, ends, f"one of cases {which} diverged")
             for lane, repeats in taken.passed(figures(now), tolerance, most).items():
                 case, unsettled = int(taken.case[lane]), float(taken.vector[counters, lane])
                 values[case], done[case] = now[lane], (taken.seen[lane], repeats, unsettled)

@@ -212,7 +212,7 @@ def simulate_with_sensitivities(
             tangents[at : at + len(memory), :here] = memory[:, lanes]
         rec_t = np.empty((schedule.rows, selection.size, DIRECTIONS))
         kernel.advance(request, vector, 0, schedule.frames, values, seeds, tangents, rec_t)
-        require_finite(kernel.layout, vector, "the run left the numbers")
+        require_finite(kernel.layout, vector, "the run diverged")
         derivatives[:, :, first : first + here] = rec_t[:, :, :here]
     counters = vector[kernel.layout.start["counters"] :]
     trajectory = Trajectory(
