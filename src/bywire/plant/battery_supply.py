@@ -13,7 +13,7 @@ Loss = Annotated[float, Signal("W", "loss in the supply's resistance", role=Role
 
 
 class Parameters(ParameterSet):
-    """Ideal voltage source behind a resistance; no dynamics of the cells."""
+    """Ideal voltage source with a series resistance, without dynamics of the cells."""
 
     V_bat: Voltage
     """open-circuit voltage of the battery"""
