@@ -35,17 +35,17 @@ class SurfaceParameters(ParameterSet):
     c1: Coefficient
     """limit of Burckhardt's adhesion, before c3 is subtracted"""
     c2: Coefficient
-    """rate at which it rises with slip"""
+    """rate at which Burckhardt's adhesion rises with slip"""
     c3: Coefficient
-    """decrease up to a locked wheel"""
+    """decrease of Burckhardt's adhesion up to a locked wheel"""
     B: Annotated[float, Unit("1", 10.0), Field(gt=0, allow_inf_nan=False)]
     """stiffness factor of the Magic Formula: with C and D, the slope at no slip"""
     C: Annotated[float, Unit("1", 1.6), Field(gt=1, lt=4, allow_inf_nan=False)]
-    """shape factor: decrease of the adhesion beyond its peak"""
+    """shape factor of the Magic Formula: decrease of the adhesion beyond its peak"""
     D: Coefficient
-    """largest adhesion"""
+    """largest adhesion of the Magic Formula"""
     E: Annotated[float, Unit("1", 0.5), Field(ge=-100, le=1, allow_inf_nan=False)]
-    """curvature factor: position of the peak"""
+    """curvature factor of the Magic Formula: position of the peak"""
 
     @model_validator(mode="after")
     def _has_a_peak(self) -> SurfaceParameters:

@@ -52,7 +52,7 @@ class Parameters(ParameterSet):
     alpha_V: Expansion
     """its expansion by volume"""
     T_rate: WarmingRate
-    """rate of its temperature"""
+    """temperature rate of the warming fluid"""
 
     @model_validator(mode="after")
     def _table_is_a_curve(self) -> Parameters:

@@ -66,11 +66,11 @@ class Parameters(ParameterSet):
     T_2: Temperature
     """temperature of the discs above which the pads fade no further"""
     f: Weight
-    """friction there, relative to that of cold pads"""
+    """friction of fully faded pads, relative to that of cold pads"""
     T_boil: Temperature
     """boiling point of the fluid at atmospheric pressure, fresh"""
     T_wet: Temperature
-    """the same for fluid with 3.7 % of water"""
+    """boiling point of the fluid at atmospheric pressure, with 3.7 % of water"""
     T_most: Temperature
     """temperature of the discs up to which these values are valid"""
 

@@ -56,7 +56,7 @@ class Parameters(ParameterSet):
     x_change: Distance
     """start of the further surface, from the front wheel's position at time zero"""
     x_back: Distance
-    """end of the further surface, likewise"""
+    """end of the further surface, from the same origin"""
     ramp: Ramp
     """length of the transition between surfaces and slopes"""
     gradient: Gradient

@@ -24,7 +24,7 @@ class Parameters(adhesion.Parameters):
     c_t: Annotated[float, Unit("s/m", 1.0), Field(ge=0, allow_inf_nan=False)]
     """damping of the sticking tyre near standstill, relative to load"""
     v_low: Annotated[float, Unit("m/s", 2.0), Field(gt=0, allow_inf_nan=False)]
-    """speed above which this damping is zero"""
+    """speed above which the damping c_t is zero"""
     tau_slide: Duration
     """time constant with which a sliding tyre loses the deflection beyond its limit"""
 
