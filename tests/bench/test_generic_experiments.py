@@ -109,7 +109,7 @@ def test_a_step_has_the_overshoot_of_a_second_order_lag() -> None:
     damping = D / (2.0 * math.sqrt(K * M))
     expected = 100.0 * math.exp(-math.pi * damping / math.sqrt(1.0 - damping**2))
     assert result.kpi("overshoot").value == pytest.approx(expected, rel=5e-3)
-    assert result.kpi("steady_state_error").note == "no set point is given"
+    assert result.kpi("steady_state_error").note == "the experiment has no set point"
     assert result.recording["x"].values[-1] == pytest.approx(200.0 / K, rel=1e-3)
     assert result.recording["F_set"].values[-1] == 200.0  # what drove it is recorded
 

@@ -55,7 +55,7 @@ def test_benchmarks_are_those_of_a_clone(bywire, process, tmp_path, monkeypatch)
 def test_failed_run_is_3(bywire, bench):
     stimulus = '[stimulus]\nkind = "step"\nstart = 0\nend = "1e300 A"\nt_step = "5 ms"\n'
     outcome = bywire("run", bench(OPEN_LOOP + stimulus), "--json")
-    refused(outcome, "left the numbers", "smaller step", status=3)
+    refused(outcome, "diverged", "smaller step", status=3)
 
 
 @pytest.mark.parametrize(

@@ -80,7 +80,7 @@ def test_a_cause_is_one_error(tmp_path: Path) -> None:
     assert [each.text.partition(":")[0] for each in broken] == ["AttributeError"]
     assert broken[0].place.file.endswith("point.py")
     others = {each.text for each in found if each is not broken[0]}
-    assert others == {"the error of renamed-actuator (renamed-example): units comes up here too"}
+    assert others == {"the error of renamed-actuator (renamed-example): units also occurs here"}
 
 
 FAULTS = """

@@ -95,7 +95,7 @@ def test_a_warning_says_which_boiling_point_is_passed_and_when():
     assert "boiling point of wet fluid, 155 degC, at t = 1 s" in wet
     assert "boiling point of fresh fluid, 230 degC, at t = 2 s" in fresh
     (disc,) = disc_heat.watch(t, State(hot + 500.0, cold, cold), WARM)
-    assert "the discs pass 650 degC" in disc
+    assert "the discs exceed 650 degC" in disc
     assert disc_heat.watch(t, State(hot + 500.0, cold, hot), WARM.replace({"law": "off"})) == []
 
 

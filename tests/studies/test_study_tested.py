@@ -25,8 +25,7 @@ TEXT = """
 kind = "corners"
 """
 SENTENCE = (
-    "fault pressure.stuck-at-last, from 0.01 s to 0.015 s: "
-    "pressure sensor shows what it showed last"
+    "fault pressure.stuck-at-last, from 0.01 s to 0.015 s: pressure sensor holds its last value"
 )
 
 

@@ -15,12 +15,12 @@ from bywire.analysis.response.sweep import Sweep
 from bywire.core.parameters import ParameterSet
 from bywire.core.typing import Array, Complex, Progress
 
-_PATIENCE = 12  # windows granted to loops with friction, which may never repeat exactly
+_PATIENCE = 12  # largest number of windows for loops with friction, which may never repeat exactly
 GAIN, PHASE = 0.01, 0.1
 """largest difference of gain [dB] and phase [degree] that counts as agreement"""
 NOTHING, LIMITS, EVERYTHING = "", "limits", "all"
-"""what is left on: nothing, at a small amplitude; the limits of currents, voltages and rates alone,
-which show at a large one; everything"""
+"""active nonlinearities: none, at a small amplitude; only limits of currents, voltages and rates,
+which act at a large amplitude; all"""
 
 
 @dataclass(frozen=True)
@@ -32,12 +32,13 @@ class Agreement:
     frequencies
         Frequencies [Hz], shape (n,).
     gain, phase
-        By what is left on (`NOTHING`, `LIMITS`, one cause, `EVERYTHING`): measured less linear in
-        dB and degree, shape (n,); NaN where the output stuck or did not settle. The limits act in
-        all but `NOTHING`: see `beyond_limits` for what a cause does by itself.
+        Measured minus linear response in dB and degree, shape (n,), by active nonlinearities
+        (`NOTHING`, `LIMITS`, one cause, `EVERYTHING`). NaN where the output stuck or did not
+        settle. The limits act in all cases except `NOTHING`: see `beyond_limits` for the separate
+        effect of a cause.
     step_gain, step_phase
-        What the finite step of the simulation makes of the linear model: that of the midpoint rule
-        less the exact one in dB and degree, shape (n,).
+        Effect of the finite simulation step on the linear model: midpoint rule minus exact model
+        in dB and degree, shape (n,).
     """
 
     frequencies: Array
@@ -48,9 +49,9 @@ class Agreement:
 
     @property
     def holds(self) -> bool:
-        """Whether the responses agree with everything off."""
+        """Whether the responses agree without nonlinearities."""
         gain, phase = np.abs(self.gain[NOTHING]).max(), np.abs(self.phase[NOTHING]).max()
-        return bool(gain <= GAIN and phase <= PHASE)  # NaN agrees with nothing
+        return bool(gain <= GAIN and phase <= PHASE)  # NaN does not agree
 
     def beyond_limits(self, cause: str) -> tuple[Array, Array]:
         """Return the effect of a cause in addition to the limits at the same amplitude.
@@ -66,11 +67,11 @@ class Agreement:
 
     @property
     def largest(self) -> list[str]:
-        """By frequency, the cause that moves the response most, shape (n,).
+        """Cause with the largest effect on the response at each frequency, shape (n,).
 
-        The limits count by what they do alone, other causes by what they add. What sticks or does
-        not settle has no number and counts as more than any; several are joined. Empty where
-        nothing moves it by more than counts as agreement.
+        Limits count by their own effect, other causes by their additional effect. Causes with which
+        the output sticks or does not settle count as largest; several are joined. The entry is
+        empty if no effect is larger than the tolerance of agreement.
         """
         moves = {LIMITS: (self.gain[LIMITS], self.phase[LIMITS])}
         singles = [c for c in self.gain if c not in (NOTHING, LIMITS, EVERYTHING)]
@@ -95,10 +96,10 @@ def agreement(
     step: float | None = None,
     progress: Progress | None = None,
 ) -> Agreement:
-    """Compare both responses with all causes of nonlinearity off, each one on, and all on.
+    """Compare both responses without nonlinearities, with each one, and with all of them.
 
-    Everything off is measured twice: at the small amplitude, where nothing is left that could
-    differ, and at the large one, where the limits may show.
+    The case without nonlinearities is measured twice: at the small amplitude, where both responses
+    must agree, and at the large one, where limits may act.
 
     Parameters
     ----------
@@ -107,8 +108,8 @@ def agreement(
     frequencies
         Frequencies [Hz], ascending.
     amplitudes
-        Amplitudes of the sine, in the input's SI unit: small, or limits show with everything off;
-        and as large as in use, or everything sticks.
+        Two amplitudes of the sine, in the input's SI unit: one that is small enough to avoid
+        limits, and one that is as large as in use, so that friction does not stick.
     step
         Substep [s]; the operating point's own by default.
 
@@ -162,5 +163,5 @@ def _in_dB_and_degree(ratio: Complex) -> tuple[Array, Array]:
 
 
 def _move(gain: Array, phase: Array) -> Array:
-    """Return the change of a response in the complex plane, relative to its magnitude before."""
+    """Return the change of a response in the complex plane, relative to its original magnitude."""
     return np.abs(10.0 ** (gain / 20.0) * np.exp(1j * np.radians(phase)) - 1.0)

@@ -1,7 +1,7 @@
 """Crossings of a level by a response: gain and phase crossovers, margins, bandwidth.
 
-The response may be computed or measured, over ascending frequencies. Between its points it
-is read straight on logarithmic axes, or exactly where it is at hand as a function.
+The response may be computed or measured, over ascending frequencies. Between its points it is
+interpolated linearly on logarithmic axes, or evaluated exactly if it is available as a function.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ DROP = math.sqrt(0.5)
 """share of the start to which a response has fallen at its bandwidth: -3 dB"""
 NEARLY_ZERO = 1.0
 """phase [degree] at the lower end that still counts as 0: a loop of finite gain"""
-_BRACKETS = 4000  # points of the grid that brackets what a function of frequency passes
+_BRACKETS = 4000  # points of the grid that brackets crossings of a function of frequency
 
 
 class Crossing(NamedTuple):
@@ -34,9 +34,8 @@ class Crossing(NamedTuple):
     frequency
         In Hz.
     margin
-        Phase margin there [degree]: 180 and the phase, followed without jumps from the lowest
-        frequency, where it counts as the value between -360 and 0: a loop with integral action
-        begins near -90.
+        Phase margin there [degree]: 180 plus the phase. The phase is unwrapped from the lowest
+        frequency, where it is between -360 and 0: a loop with integral action begins near -90.
     falls
         Whether the gain falls there.
     """
@@ -47,14 +46,14 @@ class Crossing(NamedTuple):
 
     @property
     def distance(self) -> float:
-        """Angle between the loop gain and -1, either way round [degree, 0 to 180]."""
+        """Angle between the loop gain and -1, in either direction [degree, 0 to 180]."""
         return abs((self.margin + 180.0) % 360.0 - 180.0)
 
 
 def gain_crossings(
     frequencies: Array, L: Complex, response: Response | None = None
 ) -> list[Crossing]:
-    """Return where a loop gain is 1, falling or rising, by ascending frequency.
+    """Return the crossovers of a loop gain, falling or rising, by ascending frequency.
 
     Parameters
     ----------
@@ -62,7 +61,7 @@ def gain_crossings(
         Frequencies [Hz], ascending, and loop gain there (negative feedback not counted), shape
         (n,) each.
     response
-        The loop gain as a function, where crossings are wanted to rounding.
+        The loop gain as a function, for crossings to rounding error.
     """
     size, phase = np.log(np.abs(L)), np.unwrap(np.angle(-L))
     # L between -360 and 0 degree is -L between -180 and 180.
@@ -88,12 +87,12 @@ class Margin(EqualWhereUndefined):
     Parameters
     ----------
     crossover
-        Highest frequency at which the loop gain falls to 1 [Hz]; NaN where it never does.
+        Highest frequency at which the loop gain falls to 1 [Hz]; NaN if it never does.
     phase
         Smallest phase margin of all frequencies at which the loop gain is 1 [degree]; NaN likewise.
-        The one nearest to -1 counts, whether the gain falls there or rises.
+        The one nearest to -1 counts, for falling and rising gain.
     at
-        Frequency at which that is read [Hz]; NaN likewise.
+        Frequency of the phase margin [Hz]; NaN likewise.
     """
 
     crossover: float
@@ -119,9 +118,9 @@ def margin(loop: Response, band: tuple[float, float]) -> Margin:
 def measured_margin(frequencies: Array, L: Complex) -> Margin:
     """Return crossover and phase margin of a loop gain known at some frequencies [Hz] only.
 
-    The margin is the distance from -1, within 180 degree. NaN where the frequencies hold no fall
-    to 1, with a crossover of infinity where the gain ends above: then it falls only beyond them.
-    Where there is no loop gain, NaN.
+    The margin is the distance from -1, within 180 degree. It is NaN if the gain does not fall to 1
+    within the frequencies. The crossover is then infinite if the gain ends above 1. Without loop
+    gain, both are NaN.
     """
     if not (np.isfinite(L).all() and L.all()):
         return Margin(math.nan, math.nan)
@@ -146,13 +145,13 @@ def fall(
     start
         Magnitude that counts as 1, in the gain's unit: that at standstill.
     response
-        The response as a function, where the frequency is wanted to rounding.
+        The response as a function, for a frequency to rounding error.
 
     Returns
     -------
     float
-        In Hz; 0 where the gain is below from the lowest frequency on, infinity where it stays
-        above.
+        Frequency in Hz; 0 if the gain is below -3 dB from the lowest frequency on, infinity if it
+        stays above.
     """
     size, level = np.nan_to_num(gain), DROP * start
     below = np.flatnonzero(size < level)
@@ -161,7 +160,7 @@ def fall(
     k = int(below[0])
     if k == 0:
         return 0.0
-    if size[k] == 0.0:  # it breaks off there: the last frequency at which it moved
+    if size[k] == 0.0:  # the response ends there: the last frequency at which the output moved
         return float(frequencies[k - 1])
     if response is not None:
         return _solved(response, level, frequencies[k - 1], frequencies[k])
@@ -169,14 +168,14 @@ def fall(
 
 
 def bandwidth(response: Response, band: tuple[float, float]) -> float:
-    """Return where a response falls to -3 dB of that at the band's lower end [Hz]; NaN for never.
+    """Return the frequency of -3 dB relative to the band's lower end [Hz]; NaN if there is none.
 
     Parameters
     ----------
     response
-        Any.
+        Any response.
     band
-        Frequencies to look at [Hz].
+        Frequencies to search [Hz].
     """
     f = np.geomspace(*band, _BRACKETS)
     size = np.abs(response(f))
@@ -190,14 +189,14 @@ def disk_margin(L: Complex) -> float:
 
 
 class GainFactor(NamedTuple):
-    """A factor that takes a loop to the border of stability.
+    """Factor on the loop gain at the limit of stability.
 
     Parameters
     ----------
     factor
-        Above 1 where the loop gain may grow by it, below where it may fall.
+        Above 1 if the loop gain may grow by it, below 1 if it may fall to it.
     frequency
-        Where the loop gain times the factor is -1 [Hz].
+        Frequency at which the loop gain times the factor is -1 [Hz].
     """
 
     factor: float
@@ -214,7 +213,7 @@ def gain_factors(
     frequencies, L
         Frequencies [Hz], ascending, and loop gain there, shape (n,) each.
     response
-        The loop gain as a function, where factors are wanted to rounding.
+        The loop gain as a function, for factors to rounding error.
     """
     factors = []
     for k in map(int, np.flatnonzero(np.diff(np.signbit(L.imag)))):
@@ -229,14 +228,14 @@ def gain_factors(
 
 
 def real_factor(real: float, frequency: float) -> list[GainFactor]:
-    """Return the factor of a loop gain that is real at a frequency [Hz]; none right of 0."""
+    """Return the factor of a loop gain that is real at a frequency [Hz]; None if it is positive."""
     if not (math.isfinite(real) and real < 0.0):
         return []
     return [GainFactor(-1.0 / real, frequency)]
 
 
 def upper_factor(factors: Sequence[GainFactor]) -> GainFactor:
-    """Return the factor by which a stable loop's gain may grow, and where; or inf, NaN."""
+    """Return the factor by which a stable loop's gain may grow, and its frequency; or inf, NaN."""
     return min((each for each in factors if each.factor > 1.0), default=_ANY_GROWTH)
 
 
@@ -247,11 +246,11 @@ def lower_factor(factors: Sequence[GainFactor]) -> GainFactor:
 
 
 _ANY_GROWTH, _ANY_FALL = GainFactor(math.inf, math.nan), GainFactor(0.0, math.nan)
-_LEAST_FACTOR = 1e-9  # below, L is at a pole on the border of stability, where it has no size
+_LEAST_FACTOR = 1e-9  # below it, L is at a pole on the border of stability, where it is infinite
 
 
 def _passing(frequencies: Array, values: Array, k: int) -> float:
-    """Return the frequency at which logarithms pass zero between points k and k + 1."""
+    """Return the frequency at which logarithms cross zero between points k and k + 1."""
     share = values[k] / (values[k] - values[k + 1])
     low, high = frequencies[k], frequencies[k + 1]
     return float(low * (high / low) ** share)
@@ -265,7 +264,7 @@ def _solved_real(response: Response, low: float, high: float) -> float:
 
 
 def _solved(response: Response, level: float, low: float, high: float) -> float:
-    """Return the frequency between two others at which a magnitude passes a level."""
+    """Return the frequency between two others at which a magnitude crosses a level."""
     from scipy.optimize import brentq
 
     def excess(f: float) -> float:

@@ -1,4 +1,4 @@
-"""Root locus: poles of a loop or plant against any parameter, and where it turns unstable."""
+"""Root locus: poles of a loop or plant over any parameter, and its borders of stability."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ class Border:
     Parameters
     ----------
     value
-        Of the parameter [SI].
+        Value of the parameter [SI].
     rate
-        The pole that crosses, as a rate [1/s], with positive frequency of a pair.
+        Crossing pole, as a rate [1/s]; for a pair, the one with positive frequency.
     above
         Whether the loop is stable above the value; else below it.
     """
@@ -56,7 +56,8 @@ class Locus:
     stable
         Whether the loop is stable, shape (n,).
     borders
-        Where that changes. A range that turns unstable and back between two values looks stable.
+        Values at which that changes. A loop that becomes unstable and stable again between two
+        values seems stable.
     """
 
     name: str
@@ -116,7 +117,7 @@ def locus_of(
     model
         ``model(value [SI]) -> LinearModel``, of equal size and sample time for all values.
     name, unit
-        What is varied, and its SI unit.
+        Varied quantity and its SI unit.
     values
         Values [SI], ascending, at least two.
 
@@ -153,7 +154,7 @@ def locus_of(
 
 
 def _followed(before: Complex, poles: Complex) -> Complex:
-    """Return poles in the order of those before: the assignment that moves them least."""
+    """Return poles in the order of the previous ones, with the smallest total distance."""
     from scipy.optimize import linear_sum_assignment
 
     _, columns = linear_sum_assignment(np.abs(before[:, None] - poles))
@@ -163,7 +164,7 @@ def _followed(before: Complex, poles: Complex) -> Complex:
 def _outermost(model: LinearModel) -> tuple[complex, float]:
     """Return the least stable pole as a rate [1/s], and its excess; integrators left out.
 
-    The excess is by how much it lies outside the unit circle, or right of the imaginary axis.
+    The excess is its distance outside the unit circle, or to the right of the imaginary axis.
     """
     poles = model.poles()
     if not model.period:
@@ -186,8 +187,8 @@ def _is_stable(model: LinearModel) -> bool:
 def _border(
     model: Callable[[float], LinearModel], between: tuple[float, float], above: bool
 ) -> Border:
-    """Return where stability changes between two values, by bisection."""
-    # Bisection of a yes or no: near z = 1 a pole counts as an integrator, and its excess jumps.
+    """Return the value at which stability changes between two values, by bisection."""
+    # Bisection of a Boolean: near z = 1 a pole counts as an integrator, and its excess jumps.
     low, high = between
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)

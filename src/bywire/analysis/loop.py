@@ -29,7 +29,7 @@ from bywire.core.registry import Kind, instances
 from bywire.core.typing import Array, Complex
 from bywire.simulation.run import Run
 
-_ROUNDING = 1e-12  # share of a limit by which a demand clipped to it may differ
+_ROUNDING = 1e-12  # of a limit: largest deviation of a clipped demand
 
 
 @dataclass(frozen=True)
@@ -41,9 +41,9 @@ class Saturation:
     name
         Name of its share of the time, for instance ``"sat_current"``.
     signals
-        Outputs that are limited; one at its limit is enough.
+        Limited outputs; one at its limit suffices.
     limits
-        Dotted names of the parameters that limit the magnitude; the smallest one does.
+        Dotted names of the parameters that limit the magnitude; the smallest one counts.
     """
 
     name: str
@@ -109,7 +109,7 @@ class LoopSchedule:
 
 @dataclass(frozen=True)
 class Point:
-    """An operating point, ready to run and to linearize.
+    """Operating point, ready to run and to linearize.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ class Point:
     state, memory, stimulus
         Equilibrium without dry friction.
     step
-        Substep [s] that its fastest motions want.
+        Substep [s] required by its fastest motions.
     """
 
     model: Model
@@ -151,9 +151,9 @@ class Quantity:
     Parameters
     ----------
     name, unit
-        For instance ``"pressure"`` in ``"Pa"``.
+        Name and SI unit, for instance ``"pressure"`` in ``"Pa"``.
     default
-        Where the loop is usually looked at.
+        Usual value.
     """
 
     name: str
@@ -177,7 +177,7 @@ class Quantity:
 @checked
 @dataclass(frozen=True)
 class Loop:
-    """A control loop.
+    """Control loop of a brake.
 
     Parameters
     ----------
@@ -192,51 +192,51 @@ class Loop:
     inputs
         Signals of the stimulus that are excited together; the first determines the unit.
     output
-        Signal that answers.
+        Responding signal.
     cut
-        Where the loop is cut open for margins: a state that its controller reads, or a value
-        that it hands on.
+        Signal at which the loop is cut open for margins: a state that its controller reads, or a
+        value that it writes.
     point
         ``point(par, value) -> Point``.
     causes
         Nonlinearities: name -> parameters that switch it off.
     band
-        Frequencies usually looked at [Hz].
+        Usual frequency range [Hz].
     amplitudes
-        Amplitudes usually looked at, SI; the first one is small.
+        Usual amplitudes, SI; the first one is small.
     whole
-        ``whole(par)``: other frequencies [Hz] of which a window must hold whole periods.
+        ``whole(par)``: other frequencies [Hz] of which a window must contain whole periods.
     tunables
-        What a design may choose: dotted name -> lowest and highest value [SI] worth a try.
+        Parameters that a design may choose: dotted name -> lowest and highest value [SI] to try.
     realizable
-        ``realizable(par)``: spans [SI] in place of those of ``tunables`` that a controller with
-        these sample times can run as designed, by dotted name; lowest and highest alike where it
-        has to have that value. A design keeps to them unless it is asked not to.
+        ``realizable(par)``: ranges [SI] in place of those of ``tunables`` that a controller with
+        these sample times can implement as designed, by dotted name; both ends are equal for a
+        required value. A design observes them unless the user disables that.
     sustained
-        Parameters with which the loop can be shaken for as long as it takes, for instance a disc
-        that does not slow down; applied by a design's trial with sines.
+        Parameters that allow long excitation, for instance a disc that does not slow down; a
+        design's trial with sines applies them.
     proof
-        Experiment that judges the loop in the whole brake.
+        Experiment that tests the loop in the whole brake.
     laws
         ``laws(par, value, frequencies [Hz])``: responses of the controller, at an operating point,
         to its set point and to a fall of the output, sensor and filters included, of shape (n,)
-        each; None where the loop is not that simple.
+        each; None for more complex loops.
     schedule
-        Its gain schedule, where there is one.
+        Its gain schedule, if there is one.
     saturations
-        Limits whose share of the time a frequency response tells, where the model records no mode
+        Limits whose share of the time a frequency response reports, if the model records no mode
         of that name.
     single
-        Whether nothing but one linear controller stands between set point, output and the rest:
-        then the loop gain follows from a measured closed response, see ``large_signal``.
+        Whether a single linear controller connects set point and output to the plant. The loop
+        gain then follows from a measured closed-loop response, see ``large_signal``.
     analog
-        Whether its controller is not sampled: then ``cut`` is a state within the plant, and the
-        loop gain a continuous model.
+        Whether its controller is analog. ``cut`` is then a state within the plant, and the loop
+        gain a continuous model.
     locked
-        States that its linear models hold, as those of a clamped shaft.
+        States that its linear models hold, such as those of a clamped shaft.
     side
-        Side on which its linear models are taken where the operating point lies on the corner of
-        an operation, see `corners.read_sides`; empty: such a point is refused.
+        Side of its linear models if the operating point is on the corner of an operation, see
+        `corners.read_sides`; if empty, such a point raises an error.
     """
 
     name: str
@@ -284,7 +284,7 @@ class Loop:
         Parameters
         ----------
         par, value
-            What is kept.
+            Parameters and operating point to keep.
         name
             Dotted name of a parameter, or that of the operating quantity.
         values
@@ -293,7 +293,7 @@ class Loop:
         Raises
         ------
         UnknownNameError
-            When there is no such number.
+            When the name is unknown.
         """
         self.require_number(par, name)
         if name == self.at.name:
@@ -301,7 +301,7 @@ class Loop:
         return [(par.replace({name: number}), value) for number in values]
 
     def smooth(self, par: ParameterSet, leave: str = "") -> ParameterSet:
-        """Return parameters without anything that makes the loop nonlinear, except one cause."""
+        """Return parameters with all causes of nonlinearity switched off, except one."""
         changes: dict[str, Any] = {}
         for cause, off in self.causes.items():
             if cause != leave:
@@ -311,7 +311,7 @@ class Loop:
     def closed(self, par: ParameterSet, value: float, step: float = 0.0) -> LinearModel:
         """Return the exact linear model from the input to the output at an operating point.
 
-        With a step [s] it is the one that the simulation's midpoint rule has, see ``stepped``.
+        With a step [s], it is the model of the simulation's midpoint rule, see ``stepped``.
         """
         p = self.point(self.smooth(par), value)
         with taking(self.side):
@@ -395,7 +395,7 @@ class PlantPoint:
 
     @contextmanager
     def named(self, unless: Quantity) -> Iterator[None]:
-        """Name the value in errors of what follows from it; ``unless``: whose errors name it."""
+        """Name the value in errors raised in this context, except by ``unless``."""
         try:
             yield
         except ParameterError as error:
@@ -423,9 +423,10 @@ class Plant:
     band
         Usual upper end of the frequency range [Hz].
     whole
-        The model that this one simplifies, of the same inputs and outputs; None for the exact one.
+        The model that this one simplifies, with the same inputs and outputs; None for the exact
+        model.
     side
-        As of `bywire.analysis.loop.Loop`.
+        As in `bywire.analysis.loop.Loop`.
     """
 
     name: str

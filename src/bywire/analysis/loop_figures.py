@@ -29,13 +29,13 @@ NO_LOOP = 1e-9
 _SLOWEST, _SLOW_POINTS = 1e-6, 40  # below the grid, where the loop gain is real, Hz
 _BEYOND = 100.0  # times the fastest pole: where a grid without sampling ends
 _LOWEST = 1e-2  # lower end of the frequencies looked at, Hz
-_NYQUIST = 0.998  # of half the sampling frequency, where the phase has no direction
-_REST = 1e-6  # where a response counts as that at rest, Hz
+_NYQUIST = 0.998  # of half the sampling frequency, where the phase is ambiguous
+_REST = 1e-6  # Hz, below it a response counts as that at rest
 _BAND = 0.02  # of the step: half the settling band
 _MOST = 2**15  # samples of a step response: 33 s of a loop of 1 kHz
 _NOISE_POINTS = 1000  # frequencies, evenly spaced
 _LEFT_AFTER = 10.0  # periods of the bandwidth: when an error counts as steady
-_SETTLED = 1e-4  # share of the slowest mode that may be left where a step response ends
+_SETTLED = 1e-4  # largest remaining share of the slowest mode at the end of a step response
 
 
 @dataclass(frozen=True)
@@ -55,9 +55,9 @@ class LoopFigure:
     is_less_better
         Whether a smaller value is better.
     margin
-        Its name among `LoopMargins`; empty where it is not one of them.
+        Its name among `LoopMargins`; empty if it is not one of them.
     title
-        Heading of tables; its name in words where empty.
+        Heading of tables; if empty, its name in words.
     in_decibel
         Whether it is a factor that may also be given in dB.
     """
@@ -118,7 +118,7 @@ LOOP_FIGURES: Mapping[str, LoopFigure] = {
             in_decibel=True,
         ),
         LoopFigure(
-            "delay_margin", "s", "dead time that the loop can take in addition", margin="delay"
+            "delay_margin", "s", "additional dead time that the loop tolerates", margin="delay"
         ),
         LoopFigure("disk_margin", "1", "symmetric disk margin", high=2.0, margin="disk"),
         LoopFigure(
@@ -164,7 +164,7 @@ Figure = Callable[["LoopFigures"], float]
 
 
 def _of_a_loop(figure: Figure) -> Figure:
-    """Have a figure be NaN where there is no loop."""
+    """Make a figure NaN if there is no loop."""
 
     @wraps(figure)
     def guarded(figures: LoopFigures) -> float:
@@ -174,7 +174,7 @@ def _of_a_loop(figure: Figure) -> Figure:
 
 
 def _of_an_answer(figure: Figure) -> Figure:
-    """Have a figure be NaN where the output does not answer."""
+    """Make a figure NaN if the output does not respond."""
 
     @wraps(figure)
     def guarded(figures: LoopFigures) -> float:
@@ -199,7 +199,7 @@ class LoopFigures:
     points
         Points of the grid.
     exact
-        Whether crossovers and bandwidth are solved for between the points: too dear for a search.
+        Whether to solve for crossovers and bandwidth between the points, too slow for a search.
     lowest
         Lower end of the grid [Hz].
     """
@@ -226,7 +226,7 @@ class LoopFigures:
 
     @cached_property
     def has_loop(self) -> bool:
-        """Whether anything is fed back: gains of 0, or a shut valve, leave no loop."""
+        """Whether anything is fed back: gains of 0, or a closed valve, leave no loop."""
         return bool(np.max(np.abs(self.L)) > NO_LOOP)
 
     @cached_property
@@ -268,19 +268,19 @@ class LoopFigures:
     @property
     @_of_a_loop
     def crossover(self) -> float:
-        """Highest frequency at which the loop gain falls to 1 [Hz]; 0 where it never does."""
+        """Highest frequency at which the loop gain falls to 1 [Hz]; 0 if it never does."""
         return max((at.frequency for at in self.crossings if at.falls), default=0.0)
 
     @property
     @_of_a_loop
     def phase_margin(self) -> float:
-        """Smallest phase margin of all gain crossovers [degree]; 180 where there is none."""
+        """Smallest phase margin of all gain crossovers [degree]; 180 if there is none."""
         return min((at.distance for at in self.crossings), default=180.0)
 
     @property
     @_of_a_loop
     def delay_margin(self) -> float:
-        """Additional dead time that the loop can take [s]; inf where there is no crossover."""
+        """Additional dead time that the loop tolerates [s]; inf without a crossover."""
         # Angle to -1 in the direction of a delay, which turns clockwise.
         return min(
             (at.margin % 360.0 / 360.0 / at.frequency for at in self.crossings), default=math.inf
@@ -288,7 +288,7 @@ class LoopFigures:
 
     @cached_property
     def factors(self) -> list[GainFactor]:
-        """Factors that take the loop to the border of stability, by ascending frequency."""
+        """Factors on the loop gain at the limit of stability, by ascending frequency."""
         solved = self._gain_at if self.exact else None
         slow = np.geomspace(_SLOWEST, self.lowest, _SLOW_POINTS, endpoint=False)
         f = np.concatenate([slow, self.frequencies])
@@ -302,13 +302,13 @@ class LoopFigures:
     @property
     @_of_a_loop
     def gain_margin(self) -> float:
-        """Factor above 1 by which the loop gain may grow; inf where any may."""
+        """Factor above 1 by which the loop gain may grow; inf if there is no limit."""
         return upper_factor(self.factors).factor
 
     @property
     @_of_a_loop
     def lower_gain_margin(self) -> float:
-        """Factor below 1 to which the loop gain may fall; 0 where it may be any."""
+        """Factor below 1 to which the loop gain may fall; 0 if there is no limit."""
         return lower_factor(self.factors).factor
 
     @property
@@ -384,7 +384,7 @@ class LoopFigures:
     def steady_state_error(self) -> float:
         """Residual of a unit step after ten periods of the bandwidth [%].
 
-        Not for ever: with an integrator nothing would be left, however slow it is.
+        The time is finite, because the residual of any integrator finally vanishes, however slow.
         """
         last = math.ceil(_LEFT_AFTER / (self.bandwidth * self.closed.period))
         kept = self.closed.effective()
@@ -397,12 +397,12 @@ class LoopFigures:
 
     @cached_property
     def crossings(self) -> list[Crossing]:
-        """Where the loop gain is 1."""
+        """Crossovers of the loop gain."""
         return gain_crossings(self.frequencies, self.L, self._gain_at if self.exact else None)
 
     @cached_property
     def fall(self) -> float:
-        """Bandwidth [Hz]; infinite where the closed loop stays above -3 dB."""
+        """Bandwidth [Hz]; infinite if the closed loop stays above -3 dB."""
         solved = self._closed_at if self.exact else None
         at = fall(np.abs(self.T), self.frequencies, self.rest, solved)
         if at == 0.0:  # a slow integrator: it falls below the grid

@@ -36,18 +36,18 @@ _POINTS = 2000
 
 @dataclass(frozen=True, eq=False)
 class LoopMargins(EqualWhereUndefined):
-    """Margins of a sampled loop as it is, with its delays and filters.
+    """Margins of a sampled loop, including its delays and filters.
 
-    NaN where it is unstable, and where there is no loop.
+    They are NaN if the loop is unstable, and without a loop.
 
     Parameters
     ----------
     gain
-        Smallest factor above 1 by which the loop gain may grow; inf where none makes it unstable.
+        Smallest factor above 1 by which the loop gain may grow; inf if none makes it unstable.
     phase, crossover
         Smallest phase margin of all gain crossovers [degree], and the highest of these [Hz].
     delay
-        Additional dead time that the loop can take [s].
+        Additional dead time that the loop tolerates [s].
     disk
         Disk-based margin (symmetric, skew 0): S - T of this size stays away from -1 in gain and
         phase at once; 0 to 2.
@@ -58,15 +58,15 @@ class LoopMargins(EqualWhereUndefined):
     stable
         Whether the closed loop is stable.
     has_loop
-        Whether anything is fed back: gains of 0, or a shut valve, leave no loop.
+        Whether there is feedback: gains of 0, or a closed valve, leave no loop.
     lower_gain
-        Largest factor below 1 to which the loop gain may fall; 0 where none makes it unstable.
+        Largest factor below 1 to which the loop gain may fall; 0 if none makes it unstable.
     phase_at
         Gain crossover at which the phase margin is read [Hz].
     gain_at, lower_gain_at
         Frequencies at which the two gain margins are read [Hz].
     corners
-        As of `LinearModel`.
+        As in `LinearModel`.
     """
 
     gain: float
@@ -99,7 +99,7 @@ class LoopMargins(EqualWhereUndefined):
 
 
 NO_LOOP = "no loop: the loop gain is 0 at all frequencies"
-"""sentence on a loop whose gains are 0, or whose valve is shut"""
+"""sentence on a loop whose gains are 0, or whose valve is closed"""
 UNSTABLE = LoopMargins(
     gain=math.nan,
     phase=math.nan,
@@ -134,7 +134,7 @@ def margins_of(figures: LoopFigures) -> LoopMargins:
     if not figures.is_stable:
         return replace(UNSTABLE, corners=corners) if corners else UNSTABLE
     upper, lower = upper_factor(figures.factors), lower_factor(figures.factors)
-    # Signed, where a design takes the distance from -1: below 0 the phase is beyond -180.
+    # Signed, although a design uses the distance from -1: below 0 the phase is beyond -180.
     margin = margin_of(figures.crossings)
     return LoopMargins(
         gain=upper.factor,
@@ -226,7 +226,7 @@ class LoopCurve:
 
 @dataclass(frozen=True, eq=False)
 class Family:
-    """Curves of a loop over the values of a parameter; one curve where nothing is varied.
+    """Curves of a loop over the values of a parameter; a single curve without variation.
 
     Parameters
     ----------
@@ -245,19 +245,19 @@ class Family:
 
     @property
     def worst(self) -> int:
-        """Index of the least disk margin; an unstable loop, or none, is worse than any."""
+        """Index of the least disk margin; an unstable or missing loop counts as the worst."""
         disks = [c.margins.disk if c.margins.is_sound else -math.inf for c in self.curves]
         return int(np.argmin(disks))
 
 
 @dataclass(frozen=True)
 class Disk:
-    """Circle on the real axis of the Nyquist plane that the loop gain stays out of.
+    """Circle on the real axis of the Nyquist plane, outside which the loop gain stays.
 
     Parameters
     ----------
     middle, radius
-        Of the circle; both infinite for the largest margin, where it is the left half plane.
+        Center and radius; both infinite for the largest margin, the left half plane.
     """
 
     middle: float
@@ -278,7 +278,7 @@ def disk(margin: float) -> Disk:
     Raises
     ------
     ParameterError
-        When it is not in that range.
+        When the margin is not in this range.
 
     References
     ----------

@@ -1,8 +1,8 @@
 """Periodic operating points, such as of a dithered brake, and exact linear models about them.
 
-They are fixed points of the stroboscopic map, which leads from one instant to the next a period
+They are fixed points of the stroboscopic map, which maps the system at one instant to that a period
 later. The system must have the same inputs in every period: a dither whose period is a multiple of
-the sample times, or a rotating disc. The map acts on everything that the engine carries from one
+the sample times, or a rotating disc. The map acts on all values that the engine carries from one
 substep to the next: states, their last increments, and the memory of the controllers.
 """
 
@@ -43,7 +43,7 @@ class Period:
     end
         Carried vector at the end, before its controllers run, shape (n,).
     rows
-        Recorded signals, the end left out, shape (rows, signals).
+        Recorded signals without the end, shape (rows, signals).
     """
 
     end: Array
@@ -57,11 +57,11 @@ class Derivatives:
     Parameters
     ----------
     A
-        Of the carried vector at the end by that at the beginning, shape (n, n).
+        Carried vector at the end by that at the beginning, shape (n, n).
     B
-        Of the carried vector at the end by the input of every tick, shape (n, ticks).
+        Carried vector at the end by the input of every tick, shape (n, ticks).
     C, D
-        Of the recorded signals by both, shapes (rows, signals, n) and (rows, signals, ticks).
+        Recorded signals by both, shapes (rows, signals, n) and (rows, signals, ticks).
     """
 
     A: Array
@@ -71,15 +71,15 @@ class Derivatives:
 
 
 class Stroboscope:
-    """The map of one system over its period.
+    """Map of one system over its period.
 
     Parameters
     ----------
     run
-        Its duration is the period: whole sample times and recording intervals. Its stimulus at
-        time zero is held throughout.
+        Its duration is the period, a multiple of the sample times and of the recording interval.
+        Its stimulus at time zero is held throughout.
     inputs
-        Signals of the stimulus that move together, held from one tick of the fastest controller
+        Signals of the stimulus that change together, held from one tick of the fastest controller
         to the next.
     signals
         Outputs to record.
@@ -93,7 +93,7 @@ class Stroboscope:
     UnknownNameError
         When a signal is unknown.
     ParameterError
-        When a controller rounds what it samples: derivatives through it are zero.
+        When a controller rounds its samples: derivatives through it are zero.
     """
 
     def __init__(self, run: Run, inputs: Sequence[str], signals: Sequence[str]) -> None:
@@ -136,18 +136,18 @@ class Stroboscope:
 
     @property
     def ticks(self) -> int:
-        """Ticks of the fastest controller in a period."""
+        """Number of ticks of the fastest controller in a period."""
         return self._schedule.frames // self._schedule.stimulus_frames
 
     def advance(self, start: Array) -> Period:
         """Return one period from a carried vector, shape (n,)."""
         vector, tangents = self._loaded(start)
         values, _ = self._segment(vector, tangents, self._seeds(()), 0, self._schedule.frames)
-        require_finite(self._layout, vector, "the period left the numbers")
+        require_finite(self._layout, vector, "the period diverged")
         return Period(vector[self._carried], values)
 
     def derivatives(self, start: Array) -> Derivatives:
-        """Return the derivatives of one period by start and inputs."""
+        """Return the derivatives of one period with respect to start and inputs."""
         n, ticks = start.size, self.ticks
         count = n + ticks
         end = np.empty((n, count))
@@ -182,7 +182,7 @@ class Stroboscope:
         return found
 
     def _seeds(self, lanes: Sequence[int]) -> Array:
-        """Return seeds of the kernel's one parameter, which stays, and of all stimuli."""
+        """Return the seeds of the kernel's one constant parameter and of all stimuli."""
         seeds = np.zeros((1 + self._u.shape[1], DIRECTIONS))
         for lane in lanes:
             seeds[1 + self._inputs, lane] = 1.0
@@ -196,19 +196,19 @@ class Stroboscope:
     def _segment(
         self, vector: Array, tangents: Array, seeds: Array, begin: int, end: int
     ) -> tuple[Array, Array]:
-        """Run frames begin..end, vector and tangents renewed in place; return what it recorded."""
+        """Run frames begin..end, update vector and tangents in place; return the recorded rows."""
         schedule = self._schedule
         every, signals = schedule.record_frames, self._selection.size
         rows = -(-end // every) - -(-begin // every)
         values, rec_t = np.empty((rows, signals)), np.empty((rows, signals, DIRECTIONS))
-        # The end of a period is the beginning of the next, and ticks only there.
+        # The end of a period is the beginning of the next, and controllers tick only there.
         request = Request(self._open, self._p, self._u, self._selection)
         self._kernel.advance(request, vector, begin, end, values, seeds, tangents, rec_t)
         return values, rec_t
 
 
 def _by_substeps(schedule: Schedule) -> Schedule:
-    """Return the same plan in frames of one substep, at each of which a run can be cut."""
+    """Return the same plan in frames of one substep, between which a run can be cut."""
     n = schedule.substeps
     return Schedule(
         schedule.step,
@@ -221,43 +221,43 @@ def _by_substeps(schedule: Schedule) -> Schedule:
 
 @built_once
 def _kernel(program: Program, compiler: Compiler) -> TangentKernel:
-    # Directions are set one by one; the kernel has at least one parameter among them.
+    # Directions are set individually; the kernel has at least one parameter among them.
     return TangentKernel(program, (0,), compiler)
 
 
 # --- Periodic operating points
 
 TOLERANCE = 1e-5
-"""tolerance of the distance from the orbit, relative to the usual magnitude of each signal; finite
-steps make motions with stick and slip vary"""
+"""tolerance of the distance from the orbit, relative to the usual magnitude of each signal; with
+finite steps, motions with stick-slip vary slightly"""
 DRIFT = 1e-5
-"""drift per period along directions without restoring action, in the same measure"""
-_SETTLE, _ROUNDS, _NEWTON = 50, 12, 8  # periods simulated between trials of Newton's iteration
-_NEUTRAL = 1e-7  # of the largest singular value: directions along which orbits lie side by side
+"""tolerance of the drift per period along directions without restoring action, same scale"""
+_SETTLE, _ROUNDS, _NEWTON = 50, 12, 8  # simulated periods between trials of Newton's iteration
+_NEUTRAL = 1e-7  # of the largest singular value: directions along which orbits are adjacent
 
 
 @dataclass(frozen=True, eq=False)
 class PeriodicOrbit:
-    """A motion that repeats itself.
+    """Motion that repeats itself.
 
     Parameters
     ----------
     stroboscope
         The map from period to period.
     start
-        What the engine carries at the beginning of a period, shape (n,).
+        Carried vector at the beginning of a period, shape (n,).
     rows
-        Recorded signals over the period, its end left out, shape (rows, signals).
+        Recorded signals over the period without its end, shape (rows, signals).
     distance
-        Estimated distance of ``start`` from the orbit, over the usual magnitude of each signal:
-        Newton's next step.
+        Estimated distance of ``start`` from the orbit, relative to the usual magnitude of each
+        signal: Newton's next step.
     drift
-        Change over a period that no step undoes, in the same measure: directions along which
-        nothing is restored, such as the amount of fluid enclosed.
+        Change over a period that no step can remove, on the same scale, along directions without
+        restoring action, such as the amount of fluid enclosed.
     stuck
-        Share of the time in which every dry friction sticks; 0 where there is none.
+        Share of the time during which every dry friction sticks; 0 without dry friction.
     periods
-        Periods that were simulated to find it.
+        Number of simulated periods.
     """
 
     stroboscope: Stroboscope
@@ -270,12 +270,12 @@ class PeriodicOrbit:
 
 
 def period_of(frequencies: Sequence[float], intervals: Sequence[float], step: float) -> float:
-    """Return the shortest time [s] that holds whole sample times and whole periods.
+    """Return the shortest time [s] that is a multiple of all sample times and periods.
 
     Parameters
     ----------
     frequencies
-        Of what is periodic [Hz]; may be none.
+        Frequencies of periodic signals [Hz]; may be empty.
     intervals
         Sample times [s].
     step
@@ -302,28 +302,28 @@ def period_of(frequencies: Sequence[float], intervals: Sequence[float], step: fl
 
 
 def find_orbit(stroboscope: Stroboscope, run: Run) -> PeriodicOrbit:
-    r"""Return the orbit that the system settles to.
+    r"""Return the orbit to which the system settles.
 
-    Period after period is simulated. In between Newton's iteration with the exact derivative A of
-    the map P tries
+    The function simulates period after period. In between, it tries Newton's iteration with the
+    exact derivative A of the map P,
 
     .. math:: (I - A) \Delta z = P(z) - z
 
-    and is kept where it brings the motion closer to a repetition: a slow loop needs minutes to
-    settle to what that finds in a few periods. Directions without restoring action (the amount
-    of fluid enclosed, for instance) stay where the simulation brought them.
+    and keeps a step that brings the motion closer to a repetition. A slow loop would need minutes
+    to settle; the iteration needs a few periods. Directions without restoring action (for instance
+    the amount of fluid enclosed) keep their simulated values.
 
     Parameters
     ----------
     stroboscope
         The map.
     run
-        What the map was made of: its signals' usual magnitudes scale all changes.
+        Run of the map; its signals' usual magnitudes scale all changes.
 
     Raises
     ------
     SolverError
-        When no motion repeats itself: it hunts, drifts, or sticks and slips out of step.
+        When no motion repeats itself: the system hunts, drifts, or has irregular stick-slip.
     """
     scale = magnitudes(run)
     z, periods = stroboscope.start, 0
@@ -353,7 +353,7 @@ def find_orbit(stroboscope: Stroboscope, run: Run) -> PeriodicOrbit:
 
 @dataclass(frozen=True)
 class _Tried:
-    """A candidate: its distance from the orbit, its drift over a period, periods that it took."""
+    """Candidate: distance from the orbit, drift over a period, and simulated periods."""
 
     start: Array
     distance: float
@@ -362,13 +362,13 @@ class _Tried:
 
 
 def _polished(stroboscope: Stroboscope, z: Array, scale: Array) -> _Tried:
-    """Return where Newton's iteration ends, as far as it comes closer to a repetition."""
+    """Return the last point of Newton's iteration that comes closer to a repetition."""
     distance, drift, step = _judged(stroboscope, z, scale)
     for taken in range(_NEWTON):
         if distance <= 1e-2 * TOLERANCE:
             return _Tried(z, distance, drift, taken)
         moved = _judged(stroboscope, z + step, scale)
-        if not moved[0] < 0.5 * distance:  # no number fails, too
+        if not moved[0] < 0.5 * distance:  # NaN also fails
             return _Tried(z, distance, drift, taken + 1)
         z = z + step
         distance, drift, step = moved
@@ -376,7 +376,7 @@ def _polished(stroboscope: Stroboscope, z: Array, scale: Array) -> _Tried:
 
 
 def _judged(stroboscope: Stroboscope, z: Array, scale: Array) -> tuple[float, float, Array]:
-    """Return the distance from the orbit, the drift that no step undoes, and Newton's step."""
+    """Return the distance from the orbit, the drift that no step can remove, and Newton's step."""
     residual = stroboscope.advance(z).end - z
     A = stroboscope.derivatives(z).A
     step = restored(A, residual, scale)
@@ -385,7 +385,7 @@ def _judged(stroboscope: Stroboscope, z: Array, scale: Array) -> tuple[float, fl
 
 
 def restored(A: Array, residual: Array, scale: Array) -> Array:
-    """Return the smallest x for which (I - A) x is the residual, carried values left alone.
+    """Return the smallest x for which (I - A) x is the residual; constant values stay unchanged.
 
     Parameters
     ----------
@@ -398,7 +398,7 @@ def restored(A: Array, residual: Array, scale: Array) -> Array:
     """
     n = len(A)
     eye = np.eye(n)
-    moving = np.flatnonzero((eye != A).any(axis=1))  # the others keep their value for ever
+    moving = np.flatnonzero((eye != A).any(axis=1))  # the others keep their values permanently
     gap = (eye - A)[np.ix_(moving, moving)] * scale[moving] / scale[moving, None]
     step = np.zeros(n)
     scaled = np.linalg.lstsq(gap, residual[moving] / scale[moving], rcond=_NEUTRAL)[0]
@@ -413,12 +413,12 @@ def magnitudes(run: Run) -> Array:
     return np.array([*states, *states, *held])
 
 
-# --- Linear models: friction and dither left on
+# --- Linear models with active friction and dither
 
 STEPS = (10e-6, 5e-6, 2.5e-6)
-"""substeps [s], each tried if a motion does not repeat with the one before. Longer steps disturb a
-piston that barely breaks away; with the first one the gain of the dithered pressure loop is within
-2 % of that with short steps"""
+"""substeps [s], each tried if a motion does not repeat with the previous one. Longer steps disturb
+a piston that barely breaks away. With the first one, the gain of the dithered pressure loop is
+within 2 % of that with short steps"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -429,9 +429,9 @@ class PeriodicModel:
         y_{k,r} = C_r z_k + \sum_j D_{r,j} u_{k,j}
 
     with the state z at the beginning of period k, the input u at its ticks j, and the output y
-    at its instants r: the lifted form of a periodic system. The derivatives are those of what is
-    simulated, every decision between stick and slip included; they hold for deviations that
-    change none of the decisions but their instants.
+    at its instants r: the lifted form of a periodic system. The derivatives are those of the
+    simulation, including every decision between stick and slip. They hold for deviations that
+    change only the instants of these decisions.
 
     Parameters
     ----------
@@ -463,13 +463,13 @@ class PeriodicModel:
 
     @cached_property
     def averaged(self) -> LinearModel:
-        """The model from an input held over a period to the output's mean over that period."""
+        """Model from an input held over a period to the output's mean over that period."""
         d = self.derivatives
         return self._model("averaged", d.C[:, 0].mean(axis=0), d.D[:, 0].sum(axis=1).mean())
 
     @cached_property
     def sampled(self) -> LinearModel:
-        """The model from an input held over a period to the output at the period's beginning."""
+        """Model from an input held over a period to the output at the period's beginning."""
         d = self.derivatives
         return self._model("sampled", d.C[0, 0], d.D[0, 0].sum())
 
@@ -495,20 +495,20 @@ class PeriodicModel:
 
     @property
     def steady_gain(self) -> float:
-        """Change of the output's mean over that of a constant input, SI."""
+        """Change of the output's mean divided by that of a constant input, SI."""
         d = self.derivatives
         moved = restored(d.A, d.B.sum(axis=1), magnitudes(self.run))
         return float(d.C[:, 0].mean(axis=0) @ moved + d.D[:, 0].sum(axis=1).mean())
 
     def response(self, frequencies: Array) -> Complex:
-        r"""Return the answer at the frequency of a sine in the input, ticks and all.
+        r"""Return the response at the frequency of a sine in the input, including its sampling.
 
-        A periodic system answers at f + k/T as well; what is returned is the line at f,
+        A periodic system also responds at f + k/T; the function returns the line at f,
 
         .. math:: Y = \frac{1}{n_r} \sum_r (C_r Z + D_r U) e^{-j \omega t_r}, \quad
             (e^{j \omega T} I - A) Z = B U, \quad U_j = e^{j \omega t_j}
 
-        which is what `frequency_response` measures at small amplitude.
+        which `frequency_response` measures at small amplitude.
 
         Parameters
         ----------
@@ -524,7 +524,7 @@ class PeriodicModel:
         rows, ticks = d.D.shape[0], d.D.shape[2]
         lines = []
         for f in np.asarray(frequencies, dtype=float):
-            # A zero-order hold at the ticks, not the sine itself: that is what a controller reads.
+            # A zero-order hold at the ticks, not the sine: this is what a controller reads.
             U = np.exp(2j * np.pi * f * T / ticks * np.arange(ticks))
             Z = np.linalg.solve(np.exp(2j * np.pi * f * T) * np.eye(len(d.A)) - d.A, d.B @ U)
             wave = np.exp(-2j * np.pi * f * T / rows * np.arange(rows))
@@ -539,19 +539,19 @@ def periodic_model(
     whole: Sequence[float],
     step: float | None = None,
 ) -> PeriodicModel:
-    """Return the linear model about the orbit that a system settles to.
+    """Return the linear model about the orbit to which a system settles.
 
     Parameters
     ----------
     point
-        Where it starts; stays within what the orbit attracts.
+        Start of the simulation, from which the system must settle to the orbit.
     inputs
-        Signals of the stimulus that move together.
+        Signals of the stimulus that change together.
     output
-        Signal that answers; its mean is taken over samples at the fastest controller's ticks.
+        Responding signal; its mean is that of samples at the fastest controller's ticks.
     whole
-        Frequencies [Hz] of what is periodic, such as a dither. None: the orbit is a rest, the
-        period the common sample time.
+        Frequencies [Hz] of periodic signals, such as a dither. If empty, the orbit is an
+        equilibrium, and the period is the common sample time.
     step
         Substep [s]; one of `STEPS` unless given.
 
@@ -560,7 +560,7 @@ def periodic_model(
     SolverError
         When no motion repeats itself.
     ParameterError
-        When a period is no whole number of substeps, or a controller rounds what it samples.
+        When a period is not a whole number of substeps, or a controller rounds its samples.
     CompilerError
         When there is no compiler.
     """
@@ -591,15 +591,15 @@ def dithered_loop(
     Parameters
     ----------
     loop, par, value
-        The loop and its operating point. Converters and encoders count as ideal: what is rounded
-        has no derivative.
+        The loop and its operating point. Converters and encoders count as ideal, because rounded
+        values have no derivative.
     step
         As in `periodic_model`.
 
     Raises
     ------
     InputError, SolverError, CompilerError
-        As `periodic_model`, and when the operating point does not exist or all of it sticks.
+        As `periodic_model`, and when the operating point does not exist or every friction sticks.
     """
     ideal = unrounded(loop, par)
     model = periodic_model(
@@ -610,7 +610,7 @@ def dithered_loop(
 
 
 def require_moving(model: PeriodicModel) -> None:
-    """Refuse a motion that is none: what sticks throughout has no gain.
+    """Reject an orbit without motion: a stuck mechanism has no gain.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Reduced linear models whose error is stated: balanced, modal, or states of one's choice."""
+"""Reduced linear models with a known error: balanced, modal, or with selected states."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from bywire.core.typing import Array
 Matrices = tuple[Array, Array, Array]
 Choice = Callable[[complex], bool]
 
-_BORDER = 1e-6  # of a pole's own size: this near to the border of stability it counts as on it
+_BORDER = 1e-6  # of a pole's magnitude: distance at which it counts as on the border of stability
 _STILL = 1e-10  # of the largest pole: an integrator
-_LEAST = 1e-13  # of the largest Hankel singular value: below it there is rounding alone
+_LEAST = 1e-13  # of the largest Hankel singular value: smaller ones are rounding
 
 
 @dataclass(frozen=True, eq=False)
 class Parts:
-    """A model in two parts that do not act on each other, and add up.
+    """Model split into two uncoupled parts, whose sum it is.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ class Parts:
 
 @dataclass(frozen=True, eq=False)
 class Balanced:
-    """A stable part whose controllability and observability Gramians are equal and diagonal.
+    """Stable part whose controllability and observability Gramians are equal and diagonal.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ class Balanced:
 
 
 def split(model: LinearModel, first: Choice) -> Parts:
-    """Return a model in two parts, told apart by their poles.
+    """Return a model in two parts, separated by their poles.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ def split(model: LinearModel, first: Choice) -> Parts:
     Notes
     -----
     An ordered real Schur form A = Q T Q^T puts the first part on top; a Sylvester equation then
-    removes what the second does to it.
+    removes the effect of the second part on it.
     """
     from scipy.linalg import matrix_balance, schur, solve_sylvester
 
@@ -86,7 +86,7 @@ def split(model: LinearModel, first: Choice) -> Parts:
 
 
 def lasting(model: LinearModel) -> Choice:
-    """Return the test whether a pole is unstable or on the border of stability."""
+    """Return a function that tests whether a pole is unstable or on the border of stability."""
     largest = float(np.max(np.abs(model.poles()), initial=0.0))
 
     def test(pole: complex) -> bool:
@@ -98,7 +98,7 @@ def lasting(model: LinearModel) -> Choice:
 
 
 def balanced(part: Matrices, period: float) -> Balanced:
-    """Return a balanced realization of a stable part, what does not show left out.
+    """Return a balanced realization of a stable part, without negligible states.
 
     Parameters
     ----------
@@ -140,7 +140,7 @@ def _factor(A: Array, B: Array, period: float) -> Array:
 # --- Largest error of a reduced model over a band, channel by channel
 
 _POINTS = 300
-_DECADES = 4.0  # below the band's end at which the search begins
+_DECADES = 4.0  # below the band's end: start of the search
 _NOTHING = 1e-12  # of the largest response: a channel below it has no gain to compare
 
 
@@ -164,7 +164,7 @@ class ReductionError:
         Output and input of the largest relative error.
     poles
         Largest distance of a pole within the band from the nearest one of the full model, as a
-        share of its own size; NaN where no pole lies there.
+        share of its magnitude; NaN if there is no pole in the band.
     """
 
     low: float
@@ -178,7 +178,7 @@ class ReductionError:
 
 
 def reduction_error(full: LinearModel, reduced: LinearModel, high: float) -> ReductionError:
-    """Return how far a model is off another one, from four decades below a frequency up to it.
+    """Return the error of a model relative to another one, over four decades up to a frequency.
 
     Parameters
     ----------
@@ -194,14 +194,14 @@ def reduction_error(full: LinearModel, reduced: LinearModel, high: float) -> Red
 
     Notes
     -----
-    Besides a logarithmic grid the frequencies of all poles are looked at, where peaks are.
-    Channels without gain are left out.
+    The frequencies are a logarithmic grid and those of all poles, where peaks are. Channels without
+    gain are left out.
     """
     f = frequencies(full, reduced, high)
     exact, other = full.response(f), reduced.response(f)
     size = np.abs(exact)
     peak = np.max(size, axis=0)
-    # A channel has its own unit: what counts as nothing is told by its inputs and outputs.
+    # A channel has its own unit: its inputs and outputs determine the scale of zero gain.
     seen = peak > _NOTHING * np.sqrt(np.outer(np.max(peak, axis=1), np.max(peak, axis=0)))
     if not seen.any():
         return ReductionError(
@@ -265,7 +265,7 @@ def natural(model: LinearModel) -> Array:
     return np.asarray(np.abs(np.log(live)) / 2.0 / math.pi / model.period)
 
 
-# --- States of one's choice, the others quasi-static
+# --- Selected states, the others quasi-static
 
 _NO_REST = 1e14  # condition of the equation for the rest beyond which there is none
 
@@ -277,12 +277,13 @@ def residualized(
 
     .. math:: A_{11} - A_{12} A_{22}^{-1} A_{21}, \quad \text{and so on for } B, C, D
 
-    Exact at rest; good as long as what is left out is faster than what is looked at. Corrected,
+    The model is exact at rest, and accurate if the dropped states are faster than the response of
+    interest. Corrected,
 
     .. math:: x_2 = -A_{22}^{-1} (A_{21} x_1 + B_2 u) - A_{22}^{-2} A_{21} \dot x_1
 
-    what is left out follows the kept states with its first lag; the poles are then one order
-    better in the ratio of both speeds. Its lag behind the inputs stays left out.
+    the dropped states follow the kept states with a first-order lag. The poles are then more
+    accurate by one order in the ratio of both speeds. The lag behind the inputs is still neglected.
 
     Parameters
     ----------
@@ -298,7 +299,7 @@ def residualized(
     UnknownNameError
         When a state is unknown.
     ParameterError
-        When the other states have no steady state, for instance an integrator.
+        When the dropped states have no steady state, for instance an integrator.
 
     References
     ----------
@@ -378,9 +379,8 @@ class Reduced:
         Hankel singular values of the rest of the full model, every signal in units of its
         largest response; shape (n,). Empty where they were not needed.
     bound
-        What no response of the reduced model is further off at any frequency, in SI units,
-        shape (outputs, inputs): twice the sum of the singular values left out. NaN where the
-        method has no such bound.
+        Bound of the error of each response at any frequency, in SI units, shape (outputs, inputs):
+        twice the sum of the dropped singular values. NaN if the method has no such bound.
     """
 
     model: LinearModel
@@ -398,7 +398,7 @@ def reduce(
     tolerance: float = TOLERANCE,
     method: Method = "balanced",
 ) -> Reduced:
-    """Return a model with fewer states, of a given order or as good as a band asks for.
+    """Return a model with fewer states, of a given order or with a given error over a band.
 
     Parameters
     ----------
@@ -413,10 +413,9 @@ def reduce(
     tolerance
         Largest relative error over the band, if no order is given.
     method
-        ``"balanced"``: states that show least are taken as always at rest (singular perturbation
-        of the balanced realization: exact at rest, with a bound at every frequency).
-        ``"modal"``: the same with the fastest modes; the poles that are kept are those of the
-        model.
+        ``"balanced"``: the least observable and controllable states are always at rest (singular
+        perturbation of the balanced realization: exact at rest, with a bound at every frequency).
+        ``"modal"``: the fastest modes are always at rest; the kept poles are those of the model.
 
     Raises
     ------
@@ -428,7 +427,7 @@ def reduce(
     Y. Liu, B. D. O. Anderson, "Singular perturbation approximation of balanced systems",
     International Journal of Control 50 (1989): bound and exactness at rest.
     """
-    # What no input moves stays at the operating point; what no output sees may go.
+    # States that no input moves stay at the operating point; unobservable states can be dropped.
     acting = [model.states[k] for k in model.effective()]
     full = model.reduced(acting, held=True)
     high, n = _band(full, band), len(acting)
@@ -455,7 +454,7 @@ def reduce(
             return Reduced(rung.model, error, kept, rung.hankel, rung.bound)
         best = min(best, error.relative)
     raise ParameterError(
-        f"{full.name}: no order has an error within {100.0 * tolerance:g} % up to {high:g} Hz, the "
+        f"{full.name}: no order has an error below {100.0 * tolerance:g} % up to {high:g} Hz, the "
         f"least is {100.0 * best:.2g} %; allow more, or take a lower band",
         name="tolerance",
         value=f"{100.0 * tolerance:g} %",

@@ -158,7 +158,7 @@ class Bench:
         further = [name for name, each in self.stimulus.items() if isinstance(each, Mapping)]
         if len(further) < len(self.stimulus) and chosen.driven_unit is None:
             raise ParameterError(
-                f"experiment {chosen.name!r} has its own stimulus: leave out [stimulus], or "
+                f"experiment {chosen.name!r} has its own stimulus: remove [stimulus], or "
                 "use experiment 'open-loop'",
                 name="stimulus",
             )

@@ -314,7 +314,7 @@ def _with_inputs(recording: xr.Dataset, case: Case) -> xr.Dataset:
 
 
 def inputs_recorded(rows: Rows, cases: Sequence[Case], wanted: Collection[str]) -> Rows:
-    """Return the rows of several runs with those wanted stimuli that they lack."""
+    """Return the rows of several runs with those requested stimuli that they lack."""
     each = [case.stimulus(rows["time"].values) for case in cases]
     lacking = [name for name in each[0] if name in wanted and name not in rows]
     given = {name: np.array([stimuli[name] for stimuli in each]) for name in lacking}

@@ -182,7 +182,7 @@ def with_nodes(values: Mapping[str, Any], level_unit: str) -> dict[str, Any]:
     ----------
     values
         Parameters of the stimulus. ``file``: path of the file; ``column``: name of the column,
-        needed if there are several besides time; ``unit``, ``scale``, ``sign``, ``offset``,
+        needed if there are several others than time; ``unit``, ``scale``, ``sign``, ``offset``,
         ``delay``, ``rate``, ``start``, ``format``, ``decimal`` and ``skip_lines`` as in a mapping,
         and ``time`` and ``time_unit`` for the column of times, if the file does not name them;
         ``max_gap``: longest gap that is bridged. Time starts at the first row; ``between`` is
@@ -218,7 +218,7 @@ def with_nodes(values: Mapping[str, Any], level_unit: str) -> dict[str, Any]:
         if len(names) != 1:
             more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
             raise FileError(
-                f"{path} has several columns besides time: name one of them with column "
+                f"{path} has several columns in addition to time: name one of them with column "
                 f"({', '.join(names[:_SHOWN])}{more})",
                 name="stimulus.column",
                 valid=", ".join(names),

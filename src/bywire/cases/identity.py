@@ -1,4 +1,4 @@
-"""Identity of a computation: all that its figures depend on, as its folder keeps it."""
+"""Identity of a computation: everything that determines its figures, as stored in its folder."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any, Protocol
 
 
 class Plan(Protocol):
-    """A computation whose finished pieces may be used again: a study, a campaign."""
+    """Computation whose finished pieces can be reused: a study, a campaign."""
 
     @property
     def name(self) -> str:
@@ -23,20 +23,20 @@ class Plan(Protocol):
 
     @property
     def identity(self) -> Mapping[str, Any]:
-        """All that the figures of its pieces depend on."""
+        """Everything that determines the figures of its pieces."""
         ...
 
 
-_SHOWN = 3  # entries that are named, of those that differ
+_SHOWN = 3  # number of differing entries to name
 _WORDS = {
     "version": "the version of bywire",
     "computed equations": "the equations of the model",
     "computed figures": "how the runs or their key figures are computed",
     "points": "how the library draws",
 }
-"""entries whose values say nothing to a reader"""
+"""entries whose values are not meaningful to a reader"""
 _PARTS = {"varied": ("", "together", "quantiles"), "stimuli": ("", "parameters")}
-"""entries whose values are lists, and what stands in each place of them"""
+"""entries whose values are lists, with the meaning of each element"""
 
 
 def as_json(identity: Mapping[str, Any]) -> dict[str, Any]:
@@ -52,7 +52,7 @@ def digest_of(identity: Mapping[str, Any]) -> str:
 
 
 def differing(before: Mapping[str, Any], now: Mapping[str, Any]) -> str:
-    """Return which entries of two identities differ, for a reader; empty where that is not known.
+    """Return which entries of two identities differ, for a reader; empty if that is unknown.
 
     Examples
     --------
@@ -61,7 +61,7 @@ def differing(before: Mapping[str, Any], now: Mapping[str, Any]) -> str:
     """
     if not before:
         return ""
-    if "brake" in before:  # the digest of its source, which told studies apart once
+    if "brake" in before:  # the digest of its source, an earlier identity of studies
         return "an older version of bywire has written it"
     old, new = dict(_entries(before)), dict(_entries(now))
     differ = [name for name in sorted({*old, *new}) if old.get(name) != new.get(name)]
@@ -72,9 +72,9 @@ def differing(before: Mapping[str, Any], now: Mapping[str, Any]) -> str:
 
 
 def _is_said(name: str, old: Mapping[str, Any], new: Mapping[str, Any]) -> bool:
-    """Return whether a difference follows from one of another entry.
+    """Return whether a difference follows from that of another entry.
 
-    Quantiles differ where the text of a distribution does, and all of what varies only now.
+    Quantiles differ if the text of a distribution does, as do all entries of newly varied numbers.
     """
     whole, _, part = name.rpartition(" ")
     if part == "quantiles":

@@ -1,4 +1,4 @@
-"""Pieces of work computed side by side, each kept as soon as it is finished."""
+"""Pieces of work, computed side by side and kept as soon as they are finished."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def complete(
     workers: int | None = None,
     pool: Callable[[int], AbstractContextManager[Executor]] = thread_pool,
 ) -> dict[K, T]:
-    """Return the results of all pieces; kept results are not computed again.
+    """Return the results of all pieces, without computing kept results again.
 
     Parameters
     ----------
@@ -34,15 +34,16 @@ def complete(
     kept
         Results of finished pieces.
     compute
-        Computes a piece, in a thread or process of the pool; here where one worker is enough.
+        Function that computes a piece, in a thread or process of the pool, or in this thread if
+        one worker is sufficient.
     keep
-        Called here with each piece that is computed, and what it gave.
+        Called in this thread with each computed piece and its result.
     progress
-        Called here after that, with the piece and the finished share, 0 to 1.
+        Called in this thread afterward, with the piece and the finished share, 0 to 1.
     workers
-        How many compute at a time; one a core by default.
+        Number of workers; one per core by default.
     pool
-        What they are: `thread_pool` for work that lets go of Python's lock, or processes.
+        Kind of workers: `thread_pool` for work that releases Python's lock, or processes.
 
     Raises
     ------
@@ -70,18 +71,18 @@ def complete(
 def as_completed(
     pool: Executor, compute: Callable[[K], T], pieces: Iterable[K], ahead: int | None = None
 ) -> Iterator[tuple[K, T]]:
-    """Return the results of a pool in the order in which pieces finish; the first start at once.
+    """Return the results of a pool in the order in which pieces finish.
 
     Parameters
     ----------
     pool
-        Computes the pieces.
+        Pool that computes the pieces; it starts immediately.
     compute
-        What it does with a piece.
+        Function that computes a piece.
     pieces
         The pieces.
     ahead
-        How many are begun and not yet finished at a time; all of them by default.
+        Largest number of submitted unfinished pieces; all of them by default.
     """
     left = iter(pieces)
     begun = {pool.submit(compute, piece): piece for piece in islice(left, ahead)}

@@ -1,7 +1,7 @@
 """Store of finished pieces of long work, from which an interrupted run continues.
 
-Large pieces are files of a folder, with a record that says whose they are (`PieceFolder`); small
-ones are lines of one file (`PieceLines`). A killed process loses the pieces that it was at. A
+Large pieces are files of a folder, with a record of the work to which they belong (`PieceFolder`);
+small ones are lines of one file (`PieceLines`). A killed process loses its unfinished pieces. A
 damaged piece counts as missing, and is computed again.
 """
 
@@ -27,7 +27,7 @@ def json_object(text: bytes | str) -> dict[str, Any]:
     Raises
     ------
     ValueError
-        When it is not one, or nested too deeply.
+        When the file does not contain a JSON object, or one that is nested too deeply.
     """
     try:
         value = json.loads(text)
@@ -42,8 +42,8 @@ def json_object(text: bytes | str) -> dict[str, Any]:
 class PieceFolder(ABC):
     """Folder with a record of the work, and a file for each finished piece.
 
-    A piece's file appears whole or not at all. Two commands may work at one folder: they lose time
-    where both compute a piece, and nothing else.
+    A piece's file is written completely or not at all. Two commands may use the same folder; if
+    both compute a piece, they only lose time.
 
     Parameters
     ----------
@@ -52,41 +52,41 @@ class PieceFolder(ABC):
     """
 
     NOUN: ClassVar[str]
-    """what its pieces are of, for messages and as the record's key of the identity"""
+    """noun for the work, for messages and as the record's key of the identity"""
     KIND: ClassVar[str]
-    """the same, told from others of that name"""
+    """the same noun, specific enough to distinguish it from others"""
     COMMAND: ClassVar[str]
     """command that writes such folders"""
     RECORD: ClassVar[str]
-    """file that says whose pieces the folder holds"""
+    """file with the record of the work"""
     PIECES: ClassVar[str]
-    """folder of the pieces in it"""
+    """subfolder of the pieces"""
     FILE: ClassVar[str]
     """name of a piece's file by its number, as a format"""
     SAID: ClassVar[Mapping[str, type]]
-    """what the record says, with its type"""
+    """further entries of the record, with their types"""
 
     folder: Path
 
     @property
     @abstractmethod
     def elsewhere(self) -> str:
-        """What to do where the folder holds the pieces of another plan."""
+        """Advice for a folder that contains the pieces of another plan."""
 
     def begin(self, plan: Plan, about: Mapping[str, Any]) -> None:
-        """Make the folder that of a plan, or refuse that of another.
+        """Create the folder of a plan, or reject the folder of another plan.
 
         Parameters
         ----------
         plan
-            Whose pieces it is to hold.
+            Plan of the pieces.
         about
-            What else its record says.
+            Further entries of the record.
 
         Raises
         ------
         FileError
-            When it holds the pieces of another plan, or cannot be written.
+            When the folder contains the pieces of another plan, or cannot be written.
         """
         record = self.folder / self.RECORD
         if record.exists():
@@ -101,12 +101,12 @@ class PieceFolder(ABC):
             raise self._unwritable(self.folder, error) from None
 
     def require(self, plan: Plan) -> dict[str, Any]:
-        """Return what the folder says, or refuse it where it holds the pieces of another plan.
+        """Return the folder's record, or reject a folder with the pieces of another plan.
 
         Raises
         ------
         FileError
-            When it does, or holds none.
+            When the folder contains the pieces of another plan, or no record.
         """
         known = self.record()
         if known["digest"] != plan.digest:
@@ -119,12 +119,12 @@ class PieceFolder(ABC):
         return known
 
     def record(self) -> dict[str, Any]:
-        """Return what the folder says of its pieces.
+        """Return the folder's record.
 
         Raises
         ------
         FileError
-            When it holds none.
+            When the folder contains no record.
         """
         path = self.folder / self.RECORD
         try:
@@ -145,7 +145,7 @@ class PieceFolder(ABC):
         )
 
     def holds(self, plan: Plan) -> bool:
-        """Return whether the folder is that of a plan already."""
+        """Return whether the folder already belongs to a plan."""
         try:
             return bool(self.record()["digest"] == plan.digest)
         except FileError:
@@ -156,24 +156,24 @@ class PieceFolder(ABC):
         return self.folder / self.PIECES / self.FILE.format(number)
 
     def finished(self) -> set[int]:
-        """Return the numbers of the pieces that are there."""
+        """Return the numbers of the stored pieces."""
         files = (self.folder / self.PIECES).glob(f"*{Path(self.FILE).suffix}")
         return {int(path.stem) for path in files if path.stem.isdecimal()}
 
     def keep_file(self, number: int, write: Callable[[Path], object]) -> None:
-        """Keep a piece, whole or not at all.
+        """Store a piece, completely or not at all.
 
         Parameters
         ----------
         number
-            Of the piece.
+            Number of the piece.
         write
-            Writes it to a file of this path.
+            ``write(path)``: writes the piece to a file.
 
         Raises
         ------
         FileError
-            When it cannot be written.
+            When the file cannot be written.
         """
         path = self.path(number)
         try:
@@ -192,26 +192,26 @@ class PieceFolder(ABC):
 
 @dataclass(frozen=True)
 class PieceLines:
-    """A file with a JSON object for each finished piece, one per line.
+    """File with a JSON object for each finished piece, one per line.
 
-    Each has a key, by which several pieces of work share the file.
+    Each object has a key, so that several works can share the file.
 
     Parameters
     ----------
     path
-        The file; without one nothing is kept.
+        The file; if None, nothing is stored.
     """
 
     path: Path | None
 
     def pieces(self, read: Callable[[dict[str, Any]], T]) -> Iterator[tuple[str, T]]:
-        """Yield key and value of the pieces that are there; what a killed run cut off is left out.
+        """Yield key and value of the stored pieces, without a line truncated by a killed run.
 
         Parameters
         ----------
         read
-            Makes the value of an object without its key; where it raises KeyError, TypeError or
-            ValueError the line is damaged.
+            Converts an object without its key to the value. If it raises KeyError, TypeError or
+            ValueError, the line is damaged.
 
         Raises
         ------
@@ -235,7 +235,7 @@ class PieceLines:
                 continue
 
     def keep(self, key: str, row: Mapping[str, Any]) -> None:
-        """Keep a finished piece.
+        """Store a finished piece.
 
         Raises
         ------
@@ -247,10 +247,12 @@ class PieceLines:
         line = json.dumps({"key": key, **row}).encode() + b"\n"
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            with self.path.open("a+b", buffering=0) as file:  # in one write, whoever else writes
+            with self.path.open(
+                "a+b", buffering=0
+            ) as file:  # in a single write, as other processes may write, too
                 if file.tell():
                     file.seek(-1, 2)
-                    # A line that a killed run cut off must not take this one with it.
+                    # A line truncated by a killed run must not damage this one.
                     line = line if file.read(1) == b"\n" else b"\n" + line
                 file.write(line)
         except OSError as error:

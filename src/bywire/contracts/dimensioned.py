@@ -1,4 +1,4 @@
-"""Numbers with units, which pass through the equations and reject sums of unlike quantities."""
+"""Numbers with units, which pass through equations and reject sums of different dimensions."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ PURE = ("exp", "log", "sin", "cos", "arctan", "floor", "power")  # functions of 
 
 
 class Dimensioned:
-    """A number with a unit; zero goes with every unit, any other plain number is pure.
+    """Number with a unit; zero is compatible with every unit, any other plain number is pure.
 
-    A plain NaN is what is not known: it goes with every unit too, and so does what follows from it.
+    A plain NaN is an unknown value. It is also compatible with every unit, as are its results.
     """
 
-    __array_ufunc__ = None  # NumPy's scalars hand operations over to this class
+    __array_ufunc__ = None  # NumPy's scalars pass operations on to this class
 
     def __init__(self, value: float, unit: str = "1") -> None:
         self.value, self.powers = si_value(value, unit), base_powers(unit, BASE)
@@ -87,7 +87,7 @@ class Dimensioned:
         return Condition(operator.eq, self, other)
 
     def has_unit(self, unit: str) -> bool:
-        """Return whether the dimension is that of a unit."""
+        """Return whether a number has the dimension of a unit."""
         return self.powers == base_powers(unit, BASE)
 
     def _bywire_op(self, name: str, *args: Any) -> Any:
@@ -100,7 +100,9 @@ class Dimensioned:
         if name in ("fmax", "fmin"):
             x, y, powers = _alike(*args)
             return Dimensioned.of(max(x, y) if name == "fmax" else min(x, y), powers)
-        raise TypeError(f"ops.{name} has no dimension: define it in Dimensioned._bywire_op")
+        raise TypeError(
+            f"ops.{name} has no rule for dimensions: define it in Dimensioned._bywire_op"
+        )
 
 
 class Condition:
@@ -113,7 +115,7 @@ class Condition:
         raise TypeError("an equation must not branch on a value: use ops.where")
 
     def _bywire_op(self, name: str, *args: Any) -> Any:
-        condition, then, otherwise = args  # of ops.where, the only one that takes a condition
+        condition, then, otherwise = args  # of ops.where, the only function that takes a condition
         x, y, powers = _alike(then, otherwise)
         return Dimensioned.of(x if condition.holds else y, powers)
 
@@ -146,7 +148,7 @@ def _combined(operation: Callable[[Any, Any], Any], left: Any, right: Any) -> An
     if _is_unknown(left) or _is_unknown(right):
         return float("nan")
     if _is_nothing(left) or (operation is operator.mul and _is_nothing(right)):
-        return 0.0  # nothing goes with every unit, times anything too
+        return 0.0  # zero is compatible with every unit, also as a factor
     (x, of_left), (y, of_right) = _parts(left), _parts(right)
     sign = 1.0 if operation is operator.mul else -1.0
     powers = tuple(a + sign * b for a, b in zip(of_left, of_right, strict=True))
@@ -162,7 +164,7 @@ def _is_unknown(value: Any) -> bool:
 
 
 def _alike(left: Any, right: Any) -> tuple[float, float, tuple[float, ...]]:
-    """Return two numbers and their common dimension; zero and unknown ones take the other's."""
+    """Return two numbers and their common dimension; zero and NaN take the other's."""
     (x, powers), (y, others) = _parts(left), _parts(right)
     if _is_nothing(left) or _is_unknown(left):
         return x, y, others

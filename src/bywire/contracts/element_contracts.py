@@ -45,7 +45,7 @@ NODES = 4  # of every table
 ATTEMPTS = 2000
 _SHOWN = 24  # values in a message
 MANY = 64
-"""combinations of choices above which not all are tried"""
+"""largest number of combinations of choices of which all are tried"""
 
 Arguments = dict[str, Any]
 Choices = dict[str, Any]
@@ -54,8 +54,8 @@ Choices = dict[str, Any]
 def combinations(annotations: Mapping[str, Any]) -> Iterator[Choices]:
     """Yield combinations of structural choices, ``par.law`` and the like, of some arguments.
 
-    Every combination where there are few; else every choice beside the first and beside the last
-    of all the others.
+    These are all combinations if they are few. Otherwise, every choice is combined with the first
+    and with the last of all other choices.
 
     Raises
     ------
@@ -95,7 +95,7 @@ def _options(cls: type[ParameterSet], prefix: str) -> dict[str, tuple[Any, ...]]
 
 
 class Sampler:
-    """Some arguments with one combination of choices; samples of it share one structure."""
+    """Arguments with one combination of choices; its samples share one structure."""
 
     def __init__(self, annotations: Mapping[str, Any], choices: Choices, seed: int = 2010) -> None:
         self.annotations = dict(annotations)
@@ -142,7 +142,7 @@ class Sampler:
         return (0.0, *np.cumsum(steps).tolist())
 
     def _draw(self, number: Number) -> float:
-        """Return a value well inside its range, of the magnitude of the nominal one."""
+        """Return a value well inside its range, with the magnitude of the nominal value."""
         if math.isfinite(number.low) and math.isfinite(number.high):
             share = self._rng.uniform(0.05, 0.95)
             return number.low + share * (number.high - number.low)
@@ -158,7 +158,7 @@ def samples_of(
 ) -> tuple[Arguments, np.ndarray]:
     """Return one sample, and the numbers of ``count`` samples, shape (numbers, count).
 
-    Contracts of the same arguments look at the same samples.
+    Contracts with the same arguments use the same samples.
     """
     return _samples(tuple(annotations.items()), tuple(choices.items()), count)
 
@@ -176,7 +176,7 @@ def _samples(
 
 @lru_cache(maxsize=4096)
 def is_table(cls: type[ParameterSet], name: str) -> bool:
-    """Return whether the leaf of a parameter class is a table."""
+    """Return whether a leaf of a parameter class is a table."""
     *groups, last = name.split(".")
     for group in groups:
         cls = typing.cast(Any, cls.model_fields[group].annotation)
@@ -197,7 +197,7 @@ def flattened(arguments: Arguments) -> dict[str, float]:
 
 
 def carrying(arguments: Arguments, values: Mapping[str, Any]) -> Arguments:
-    """Return arguments of the same structure that carry other objects as their numbers."""
+    """Return arguments of the same structure with other objects as their numbers."""
     renewed: Arguments = {}
     for name, value in arguments.items():
         if isinstance(value, ParameterSet):
@@ -216,14 +216,14 @@ def described(
     values: Sequence[float] | Array = (),
     is_broken: bool = True,
 ) -> str:
-    """Return with which choices and values a contract was tried, as messages end; with units.
+    """Return the choices and values of a trial with units, for the end of a message.
 
     Parameters
     ----------
     structure, values
-        A sample, and the numbers in it, in the order of `flattened`; none where all were alike.
+        A sample, and its numbers in the order of `flattened`; None if all samples were equal.
     is_broken
-        Whether the values matter, as they broke the contract.
+        Whether to list the values, because they broke the contract.
     """
     texts = [f"{name} = {value}" for name, value in choices.items()]
     if structure is not None and is_broken:
@@ -235,7 +235,7 @@ def described(
 
 
 def symbolic(arguments: Arguments) -> tuple[ca.SX, Arguments]:
-    """Return a column of symbols and the arguments that carry them."""
+    """Return a column of symbols and the arguments that contain them."""
     names = list(flattened(arguments))
     column = ca.SX.sym("a", len(names))
     return column, carrying(arguments, dict(zip(names, ca.vertsplit(column), strict=True)))
@@ -249,13 +249,13 @@ def evaluate(function: Callable[..., Any], structure: Arguments, rows: Any) -> n
 
 
 def traced(function: Callable[..., Any], structure: Arguments) -> tuple[ca.SX, ca.SX]:
-    """Return a column of symbols and the column of results as expressions of them."""
+    """Return a column of symbols and a column of results as expressions of these."""
     column, arguments = symbolic(structure)
     return column, ca.vertcat(*flat(call(function, arguments)))
 
 
 def call(function: Callable[..., Any], arguments: Arguments) -> Any:
-    """Call a function with those of the arguments that it takes."""
+    """Call a function with the arguments that it has."""
     return function(**{name: arguments[name] for name in inspect.signature(function).parameters})
 
 
@@ -323,7 +323,7 @@ def refuses_outside(
     name
         Dotted name of the number, or of a table of them.
     wanted
-        ``wanted(leaf, value)``: what the message has to contain.
+        ``wanted(leaf, value)``: texts that the message must contain.
     """
     leaf = leaf_fields(type(par))[name]
     place = _declared_at(type(par), name)
@@ -342,7 +342,7 @@ def refuses_outside(
 
 
 def outside(leaf: Leaf) -> Iterator[float]:
-    """Yield values that are not numbers, and the values just outside the range."""
+    """Yield NaN, infinities, and the values just outside the range."""
     yield from (math.nan, math.inf, -math.inf)
     if math.isfinite(leaf.low):
         yield leaf.low if leaf.low_open else math.nextafter(leaf.low, -math.inf)
@@ -375,9 +375,9 @@ Function = Callable[..., Any]
 
 SAMPLES = 30
 BACK_ENDS = 1e-12
-"""largest difference of floats, arrays and symbols, relative to the largest value"""
+"""largest difference between floats, arrays and symbols, relative to the largest value"""
 DIFFERENCE = 1e-6
-"""step of the differences, of the nominal value"""
+"""step of the differences, relative to the nominal value"""
 SLOPE = 1e-7
 """largest deviation of a derivative from the differences"""
 PREFIX = 1e-12
@@ -403,7 +403,7 @@ def has_annotated_units(function: Function) -> Iterator[Evidence]:
 
 
 def is_in_SI(function: Function) -> Iterator[Evidence]:
-    """Check that all units are SI: no code applies the factor of a prefix."""
+    """Check that all units are SI, because no code applies the factor of a prefix."""
     arguments, returns = signature_of(function)
     for argument, annotation in (*arguments.items(), ("result", returns)):
         for name, number in numbers(argument, annotation).items():
@@ -421,7 +421,7 @@ def has_agreeing_back_ends(function: Function) -> Iterator[Evidence]:
         arrays = evaluate(function, structure, samples)
         column, results = traced(function, structure)
         symbols = ca.Function("f", [column], [results])(samples).full()
-        # A difference of large terms is as good as the terms: the row's largest value is scale.
+        # A difference of large terms is as accurate as these: the row's largest value is scale.
         scale = np.abs(floats).max(axis=1, keepdims=True)
         for name, other in (("arrays", arrays), ("symbols", symbols)):
             apart = np.abs(other - floats)
@@ -432,7 +432,7 @@ def has_agreeing_back_ends(function: Function) -> Iterator[Evidence]:
 
 
 def has_its_slopes(function: Function) -> Iterator[Evidence]:
-    """Check that the symbolic Jacobian is the slope of the function, away from kinks."""
+    """Check that the symbolic Jacobian equals the function's slope, away from kinks."""
     arguments, _ = signature_of(function)
     for choices in combinations(arguments):
         sampler = Sampler(arguments, choices)
@@ -455,7 +455,7 @@ def has_its_slopes(function: Function) -> Iterator[Evidence]:
         ]
         for j, (name, nominal, wide, narrow) in enumerate(zip(names, nominals, *both, strict=True)):
             scale = largest / nominal + np.abs(exact[:, j])
-            # Where the two differences disagree there is a kink or a jump between their ends.
+            # If the two differences disagree, there is a kink or a jump between their ends.
             smooth = np.abs(wide - narrow) <= 1e-3 * scale
             if not np.all(smooth.mean(axis=1) > 0.5):
                 yield Evidence(False, f"kinks everywhere along {name}{described(choices)}")
@@ -479,7 +479,7 @@ def _slopes(function: Function, structure: Arguments, matrix: Array, steps: Arra
 
 
 def _relative(off: Array, scale: Array) -> float:
-    """Return the largest share; a difference where all values are zero is infinitely large."""
+    """Return the largest relative difference; infinite if values differ that are all zero."""
     wide = np.broadcast_to(scale, off.shape)
     with np.errstate(divide="ignore", invalid="ignore"):
         share = np.where(off == 0.0, 0.0, off / wide)
@@ -487,13 +487,13 @@ def _relative(off: Array, scale: Array) -> float:
 
 
 # --- Energy: the stored energy changes by the power in minus the losses
-# An element with ``energy`` also has ``power_in``; where the energy depends on a ``State`` it has
-# ``mass`` and ``balance``; with inputs that its energy depends on it has ``input_rate``, a tuple
-# of their derivatives under their names; without ``power_loss`` it is lossless. An argument whose
+# An element with ``energy`` also has ``power_in``. If the energy depends on a ``State``, it has
+# ``mass`` and ``balance``. If the energy depends on inputs, it has ``input_rate``, a tuple with
+# their derivatives under their names. Without ``power_loss`` it is lossless. An argument whose
 # type another function of the element returns (the contact forces) is computed by that function.
 
 BALANCE = 1e-9
-"""of the powers that flow; the series of the fluid's flow energy is off by some 1e-10"""
+"""of the powers; the series for the fluid's flow energy has an error of about 1e-10"""
 ENERGETIC = ("energy", "power_in", "power_loss", "mass", "balance", "input_rate")
 
 
@@ -548,7 +548,7 @@ def keeps_energy(module: ModuleType) -> Iterator[Evidence]:
             yield Evidence(False, text, place=place)
             return
         off, scale = np.abs(powers.sum(axis=0)), np.abs(powers).sum(axis=0)
-        if not scale.any():  # the choices may switch it off
+        if not scale.any():  # choices may switch it off
             continue
         is_alive = True
         shares = off / np.where(scale > 0, scale, 1.0)
@@ -584,7 +584,7 @@ def loses_what_it_says(module: ModuleType) -> Iterator[Evidence]:
 
 
 def _consistent(module: ModuleType, known: dict[str, Any], sample: Arguments) -> Arguments:
-    """Return the arguments with those computed that the element has a law for."""
+    """Return the arguments, with those replaced that the element has a law for."""
     computed: Arguments = {}
     for law in (f for k, f in functions(module).items() if k not in ENERGETIC):
         takes, gives = signature_of(law)

@@ -1,4 +1,4 @@
-"""Every element and control law, and the meaning of its functions, read off their annotations."""
+"""Elements and control laws, and the meaning of their functions according to the annotations."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Number:
 
 @dataclass(frozen=True)
 class Element:
-    """A file of equations: a physical element, or a control law.
+    """File of equations: a physical element, or a control law.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def every_element() -> dict[str, Element]:
 
 
 def elements_by_name() -> dict[str, Element]:
-    """Return all elements and control laws by each of their names: the last part may be enough."""
+    """Return all elements and control laws by each valid name; the last part may suffice."""
     every = every_element()
     ends = [name.rpartition(".")[2] for name in every]
     short = {name.rpartition(".")[2]: element for name, element in every.items()}
@@ -80,7 +80,7 @@ def elements_by_name() -> dict[str, Element]:
 
 def elements_of(brake: Brake) -> dict[str, Element]:
     """Return the elements and laws of a brake's package, and those that its modules import."""
-    ASSEMBLIES.of(brake.module)  # loads its models, and so what they use
+    ASSEMBLIES.of(brake.module)  # loads its models and the modules that they use
     known = every_element()
     bring = {**ELEMENTS.of(brake.module), **LAWS.of(brake.module)}
     files = {each.module.__name__: name for name, each in known.items()}
@@ -126,7 +126,7 @@ def parameter_classes(module: ModuleType) -> list[type[ParameterSet]]:
 
 
 def signature_of(function: Callable[..., Any]) -> tuple[dict[str, Any], Any]:
-    """Return the annotations of the arguments, by name, and that of the result."""
+    """Return the annotations of the arguments by name, and the annotation of the result."""
     hints = typing.get_type_hints(function, include_extras=True)
     names = list(inspect.signature(function).parameters)
     missing = [name for name in (*names, "return") if name not in hints]
@@ -136,7 +136,7 @@ def signature_of(function: Callable[..., Any]) -> tuple[dict[str, Any], Any]:
 
 
 def merged(members: Iterable[Callable[..., Any]]) -> dict[str, Any]:
-    """Return the arguments of several functions of an element: one name, one meaning."""
+    """Return the arguments of an element's functions, in which each name has one meaning."""
     known: dict[str, Any] = {}
     for function in members:
         for name, annotation in signature_of(function)[0].items():
@@ -156,12 +156,12 @@ def is_signals(annotation: Any) -> bool:
 
 
 def numbers(name: str, annotation: Any) -> dict[str, Number]:
-    """Return all numbers below an annotation, by dotted name; tables under the name of the table.
+    """Return all numbers in an annotation by dotted name; a table counts as one number.
 
     Raises
     ------
     TypeError
-        When the annotation does not say the unit of all of its numbers.
+        When the annotation does not declare the units of all numbers.
     """
     if is_parameters(annotation):
         leaves = leaf_fields(annotation, f"{name}.")

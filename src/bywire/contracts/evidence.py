@@ -1,4 +1,4 @@
-"""Evidence on a contract: whether it holds, by which measure, and where in the code."""
+"""Evidence on a contract: outcome, measure, and place in the code."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from typing import Any, Literal
 
 
 class NotCheckedError(Exception):
-    """A contract that cannot be put to the test; its text says why."""
+    """Contract that cannot be checked; the text contains the reason."""
 
 
 @dataclass(frozen=True)
 class Place:
-    """A line of a file; line 0 is the file as a whole."""
+    """Line of a file; line 0 stands for the whole file."""
 
     file: str
     line: int
@@ -42,9 +42,9 @@ class Evidence:
     figure, limit
         Measure and its limit; None if the contract has none.
     place
-        Line to look at, where it is another than that of the subject.
+        Line to inspect, if it is not that of the subject.
     is_error
-        Whether an error kept the contract from being tried.
+        Whether an error prevented the check.
     """
 
     holds: bool
@@ -61,7 +61,7 @@ def measured(figure: float, limit: float, text: str, place: Place | None = None)
 
 
 def worst(evidence: Iterable[Evidence]) -> Evidence:
-    """Return the first evidence that does not hold, else the one nearest to its limit."""
+    """Return the first evidence that does not hold, else the evidence nearest to its limit."""
     nearest: Evidence | None = None
     for each in evidence:
         if not each.holds:
@@ -78,7 +78,7 @@ def _share(evidence: Evidence) -> float:
 
 
 Contract = Callable[[Any], Evidence | Iterator[Evidence]]
-"""one thing that a subject (function, module, class, model) must keep"""
+"""one rule for a subject (function, module, class, model)"""
 
 
 def examine(contract: Contract, subject: Any, place: Place | None = None) -> Evidence:
@@ -87,19 +87,19 @@ def examine(contract: Contract, subject: Any, place: Place | None = None) -> Evi
     Parameters
     ----------
     place
-        Where the subject stands, if it is another place than that of its own code.
+        Place of the subject, if it is not that of its own code.
 
     Raises
     ------
     NotCheckedError
-        When it cannot be put to the test.
+        When the contract cannot be checked.
     """
     try:
         evidence = contract(subject)
         return evidence if isinstance(evidence, Evidence) else worst(evidence)
     except NotCheckedError:
         raise
-    except Exception as error:  # whatever a user's equations raise
+    except Exception as error:  # any error of a user's equations
         text = " ".join(str(error).split())
         at = place or place_of(subject)
         said = f"{type(error).__name__}: {text}"
@@ -137,7 +137,7 @@ def field_place(cls: type[Any], name: str) -> Place:
 
 
 def _raised_at(error: Exception, file: str) -> Place | None:
-    """Return the innermost line of the subject's folder at which an error came up."""
+    """Return the innermost line in the subject's folder at which an error was raised."""
     folder = Path(file).parent
     lines = [
         Place(frame.filename, frame.lineno or 0)
@@ -147,7 +147,7 @@ def _raised_at(error: Exception, file: str) -> Place | None:
     return lines[-1] if lines else None
 
 
-# --- What is reported: one line per subject and contract
+# --- Findings: one line per subject and contract
 
 Outcome = Literal["holds", "broken", "not checked"]
 
@@ -169,9 +169,9 @@ class Finding:
     figure, limit
         Measure and its limit; None if the contract has none.
     place
-        Line to look at.
+        Line to inspect.
     is_error
-        Whether an error of the subject kept the contract from being tried.
+        Whether an error of the subject prevented the check.
     """
 
     subject: str
@@ -189,7 +189,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class Demand:
-    """One contract that a named subject has to keep."""
+    """Contract of a named subject."""
 
     name: str
     subject: str
@@ -198,7 +198,7 @@ class Demand:
     place: Place | None = None
 
     def settle(self) -> Finding:
-        """Return what comes out."""
+        """Check the contract and return the finding."""
         place = self.place or place_of(self.on)
         try:
             evidence = examine(self.contract, self.on, place)
@@ -218,9 +218,9 @@ class Demand:
 
 
 def one_by_cause(findings: Iterable[Finding]) -> Iterator[Finding]:
-    """Yield findings in their order, an error as broken once: what else it stops is not checked.
+    """Yield findings in order; report each error once, and mark other contracts as not checked.
 
-    A parameter that was renamed keeps every contract of a model from being tried, at one line.
+    A renamed parameter, for instance, prevents the check of every contract of a model at one line.
     """
     seen: dict[tuple[str, Place], Finding] = {}
     for each in findings:
@@ -228,7 +228,7 @@ def one_by_cause(findings: Iterable[Finding]) -> Iterator[Finding]:
         if first is each:
             yield each
         else:
-            text = f"the error of {first.subject}: {first.contract} comes up here too"
+            text = f"the error of {first.subject}: {first.contract} also occurs here"
             yield replace(each, outcome="not checked", text=text)
 
 

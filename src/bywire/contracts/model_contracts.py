@@ -39,19 +39,19 @@ from bywire.simulation.sensitivity import simulate_with_sensitivities
 from bywire.simulation.symbols import SX
 
 SLOW_SHARES = (1.0, 0.1, 1e-2, 1e-3, 1e-4)
-"""of the controllers' moves, until what has dry friction rests all through the run"""
+"""shares of the controllers' moves, tried until all velocities with dry friction rest in the run"""
 INSIDE = 0.9
-"""of a friction's bounds: a force within holds at the start"""
+"""share of a friction's bounds: a force within it is held at the start"""
 SLOW = (1e-4, 1e-3, 1e-2)
-"""of a usual speed: what is so slow feels next to nothing of a smooth force"""
+"""of a usual speed: at so low a speed, smooth forces hardly act"""
 HIDDEN = 0.1
-"""of the force up to the usual speed, by which it may come sooner than in proportion to speed"""
+"""of the force at the usual speed: largest excess over a force proportional to speed"""
 GROWN = 0.3
-"""the same of a dry friction's bounds, up to a tenth of the usual speed"""
+"""the same for the bounds of a dry friction, up to a tenth of the usual speed"""
 
 
 def rests_exactly(trial: Trial) -> Iterator[Evidence]:
-    """Find whether velocities with dry friction are zero, not small, below breakaway."""
+    """Check that velocities with dry friction are exactly zero, not small, below breakaway."""
     start, place = trial.start, trial.place("bounds", "friction")
     if not trial.model.frictions:
         raise NotCheckedError("the model declares no dry friction")
@@ -68,17 +68,17 @@ def rests_exactly(trial: Trial) -> Iterator[Evidence]:
                 waiting.discard(name)
                 text = f"{name} is exactly zero at {amount:g} of the controllers' moves"
                 yield Evidence(True, text, place=place)
-    for name in sorted(waiting):  # what else loads it may move it later, as a disc's run-out does
+    for name in sorted(waiting):  # other loads may move it later, such as a disc's run-out
         first = float(run[1, names.index(name)])
         text = (
-            f"{name} is {first:.2g} after a sample time at {SLOW_SHARES[-1]:g} of the controllers' "
-            f"moves, where {holds[name]:.2g} of its friction would hold it"
+            f"{name} is {first:.2g} after one sample time at {SLOW_SHARES[-1]:g} of the "
+            f"controllers' moves, where {holds[name]:.2g} of its friction would hold it"
         )
         yield Evidence(first == 0.0, text, place=place)
 
 
 def _holds_at_start(trial: Trial) -> dict[str, float]:
-    """Return the share of its dry friction that holds each resting velocity at the start."""
+    """Return the share of dry friction that holds each resting velocity at the start."""
     start, model = trial.start, trial.model
     x, shares = start.state, {}
     contact = _forces(trial, SX(ca.DM(list(x))))
@@ -94,7 +94,7 @@ def _holds_at_start(trial: Trial) -> dict[str, float]:
 
 
 def hides_no_friction(trial: Trial) -> Iterator[Evidence]:
-    """Find whether the balance of a velocity jumps where it turns, as hidden friction does."""
+    """Check whether the balance of a velocity jumps at its reversal, as with hidden friction."""
     state = signals_of(trial.model.State)
     speeds = [n for n, s in state.items() if s.unit in ("rad/s", "m/s")]
     if not speeds:
@@ -115,7 +115,7 @@ def hides_no_friction(trial: Trial) -> Iterator[Evidence]:
 
 
 def _contain_zero(trial: Trial) -> Iterator[Evidence]:
-    """Yield whether the bounds of every friction have zero between them."""
+    """Check that the bounds of every friction include zero."""
     start, model = trial.start, trial.model
     contact = _forces(trial, SX(ca.DM(list(start.state))))
     bounds = model.bounds(start.state, start.state, start.memory, start.par, contact)
@@ -128,7 +128,7 @@ def _contain_zero(trial: Trial) -> Iterator[Evidence]:
 
 
 def _same_at_rest(trial: Trial, name: str) -> Evidence:
-    """Return whether bounds come up with speed that are not there at rest."""
+    """Check that the bounds of a friction do not vanish at rest and appear with speed."""
     nominal = signals_of(trial.model.State)[name].nominal
     rest, far = (_bounds_at(trial, name, r * nominal) for r in (0.0, 1.0))
     slow = {r: _bounds_at(trial, name, r * nominal) for r in (*SLOW, 0.1)}
@@ -169,7 +169,7 @@ def _forces(trial: Trial, column: Any) -> tuple[float, ...]:
 # --- Contracts of a model and of its parameter sets: units, runs, energies, sensitivities
 
 OFF = 0.37
-"""how far from the start equations are evaluated, of usual magnitudes: away from their zeros"""
+"""distance from the start at which to evaluate equations, of usual magnitudes: away from zeros"""
 
 
 def has_its_units(trial: Trial) -> Iterator[Evidence]:
@@ -233,7 +233,7 @@ def _carrying(kind: Any, values: Mapping[str, float]) -> Any:
 
 
 def _contact(model: Any, x: Any, par: Any) -> tuple[Any, ...]:
-    """Return forces of the contacts: overlaps over compliances, of either sign."""
+    """Return contact forces, overlaps divided by compliances, of either sign."""
     forces: list[Any] = []
     for group, matrix in zip(model.gap(x, x, par), model.compliance(par), strict=True):
         forces += [d / matrix[k][k] for k, d in enumerate(group)]
@@ -256,18 +256,18 @@ def _fits(what: str, value: Any, unit: str, trial: Trial, *members: str) -> Evid
     return Evidence(fits(value, unit), text, place=trial.place(*members))
 
 
-# --- Energy balance: the energy input of a run goes to losses and to storage
+# --- Energy balance: the energy input of a run equals losses plus stored energy
 
 RESIDUAL = 1e-6
-"""of the energy that is turned over: what may be left once the step's own error is taken off"""
+"""of the energy turnover: largest residual after subtracting the numerical error"""
 ENERGY_SHARES = (LARGE, 0.05)
 
 
 def closes_its_energy(trial: Trial) -> Iterator[Evidence]:
     """Check that the energy balances of a large and of a small run close.
 
-    The step's own error falls with its square: of the residuals at two steps the difference tells
-    it, and it is taken off.
+    The numerical error is proportional to the square of the step. The difference of the residuals
+    at two steps gives this error, which is subtracted.
     """
     place = trial.place("powers", "power")
     for share in ENERGY_SHARES:
@@ -298,23 +298,23 @@ def _ledgers(run: Run) -> dict[str, Ledger]:
     return {"": first, **further_ledgers(recording)}
 
 
-# --- Sensitivities: the exact derivatives of a run are its differences
+# --- Sensitivities: exact derivatives of a run equal differences of runs
 
 PARAMETERS = 8
-"""number of tested parameters: those that move the states most"""
+"""number of tested parameters: those with the largest effect on the states"""
 INFLUENCE = 1e-3
-"""relative change of a parameter by which its influence is judged"""
+"""relative change of a parameter for ranking its influence"""
 DIFFERENCE = 1e-6
 """relative step of the differences"""
 SLOPE = 1e-3
-"""by how much a derivative may differ from them, of the largest of all states, half of the time"""
+"""largest difference of a derivative, relative to that of all states, during half of the time"""
 
 
 def has_its_derivatives(trial: Trial) -> Iterator[Evidence]:
-    """Find whether the derivatives of the states by the parameters are differences of runs.
+    """Check that derivatives of the states by the parameters equal differences of runs.
 
-    Without dry friction, and without controllers that round: breakaway and reversals move in time
-    with a parameter, which exact derivatives follow within a few per cent and differences do not.
+    The runs have no dry friction and no controllers that round. Instants of breakaway and reversals
+    depend on a parameter: exact derivatives include this within a few percent, differences do not.
     """
     if find_compiler() is None:
         raise NotCheckedError("there is no C compiler: install the extra bywire[compiler]")
@@ -324,7 +324,7 @@ def has_its_derivatives(trial: Trial) -> Iterator[Evidence]:
     if not chosen:
         raise NotCheckedError(f"from {trial.start.known} no parameter moves any state")
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of converters; their runs are those of the plant alone
+        warnings.simplefilter("ignore")  # of converters; these runs are those of the plant alone
         exact = simulate_with_sensitivities(run, tuple(chosen), names)
     at = run.par.leaves()
     ahead = {name: [at[name]] * 2 * len(chosen) for name in chosen}
@@ -340,8 +340,8 @@ def has_its_derivatives(trial: Trial) -> Iterator[Evidence]:
         rounding = np.abs(values[2 * k]).max(axis=0) * 1e-12 / width / nominal
         largest = float(max(np.abs(slopes).max(), np.abs(differences).max()))
         if largest * SLOPE <= rounding.max():
-            continue  # what the states feel of this parameter drowns in rounding
-        # Not everywhere: contacts that close move in time, and fixed steps do not show that.
+            continue  # rounding hides the effect of this parameter on the states
+        # Not at all times: the instants of closing contacts move, which fixed steps do not show.
         off = np.median(np.abs(slopes - differences), axis=0) / largest
         j = int(np.argmax(off))
         state = trial.model.State._fields[j]
@@ -353,7 +353,7 @@ def has_its_derivatives(trial: Trial) -> Iterator[Evidence]:
 
 
 def _strongest(trial: Trial, run: Run) -> list[str]:
-    """Return the parameters that move the states most, each by the same share of its value."""
+    """Return the parameters with the largest effect on the states for the same relative change."""
     known = dict(constants(run))
     cases: dict[str, float] = {}
     for name in known:
@@ -384,29 +384,29 @@ def _moved(run: Run, name: str, share: float) -> float:
     return value + share * (abs(value) or leaf_fields(type(run.par))[name].unit.nominal)
 
 
-# --- Runs: order of the step, and one result of every engine
+# --- Runs: order of the scheme, and equal results of all engines
 
 ORDER = 2.0
 SHORTFALL = 0.3
-"""largest deviation of the observed order below two; a model of first order is at one"""
+"""largest deviation of the observed order below two; the order of an invalid model is one"""
 HALVINGS = 4
 SMOOTH_SHARES = (1.0, 0.3, 0.1)
 SHARES = (1.0, 0.5, 0.25, 0.12, 0.06, 0.03)
-"""of the controllers' moves: where stick and slip change instants, one run's errors scatter"""
+"""shares of the controllers' moves: if stick-slip shifts instants, the errors of one run scatter"""
 SCATTER = 0.2
-"""least standard error of the order of one run: a few errors may lie on a line by chance"""
+"""least standard error of the order of one run: a few errors may be on a line by chance"""
 ROUNDING = 1e-12
-"""of a state's largest or usual magnitude: differences below it tell nothing of the step"""
+"""of a state's largest or usual magnitude: smaller differences are not errors of the step"""
 AGREEMENT = 1e-9
-"""by how much engines may differ, of the largest value of a signal in the run, which counts at
-least a thousandth of the usual one"""
+"""largest difference between engines, relative to the largest value of a signal in the run, which
+counts as at least a thousandth of the usual one"""
 _VIRTUAL = 0.02  # length [s] of the run that is repeated without a compiler
 
 
 def is_of_second_order(trial: Trial) -> Iterator[Evidence]:
-    """Find whether every state of the plant converges with the square of the substep.
+    """Check that every state of the plant converges with the square of the substep.
 
-    Without dry friction, and with it: a substep in which a velocity turns round is cut there.
+    This holds without and with dry friction, as a substep is cut where a velocity reverses.
     """
     orders = list(_orders(trial, False, ORDER))
     if not orders:
@@ -428,7 +428,7 @@ def _orders(trial: Trial, frictions: bool, wanted: float) -> Iterator[Evidence]:
             runs = [
                 states(simulate(trial.drive.run(share, step, frictions)), names) for step in steps
             ]
-        except SolverError:  # what runs away without its friction
+        except SolverError:  # a model that runs away without its friction
             continue
         floor = ROUNDING * np.maximum(np.abs(runs[-1]).max(axis=0), nominal)
         changes = [np.sqrt(np.mean((a - b) ** 2, axis=0)) for a, b in pairwise(runs)]
@@ -448,12 +448,12 @@ def _orders(trial: Trial, frictions: bool, wanted: float) -> Iterator[Evidence]:
 def _observed(errors: Array) -> tuple[float, float]:
     """Return the order with which errors fall, and twice its standard error.
 
-    The mean over the runs, those counting most whose errors lie on a line.
+    It is the mean over the runs, weighted by how closely their errors are on a line.
 
     Parameters
     ----------
     errors
-        Of every run at every halving of the step, shape (runs, halvings).
+        Errors of every run at every halving of the step, shape (runs, halvings).
     """
     logs = np.log2(errors)
     logs = logs[np.isfinite(logs).all(axis=1)]
@@ -469,7 +469,7 @@ def _observed(errors: Array) -> tuple[float, float]:
 
 
 def has_agreeing_engines(trial: Trial) -> Iterator[Evidence]:
-    """Find whether the compiled kernel and the virtual machine compute one run."""
+    """Check that the compiled kernel and the virtual machine compute the same run."""
     if find_compiler() is None:
         raise NotCheckedError("there is no C compiler: install the extra bywire[compiler]")
     run = trial.start.run(LARGE, duration=_duration(trial.start))
@@ -546,13 +546,13 @@ OF_A_MODEL: dict[str, Contract] = {
 
 
 def demands_on_set(name: str, par: ParameterSet) -> Demands:
-    """Yield every contract that a parameter set has to keep."""
+    """Yield every contract of a parameter set."""
     for contract, test in OF_A_SET.items():
         yield Demand(contract, name, par, test)
 
 
 OF_ITS_NUMBERS = ("exact rest", "hidden friction", "energy of a run")
-"""those of them that depend on the numbers of a parameter set"""
+"""the model contracts that depend on the numbers of a parameter set"""
 
 
 def demands_on_model(name: str, trial: Trial, of_numbers: bool = False) -> Demands:

@@ -1,4 +1,4 @@
-"""Contract of a model's linear model: it describes small motions of the plant."""
+"""Contract of a model's linearization: it describes small motions of the plant."""
 
 from __future__ import annotations
 
@@ -32,20 +32,20 @@ from bywire.core.typing import Array
 from bywire.simulation.run import simulate
 
 SMALL = (1e-4, 1e-5)
-"""of the controllers' moves: what is nonlinear falls from one to the next"""
+"""shares of the controllers' moves: nonlinear effects decrease from one to the next"""
 MISMATCH = 0.02
-"""by how much the responses may differ, of the larger one's largest value"""
+"""largest difference of the responses, relative to the largest value of the larger one"""
 AT_REST = 1e-3
-"""of usual magnitudes in a second: a start that drifts so slowly is an equilibrium"""
+"""usual magnitudes per second: a start with a slower drift counts as an equilibrium"""
 
 
 def is_its_linear_model(trial: Trial) -> Iterator[Evidence]:
-    """Check that the linear model of the plant gives its response to small motions.
+    """Check that the linear model of the plant predicts its response to small motions.
 
-    Loops of the model are not on a corner at their usual operating point.
+    Loops of the model must not be on a corner at their usual operating point.
 
-    Without dry friction where the start is an equilibrium of the smooth equations; else with what
-    has friction held fast.
+    If the start is an equilibrium of the smooth equations, the check removes dry friction.
+    Otherwise it holds all velocities with friction at zero.
     """
     start = trial.start
     try:
@@ -74,7 +74,7 @@ def is_its_linear_model(trial: Trial) -> Iterator[Evidence]:
             continue
         moving += 1
         off = min(float(np.abs(run[:, k] - exact).max()) for run in deviations) / size
-        how = "without dry friction" if removed else "with what has friction held"
+        how = "without dry friction" if removed else "with friction holding all its velocities"
         text = f"{name} differs from its linear response by {off:.1e} of its largest value, {how}"
         yield measured(off, MISMATCH, text, place)
     if not moving:
@@ -82,19 +82,19 @@ def is_its_linear_model(trial: Trial) -> Iterator[Evidence]:
 
 
 def _require_loops_off_corners(trial: Trial) -> None:
-    """Reject loops of the model whose usual operating point is on a corner of plant or law."""
+    """Reject loops of the model whose usual operating point is on a corner."""
     for loop in LOOPS.all().values():
         if loop.assembly == trial.model.name:
             try:
                 loop.gain_and_closed(trial.start.par, loop.at.default)
             except CornerError:
                 raise
-            except InputError:  # a loop of other choices
+            except InputError:  # a loop for other choices
                 continue
 
 
 def _linear(trial: Trial) -> tuple[LinearModel, bool]:
-    """Return the linear model, and whether dry friction is removed in it."""
+    """Return the linear model, and whether it is without dry friction."""
     start = trial.start
     reasons = []
     nominal = np.array([s.nominal for s in signals_of(trial.model.State).values()])
@@ -124,7 +124,7 @@ def _linear(trial: Trial) -> tuple[LinearModel, bool]:
 
 
 def _response(linear: LinearModel, inputs: Array, period: float) -> Array:
-    """Return the states under inputs that are held for a sample time, shape (rows, states)."""
+    """Return the states for inputs that are held for a sample time, shape (rows, states)."""
     n, m = linear.B.shape
     block = np.zeros((n + m, n + m))
     block[:n, :n], block[:n, n:] = linear.A, linear.B
@@ -137,20 +137,20 @@ def _response(linear: LinearModel, inputs: Array, period: float) -> Array:
 
 
 MOST = 40
-"""operations of a model that are put on their corners, one place in the source each"""
+"""largest number of operations of a model to put on their corners, one per place in the source"""
 ONE_SIDED = 1e-3
-"""by how much a linear model may differ from differences on its side, of the largest effect"""
+"""largest deviation of a linear model from differences on its side, of the largest effect"""
 ROUNDING = 1e-14
-"""of rates: what differences of them may be off"""
+"""of rates: largest error of their differences"""
 _NEWTON = 8
 
 
 def is_linear_beside_its_corners(trial: Trial) -> Iterator[Evidence]:
-    """Check that linear models are valid, or rejected, where operations are on their corners.
+    """Check that linear models are valid or rejected when operations are on their corners.
 
-    The plant's operating point is driven to the corner of each limit, choice and magnitude in its
-    equations. There, a model that is returned without a word must hold on both sides; where it is
-    refused, those of the two sides must be what the equations do beside the corner.
+    The check moves the plant's operating point to the corner of each limit, selection and absolute
+    value in its equations. A model that is returned there must hold on both sides. If it is
+    rejected, the models of the two sides must match the equations next to the corner.
     """
     start = trial.start
     try:
@@ -174,7 +174,7 @@ def is_linear_beside_its_corners(trial: Trial) -> Iterator[Evidence]:
 def _driven(
     at: SmoothPoint, free: NDArray[np.bool_], usual: Array, order: int
 ) -> SmoothPoint | None:
-    """Return the nearest point at which an operation is on its corner; None where none is found."""
+    """Return the nearest point at which an operation is on its corner; None if none is found."""
     for _ in range(_NEWTON):
         kink = _kink(kinks_at(at, free, usual, outputs=False, ticks=False), order)
         if kink is None or not np.isfinite(kink.excess):
@@ -189,7 +189,7 @@ def _driven(
 
 
 def _with_its_contacts(at: SmoothPoint) -> SmoothPoint | None:
-    """Return a point with its closed contacts; None where one touches, or a limit is reached."""
+    """Return a point with its closed contacts; None if one just touches, or at a limit."""
     model = at.model
     state = cast(NamedTuple, cast(Any, model.State)(*at.state.tolist()))
     memory = cast(NamedTuple, cast(Any, model.Memory)(*at.memory.tolist()))
@@ -228,11 +228,11 @@ def _beside(trial: Trial, at: SmoothPoint, free: NDArray[np.bool_], place: str) 
     for away in (by, -by):
         once, twice = (at.moved(share * away).plant()[4][:, 0] for share in (0.5, 1.0))
         if not (np.isfinite(once).all() and np.isfinite(twice).all()):
-            return Evidence(True, f"{place} is on its corner beside what has no numbers")
+            return Evidence(True, f"{place} is on its corner, near which a value is not finite")
         wanted, step = twice - once, 0.5 * away[: n + m]
         size = np.maximum(np.abs(sides[0]), np.abs(sides[-1])) @ np.abs(step)
         rounding = ROUNDING * (np.abs(once) + np.abs(twice))
-        # A slope whose effect takes more than a second for a usual magnitude needs no precision.
+        # A slope that takes more than a second to change a signal by its magnitude is negligible.
         size = np.maximum(size, rounding / ONE_SIDED + REACH * magnitudes(at)[:n])
         most = max(most, min(float(np.max(np.abs(J @ step - wanted) / size)) for J in sides))
     text = f"with {place} on its corner the linear model {how} is off by {most:.1e}"

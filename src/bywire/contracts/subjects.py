@@ -25,20 +25,20 @@ from bywire.core.signals import signals_of
 
 
 def demands_on(name: str | None, figures: Collection[str]) -> Iterator[Demand]:
-    """Yield every contract that something has to keep.
+    """Yield every contract of a subject.
 
     Parameters
     ----------
     name
-        Of a brake, a model, an experiment, an element, a control law or a parameter set;
+        Name of a brake, a model, an experiment, an element, a control law or a parameter set;
         everything installed by default.
     figures
-        Names of the figures that experiments may ask for.
+        Names of the figures that experiments may use.
 
     Raises
     ------
     UnknownNameError
-        With the nearest known names.
+        When the name is unknown; the message lists the nearest names.
     """
     if name is None:
         yield from _on_elements(every_element().values())
@@ -58,9 +58,9 @@ def demands_on(name: str | None, figures: Collection[str]) -> Iterator[Demand]:
 
 
 def _element(name: str) -> Element:
-    """Return an element by its dotted name, or by the last part of it where that is enough.
+    """Return an element by its dotted name, or by the last part if it is unique.
 
-    Hyphens count as underscores: names of modules have none.
+    Hyphens count as underscores, as names of modules have no hyphens.
     """
     known, module = every_element(), name.replace("-", "_")
     ends = [full for full in known if full.rpartition(".")[2] == module]
@@ -77,7 +77,7 @@ def _on_elements(elements: Iterable[Element]) -> Iterator[Demand]:
 
 
 def _on_brake(brake: Brake, figures: Collection[str]) -> Iterator[Demand]:
-    FAMILIES.of(brake.module)  # rejects a key figure that has no translation to C
+    FAMILIES.of(brake.module)  # rejects a key figure that cannot be translated to C
     for entry in PARAMETER_SETS.of(brake.module).values():
         yield from _on_set(entry)
     for model in ASSEMBLIES.of(brake.module).values():
@@ -91,7 +91,7 @@ def _on_set(entry: CitedSet) -> Iterator[Demand]:
 
 
 def _on_model(model: Any) -> Iterator[Demand]:
-    """Yield the contracts of a model: all with its first parameter set, of numbers with others."""
+    """Yield the contracts of a model: all with its first parameter set, then those of numbers."""
     entries = [e for e in PARAMETER_SETS.all().values() if e.assembly == model.name]
     for k, entry in enumerate(entries):
         subject = f"{model.name} ({entry.name})"
@@ -105,7 +105,7 @@ def _trial(model: type[Any], entry: CitedSet) -> Trial:
 
 
 def _rig_trial(model: type[Any]) -> Trial:
-    """Return the trial of a model without a parameter set: an experiment of its brake starts it."""
+    """Return the trial of a model without a parameter set, from an experiment of its brake."""
     module = ASSEMBLIES.owner(model.name)
     sets = [entry.parameters() for entry in PARAMETER_SETS.of(module).values()]
     return Trial(model, lambda: start_of_a_rig(model(), sets, module))
@@ -118,14 +118,14 @@ _SAMPLES = 201
 
 @dataclass(frozen=True)
 class Rehearsal:
-    """An experiment with its defaults, and the recordings of brakes that never move.
+    """Experiment with its defaults, and recordings of brakes that never move.
 
     Parameters
     ----------
     experiment
         The experiment.
     figures
-        Names of the figures that there are.
+        Names of the existing figures.
     """
 
     experiment: Experiment
@@ -138,7 +138,7 @@ class Rehearsal:
         Raises
         ------
         NotCheckedError
-            When there is none.
+            When there is no set.
         """
         try:
             return PARAMETER_SETS.find(main_set(self.experiment.assembly)).parameters()
@@ -147,7 +147,7 @@ class Rehearsal:
 
     @cached_property
     def cases(self) -> tuple[Case, ...]:
-        """Its runs, with stimuli that stay at zero where a bench file has to give some."""
+        """Its runs, with zero stimuli in place of those of a bench file."""
         experiment, options = self.experiment, self.experiment.defaults
         stimulus: Any = None
         if experiment.driven_unit is not None:
@@ -185,35 +185,35 @@ class Rehearsal:
 
 
 def has_its_assembly(rehearsal: Rehearsal) -> Evidence:
-    """Return whether the assembly is declared that it tests."""
+    """Check that the experiment's assembly is declared."""
     return _named("assembly", [rehearsal.experiment.assembly], ASSEMBLIES.all())
 
 
 def has_its_figures(rehearsal: Rehearsal) -> Evidence:
-    """Return whether every figure is declared that it names."""
+    """Check that every figure named by the experiment is declared."""
     return _named("figure", rehearsal.experiment.figures, rehearsal.figures)
 
 
 def drives_stimuli(rehearsal: Rehearsal) -> Iterator[Evidence]:
-    """Yield whether its models have the stimuli that it drives, run by run."""
+    """Check for each run that its model has the stimuli that the experiment drives."""
     for case in rehearsal.cases:
         driven = case.stimulus(np.zeros(1))
         yield _named(f"stimulus of {case.model.name}", driven, case.model.Stimulus._fields)
 
 
 def judges_what_is_recorded(rehearsal: Rehearsal) -> Evidence:
-    """Return whether the computed key figures are the declared ones.
+    """Check that the computed key figures are the declared ones.
 
     Raises
     ------
     NotCheckedError
-        When a recording at rest is too little to tell.
+        When a recording at rest is not sufficient.
     """
     experiment, options = rehearsal.experiment, rehearsal.experiment.defaults
     try:
         given = {kpi.name: kpi.unit for kpi in experiment.judge(rehearsal.recordings(), options)}
     except (KeyError, AttributeError, UnknownNameError, ModelError):
-        raise  # it names something that is missing, or a key figure that has no translation to C
+        raise  # it names something missing, or a key figure that cannot be translated to C
     except Exception as error:
         raise NotCheckedError(f"no recorded signal moves: {error}") from error
     declared = experiment.kpis_with(options)
@@ -242,7 +242,7 @@ OF_AN_EXPERIMENT: dict[str, Contract] = {
 
 
 def demands_on_experiment(experiment: Experiment, figures: Collection[str]) -> Demands:
-    """Yield every contract that an experiment has to keep."""
+    """Yield every contract of an experiment."""
     rehearsal, place = Rehearsal(experiment, figures), Place(*EXPERIMENTS.place(experiment.name))
     for contract, test in OF_AN_EXPERIMENT.items():
         yield Demand(contract, experiment.name, rehearsal, test, place)

@@ -1,4 +1,4 @@
-"""Trial of one model with one parameter set: start of its runs, and what they share."""
+"""Trial of one model with one parameter set: start of its runs, and their shared results."""
 
 from __future__ import annotations
 
@@ -26,22 +26,22 @@ from bywire.simulation.run import Run, Trajectory, simulate
 STEP = 20e-6
 """substep [s] of the runs, or the next smaller one that divides the sample times"""
 ACTIVE = 0.2
-"""time [s] of the one wave that excites a run; then the stimulus is what it was before"""
+"""time [s] of the single wave that excites a run; the stimulus then returns to its first value"""
 DURATION = 0.3
 
 
 @dataclass(frozen=True)
 class Start:
-    """A model ready to run.
+    """Model with parameters and a start, ready to run.
 
     Parameters
     ----------
     model, par
         The system and its parameters.
     state, memory, stimulus
-        Where it starts, at rest if anybody says where that is.
+        Start of the run, at rest if a rest is declared.
     known
-        Who says so, for instance ``"loop pressure"``.
+        Source of the start, for instance ``"loop pressure"``.
     """
 
     model: Model
@@ -58,7 +58,7 @@ class Start:
 
     @property
     def step(self) -> float:
-        """Substep [s]: at most `STEP`, and a whole number of them in every sample time."""
+        """Substep [s]: at most `STEP`, and a divisor of every sample time."""
         periods = [task.period for task in self.model.tasks(self.par)]
         for count in range(int(np.ceil(self.period / STEP - 1e-9)), 100_000):
             step = self.period / count
@@ -67,12 +67,12 @@ class Start:
         return self.period
 
     def run(self, share: float, duration: float = DURATION, record: float = 0.0) -> Run:
-        """Return a run in which every signal of the stimulus swings once, within its range.
+        """Return a run in which every signal of the stimulus makes one wave within its range.
 
         Parameters
         ----------
         share
-            Amplitude, of the signal's usual magnitude.
+            Amplitude, relative to the signal's usual magnitude.
         record
             Recording interval [s]; the fastest sample time by default.
         """
@@ -100,11 +100,11 @@ class Start:
 
 
 def start_of(model: Model, par: ParameterSet) -> Start:
-    """Return where the runs of a model with some parameters start.
+    """Return the start of the runs of a model with some parameters.
 
-    The operating point of one of its loops, or the start of one of its experiments, of the same
-    choices where there is one; else its rest. A rest is often on a stop, where contacts just touch
-    and little can be put to the test.
+    It is the operating point of one of the model's loops, or the start of one of its experiments,
+    with the same choices if there is one; else the model's rest. A rest is often at an end stop,
+    where contacts just touch and little can be checked.
     """
     known = list(_points(model, par)) or list(_cases(model, par))
     same = [each for each in known if each.par.choices() == par.choices()]
@@ -115,7 +115,7 @@ def start_of(model: Model, par: ParameterSet) -> Start:
 
 
 def start_of_a_rig(model: Model, sets: Iterable[ParameterSet], module: str) -> Start:
-    """Return the start of a model without parameter set in an experiment.
+    """Return the start of a model without a parameter set, from an experiment.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ def start_of_a_rig(model: Model, sets: Iterable[ParameterSet], module: str) -> S
     Raises
     ------
     ParameterError
-        When none does.
+        When no experiment starts the model.
     """
     for par in sets:
         for start in _cases(model, par, module):
@@ -164,7 +164,7 @@ def _cases(model: Model, par: ParameterSet, module: str = "") -> Iterator[Start]
             continue
         try:
             cases = (experiment.preview or experiment.cases)(par, experiment.defaults, None)
-        except (InputError, AttributeError, TypeError):  # it wants other parameters, or a stimulus
+        except (InputError, AttributeError, TypeError):  # it needs other parameters, or a stimulus
             continue
         for case in cases:
             if type(case.model) is type(model):
@@ -180,18 +180,18 @@ def _cases(model: Model, par: ParameterSet, module: str = "") -> Iterator[Start]
                 break
 
 
-# --- Models around a model: all that it is, recorded; its plant alone, under prescribed memory
+# --- Wrapped models: all states and memory recorded; the plant alone with a prescribed memory
 
 
 class Clock(NamedTuple):
-    """An integral that every model has."""
+    """Integral that every model has."""
 
     t: Annotated[float, Signal("s", "time")]
 
 
 @cache
 def _recorded(model: type[Model], state: type[NamedTuple], memory: type[NamedTuple]) -> Any:
-    """Return the signal tuple of all states, then of all of the memory."""
+    """Return the signal tuple of all states, then of the whole memory."""
     fields = {f"x_{name}": signal for name, signal in signals_of(state).items()}
     fields |= {f"m_{name}": signal for name, signal in signals_of(memory).items()}
     annotated: list[Any] = [(name, Annotated[float, signal]) for name, signal in fields.items()]
@@ -199,16 +199,16 @@ def _recorded(model: type[Model], state: type[NamedTuple], memory: type[NamedTup
 
 
 class Probe(Wrapping):
-    """A model whose states and memory are recorded, and no energies.
+    """Model that records its states and memory, but no energies.
 
     Parameters
     ----------
     model
         The model.
     held
-        Whether the stimulus is the memory itself: then the plant runs without its controllers.
+        Whether the stimulus is the memory itself, so that the plant runs without controllers.
     frictions
-        Whether there is dry friction.
+        Whether to include dry friction.
     """
 
     def __init__(self, model: Model, held: bool, frictions: bool = True) -> None:
@@ -222,7 +222,7 @@ class Probe(Wrapping):
 
     @property
     def Flow(self) -> type[NamedTuple]:
-        """Nothing but time."""
+        """Integral: only time."""
         return Clock
 
     @property
@@ -237,7 +237,7 @@ class Probe(Wrapping):
         return self.inner.frictions if self.rubs else ()
 
     def tasks(self, par: Any) -> tuple[Task, ...]:
-        """Return the controllers, or the task that hands on what is prescribed."""
+        """Return the controllers, or the task that passes on the prescribed memory."""
         tasks = self.inner.tasks(par)
         if not self.held:
             return tasks
@@ -263,14 +263,14 @@ class Probe(Wrapping):
 
 @dataclass(frozen=True, eq=False)
 class Drive:
-    """Memory over time, as the controllers of a run wrote it, to prescribe in other runs.
+    """Memory over time, as written by the controllers of a run, to prescribe in other runs.
 
     Parameters
     ----------
     start
-        Where that run started.
+        Start of that run.
     rows
-        By how much it differs from that of the start, at every sample time; shape (samples,
+        Difference of the memory from that of the start, at every sample time; shape (samples,
         memories).
     """
 
@@ -283,11 +283,11 @@ class Drive:
         Parameters
         ----------
         share
-            How much of the memory's changes is prescribed.
+            Prescribed share of the memory's changes.
         step
             Substep [s]; that of the start by default.
         frictions
-            Whether there is dry friction.
+            Whether to include dry friction.
         """
         memory = np.array([float(value) for value in self.start.memory])
         rows = memory + share * self.rows
@@ -310,7 +310,7 @@ class Drive:
 
 
 def drive_of(start: Start, share: float) -> Drive:
-    """Return what the controllers do in a run from a start, see `Start.run`."""
+    """Return the memory that the controllers write in a run from a start, see `Start.run`."""
     run = start.run(share)
     probe = Run(
         Probe(start.model, held=False),
@@ -335,18 +335,18 @@ def states(trajectory: Trajectory, names: Sequence[str]) -> Array:
 # --- The trial
 
 LARGE = 0.5
-"""amplitude of the stimulus in large runs, of the signals' usual magnitudes"""
+"""amplitude of the stimulus in large runs, relative to the signals' usual magnitudes"""
 
 
 class Trial:
-    """Model at its start, with results that its runs share.
+    """Model at its start, with results that its checks share.
 
     Parameters
     ----------
     kind
         Class of the model.
     find_start
-        Returns the model with its parameters, and where its runs start.
+        Function that returns the model with its parameters and the start of its runs.
     """
 
     def __init__(self, kind: type[Any], find_start: Callable[[], Start]) -> None:
@@ -354,12 +354,12 @@ class Trial:
 
     @cached_property
     def start(self) -> Start:
-        """The model with its parameters, where its runs start.
+        """Model with its parameters, at the start of its runs.
 
         Raises
         ------
         NotCheckedError
-            When nobody can say where.
+            When no start is known.
         """
         try:
             return self._find_start()
@@ -373,7 +373,7 @@ class Trial:
 
     @cached_property
     def drive(self) -> Drive:
-        """What the controllers do in a large run.
+        """Memory that the controllers write in a large run.
 
         Raises
         ------
@@ -398,8 +398,8 @@ class Trial:
     def large_run(self, frictions: bool) -> Run:
         """Return a large run from the start, with states and memory recorded.
 
-        Where a controller rounds it is that of the plant alone: a last digit can change a code, and
-        nothing has derivatives.
+        If a controller rounds, it is a run of the plant alone: the last digit of a signal may
+        change a code, and there are no derivatives.
         """
         if self.rounds:
             return self.drive.run(frictions=frictions)
@@ -407,7 +407,7 @@ class Trial:
         return replace(self.start.run(LARGE), model=probe)
 
     def place(self, *members: str) -> Place:
-        """Return where the first of some members of the model is written, else its class."""
+        """Return the place of the first of some members of the model, else of its class."""
         for member in members:
             function = vars(self.kind).get(member)
             if inspect.isfunction(function):
@@ -416,7 +416,7 @@ class Trial:
 
 
 def constants(run: Run) -> Iterator[tuple[str, float]]:
-    """Yield the numbers of a run that may vary within an ensemble: no table, no sample time."""
+    """Yield the numbers of a run that may vary within an ensemble: no tables or sample times."""
     periods = [task.period for task in run.model.tasks(run.par)]
     for name, value in run.par.flat().items():
         if name in run.par.leaves():

@@ -16,7 +16,7 @@ BUILD, DUMP, HOLD, STEPPED = 0.0, 1.0, 2.0, 3.0
 PHASES = ("build", "dump", "hold", "stepped")
 """names of the phases 0 to 3"""
 _FAR = 0.5  # share of the pressure that remains if a wheel slips far in spite of a dump
-_LEAST = 0.05  # of the pressure: from less, steps would lead up again too late
+_LEAST = 0.05  # share of the pressure; from less, steps would build it up too slowly
 
 SampleTime = Annotated[float, Signal("s", "sample time", 1e-3), Gt(0)]
 Flag = Annotated[float, Signal("1", "flag")]
@@ -27,41 +27,41 @@ Speed = Annotated[float, Unit("m/s", 5.0), Field(gt=0, allow_inf_nan=False)]
 class Parameters(ParameterSet):
     """Thresholds, times, and pressures relative to the last one that the road held.
 
-    A threshold judges the slip ahead, to which the wheel's deceleration leads within ``t_lead``:
-    a line in the plane of slip and deceleration, beyond which a wheel that slows down quickly is
-    while it still slips little. Nothing depends on the road.
+    Thresholds act on the slip ahead, which the wheel's deceleration predicts for ``t_lead``. A
+    threshold is thus a line in the plane of slip and deceleration: a wheel that slows down quickly
+    crosses it while its slip is still small. No parameter depends on the road.
     """
 
     slip_keep: Fraction
     """slip ahead above which the first build-up is halted"""
     slip_dump: Fraction
-    """slip ahead above which pressure is taken back"""
+    """slip ahead above which pressure is reduced"""
     slip_back: Fraction
     """slip below which a wheel has recovered"""
     t_lead: TimeConstant
-    """how far ahead slip is judged"""
+    """prediction time of the slip ahead"""
     a_hold: Annotated[float, Unit("m/s**2", 10.0), Field(ge=0, allow_inf_nan=False)]
-    """how quickly a wheel must come back, over keeping its slip, or more is taken back"""
+    """least recovery rate of a wheel, relative to constant slip, or pressure falls further"""
     t_hold: Duration
-    """time for which pressure is kept at least"""
+    """least time for which pressure is held"""
     t_most: Duration
-    """time after which it is built up again in any case"""
+    """time after which pressure is built up again in any case"""
     dump: Annotated[float, Unit("1/s", 100.0), Field(gt=0, allow_inf_nan=False)]
-    """how fast it is taken back, over itself"""
+    """rate at which pressure is reduced, relative to the pressure"""
     depth: Fraction
     """pressure at the end of a dump, relative to the last one that the road held"""
     back: Factor
-    """pressure at which the stepped build begins, over the same"""
+    """pressure at which the stepped build-up begins, relative to the same"""
     t_step: Duration
     """time between two steps"""
     step: Fraction
-    """first step, over the same"""
+    """first step, relative to the same"""
     growth: Factor
-    """a step over that before: the longer all goes well, the faster"""
+    """ratio of a step to the previous one: build-up accelerates while the wheel does not lock"""
     tau_a: TimeConstant
     """time constant of the deceleration's filter"""
     tau_p: TimeConstant
-    """time in which the brake follows its demand, as the controller believes it"""
+    """time constant of the brake behind its demand, as assumed by the controller"""
     v_off: Speed
     """speed below which the wheel may lock"""
     v_fall: Speed
@@ -73,9 +73,9 @@ class State(NamedTuple):
 
     phase: Annotated[float, Signal("1", "phase of anti-lock control", 3.0)]
     since: Annotated[float, Signal("s", "time since the last phase or step began", 0.1)]
-    p_left: Annotated[float, Signal("Pa", "demand that was left", 2e6)]
-    p_hat: Annotated[float, Signal("Pa", "pressure as the controller believes it", 2e6)]
-    p_held: Annotated[float, Signal("Pa", "pressure that the road last held", 2e6)]
+    p_left: Annotated[float, Signal("Pa", "remaining demand", 2e6)]
+    p_hat: Annotated[float, Signal("Pa", "pressure assumed by the controller", 2e6)]
+    p_held: Annotated[float, Signal("Pa", "last pressure that the road could hold", 2e6)]
     rise: Annotated[float, Signal("Pa", "next step of the pressure", 1e5)]
     slowing: Slowing
 
@@ -137,7 +137,7 @@ def seen(x: State, u: Input, slowing: Slowing, par: Parameters) -> Seen:
 
 
 def next_phase(phase: Flag, s: Seen) -> Flag:
-    """Return the phase that follows."""
+    """Return the next phase."""
     from_build = ops.where(s.locking > 0.5, DUMP, ops.where(s.biting > 0.5, HOLD, BUILD))
     from_dump = ops.where(s.dumped > 0.5, HOLD, DUMP)
     from_hold = ops.where(s.falling > 0.5, DUMP, ops.where(s.recovered > 0.5, STEPPED, HOLD))
@@ -148,9 +148,9 @@ def next_phase(phase: Flag, s: Seen) -> Flag:
 
 
 def balanced(p: Pressure, slowing: Slowing, u: Input) -> Pressure:
-    r"""Return the pressure that the road holds, :math:`p - (a_{wheel} - a) J/(r k)`.
+    r"""Return the pressure that the road can hold, :math:`p - (a_{wheel} - a) J/(r k)`.
 
-    A wheel that slows more than the vehicle has more brake torque than the road holds.
+    A wheel with more deceleration than the vehicle has more brake torque than the road can hold.
     """
     return ops.fmax(p - (slowing - u.a) * u.inertia, _LEAST * p)
 
@@ -160,15 +160,15 @@ def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, O
 
     References
     ----------
-    The phases are those of anti-lock brakes as R. Bosch GmbH, Automotive Handbook, describes them;
-    thresholds ahead, the pressure that is remembered, and growing steps are ours.
+    R. Bosch GmbH, Automotive Handbook, for the phases of anti-lock brakes. The predictive
+    thresholds, the remembered pressure and the growing steps are our own.
     """
     slowing = x.slowing + T / (par.tau_a + T) * ((u.v_last - u.v_wheel) / T - x.slowing)
     p_hat = x.p_hat + T / (par.tau_p + T) * (u.p_ref - x.p_hat)
     phase = ops.where(u.p_before <= 0, BUILD, next_phase(x.phase, seen(x, u, slowing, par)))
     begun = ops.where(ops.fabs(phase - x.phase) > 0.5, 1.0, 0.0)
-    # The road is asked anew where a dump begins, or the first bite ends. Where a dump was not
-    # enough, the memory was wrong or the road is another: it holds no more than was left.
+    # The road limit is estimated again when a dump begins or the first bite ends. If a dump was not
+    # sufficient, the estimate was wrong or the road has changed: it holds at most what remained.
     held = balanced(p_hat, slowing, u)
     far = ops.where(u.slip > par.slip_dump, _FAR, par.depth)
     again = ops.where(ops.fabs(x.phase - HOLD) < 0.5, ops.fmin(held, far * x.p_held), held)

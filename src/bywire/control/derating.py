@@ -1,4 +1,4 @@
-"""Derating: a motor's current limit falls with the winding's temperature, as the ECU believes it.
+"""Derating: a motor's current limit falls with the winding temperature estimated by the ECU.
 
 The winding has no sensor: the ECU runs a thermal model on the current.
 """
@@ -25,39 +25,39 @@ from bywire.core.units import shown
 
 LeastCurrent = Annotated[float, Unit("A", 10.0), Field(ge=0, allow_inf_nan=False)]
 SampleTime = Annotated[float, Signal("s", "sample time", 1e-3), Gt(0)]
-Rise = Annotated[float, Signal("delta_degC", "rise above the air as the ECU believes it", 50.0)]
+Rise = Annotated[float, Signal("delta_degC", "rise above the air, estimated by the ECU", 50.0)]
 
 
 class Parameters(ParameterSet):
-    """The ECU's thermal model, and how the limit follows it.
+    """Thermal model of the ECU, and the current limit that follows from it.
 
-    ``law``: ``"current"`` lowers the limit; ``"off"`` keeps it, and computes nothing.
+    ``law``: ``"current"`` lowers the limit; ``"off"`` keeps it constant and computes nothing.
     """
 
     law: Literal["off", "current"]
     """whether the limit falls with temperature"""
     R_hat: Resistance
-    """resistance at T_ref_hat as the ECU believes it"""
+    """resistance at T_ref_hat assumed by the ECU"""
     a_R_hat: TemperatureCoefficient
     """growth of the resistance with temperature"""
     C_w_hat: HeatCapacity
-    """heat capacity of the winding as the ECU believes it"""
+    """heat capacity of the winding assumed by the ECU"""
     C_h_hat: HeatCapacity
-    """that of the housing"""
+    """heat capacity of the housing assumed by the ECU"""
     G_wh_hat: HeatConductance
-    """conductance from winding to housing as the ECU believes it"""
+    """conductance from winding to housing assumed by the ECU"""
     G_ha_hat: HeatConductance
-    """that from housing to the air"""
+    """conductance from housing to the air assumed by the ECU"""
     T_ref_hat: Temperature
     """temperature at which R_hat holds"""
     T_a_hat: Temperature
-    """temperature of the air as the ECU believes it"""
+    """temperature of the air assumed by the ECU"""
     T_derate: Temperature
-    """temperature of the winding from which on the limit falls"""
+    """temperature of the winding above which the limit falls"""
     T_limit: Temperature
-    """temperature at which it has fallen to i_least"""
+    """temperature at which the limit has fallen to i_least"""
     i_least: LeastCurrent
-    """current that is left at any temperature"""
+    """least limit at any temperature"""
 
     @model_validator(mode="after")
     def _falls(self) -> Parameters:
@@ -70,21 +70,21 @@ class Parameters(ParameterSet):
 
 
 class State(NamedTuple):
-    """Rises above the air: zero is a motor that has rested."""
+    """Temperature rises above the air; zero for a cold motor."""
 
     winding: Rise
     housing: Rise
 
 
 class Input(NamedTuple):
-    """Current as measured or demanded, and its limit while the motor is cold."""
+    """Measured or demanded current, and its limit for a cold motor."""
 
     i: Annotated[float, Signal("A", "motor current", 5.0)]
     i_max: Annotated[float, Signal("A", "limit of the current's magnitude", 20.0), Ge(0)]
 
 
 class Output(NamedTuple):
-    """The limit now, the winding's temperature as believed, and whether the limit was lowered."""
+    """Current limit, estimated winding temperature, and whether the limit is lowered."""
 
     i_max: Annotated[float, Signal("A", "limit of the current's magnitude", 20.0)]
     T: Annotated[float, Signal("K", "temperature of the winding, estimated", 350.0)]
@@ -92,7 +92,7 @@ class Output(NamedTuple):
 
 
 def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, Output]:
-    r"""Advance the thermal model by one sample, and return the limit that follows.
+    r"""Advance the thermal model by one sample, and return the resulting limit.
 
     .. math::
         C_w \dot\vartheta_w &= R(\vartheta_w)\, i^2 - G_{wh} (\vartheta_w - \vartheta_h) \\
@@ -102,8 +102,8 @@ def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, O
 
     Notes
     -----
-    Linear and not a switch: where a demand holds the limit, current and temperature settle where
-    the heat that comes is the heat that goes, without hunting.
+    The limit is linear instead of a switch. While a demand is at the limit, current and temperature
+    settle at the balance of heat input and heat loss, without hunting.
     """
     if par.law == "off":
         return x, Output(u.i_max, par.T_a_hat, 0.0)

@@ -34,7 +34,7 @@ class Parameters(ParameterSet):
 
 
 class Believed(ParameterSet):
-    """Friction and motor as the ECU believes them; possibly wrong."""
+    """Friction and motor assumed by the ECU, possibly with errors."""
 
     K_e: TorqueConstant
     """torque constant"""
@@ -50,7 +50,7 @@ _ROUNDING = 1e-9  # share of the period: far above the phase's rounding, far bel
 
 
 class State(NamedTuple):
-    """Phase as a share of the period, from 0 to below 1 but for rounding."""
+    """Phase as a share of the period, 0 <= phase < 1 except for rounding."""
 
     phase: Annotated[float, Signal("1", "dither phase", 0.5)]
 
@@ -64,7 +64,7 @@ class Output(NamedTuple):
 def breakaway_current(
     p: Annotated[float, Signal("Pa", "measured pressure", 2e6)], est_par: Believed
 ) -> Annotated[float, Signal("A", "breakaway current", 1.0)]:
-    r"""Return the current that breaks the piston away.
+    r"""Return the breakaway current of the piston.
 
     .. math:: i_{brkf} = \frac{k_{brk,p}}{K_e} (T_{pr} + f_{cfr,p} p_{mc})
 
@@ -87,8 +87,8 @@ def output(
 ) -> tuple[State, Output]:
     r"""Advance the dither by one sample.
 
-    A phase that differs from the end of a period or of a half of it by rounding alone counts as
-    that end: the samples of a square wave are then as many above zero as below.
+    A phase that differs from the end of a period or half period by rounding only counts as that
+    end. A square wave then has equally many samples above and below zero.
 
     .. math:: i_{dit}(t) = A_{dit} \sin(2 \pi f_{dit} t), \quad A_{dit} = i_{brkf}
 

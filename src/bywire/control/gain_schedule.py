@@ -30,7 +30,7 @@ class Gains(ParameterSet):
 
 
 class Parameters(ParameterSet):
-    """Regions of pressure; the gains of the medium one are those of the PID itself."""
+    """Regions of pressure; the gains of the medium region are those of the PID itself."""
 
     law: Literal["off", "regions"]
     """whether the gains depend on the pressure"""
@@ -47,8 +47,8 @@ class Parameters(ParameterSet):
     def _blends_are_apart(self) -> Parameters:
         if not self.p_1 + self.p_blend <= self.p_2:
             raise ValueError(
-                f"p_1 = {self.p_1:g} Pa and p_2 = {self.p_2:g} Pa must be p_blend = "
-                f"{self.p_blend:g} Pa apart at least, or the blends overlap: move a border, or "
+                f"p_1 = {self.p_1:g} Pa and p_2 = {self.p_2:g} Pa must be at least p_blend = "
+                f"{self.p_blend:g} Pa apart, or the blends overlap: move a border, or "
                 "take a narrower blend"
             )
         return self
@@ -82,8 +82,8 @@ def output(
     References
     ----------
     Dardanelli, Alli, Savaresi (2010), Table 4, for the three regions; W. J. Rugh, J. S. Shamma,
-    Research on gain scheduling, Automatica 36 (2000), for what such a schedule promises: near
-    each equilibrium, and for slow motion between them.
+    Research on gain scheduling, Automatica 36 (2000), for the validity of such a schedule: near
+    each equilibrium, and for slow motion between equilibria.
     """
     if par.law == "off":
         return Output(k_p=medium.k_p, k_i=medium.k_i, k_d=medium.k_d)

@@ -16,10 +16,10 @@ SampleTime = Annotated[float, Signal("s", "sample time", 1e-3), Gt(0)]
 
 
 class Parameters(ParameterSet):
-    """It acts before the wheel lifts: once lifted, no lower demand within reach brings it back."""
+    """It acts before the wheel lifts: a lifted wheel would need an impractically low demand."""
 
     a_lim: Annotated[float, Unit("m/s**2", 10.0), Field(gt=0, allow_inf_nan=False)]
-    """deceleration that is not exceeded; the limit of the flat body is g l_f/h"""
+    """limit of the deceleration; that of the flat body is g l_f/h"""
     k_p: Annotated[float, Unit("Pa*s**2/m", 1e5), Field(ge=0, allow_inf_nan=False)]
     """proportional gain"""
     T_i: Duration
@@ -35,7 +35,7 @@ class State(NamedTuple):
 
 
 class Input(NamedTuple):
-    """Deceleration, rider's demand, the demand to be lowered, and that a sample ago."""
+    """Deceleration, rider's demand, the demand to lower, and its previous sample."""
 
     a: Annotated[float, Signal("m/s**2", "measured deceleration", 10.0)]
     p_rider: Pressure

@@ -16,7 +16,7 @@ SampleTime = Annotated[float, Signal("s", "sample time", 1e-3), Gt(0)]
 
 
 class Parameters(ParameterSet):
-    """Filter between pressure and current controller, eq. (20)'s neighbor in the signal chain.
+    """Filter between pressure and current controller, next to eq. (20) in the signal chain.
 
     ``place`` says where the dither joins: ``"after-dither"`` filters demand and dither together
     (the paper's wording), ``"before-dither"`` the demand alone.

@@ -1,4 +1,4 @@
-"""Mixed slip and deceleration of a wheel: the controlled variable where slip alone is uncertain."""
+"""Mix of slip and deceleration of a wheel: a controlled variable if slip alone is uncertain."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ SampleTime = Annotated[float, Signal("s", "sample time", 1e-3), Gt(0)]
 
 
 class Parameters(ParameterSet):
-    """Share of both, and the deceleration that goes with the slip that is held.
+    """Shares of slip and deceleration, and the deceleration that corresponds to the slip set point.
 
-    ``alpha`` 1 is slip alone, 0 deceleration alone. Between them less slip is asked for where the
-    road holds more. Deceleration has the rate of the slip in it, times speed over gravity: gains
-    have to be its own, and fixed ones do at every speed.
+    ``alpha`` 1 is slip alone, 0 deceleration alone. In between, the controller demands less slip if
+    the road holds more. Deceleration contains the rate of the slip, times speed over gravity:
+    it needs separate gains, but fixed ones suffice at every speed.
     """
 
     alpha: Weight
     """share of the slip"""
     eta_set: Annotated[float, Unit("1", 0.5), Field(ge=0, allow_inf_nan=False)]
-    """deceleration of the wheel over gravity that is held"""
+    """set point of the wheel's deceleration over gravity"""
     tau: TimeConstant
     """time constant of the deceleration's filter"""
     g: Annotated[float, Unit("m/s**2", 9.81), Field(gt=0, allow_inf_nan=False)]
@@ -48,7 +48,7 @@ class Input(NamedTuple):
 
 
 class Output(NamedTuple):
-    """Substitutes of set point and slip."""
+    """Mixed variables in place of set point and slip."""
 
     set_point: Annotated[float, Signal("1", "mixed set point", 0.1)]
     mixed: Annotated[float, Signal("1", "mixed slip and deceleration", 0.1)]

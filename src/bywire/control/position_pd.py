@@ -1,4 +1,4 @@
-"""Motor position control: stiffness and damping by the encoder, current demand to the drive."""
+"""Motor position control: stiffness and damping from the encoder, current demand to the drive."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SampleTime = Annotated[float, Signal("s", "sample time", 2e-4), Gt(0)]
 class Parameters(ParameterSet):
     """Second-order position loop, without integral part.
 
-    A high bandwidth (60 Hz) serves the brake; a low one (12 Hz) keeps clear of the current limit.
+    The brake uses a high bandwidth (60 Hz); a low one (12 Hz) stays within the current limit.
     """
 
     f_n: Frequency
@@ -28,13 +28,13 @@ class Parameters(ParameterSet):
     c: Weight
     """share of the reference's speed that is not damped; 0 damps the whole speed"""
     f_speed: Frequency
-    """corner of the filter behind the encoder's differences"""
+    """corner of the filter of the encoder's differences"""
     i_max: Current
     """limit of the current demand's magnitude"""
     J_hat: Inertia
-    """inertia as the controller believes it"""
+    """inertia assumed by the controller"""
     K_hat: TorqueConstant
-    """torque constant as the controller believes it"""
+    """torque constant assumed by the controller"""
 
 
 class State(NamedTuple):
@@ -65,11 +65,11 @@ def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, O
         i = \frac{J}{K_T} \left(\omega_n^2 (\theta_{ref} - \theta)
         + 2 \zeta \omega_n (c\, \omega_{ref} - \hat\omega)\right)
 
-    with the speed from differences of the encoder behind a first-order filter.
+    with the speed from differences of the encoder after a first-order filter.
 
     References
     ----------
-    Roberts et al. (2003), section "Motor & rollerscrew alone": two bandwidths, no law is given.
+    Roberts et al. (2003), section "Motor & rollerscrew alone": two bandwidths, without the law.
     """
     angle = 2.0 * math.pi * par.f_speed * T
     difference = (u.theta - x.last) / T

@@ -44,7 +44,7 @@ class Parameters(ParameterSet):
 
 
 class State(NamedTuple):
-    """Integral, filtered derivative, and the signal that it is taken of."""
+    """Integral, filtered derivative, and the differentiated signal."""
 
     integral: Annotated[float, Signal("A", "integral part", 3.0)]
     slope: Annotated[float, Signal("A", "derivative part", 1.0)]
@@ -92,20 +92,20 @@ def at_rest(
 def transferred(
     x: State,
     u: Input,
-    k_p: Annotated[float, Signal("A/Pa", "proportional gain until now", 1e-5)],
+    k_p: Annotated[float, Signal("A/Pa", "previous proportional gain", 1e-5)],
     par: Parameters,
 ) -> State:
-    r"""Return the state with which the gains of ``par`` take over without a bump.
+    r"""Return the state for a bumpless transfer to the gains of ``par``.
 
     .. math:: I \leftarrow I + (k_p^{old} - k_p) (b r - p)
 
-    The demand at this input is then that of the old gains. Integral and derivative part are
-    currents, which new k_i and k_d leave as they are.
+    The demand at this input then equals that of the old gains. Integral and derivative part are
+    currents, which new k_i and k_d do not change.
 
     Notes
     -----
-    A k_p that follows the pressure sums up to an integral of k_p over the error: at an equilibrium
-    the loop's linear model is exactly that of the gains frozen there.
+    With a pressure-dependent k_p, the demand contains the integral of k_p over the error. At an
+    equilibrium, the loop's linear model is exactly that with the gains frozen there.
 
     References
     ----------

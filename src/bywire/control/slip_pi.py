@@ -1,4 +1,4 @@
-"""Slip control of one wheel: PI whose gain follows the speed, and which only lowers a demand."""
+"""Slip control of one wheel: PI with a speed-dependent gain, which only lowers a demand."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ SampleTime = Annotated[float, Signal("s", "sample time", 1e-3), Gt(0)]
 
 
 class Parameters(ParameterSet):
-    """Gains by the crossover of the loop, from the wheel's parameters that the ECU assumes.
+    """Gains from the crossover of the loop, with the wheel parameters that the ECU assumes.
 
-    ``schedule``: ``"speed"`` lets the gain follow the speed, with which gain and pole of the wheel
-    fall; ``"fixed"`` keeps that of v_fixed.
+    ``schedule``: ``"speed"`` makes the gain proportional to speed, like gain and pole of the wheel;
+    ``"fixed"`` keeps the gain at v_fixed.
     """
 
     schedule: Literal["speed", "fixed"]
     """whether the gain follows the speed"""
     slip_set: Fraction
-    """slip that is held"""
+    """slip set point"""
     omega_c: Annotated[float, Unit("rad/s", 20.0), Field(gt=0, allow_inf_nan=False)]
     """crossover of the loop on the falling side of adhesion"""
     T_i: Duration
@@ -34,19 +34,19 @@ class Parameters(ParameterSet):
     T_t: Duration
     """tracking time of the anti-wind-up"""
     eager: Gain
-    """by how many times more the integral grows where there is no slip, less the nearer it comes"""
+    """additional integral gain without slip, as a factor; it falls to zero at the set slip"""
     v_off: Annotated[float, Unit("m/s", 2.0), Field(gt=0, allow_inf_nan=False)]
-    """speed to which slip is relative at least: below, control fades out and the wheel may lock"""
+    """least speed to which slip is relative: below it, control fades out and the wheel may lock"""
     v_fall: Annotated[float, Unit("m/s", 5.0), Field(gt=0, allow_inf_nan=False)]
-    """speed below which the slip that is held falls with speed, as far as sensors can follow"""
+    """speed below which the slip set point falls with speed, because sensors lag"""
     v_fixed: Annotated[float, Unit("m/s", 15.0), Field(gt=0, allow_inf_nan=False)]
-    """speed whose gain is kept (schedule "fixed")"""
+    """speed for which the fixed gain is computed (schedule "fixed")"""
     J_hat: Annotated[float, Unit("kg*m**2", 0.5), Field(gt=0, allow_inf_nan=False)]
-    """inertia of the wheel as the ECU believes it"""
+    """inertia of the wheel assumed by the ECU"""
     r_hat: Length
-    """its radius"""
+    """radius of the wheel assumed by the ECU"""
     k_hat: Annotated[float, Unit("N*m/Pa", 3e-4), Field(gt=0, allow_inf_nan=False)]
-    """torque of its brake over pressure"""
+    """brake torque per pressure assumed by the ECU"""
 
 
 class State(NamedTuple):
@@ -56,7 +56,7 @@ class State(NamedTuple):
 
 
 class Input(NamedTuple):
-    """Speed, slip, set point, the rider's demand, the demand to be lowered, and the last one."""
+    """Speed, slip, set point, rider's demand, the demand to lower, and its previous sample."""
 
     v: Annotated[float, Signal("m/s", "vehicle speed", 20.0), Ge(0)]
     slip_set: Annotated[float, Signal("1", "slip set point", 0.1)]
@@ -84,7 +84,7 @@ def gain(
 def set_point(
     v: Annotated[float, Signal("m/s", "vehicle speed", 20.0), Ge(0)], par: Parameters
 ) -> Annotated[float, Signal("1", "slip set point", 0.1)]:
-    """Return the slip that is held at a speed."""
+    """Return the slip set point at a speed."""
     return par.slip_set * ops.fmin(v / par.v_fall, 1.0)
 
 
@@ -93,7 +93,7 @@ def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, O
 
     .. math:: p = \min(p_{most}, K_p (\lambda_{set} - \lambda) + I)
 
-    The integral follows the output in the tracking time, and starts at the rider's demand.
+    The integral follows the output with the tracking time, and starts at the rider's demand.
 
     Notes
     -----
@@ -105,7 +105,7 @@ def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, O
     References
     ----------
     S. M. Savaresi, M. Tanelli, Active Braking Control Systems Design for Vehicles, 2010: slip
-    control of a single corner; the gain that follows the speed is derived from its linear model.
+    control of a single corner; the speed-dependent gain is derived from its linear model.
     """
     K_p = gain(u.v, par)
     error = u.slip_set - u.slip
@@ -113,11 +113,11 @@ def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, O
     p = ops.clip(unlimited, 0.0, ops.fmax(u.p_most, 0.0))
     short = ops.fmax(error, 0.0) / ops.fmax(u.slip_set, _NO_SLIP)
     # While a demand builds up, slip control is not the cause of missing pressure. Below v_fall the
-    # edges of the wheel come so late that slip looks too small: no faster integral then.
+    # edges of the wheel are so late that slip seems too small: no faster integral then.
     calm = ops.where(u.p_most < u.p_rider, 1.0, ops.where(u.v < par.v_fall, 1.0, 0.0))
     haste = 1.0 + par.eager * (1.0 - calm) * short
     growth = K_p / par.T_i * haste * error + (p - unlimited) / par.T_t
-    # Nothing to be lowered yet: the first demand must not wait for the integral.
+    # No demand to lower yet: the first demand must not wait for the integral.
     idle = u.p_before <= 0
     integral = ops.where(idle, ops.fmax(u.p_rider, 0.0), x.integral + T * growth)
     return State(integral), Output(p, ops.where(p < u.p_most, 1.0, 0.0))

@@ -1,4 +1,4 @@
-"""Speed of the vehicle from its wheels, while these slip."""
+"""Speed of the vehicle from its wheels while they slip."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ class Parameters(ParameterSet):
     """Reference speed.
 
     ``law``: ``"wheels"`` follows the faster wheel, but falls no faster than the best braking;
-    ``"accelerometer"`` adds up the measured deceleration, and comes back to the faster wheel where
-    this slips little. The first fails where both wheels slip together.
+    ``"accelerometer"`` integrates the measured deceleration, and returns to the faster wheel while
+    it slips little. The first law fails if both wheels slip at the same time.
     """
 
     law: Literal["wheels", "accelerometer"]
@@ -31,9 +31,9 @@ class Parameters(ParameterSet):
     slip_small: Weight
     """slip up to which a wheel counts as reliable (law "accelerometer")"""
     tau: Duration
-    """time in which the reference comes back to a wheel that is believed"""
+    """time constant with which the reference returns to a reliable wheel"""
     v_still: Annotated[float, Unit("m/s", 1.0), Field(gt=0, allow_inf_nan=False)]
-    """speed below which every wheel counts as reliable: else an error would stay at standstill"""
+    """speed below which every wheel is reliable; otherwise an error would remain at standstill"""
 
 
 class State(NamedTuple):
@@ -51,7 +51,7 @@ class Input(NamedTuple):
 
 
 def output(x: State, u: Input, T: SampleTime, par: Parameters) -> State:
-    """Advance the reference by one sample; never below the faster wheel, which brakes only."""
+    """Advance the reference by one sample; it is never below the faster wheel."""
     fastest = ops.fmax(u.v_f, u.v_r)
     if par.law == "wheels":
         return State(ops.fmax(ops.fmax(fastest, x.v - par.a_max * T), 0.0))
@@ -65,6 +65,6 @@ def slip(
     v: Speed,
     v_wheel: Annotated[float, Signal("m/s", "measured speed of the tread", 20.0)],
     v_off: Annotated[float, Signal("m/s", "speed below which slip is uncertain", 2.0), Gt(0)],
-) -> Annotated[float, Signal("1", "braking slip as the ECU computes it", 0.1)]:
-    """Return the braking slip as the ECU computes it, relative to at least ``v_off``."""
+) -> Annotated[float, Signal("1", "braking slip computed by the ECU", 0.1)]:
+    """Return the braking slip computed by the ECU, relative to at least ``v_off``."""
     return (v - v_wheel) / ops.fmax(v, v_off)

@@ -1,7 +1,7 @@
-"""Adjuster of a brake's clearance: it counts how far the pads travel, and turns by whole teeth.
+"""Adjuster of a brake's clearance: it measures the travel of the pads, and turns by whole teeth.
 
 It acts only while the brake is parked. Its faults are parameters of the turning. Teeth are
-positive where they take clearance away.
+positive if they reduce the clearance.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from bywire.core.signals import Signal
 
 WAITS, APPLIED, TURNS = 0.0, 1.0, 2.0
 
-_WHOLE = 1e-9  # of a tooth: rounding error of a whole one
+_WHOLE = 1e-9  # of a tooth: rounding error of a whole tooth
 Flag = Annotated[float, Signal("1", "flag")]
 Teeth = Annotated[float, Signal("1", "teeth")]
 
@@ -25,12 +25,12 @@ Teeth = Annotated[float, Signal("1", "teeth")]
 class Parameters(ParameterSet):
     """Thresholds and steps of the adjuster, and its fault.
 
-    ``ways``: ``"closing"`` takes clearance away only; ``"both"`` also gives it back where there is
-    less than ``gap_min``.
-    ``fault``: ``"none"``; ``"stuck"``: nothing turns; ``"one-way"``: nothing turns that would give
-    clearance back; ``"slips"``: every second tooth turns nothing; ``"over-adjusts"``: one tooth too
-    many; ``"blind-to-heat"``: it takes a hot disc for a cold one. The adjuster knows of none of
-    them: its count goes on.
+    ``ways``: ``"closing"`` only reduces clearance; ``"both"`` also increases a clearance below
+    ``gap_min``.
+    ``fault``: ``"none"``; ``"stuck"``: nothing turns; ``"one-way"``: the adjuster does not increase
+    clearance; ``"slips"``: every second tooth has no effect; ``"over-adjusts"``: one tooth too
+    many; ``"blind-to-heat"``: the adjuster treats a hot disc as a cold one. It does not detect any
+    of these faults and continues its count.
     """
 
     gap_nominal: Length
@@ -38,17 +38,17 @@ class Parameters(ParameterSet):
     band: Length
     """excess of the clearance that it tolerates"""
     gap_min: Length
-    """clearance of the cold brake below which it never turns; a hot disc takes some of it"""
+    """clearance of the cold brake below which it never turns; a hot disc reduces it"""
     tooth: Length
-    """clearance that a tooth takes away"""
+    """clearance removed by a tooth"""
     applications: Annotated[float, Unit("1", 3.0), Field(ge=1, allow_inf_nan=False)]
-    """applications one after the other that have to show the same before it turns"""
+    """number of consecutive applications with the same deviation before it turns"""
     growth: Annotated[float, Unit("m/K", 3e-7), Field(ge=0, allow_inf_nan=False)]
-    """clearance that each kelvin of the disc takes away"""
+    """clearance lost per kelvin of the disc"""
     T_cold: Annotated[float, Unit("K", 300.0), Field(gt=0, allow_inf_nan=False)]
     """temperature of a cold disc"""
     ways: Literal["closing", "both"]
-    """which ways it turns"""
+    """directions in which it turns"""
     fault: Literal["none", "stuck", "one-way", "slips", "over-adjusts", "blind-to-heat"]
     """fault"""
 
@@ -56,15 +56,17 @@ class Parameters(ParameterSet):
 class State(NamedTuple):
     """Memory."""
 
-    applied: Annotated[float, Signal("1", "the brake was applied since it was parked last")]
+    applied: Annotated[float, Signal("1", "the brake was applied since it was last parked")]
     wide: Annotated[float, Signal("1", "applications in a row with too much gap; < 0: too little")]
-    teeth: Annotated[float, Signal("1", "teeth turned, by its own count")]
+    teeth: Annotated[float, Signal("1", "teeth turned, by the adjuster's count")]
 
 
 class Input(NamedTuple):
-    """Signals, all that the wear log needs."""
+    """Signals that the wear log needs."""
 
-    gap: Annotated[float, Signal("m", "clearance by the way from parking to contact", 2e-4)]
+    gap: Annotated[
+        float, Signal("m", "clearance from the travel between parking and contact", 2e-4)
+    ]
     T: Annotated[float, Signal("K", "temperature of the disc, estimated", 350.0)]
     touching: Annotated[float, Signal("1", "the pads press on the disc")]
     parked: Annotated[float, Signal("1", "the brake is parked")]
@@ -72,7 +74,7 @@ class Input(NamedTuple):
 
 
 class Output(NamedTuple):
-    """Teeth to be turned now, as it means to, and as they turn; what it is at."""
+    """Intended and actual teeth to turn now, and the state of the adjuster."""
 
     teeth: Teeth
     turned: Teeth
@@ -80,16 +82,17 @@ class Output(NamedTuple):
 
 
 def cold_gap(u: Input, par: Parameters) -> Annotated[float, Signal("m", "clearance when cold")]:
-    """Return the clearance of the cold brake, by the way to contact and the disc's growth."""
+    """Return the clearance of the cold brake, from the travel to contact and the disc's growth."""
     if par.fault == "blind-to-heat":
         return u.gap
     return u.gap + par.growth * (u.T - par.T_cold)
 
 
 def due(gap: Annotated[float, Signal("m", "clearance when cold", 2e-4)], par: Parameters) -> Teeth:
-    """Return the teeth that bring a clearance back, never below the nominal nor the least one.
+    """Return the teeth that restore a clearance, not below the nominal or the least clearance.
 
-    Below the least one as few as make it up, if they may turn that way; else none.
+    Below the least clearance, it is the smallest sufficient number if the direction is allowed,
+    else zero.
     """
     spare = gap - ops.fmax(par.gap_nominal, par.gap_min)
     closing = ops.fmax(ops.floor(spare / par.tooth + _WHOLE), 0.0)
@@ -99,12 +102,12 @@ def due(gap: Annotated[float, Signal("m", "clearance when cold", 2e-4)], par: Pa
 
 
 def turned(teeth: Teeth, before: Teeth, par: Parameters) -> Teeth:
-    """Return the teeth that really turn, of those that are to, by what was turned before."""
+    """Return the teeth that actually turn, from the intended ones and the previous count."""
     if par.fault == "stuck":
         return 0.0 * teeth
     if par.fault == "one-way":
         return ops.fmax(teeth, 0.0)
-    if par.fault == "slips":  # the odd ones of all that were ever to be turned hold
+    if par.fault == "slips":  # of all intended teeth, the odd ones hold
         return ops.floor(0.5 * (before + teeth + 1.0)) - ops.floor(0.5 * (before + 1.0))
     if par.fault == "over-adjusts":
         return teeth + ops.where(teeth > 0, 1.0, 0.0)
@@ -114,8 +117,8 @@ def turned(teeth: Teeth, before: Teeth, par: Parameters) -> Teeth:
 def output(x: State, u: Input, par: Parameters) -> tuple[State, Output]:
     """Advance the adjuster by one sample.
 
-    An application is one in which the pads touched; it counts once, when the brake is parked behind
-    it and nothing is demanded.
+    An application is one in which the pads touched the disc. It counts once, when the brake is
+    parked after it without a demand.
     """
     rests = ops.where(u.parked > 0.5, ops.where(u.wanted > 0.5, 0.0, 1.0), 0.0)
     finished = rests * x.applied

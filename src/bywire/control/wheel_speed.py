@@ -18,14 +18,14 @@ Age = Annotated[float, Signal("s", "time since the last edge", 1e-3), Ge(0)]
 
 
 class Parameters(ParameterSet):
-    """Wheel sensors as the ECU assumes them.
+    """Wheel sensors assumed by the ECU.
 
     ``law``: ``"period"`` divides the angle between edges by the time between them, and lets the
-    speed fall while none comes; ``"difference"`` takes differences of the angle over a sample.
+    speed fall while no edge arrives; ``"difference"`` takes differences of the angle over a sample.
     """
 
     law: Literal["period", "difference"]
-    """how speed follows from edges"""
+    """method of computing the speed"""
     pulses: Annotated[float, Unit("1", 48.0), Field(ge=1, allow_inf_nan=False)]
     """pulses per revolution"""
 
@@ -54,7 +54,7 @@ def output(x: State, u: Input, T: SampleTime, par: Parameters) -> State:
     waited = x.age + T
     slowest = 2.0 * math.pi / par.pulses / waited
     fading = ops.clip(x.omega, -slowest, slowest)
-    # Two edges within a sample may not be told apart where rounding eats the time between them.
+    # Two edges within a sample may coincide after rounding.
     elapsed = ops.fmax(waited - u.age, 1e-3 * T)
     return State(
         u.angle, ops.where(still, waited, u.age), ops.where(still, fading, turned / elapsed)

@@ -18,9 +18,9 @@ Noise = Annotated[float, Signal("1", "standard normal noise", 1.0)]
 class Parameters(ParameterSet):
     """Uniform quantizer over the sensor's span, rounding to the nearest code.
 
-    N codes, 0 to N - 1, stand for the readings 0, 1/N, ..., 1 - 1/N: 12 bits are 4096 distinct
-    codes, the middle of the span is code 2048 exactly, and the highest code shows one step less
-    than the end of the span.
+    N codes, 0 to N - 1, represent the readings 0, 1/N, ..., 1 - 1/N. With 12 bits there are 4096
+    distinct codes, the middle of the span is exactly code 2048, and the highest code is one step
+    below the end of the span.
     """
 
     law: Literal["ideal", "quantized"]

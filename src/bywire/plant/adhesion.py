@@ -1,4 +1,4 @@
-"""Adhesion of a tyre over its slip, on a surface: by Burckhardt, or by the Magic Formula."""
+"""Adhesion of a tyre on a surface as a function of slip: Burckhardt, or the Magic Formula."""
 
 from __future__ import annotations
 
@@ -35,17 +35,17 @@ class SurfaceParameters(ParameterSet):
     c1: Coefficient
     """limit of Burckhardt's adhesion, before c3 is subtracted"""
     c2: Coefficient
-    """how fast it rises with slip"""
+    """rate at which Burckhardt's adhesion rises with slip"""
     c3: Coefficient
-    """how much it falls up to a locked wheel"""
+    """decrease of Burckhardt's adhesion up to a locked wheel"""
     B: Annotated[float, Unit("1", 10.0), Field(gt=0, allow_inf_nan=False)]
     """stiffness factor of the Magic Formula: with C and D, the slope at no slip"""
     C: Annotated[float, Unit("1", 1.6), Field(gt=1, lt=4, allow_inf_nan=False)]
-    """its shape factor: how far the adhesion falls beyond its peak"""
+    """shape factor of the Magic Formula: decrease of the adhesion beyond its peak"""
     D: Coefficient
-    """its largest adhesion"""
+    """largest adhesion of the Magic Formula"""
     E: Annotated[float, Unit("1", 0.5), Field(ge=-100, le=1, allow_inf_nan=False)]
-    """its curvature factor: where the peak is"""
+    """curvature factor of the Magic Formula: position of the peak"""
 
     @model_validator(mode="after")
     def _has_a_peak(self) -> SurfaceParameters:
@@ -76,14 +76,14 @@ class Surface(NamedTuple):
 
 
 class Rising(NamedTuple):
-    """A point of the rising branch, as high as one of the curve."""
+    """Point of the rising branch with the adhesion of another point of the curve."""
 
     mu: Annotated[float, Signal("1", "adhesion", 1.0)]
     slip: Annotated[float, Signal("1", "slip", 0.1)]
 
 
 class Parameters(ParameterSet):
-    """How adhesion depends on slip."""
+    """Law of the adhesion over slip."""
 
     curve: Curve
     """``"burckhardt"``, or ``"magic-formula"``, with B, C, D and E of the surface"""
@@ -105,14 +105,14 @@ def burckhardt(slip: Slip, ground: Surface) -> Adhesion:
 
 
 def burckhardt_peak(ground: Surface) -> Slip:
-    r"""Return the slip of its peak, :math:`\lambda^* = \ln(c_1 c_2/c_3)/c_2`, <= 1."""
+    r"""Return the slip at the peak, :math:`\lambda^* = \ln(c_1 c_2/c_3)/c_2`, <= 1."""
     return ops.fmin(ops.log(ground.c1 * ground.c2 / ground.c3) / ground.c2, 1.0)
 
 
 def burckhardt_rising(
     mu: Annotated[float, Signal("1", "adhesion", 1.0), Ge(0)], ground: Surface
 ) -> Slip:
-    """Return the slip below the peak's at which the adhesion is ``mu``, within 5e-6.
+    """Return the slip below that of the peak at which the adhesion is ``mu``, within 5e-6.
 
     By Newton's method from below: from the slip without the curve's linear fall, or from the
     parabola through the peak, whichever is closer.
@@ -145,7 +145,7 @@ def magic_formula(slip: Slip, ground: Surface) -> Adhesion:
 
     References
     ----------
-    H. Pacejka, Tire and Vehicle Dynamics: longitudinal slip alone, without shifts.
+    H. Pacejka, Tire and Vehicle Dynamics, for longitudinal slip only, without shifts.
     """
     return ground.D * ops.sin(angle(slip, ground))
 
@@ -176,7 +176,7 @@ def adhesion(slip: Slip, ground: Surface, par: Parameters) -> Adhesion:
 
 
 def peak_slip(ground: Surface, par: Parameters) -> Slip:
-    """Return the slip of the largest adhesion, <= 1."""
+    """Return the slip at the largest adhesion, <= 1."""
     if par.curve == "magic-formula":
         return magic_rising(0.5 * math.pi, ground)
     return burckhardt_peak(ground)
@@ -185,10 +185,10 @@ def peak_slip(ground: Surface, par: Parameters) -> Slip:
 def held(slip: Slip, ground: Surface, par: Parameters) -> Rising:
     """Return the adhesion limit at a slip: the peak up to its slip, the curve beyond.
 
-    The slip is that on the rising branch of the curve at which as much is held.
+    The second value is the slip on the rising branch with the same adhesion.
     """
     if par.curve == "magic-formula":
-        # As much is left at an angle beyond pi/2 as there is the same way before it.
+        # The adhesion at an angle beyond pi/2 equals that at the same distance before it.
         theta = ops.fmax(angle(slip, ground), 0.5 * math.pi)
         return Rising(ground.D * ops.sin(theta), magic_rising(math.pi - theta, ground))
     peak = burckhardt_peak(ground)

@@ -30,11 +30,11 @@ class Parameters(ParameterSet):
     T_nu: Torque
     """viscous friction at omega_ref with grease of nu_ref"""
     omega_ref: AngularSpeed
-    """speed that T_nu is stated at"""
+    """speed at which T_nu is stated"""
     nu: KinematicViscosity
     """viscosity of the grease"""
     nu_ref: KinematicViscosity
-    """viscosity that T_nu is stated at"""
+    """viscosity at which T_nu is stated"""
     k_nu: Factor
     """exponent of the viscous term, 2/3 in bearing catalogs"""
     G_S: Gain
@@ -42,7 +42,7 @@ class Parameters(ParameterSet):
     k_S: Factor
     """exponent factor of the Stribeck peak"""
     omega_S: AngularSpeed
-    """speed over which the Stribeck peak falls"""
+    """characteristic speed of the Stribeck peak"""
 
 
 FAULTS = (ParameterFault("worn", "more friction", ("C_0", "C_1", "C_2", "T_nu"), 5.0),)
@@ -64,9 +64,9 @@ def friction(u: Input, par: Parameters) -> Annotated[float, Signal("N*m", "beari
 
     Notes
     -----
-    The paper's exponential has the signed speed, which would grow without bound in one direction;
-    its magnitude is meant. The grease term is written with a reference point, so that no unit
-    hides in a coefficient: ``G_nu (nu |omega|)^k_nu`` of the paper with nu in mm^2/s.
+    The paper's exponential contains the signed speed and would grow without bound in one direction;
+    we use the magnitude. The grease term has a reference point, so that no coefficient has a hidden
+    unit. The paper writes ``G_nu (nu |omega|)^k_nu`` with nu in mm^2/s.
 
     References
     ----------
@@ -75,7 +75,7 @@ def friction(u: Input, par: Parameters) -> Annotated[float, Signal("N*m", "beari
     axial = par.C_0 + par.C_1 * ops.fabs(u.force) + par.C_2 * u.force * u.force
     speed = ops.fabs(u.omega)
     ratio = par.nu / par.nu_ref * (speed / par.omega_ref)
-    # Nothing at rest, where kernels then skip the power; the floor keeps its slope finite.
+    # Zero at rest, where kernels skip the power; the floor keeps its slope finite.
     churned = ops.where(ratio > _STILL, ops.power(ops.fmax(ratio, _STILL), par.k_nu), 0.0)
     viscous = par.T_nu * churned
     stribeck = par.G_S * axial * ops.decay(par.k_S * speed / par.omega_S, rests=True)

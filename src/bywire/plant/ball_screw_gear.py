@@ -13,10 +13,10 @@ from bywire.core.signals import Energy, Power, ReflectedInertia, Signal, Torque
 class Parameters(ParameterSet):
     """Rigid drive train with one efficiency.
 
-    ``law = "paper"`` keeps eq. (8), whose constant efficiency lets the gear *give* energy when
+    ``law = "paper"`` uses eq. (8), whose constant efficiency lets the gear *generate* energy when
     the load drives it. ``law = "directional"`` makes the loss a load-dependent friction,
     (1/eta_g - 1) times the load torque, in both directions (back-driven efficiency
-    2 - 1/eta_g): it never gives energy and holds at rest.
+    2 - 1/eta_g). It never generates energy and holds at rest.
     """
 
     k_g: GearRatio
@@ -24,7 +24,7 @@ class Parameters(ParameterSet):
     eta_g: Fraction
     """efficiency of gear and screw, driving"""
     law: Literal["paper", "directional"]
-    """how the efficiency acts: as in eq. (8), or as a friction that depends on direction"""
+    """effect of the efficiency: as in eq. (8), or as a friction that depends on direction"""
     J_mot: Inertia
     """inertia of rotor, gear and screw at the motor shaft"""
     M_mc: Mass
@@ -75,7 +75,7 @@ class Output(NamedTuple):
 
 
 def inertia(par: Parameters) -> ReflectedInertia:
-    r"""Return the inertia that the shaft moves.
+    r"""Return the inertia at the shaft.
 
     .. math:: M' = \eta_g J_{mot} + k_g^2 M_{mc}
 
@@ -149,7 +149,7 @@ def transmission_loss(
     acceleration: Annotated[float, Signal("rad/s**2", "acceleration of the shaft", 1e3)],
     par: Parameters,
 ) -> Power:
-    r"""Return the loss of law "paper"; negative where the gear gives energy.
+    r"""Return the loss of law "paper"; negative when the gear generates energy.
 
     .. math:: -W_l = (1 - \eta_g) (T - J_{mot} \dot\Omega) \Omega
 
@@ -163,6 +163,6 @@ def transmission_loss(
 
 
 def power_loss(x: State, u: Input, par: Parameters) -> Power:
-    """Return transmission and friction losses together, signed: law "paper" can give energy."""
+    """Return transmission plus friction losses, signed: law "paper" can generate energy."""
     acceleration = balance(x, u, par).omega / inertia(par)
     return transmission_loss(x, u.torque, acceleration, par) - u.friction * x.omega

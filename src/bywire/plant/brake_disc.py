@@ -1,4 +1,4 @@
-"""Brake discs of a wheel, from the pressure in the calipers to the torque that they can hold."""
+"""Brake discs of a wheel: largest brake torque from the pressure in the calipers."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ class Parameters(ParameterSet):
     """Discs and calipers of one wheel."""
 
     faces: Count
-    """faces that pads press on: two for each disc"""
+    """number of friction faces: two per disc"""
     mu_pad: Factor
     """coefficient of friction of the pads"""
     A_cal: Area
     """area of the pistons on one side of a disc"""
     r_eff: Length
-    """radius at which the pads' friction acts"""
+    """effective radius of the pads' friction"""
     T_drag: Torque
     """torque of pads that drag without pressure; 0 if they do not"""
 
 
 FAULTS = (
-    ParameterFault("glazed", "less friction of the pads", ("mu_pad",), 0.7),
+    ParameterFault("glazed", "lower pad friction", ("mu_pad",), 0.7),
     ParameterFault(
         "dragging",
         "a piston sticks in its caliper: pads drag, by the torque",
@@ -61,5 +61,5 @@ def torque_per_pressure(
 
 
 def output(u: Input, par: Parameters) -> Output:
-    """Return the torque; without pressure only that of dragging pads."""
+    """Return the torque; without pressure, only that of dragging pads."""
     return Output(torque=ops.fmax(torque_per_pressure(par) * u.p, par.T_drag))

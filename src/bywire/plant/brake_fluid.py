@@ -34,7 +34,7 @@ class Parameters(ParameterSet):
     rho: Density
     """density"""
     air: Literal["none", "entrained", "caliper"]
-    """where gas bubbles sit: nowhere, in the master cylinder's chamber, or in line and caliper"""
+    """place of gas bubbles: none, in the master cylinder's chamber, or in line and caliper"""
     V_air: Volume
     """volume of the gas at ambient pressure"""
     n_air: Annotated[float, Unit("1", 1.2), Field(gt=1, le=1.7, allow_inf_nan=False)]
@@ -85,8 +85,8 @@ def compliance(u: Chamber, par: Parameters) -> FluidCompliance:
 
     .. math:: \frac{V - V_g}{\beta} + \frac{V_g}{n (p_{atm} + p)}
 
-    The fluid fills the rest of the volume: with V in the place of V - V_g the stored energy is not
-    the integral of the powers.
+    The fluid fills the rest of the volume: with V instead of V - V_g, the stored energy would not
+    be the integral of the powers.
     """
     if par.air != "entrained":
         return u.V / par.beta
@@ -95,7 +95,7 @@ def compliance(u: Chamber, par: Parameters) -> FluidCompliance:
 
 
 def gas_compliance(p: GaugePressure, par: Parameters) -> FluidCompliance:
-    r"""Return :math:`-dV_g/dp` of the gas, wherever it sits; the parameters say that there is some.
+    r"""Return :math:`-dV_g/dp` of the gas, in any place; the parameters must declare gas.
 
     .. math:: \frac{V_{air}}{n (p_{atm} + p)} \left(\frac{p_{atm}}{p_{atm} + p}\right)^{1/n}
     """
@@ -124,7 +124,7 @@ def gas_energy(p: GaugePressure, par: Parameters) -> Energy:
 
 
 def inflow_energy(p: GaugePressure, par: Parameters) -> Energy:
-    r"""Return the energy that inflow has brought, gas and fluid together.
+    r"""Return the energy supplied by inflow, of gas and fluid together.
 
     .. math:: \int_0^p h(p') \left(-\frac{dV_g}{dp'}\right) dp'
 
@@ -153,8 +153,8 @@ def flow_energy(
     .. math:: h(p) = \beta (e^{p/\beta} - 1) \approx
         p (1 + \tfrac{z}{2} (1 + \tfrac{z}{3} (1 + \tfrac{z}{4}))), \quad z = p/\beta
 
-    Flow work plus the compression energy that the fluid takes along. The series is off by
-    z^4/120 of the value, below 1e-11 up to 50 bar.
+    It is flow work plus the transported compression energy. The relative error of the series is
+    z^4/120, below 1e-11 up to 50 bar.
     """
     c1 = 1.0 / (2.0 * par.beta)
     c2 = c1 / (3.0 * par.beta)

@@ -1,4 +1,4 @@
-"""Caliper with pad spring: pressure that grows with the volume taken in."""
+"""Caliper with pad spring: pressure grows with the absorbed volume."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ class Parameters(ParameterSet):
 
     ``law``: ``"linear"`` is eq. (11); ``"compressible"`` is eq. (10), with the compressibility
     of the fluid in the caliper; ``"table"`` interpolates a measured pressure-volume curve, whose
-    flat start can hold the volume of a knock-back. ``leak``: whether fluid is lost to the outside
-    in proportion to the pressure. ``fluid_heat``: whether the fluid in the caliper warms and
-    expands: where no port lets it out, it presses the pads on. Gas in line and caliper
-    (``fluid.air = "caliper"``) adds to the volume that the caliper takes in.
+    flat start can include the volume of a knock-back. ``leak``: whether fluid is lost to the
+    outside in proportion to the pressure. ``fluid_heat``: whether the fluid in the caliper warms
+    and expands. If no port is open, it then applies the pads. Gas in line and caliper
+    (``fluid.air = "caliper"``) increases the volume that the caliper absorbs.
     """
 
     law: Literal["linear", "compressible", "table"]
-    """which relation of pressure and volume holds"""
+    """relation of pressure and volume"""
     A_pd: Area
     """piston area"""
     K_pd: Stiffness
@@ -52,7 +52,7 @@ class Parameters(ParameterSet):
     alpha_V: Expansion
     """its expansion by volume"""
     T_rate: WarmingRate
-    """by how much it warms in a time"""
+    """temperature rate of the warming fluid"""
 
     @model_validator(mode="after")
     def _table_is_a_curve(self) -> Parameters:
@@ -121,7 +121,7 @@ def mass(x: State, par: Parameters, fluid: brake_fluid.Parameters) -> FluidCompl
 
 
 def _pads(x: State, par: Parameters, fluid: brake_fluid.Parameters) -> float:
-    """Return dV/dp of the pads and of the fluid that they took in."""
+    """Return dV/dp of the pads and of the absorbed fluid."""
     if par.law == "table":
         return _slope(x.p, par)
     spring = par.A_pd * par.A_pd / par.K_pd
@@ -129,7 +129,7 @@ def _pads(x: State, par: Parameters, fluid: brake_fluid.Parameters) -> float:
 
 
 def expansion(par: Parameters) -> Annotated[float, Signal("m**3/s", "flow", 1e-8)]:
-    r"""Return the volume by which warming fluid grows in a time, :math:`\alpha_V V \dot T`."""
+    r"""Return the expansion rate of warming fluid, :math:`\alpha_V V \dot T`."""
     return 0.0 if par.fluid_heat == "off" else par.alpha_V * par.V_hot * par.T_rate
 
 
@@ -151,13 +151,13 @@ def _slope(p: float, par: Parameters) -> float:
 
 
 def energy(x: State, par: Parameters, fluid: brake_fluid.Parameters) -> Energy:
-    """Return the energy of the pads, of fluid that came in and of gas: integral of h(p) dV."""
+    """Return the energy of the pads, of the inflow and of gas: integral of h(p) dV."""
     pads = _pad_energy(x, par, fluid)
     return pads + brake_fluid.inflow_energy(x.p, fluid) if fluid.air == "caliper" else pads
 
 
 def _pad_energy(x: State, par: Parameters, fluid: brake_fluid.Parameters) -> float:
-    """Return the energy of the pads and of the fluid that they took in."""
+    """Return the energy of the pads and of the absorbed fluid."""
     H = brake_fluid.flow_energy_integral
     if par.law == "table":
         total = 0.0 * H(x.p, fluid) * _slope(x.p, par)
@@ -177,13 +177,13 @@ def _pad_energy(x: State, par: Parameters, fluid: brake_fluid.Parameters) -> flo
 
 
 def power_in(x: State, u: Input, par: Parameters, fluid: brake_fluid.Parameters) -> Power:
-    """Return the power of the inflow, and of fluid that expands."""
+    """Return the power of the inflow and of expanding fluid."""
     carried = brake_fluid.convected_power(u.q, x.p, fluid)
     return carried if par.fluid_heat == "off" else carried + expansion_power(x, par, fluid)
 
 
 def expansion_power(x: State, par: Parameters, fluid: brake_fluid.Parameters) -> Power:
-    """Return the power of fluid that expands; negative while it cools."""
+    """Return the power of expanding fluid; negative while it cools."""
     return brake_fluid.convected_power(expansion(par), x.p, fluid)
 
 

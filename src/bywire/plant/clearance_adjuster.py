@@ -1,6 +1,6 @@
-"""Adjuster's screw: takes clearance away while it turns, and holds its place otherwise.
+"""Screw of a clearance adjuster: reduces the clearance while it turns, and otherwise holds.
 
-A controller holds how fast it turns; it is self-locking, so that no load drives it.
+A controller sets its speed. It is self-locking, so that no load drives it.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ Lag = Annotated[float, Unit("s", 5e-3), Field(gt=0, allow_inf_nan=False)]
 
 
 class Parameters(ParameterSet):
-    """A screw that follows its drive with a lag of first order.
+    """Screw that follows its drive with a first-order lag.
 
     ``law``: ``"screw"``; ``"none"``: the brake has no adjuster.
     """
@@ -25,15 +25,15 @@ class Parameters(ParameterSet):
     law: Literal["none", "screw"]
     """whether the brake has an adjuster"""
     tooth: Length
-    """clearance that a tooth takes away"""
+    """clearance removed by a tooth"""
     tau_turn: Lag
-    """time constant with which its speed follows that of its drive"""
+    """time constant of its speed behind that of its drive"""
 
 
 class State(NamedTuple):
-    """Clearance taken away, and its rate."""
+    """Removed clearance, and its rate."""
 
-    taken: Annotated[float, Signal("m", "clearance that the adjuster took away", 1e-4)]
+    taken: Annotated[float, Signal("m", "clearance removed by the adjuster", 1e-4)]
     taking: Annotated[float, Signal("m/s", "speed of the adjuster", 0.01)]
 
 
@@ -45,18 +45,18 @@ class Rate(NamedTuple):
 
 
 class Input(NamedTuple):
-    """How it is turned."""
+    """Speed of the drive."""
 
-    turning: Annotated[float, Signal("1/s", "teeth turned in a second", 50.0)]
+    turning: Annotated[float, Signal("1/s", "teeth turned per second", 50.0)]
 
 
 def rate(x: State, u: Input, par: Parameters) -> Rate:
-    r"""Return how the screw moves.
+    r"""Return the derivatives of the screw's motion.
 
     .. math:: \tau \ddot c + \dot c = s \dot n
 
-    with teeth of s, turned at a speed. In the end the clearance has changed by whole teeth, as
-    long as whole teeth were turned.
+    with a pitch s per tooth. After whole teeth were turned, the clearance has changed by whole
+    teeth.
     """
     if par.law == "none":
         return Rate(0.0, 0.0)
@@ -64,5 +64,5 @@ def rate(x: State, u: Input, par: Parameters) -> Rate:
 
 
 def moved(x: State, par: Parameters) -> State:
-    """Return clearance taken away and speed; zero without an adjuster."""
+    """Return removed clearance and speed; zero without an adjuster."""
     return State(0.0, 0.0) if par.law == "none" else x

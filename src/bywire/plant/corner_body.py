@@ -12,7 +12,7 @@ from bywire.core.signals import Energy, Power, Signal
 
 
 class Parameters(ParameterSet):
-    """Mass and weight on one wheel; its load does not change."""
+    """Mass and weight on one wheel, with a constant load."""
 
     m: Annotated[float, Unit("kg", 450.0), Field(gt=0, allow_inf_nan=False)]
     """mass of the corner"""
@@ -21,7 +21,7 @@ class Parameters(ParameterSet):
 
 
 class State(NamedTuple):
-    """Place and speed."""
+    """Position and speed."""
 
     s: Annotated[float, Signal("m", "distance", 30.0)]
     v: Annotated[float, Signal("m/s", "vehicle speed", 20.0)]
@@ -35,7 +35,7 @@ class Factors(NamedTuple):
 
 
 class Balance(NamedTuple):
-    """Right-hand sides of place and speed."""
+    """Right-hand sides of position and speed."""
 
     s: Annotated[float, Signal("m/s", "vehicle speed", 20.0)]
     v: Annotated[float, Signal("N", "force", 1e3)]

@@ -28,9 +28,9 @@ class Parameters(ParameterSet):
     f_n: ForcePerPressure
     """growth of the Coulomb friction with pressure, releasing"""
     k_brk: BreakawayFactor
-    """breakaway over Coulomb friction"""
+    """breakaway friction relative to Coulomb friction"""
     v_S: SlidingSpeed
-    """speed over which the Stribeck peak falls"""
+    """characteristic speed of the Stribeck peak"""
     mu: Damping
     """viscous friction per speed"""
 
@@ -54,7 +54,7 @@ def output(u: Input, par: Parameters) -> Output:
 
     .. math:: F = (F_{pr} + f p) (1 + (k_{brk} - 1) e^{-|v|/v_S}) + \mu |v|
 
-    with f of the direction. At rest these are the breakaway forces.
+    with f for each direction. At rest these are the breakaway forces.
     """
     speed, p = ops.fabs(u.v), ops.fmax(u.p, 0.0)
     peak = 1.0 + (par.k_brk - 1.0) * ops.decay(speed / par.v_S)

@@ -41,13 +41,13 @@ class Parameters(ParameterSet):
     V_dc: Voltage
     """supply voltage: gain and limit of the PWM stage"""
     R_off: Resistance
-    """resistance of the diodes while the stage is off, in which the current decays"""
+    """resistance of the diodes, in which the current decays while the stage is off"""
 
 
 FAULTS = (
-    ParameterFault("under-voltage", "less voltage at the power stage", ("V_dc",), 0.5),
-    ParameterFault("scale", "current measurement shows a multiple", ("G_sense",), 0.5),
-    ParameterFault("derated", "less current than demanded", ("i_max",), 0.5),
+    ParameterFault("under-voltage", "lower voltage at the power stage", ("V_dc",), 0.5),
+    ParameterFault("scale", "current measurement is scaled by a factor", ("G_sense",), 0.5),
+    ParameterFault("derated", "lower current limit", ("i_max",), 0.5),
 )
 
 
@@ -92,11 +92,11 @@ def output(x: State, u: Input, par: Parameters) -> Output:
 
     .. math:: V = V_{dc}\, \mathrm{sat}(k_p e + I), \quad |\mathrm{sat}| \le 1
 
-    While the stage is off, back-EMF minus R_off i: the current dies away and stays zero.
+    While the stage is off, it is back-EMF minus R_off i: the current decays and stays zero.
 
     References
     ----------
-    Roberts et al. (2003), section "Current controller". PWM gain and limit are the supply's.
+    Roberts et al. (2003), section "Current controller". The supply determines PWM gain and limit.
     """
     duty = ops.clip(par.k_p * error(x, par) + x.integral, -1.0, 1.0)
     return Output(v=ops.where(u.on > 0.5, par.V_dc * duty, u.emf - par.R_off * u.i))
@@ -107,8 +107,8 @@ def rate(x: State, u: Input, par: Parameters) -> Rate:
 
     .. math:: \dot I = k_i e + (\mathrm{sat}(k_p e + I) - k_p e - I)/T_t
 
-    The last term is the anti-wind-up (our reading; the paper has none). While the stage is off,
-    the integral part decays with T_t.
+    The last term is the anti-wind-up (our interpretation; the paper has none). While the stage is
+    off, the integral part decays with T_t.
     """
     e = error(x, par)
     unlimited = par.k_p * e + x.integral

@@ -21,9 +21,9 @@ class Parameters(ParameterSet):
     """Linear between the ends of its range, saturating there; no dynamics."""
 
     i_low: SignedCurrent
-    """lowest current that it shows"""
+    """lowest current of the range"""
     i_high: SignedCurrent
-    """highest current that it shows"""
+    """highest current of the range"""
 
     @model_validator(mode="after")
     def _ordered(self) -> Parameters:
@@ -35,7 +35,7 @@ class Parameters(ParameterSet):
 
 
 class Input(NamedTuple):
-    """Current through it."""
+    """Current through the sensor."""
 
     i: MotorCurrent
 
@@ -52,7 +52,7 @@ def value(share: Reading, par: Parameters) -> MotorCurrent:
 
 @row_by_row
 def watch(t: Array, u: Input, par: Parameters) -> list[str]:
-    """Return whether the current left the sensor's range, and when first."""
+    """Warn if the current leaves the sensor's range, with the first time."""
     text = f"the current leaves the sensor's range, {par.i_low:g} to {par.i_high:g} A,"
     beyond = outside(u.i, par.i_low, par.i_high)
-    return first(t, beyond, text, ": the measured value stays at its end")
+    return first(t, beyond, text, ": the measured value stays at the end of the range")

@@ -72,8 +72,8 @@ def balance(x: State, u: Input, par: Parameters) -> Balance:
 
     Notes
     -----
-    The printed equation carries the opposite sign on its right-hand side; current must rise
-    with voltage.
+    The printed equation has the opposite sign on its right-hand side, but current must rise with
+    voltage.
 
     References
     ----------

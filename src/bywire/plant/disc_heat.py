@@ -24,9 +24,9 @@ _STANDS = 1e-9  # of v_ref: below it the power of the speed is 0, without a slop
 
 
 class Parameters(ParameterSet):
-    """Three bodies of one temperature each.
+    """Three bodies with one temperature each.
 
-    ``law``: ``"lumped"``; ``"off"`` keeps the friction of the cold pads, and no temperature moves.
+    ``law``: ``"lumped"``; ``"off"`` keeps the friction of cold pads and constant temperatures.
     """
 
     law: Literal["off", "lumped"]
@@ -42,7 +42,7 @@ class Parameters(ParameterSet):
     A: Area
     """surface of the discs that the air cools"""
     h_0: Convection
-    """convection at rest"""
+    """convection coefficient at rest"""
     h_1: Convection
     """increase of h_0 at the speed v_ref"""
     v_ref: Annotated[float, Unit("m/s", 1.0), Field(gt=0, allow_inf_nan=False)]
@@ -52,25 +52,25 @@ class Parameters(ParameterSet):
     sigma: Annotated[float, Unit("W/(m**2*K**4)", 5.67e-8), Field(ge=0, allow_inf_nan=False)]
     """constant of Stefan and Boltzmann"""
     G_dp: HeatConductance
-    """conductance from discs to pads that are pressed on"""
+    """conductance from discs to applied pads"""
     G_open: HeatConductance
-    """that to open ones"""
+    """conductance from discs to released pads"""
     G_pf: HeatConductance
     """conductance from pads to calipers"""
     G_f: HeatConductance
     """conductance from calipers to the air"""
     T_a: Temperature
-    """temperature of the air, and of all before the first stop"""
+    """temperature of the air, and of all bodies before the first stop"""
     T_1: Temperature
     """temperature of the discs up to which the pads have their cold friction"""
     T_2: Temperature
-    """temperature of the discs from which on they fade no further"""
+    """temperature of the discs above which the pads fade no further"""
     f: Weight
-    """friction there, over that of cold pads"""
+    """friction of fully faded pads, relative to that of cold pads"""
     T_boil: Temperature
     """boiling point of the fluid at atmospheric pressure, fresh"""
     T_wet: Temperature
-    """the same of fluid with 3.7 % of water"""
+    """boiling point of the fluid at atmospheric pressure, with 3.7 % of water"""
     T_most: Temperature
     """temperature of the discs up to which these values are valid"""
 
@@ -79,7 +79,7 @@ class Parameters(ParameterSet):
         if not self.T_1 < self.T_2:
             raise ValueError(
                 f"T_1 = {shown(self.T_1, 'K')} must be < T_2 = {shown(self.T_2, 'K')}: pads "
-                "fade from the one to the other"
+                "fade from T_1 to T_2"
             )
         return self
 
@@ -117,7 +117,7 @@ class Input(NamedTuple):
 
     P: Annotated[float, Signal("W", "friction power of the brake", 3e4), Ge(0)]
     v: Annotated[float, Signal("m/s", "vehicle speed", 20.0)]
-    pressed: Annotated[float, Signal("1", "pads are pressed on"), Ge(0), Le(1)]
+    pressed: Annotated[float, Signal("1", "pads are applied"), Ge(0), Le(1)]
 
 
 class Stored(NamedTuple):
@@ -139,8 +139,8 @@ class Flows(NamedTuple):
 
 def friction(
     T_disc: Kelvin, par: Parameters
-) -> Annotated[float, Signal("1", "friction over that of cold pads", 1.0)]:
-    r"""Return the friction of the pads over that of cold ones.
+) -> Annotated[float, Signal("1", "friction relative to that of cold pads", 1.0)]:
+    r"""Return the friction of the pads relative to that of cold ones.
 
     .. math:: \mu/\mu_0 = 1 - (1 - f)\, \mathrm{clip}((T_d - T_1)/(T_2 - T_1), 0, 1)
     """
@@ -219,7 +219,7 @@ def energy(x: State, par: Parameters) -> Energy:
 
 
 def power_in(u: Input, par: Parameters) -> Power:
-    """Return the power of the friction, where it warms anything."""
+    """Return the power of the friction if it heats the brake."""
     return 0.0 if par.law == "off" else u.P
 
 
@@ -233,14 +233,14 @@ def power_loss(x: State, u: Input, par: Parameters) -> Cooling:
 
 @row_by_row
 def watch(t: Array, x: State, par: Parameters) -> list[str]:
-    """Return whether the fluid may boil, and whether discs get hotter than these numbers hold."""
+    """Warn if the fluid may boil, and if the discs exceed the valid range of the parameters."""
     if par.law == "off":
         return []
-    boils = "the brake fluid passes the boiling point of {} fluid, {},".format
-    vapor = ": vapor takes stroke, which is not simulated here"
+    boils = "the brake fluid exceeds the boiling point of {} fluid, {},".format
+    vapor = ": vapor costs stroke, which is not simulated here"
     wet, fresh, most = (shown(T, "K") for T in (par.T_wet, par.T_boil, par.T_most))
     return [
         *first(t, x.T_fluid > par.T_wet, boils("wet", wet), vapor),
         *first(t, x.T_fluid > par.T_boil, boils("fresh", fresh), vapor),
-        *first(t, x.T_disc > par.T_most, f"the discs pass {most}, the end of their valid range,"),
+        *first(t, x.T_disc > par.T_most, f"the discs exceed {most}, the end of their valid range,"),
     ]

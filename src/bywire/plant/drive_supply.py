@@ -14,7 +14,7 @@ Watts = Annotated[float, Signal("W", "power", 50.0)]
 
 
 class Parameters(ParameterSet):
-    """Stiff supply, lossless power stages: power that the motors do not take is standby."""
+    """Stiff supply and lossless power stages: all power beyond that of the motors is standby."""
 
     P_standby: Annotated[float, Unit("W", 20.0), Field(ge=0, allow_inf_nan=False)]
     """power of the drives' electronics, both together"""
@@ -31,7 +31,7 @@ class State(NamedTuple):
 class Rate(NamedTuple):
     """Derivative of the state."""
 
-    P: Annotated[float, Signal("W/s", "rate of the shown power", 1e3)]
+    P: Annotated[float, Signal("W/s", "rate of the measured power", 1e3)]
 
 
 class Input(NamedTuple):

@@ -1,4 +1,4 @@
-"""Rotor of a servo motor whose current is known, without winding and drive."""
+"""Rotor of a servo motor with a prescribed current, without winding and drive."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def mass(par: Parameters) -> Factors:
 
 
 def balance(x: State, u: Input, par: Parameters) -> Balance:
-    """Return speed and torque, as of `servo_motor.balance`."""
+    """Return speed and torque, as in `servo_motor.balance`."""
     motor = servo_motor.State(u.i, x.theta, x.omega)
     rows = servo_motor.balance(motor, servo_motor.Input(0.0, u.load, u.friction), par)
     return Balance(theta=rows.theta, omega=rows.omega)

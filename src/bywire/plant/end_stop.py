@@ -28,7 +28,7 @@ class Parameters(ParameterSet):
 
 
 class Input(NamedTuple):
-    """Travel and speed of the body, and where the two stops stand."""
+    """Travel and speed of the body, and positions of the two stops."""
 
     x: Annotated[float, Signal("m", "travel", 1e-3)]
     v: Annotated[float, Signal("m/s", "speed", 0.02)]
@@ -37,7 +37,7 @@ class Input(NamedTuple):
 
 
 class InputRate(NamedTuple):
-    """Derivatives of the inputs that the stored energy depends on; the stops stand still."""
+    """Derivatives of the inputs that affect the stored energy; the stops do not move."""
 
     x: Annotated[float, Signal("m/s", "speed", 0.02)]
     x_rest: Annotated[float, Signal("m/s", "speed of the near stop", 0.02)]
@@ -83,7 +83,7 @@ def load(f: Forces) -> Annotated[float, Signal("N", "load on the body", 100.0)]:
 
 
 def input_rate(u: Input) -> InputRate:
-    """Return how the travel moves: the stops store energy, and the body's travel is their port."""
+    """Return the rate of the travel, the port through which the stops store energy."""
     return InputRate(x=u.v, x_rest=0.0, x_end=0.0)
 
 
@@ -99,6 +99,6 @@ def power_in(u: Input, f: Forces) -> Work:
 
 
 def power_loss(u: Input, f: Forces, par: Parameters) -> Loss:
-    """Return the power that the stops take and do not store, >= 0."""
+    """Return the power that the stops dissipate, >= 0."""
     near, far = ops.fmax(u.x_rest - u.x, 0.0), ops.fmax(u.x - u.x_end, 0.0)
     return (load(f) - par.k_stop * (far - near)) * u.v

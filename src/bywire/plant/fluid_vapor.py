@@ -1,4 +1,4 @@
-"""Vapor in brake fluid that boils: bubbles beyond its boiling point, which falls with its water."""
+"""Vapor in boiling brake fluid: bubbles above the boiling point, which falls with water content."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Kelvin = Annotated[float, Signal("K", "temperature of the fluid", 430.0), Ge(0)]
 
 
 class Parameters(ParameterSet):
-    """Boiling points as FMVSS 116 tests them, at atmospheric pressure, and how fluid boils."""
+    """Boiling points according to FMVSS 116, at atmospheric pressure, and growth of vapor."""
 
     water: Share
     """share of water in the fluid, by mass"""
@@ -30,9 +30,9 @@ class Parameters(ParameterSet):
     water_wet: Annotated[float, Unit("1", 0.037), Field(gt=0, lt=1, allow_inf_nan=False)]
     """share of water in wet fluid, up to which these values are valid"""
     V: Volume
-    """volume of the fluid that is as hot"""
+    """volume of the hot fluid"""
     growth: Growth
-    """vapor per volume of that fluid and kelvin beyond its boiling point, at ambient pressure"""
+    """vapor per volume of this fluid and kelvin above its boiling point, at ambient pressure"""
     T_most: Temperature
     """temperature of the fluid up to which these values are valid"""
 
@@ -46,7 +46,7 @@ class Parameters(ParameterSet):
         if self.water > self.water_wet:
             raise ValueError(
                 f"water = {self.water:g} must be <= water_wet = {self.water_wet:g}, up to which "
-                "the boiling point is known: lower it, or set T_wet to the point of wetter fluid"
+                "the boiling point is known: lower water, or set T_wet to that of wetter fluid"
             )
         return self
 
@@ -58,7 +58,8 @@ def boiling_point(par: Parameters) -> Annotated[float, Signal("K", "boiling poin
 
     Notes
     -----
-    A straight line between the two points that are tested; in truth the first water costs most.
+    This is a straight line between the two tested points; in reality, the first water has the
+    largest effect.
 
     References
     ----------
@@ -72,11 +73,11 @@ def volume(T: Kelvin, par: Parameters) -> Annotated[float, Signal("m**3", "vapor
 
     .. math:: V_{vapor} = \gamma V \max(T - T_b, 0)
 
-    Under pressure it yields as a gas does (`brake_fluid`, air in line and caliper).
+    Under pressure it is compressed like a gas (`brake_fluid`, air in line and caliper).
 
     Notes
     -----
-    By its heat alone a fluid of 2.3 kJ/(kg K) boils away the water of 10 ml of vapor per kelvin and
-    5 ml; how much of it forms before the fluid is pushed back or cools is the growth's matter.
+    The heat of 5 ml of fluid with 2.3 kJ/(kg K) suffices for 10 ml of vapor per kelvin. The growth
+    determines how much vapor forms before the fluid is pushed back or cools.
     """
     return par.growth * par.V * ops.fmax(T - boiling_point(par), 0.0)

@@ -20,10 +20,10 @@ RunOut = Annotated[float, Unit("m", 4e-6), Field(ge=0, allow_inf_nan=False)]
 
 
 class Parameters(ParameterSet):
-    """Rigid disc and flywheel; the braking moment is a friction, so that the disc truly stops.
+    """Rigid disc and flywheel; the braking moment is a friction, so that the disc really stops.
 
-    ``law``: ``"coasting"`` lets the brake slow it down; ``"driven"`` keeps its speed near
-    ``Omega_0`` by a proportional speed controller of the AC motor.
+    ``law``: with ``"coasting"``, the brake slows the disc down; with ``"driven"``, a proportional
+    speed controller of the AC motor keeps its speed near ``Omega_0``.
     """
 
     law: Literal["coasting", "driven"]
@@ -31,7 +31,7 @@ class Parameters(ParameterSet):
     J_F: BigInertia
     """inertia of flywheel and disc"""
     Omega_0: DiscSpeed
-    """speed at the start, and the one kept when driven"""
+    """speed at the start, and the set point when driven"""
     K_drive: SpeedGain
     """gain of the speed controller (law "driven")"""
     Omega_still: StillSpeed
@@ -40,7 +40,7 @@ class Parameters(ParameterSet):
     """amplitude of the run-out that the floating caliper does not follow"""
 
 
-FAULTS = (ParameterFault("run-out", "the disc runs out of true, by a multiple", ("runout",), 5.0),)
+FAULTS = (ParameterFault("run-out", "disc run-out larger by a factor", ("runout",), 5.0),)
 
 
 class State(NamedTuple):
@@ -65,13 +65,13 @@ class Balance(NamedTuple):
 
 
 class Input(NamedTuple):
-    """The brake's moment as a friction on the disc: against its rotation."""
+    """Brake moment as a friction on the disc, against its rotation."""
 
     friction: Annotated[float, Signal("N*m", "moment of the pads on the disc", 300.0)]
 
 
 def turning(x: State, par: Parameters) -> Annotated[float, Signal("1", "direction of the disc")]:
-    """Return +1 or -1, the direction of rotation, and 0 for a stopped disc."""
+    """Return the direction of rotation, +1 or -1, and 0 for a stopped disc."""
     backward = ops.where(x.Omega < -par.Omega_still, -1.0, 0.0)
     return ops.where(x.Omega > par.Omega_still, 1.0, backward)
 

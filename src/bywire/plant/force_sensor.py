@@ -19,7 +19,7 @@ Loss = Annotated[
 
 
 class Parameters(ParameterSet):
-    """Bolted to both screws: it takes compression and tension. No mass, calibrated."""
+    """Calibrated sensor without mass, bolted to both screws for compression and tension."""
 
     K_F: Stiffness
     """stiffness of the sensor with its adapters"""
@@ -32,13 +32,13 @@ class Parameters(ParameterSet):
 class State(NamedTuple):
     """Reading of the amplifier."""
 
-    y: Annotated[float, Signal("N", "force shown by the sensor", 1000.0)]
+    y: Annotated[float, Signal("N", "force measured by the sensor", 1000.0)]
 
 
 class Rate(NamedTuple):
     """Derivative of the state."""
 
-    y: Annotated[float, Signal("N/s", "rate of the shown force", 1e5)]
+    y: Annotated[float, Signal("N/s", "rate of the measured force", 1e5)]
 
 
 class Input(NamedTuple):
@@ -65,7 +65,7 @@ def stiffness(u: Input, par: Parameters) -> Annotated[float, Signal("N/m", "stif
 
 
 def compression(u: Input) -> Annotated[float, Signal("m", "compression of the line", 1e-4)]:
-    """Return how much closer the nuts are than without force; negative in tension."""
+    """Return the approach of the nuts relative to zero force; negative in tension."""
     return u.X_1 - u.X_2
 
 
@@ -85,12 +85,12 @@ def force(u: Input, par: Parameters) -> AxialForce:
 
 
 def rate(x: State, u: Input, par: Parameters) -> Rate:
-    r"""Return the derivative of the shown force, :math:`2 \pi f_F (F - y_F)`."""
+    r"""Return the derivative of the measured force, :math:`2 \pi f_F (F - y_F)`."""
     return Rate(y=2.0 * math.pi * par.f_F * (force(u, par) - x.y))
 
 
 def input_rate(u: Input) -> InputRate:
-    """Return how the nuts move: the line stores energy, and they are its ports."""
+    """Return the rates of the nuts, the ports through which the line stores energy."""
     return InputRate(X_1=u.V_1, X_2=u.V_2, c=0.0)
 
 

@@ -1,4 +1,4 @@
-"""Ground below the rear wheel: it pushes and never pulls, and a landing does not rebound."""
+"""Ground below the rear wheel: it pushes and never pulls, and a landing wheel does not rebound."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Parameters(ParameterSet):
 
 
 class Input(NamedTuple):
-    """How far the rear wheel has risen, and how fast."""
+    """Rise of the rear wheel, and its rate."""
 
     z: Annotated[float, Signal("m", "rise of the rear wheel", 1e-2)]
     v: Annotated[float, Signal("m/s", "speed of its rise", 0.1)]
@@ -69,7 +69,7 @@ def forces(u: Input, par: Parameters) -> Forces:
 
 
 def input_rate(u: Input) -> InputRate:
-    """Return how the rise moves."""
+    """Return the rate of the rise."""
     return InputRate(z=u.v)
 
 
@@ -85,5 +85,5 @@ def power_in(u: Input, f: Forces) -> Power:
 
 
 def power_loss(u: Input, f: Forces, par: Parameters) -> Loss:
-    """Return the power that the contact takes and does not store, >= 0."""
+    """Return the power that the contact dissipates, >= 0."""
     return (par.k * ops.fmax(-u.z, 0.0) - f.support) * u.v

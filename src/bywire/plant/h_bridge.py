@@ -11,7 +11,7 @@ from bywire.core.signals import Signal
 
 
 class Parameters(ParameterSet):
-    """Lossless averaged bridge; the ripple at the carrier is neglected, dead times too."""
+    """Lossless averaged bridge, without the ripple of the carrier and without dead times."""
 
     D_max: Fraction
     """limit of the duty cycle's magnitude"""

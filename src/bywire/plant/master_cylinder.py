@@ -1,4 +1,4 @@
-"""Master cylinder: piston, pressure chamber, and the force that the piston feels."""
+"""Master cylinder: piston, pressure chamber, and force on the piston."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ Loss = Annotated[
 
 
 class Parameters(ParameterSet):
-    """Chamber that the piston empties; gauge pressures."""
+    """Pressure chamber with piston, in gauge pressures."""
 
     A_mc: Area
     """piston area"""
     s_mc: Length
-    """chamber length at zero travel: where the chamber's volume would vanish"""
+    """chamber length at zero travel: the travel at which its volume would be zero"""
     x_rest: Length
     """travel of the retracted piston, at its near end stop and zero pressure"""
     x_end: Length
@@ -67,13 +67,13 @@ class Input(NamedTuple):
 
 
 class InputRate(NamedTuple):
-    """Derivatives of the inputs that the stored energy depends on."""
+    """Derivatives of the inputs that affect the stored energy."""
 
     x: Annotated[float, Signal("m/s", "piston speed", 0.02)]
 
 
 class Output(NamedTuple):
-    """Load that the piston puts on the drive, against clamping."""
+    """Load of the piston on the drive, against clamping."""
 
     force: Annotated[float, Signal("N", "piston load", 200.0)]
 
@@ -106,7 +106,7 @@ def output(x: State, u: Input, par: Parameters) -> Output:
 
 
 def input_rate(u: Input) -> InputRate:
-    """Return how the travel moves: the chamber's volume is a port, not a state."""
+    """Return the rate of the travel: the chamber's volume is a port, not a state."""
     return InputRate(x=u.v)
 
 

@@ -20,13 +20,13 @@ class Parameters(ParameterSet):
 class State(NamedTuple):
     """Reading."""
 
-    M: Annotated[float, Signal("N*m", "moment shown by the sensor", 300.0)]
+    M: Annotated[float, Signal("N*m", "moment measured by the sensor", 300.0)]
 
 
 class Rate(NamedTuple):
     """Derivative of the state."""
 
-    M: Annotated[float, Signal("N*m/s", "rate of the shown moment", 1e4)]
+    M: Annotated[float, Signal("N*m/s", "rate of the measured moment", 1e4)]
 
 
 class Input(NamedTuple):
@@ -36,5 +36,5 @@ class Input(NamedTuple):
 
 
 def rate(x: State, u: Input, par: Parameters) -> Rate:
-    r"""Return the derivative of the shown moment, :math:`2 \pi f_M (M_B - M)`."""
+    r"""Return the derivative of the measured moment, :math:`2 \pi f_M (M_B - M)`."""
     return Rate(M=2.0 * math.pi * par.f_M * (u.M - x.M))

@@ -1,7 +1,7 @@
-"""Heat of a motor: copper loss warms its winding, the winding its housing, and that the air.
+"""Heat of a motor: copper loss heats the winding, the winding the housing, the housing the air.
 
-Copper conducts less when hot, and magnets hold less: see `warmth`, a motor's resistance and
-torque constant follow.
+The resistance of copper grows with temperature, and magnets become weaker. The motor's resistance
+and torque constant follow from `warmth`.
 """
 
 from __future__ import annotations
@@ -36,10 +36,10 @@ Kelvin = Annotated[float, Signal("K", "temperature", 400.0), Ge(0)]
 
 
 class Parameters(ParameterSet):
-    """Two bodies of one temperature each.
+    """Two bodies with one temperature each.
 
-    ``law``: ``"lumped"``; ``"off"`` keeps the motor as it is at ``T_ref``, and no temperature
-    moves.
+    ``law``: ``"lumped"``; ``"off"`` keeps the motor at its values for ``T_ref``, with constant
+    temperatures.
     """
 
     law: Literal["off", "lumped"]
@@ -57,7 +57,7 @@ class Parameters(ParameterSet):
     a_K: TemperatureCoefficient
     """fall of the torque constant with the housing's temperature, magnets"""
     T_ref: Temperature
-    """temperature at which the motor's resistance and torque constant hold"""
+    """temperature at which the motor's resistance and torque constant are stated"""
     T_a: Temperature
     """temperature of the air, and of the motor at the start"""
     T_most: Temperature
@@ -96,7 +96,7 @@ class Balance(NamedTuple):
 
 
 class Input(NamedTuple):
-    """What the winding loses."""
+    """Copper loss of the winding."""
 
     P: Annotated[float, Signal("W", "copper loss", 30.0), Ge(0)]
 
@@ -109,10 +109,14 @@ class Stored(NamedTuple):
 
 
 class Warmth(NamedTuple):
-    """Resistance and torque constant over those at the reference temperature."""
+    """Resistance and torque constant relative to those at the reference temperature."""
 
-    R: Annotated[float, Signal("1", "resistance over that at the reference temperature", 1.0)]
-    K: Annotated[float, Signal("1", "torque constant over that at the reference temperature", 1.0)]
+    R: Annotated[
+        float, Signal("1", "resistance relative to that at the reference temperature", 1.0)
+    ]
+    K: Annotated[
+        float, Signal("1", "torque constant relative to that at the reference temperature", 1.0)
+    ]
 
 
 def mass(par: Parameters) -> Factors:
@@ -159,7 +163,7 @@ def energy(x: State, par: Parameters) -> Energy:
 
 
 def power_in(u: Input, par: Parameters) -> Power:
-    """Return the copper loss, where it warms anything."""
+    """Return the copper loss if it heats the motor."""
     return 0.0 if par.law == "off" else u.P
 
 
@@ -169,14 +173,14 @@ def power_loss(x: State, par: Parameters) -> Conducted:
 
 
 def cold(par: Parameters) -> State:
-    """Return a motor as warm as the air."""
+    """Return the state of a motor at the temperature of the air."""
     return State(par.T_a, par.T_a)
 
 
 @row_by_row
 def watch(t: Array, x: State, par: Parameters) -> list[str]:
-    """Warn if the winding gets hotter than its insulation's limit."""
+    """Warn if the winding exceeds the limit of its insulation."""
     if par.law == "off":
         return []
     most = shown(par.T_most, "K")
-    return list(first(t, x.T_winding > par.T_most, f"the winding passes {most}, its limit,"))
+    return list(first(t, x.T_winding > par.T_most, f"the winding exceeds {most}, its limit,"))

@@ -1,4 +1,4 @@
-"""Brake pads that wear by the work of their friction, and soften a caliper by their thickness."""
+"""Brake pads: wear by friction work, and compliance of the pads in the caliper."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ class Parameters(ParameterSet):
     T_hot: AbsoluteTemperature
     """temperature above which wear grows"""
     T_act: Activation
-    """how fast it grows: activation energy over gas constant"""
+    """its growth: activation energy over gas constant"""
     n_pads: Count
-    """pads that share the work"""
+    """number of pads that share the work"""
     A_pad: Area
     """area of a pad's lining"""
     E_pad: Modulus
@@ -37,14 +37,14 @@ class Parameters(ParameterSet):
 
 
 class Input(NamedTuple):
-    """Friction power, and how hot the friction surface is."""
+    """Friction power, and temperature of the friction surface."""
 
     P: Annotated[float, Signal("W", "friction power", 1e4)]
     T: Annotated[float, Signal("K", "temperature of the friction surface", 400.0), Gt(0)]
 
 
 class Output(NamedTuple):
-    """How fast each pad gets thinner."""
+    """Wear rate of each pad."""
 
     rate: Annotated[float, Signal("m/s", "wear rate of a pad", 1e-7)]
 

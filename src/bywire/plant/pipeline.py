@@ -18,7 +18,7 @@ Loss = Annotated[float, Signal("W", "loss in the pipeline", role=Role("sink", "p
 
 
 class Parameters(ParameterSet):
-    """Rigid round pipe without inertia of the fluid; valid while Re < Re_max."""
+    """Rigid round pipe without fluid inertia; valid for Re < Re_max."""
 
     d_pl: Length
     """inner diameter"""
@@ -54,7 +54,7 @@ def resistance(par: Parameters, fluid: brake_fluid.Parameters) -> FlowResistance
 
     Notes
     -----
-    The Hagen-Poiseuille law has 8 in the place of 32; the coefficient is a parameter.
+    The Hagen-Poiseuille law has 8 in place of 32; the coefficient is a parameter.
 
     References
     ----------
@@ -74,14 +74,14 @@ def output(u: Input, par: Parameters, fluid: brake_fluid.Parameters) -> Output:
 
 
 def power_loss(u: Input, par: Parameters, fluid: brake_fluid.Parameters) -> Loss:
-    """Return the heat of the flow, with the compression energy that it gives up, >= 0."""
+    """Return the heat of the flow, including released compression energy, >= 0."""
     q = output(u, par, fluid).q
     return q * (brake_fluid.flow_energy(u.p_a, fluid) - brake_fluid.flow_energy(u.p_b, fluid))
 
 
 @row_by_row
 def watch(t: Array, u: Input, par: Parameters, fluid: brake_fluid.Parameters) -> list[str]:
-    """Return whether the flow was too fast to be laminar."""
+    """Warn if the flow was too fast to be laminar."""
     Re = highest(output(u, par, fluid).Re)
     if not Re > par.Re_max:
         return []

@@ -1,9 +1,9 @@
-"""Friction between the caliper's piston and its seal: pressure that moves no pad.
+"""Friction between the caliper's piston and its seal: pressure that does not move the pads.
 
-A piston without mass whose friction depends on its speed would chatter. Here the flow is what is
-set-valued: fluid moves the piston in where the line's pressure exceeds that of the pads by more
-than the friction takes, and out where it falls below it by more; in between the piston stands and
-nothing flows. Both flows are one-sided contact forces, whose compliance is the line's resistance.
+A massless piston whose friction depends on its speed would chatter. Here the flow is set-valued.
+Fluid moves the piston in if the line pressure exceeds that of the pads by more than the friction,
+and out if it is below it by more. In between, the piston rests and nothing flows. Both flows are
+one-sided contact forces, whose compliance is the line's resistance.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ Flow = Annotated[float, Signal("m**3/s", "flow into the caliper", 1e-6)]
 class Parameters(ParameterSet):
     """Coulomb friction of a piston, and the elasticity of its seal.
 
-    ``law``: ``"sticking"``; ``"off"``, for a piston that follows its fluid.
+    ``law``: ``"sticking"``; ``"off"`` for a piston without friction.
     """
 
     law: Literal["off", "sticking"]
@@ -36,7 +36,7 @@ class Parameters(ParameterSet):
     F_fr: Force
     """friction force on the piston"""
     rollback: Weight
-    """share of it by which the deformed seal pulls the piston back; 0 for a seized one"""
+    """share of the friction with which the deformed seal retracts the piston; 0 if seized"""
 
 
 FAULTS = (
@@ -51,14 +51,14 @@ FAULTS = (
 
 
 class Input(NamedTuple):
-    """Pressures at the two ends of line and piston."""
+    """Pressures at both ends of line and piston."""
 
     p_line: Annotated[float, Signal("Pa", "pressure where the line begins", 2e6)]
-    p_pads: Annotated[float, Signal("Pa", "pressure that the pads return", 2e6)]
+    p_pads: Annotated[float, Signal("Pa", "pressure of the pads", 2e6)]
 
 
 class Forces(NamedTuple):
-    """Flows, both >= 0: they solve the same complementarity as forces of contacts."""
+    """Flows, both >= 0; they solve the same complementarity problem as contact forces."""
 
     inward: Annotated[float, Signal("m**3/s", "flow that moves the piston in", 1e-6), Ge(0)]
     outward: Annotated[float, Signal("m**3/s", "flow that moves the piston out", 1e-6), Ge(0)]
@@ -72,19 +72,19 @@ class Overlaps(NamedTuple):
 
 
 class Thresholds(NamedTuple):
-    """Differences of pressure that the friction takes."""
+    """Pressure differences held by the friction."""
 
     inward: Annotated[float, Signal("Pa", "friction over area, inward", 1e5)]
     outward: Annotated[float, Signal("Pa", "friction over area, outward", 1e5)]
 
 
 def exists(par: Parameters) -> bool:
-    """Tell whether there are contacts: only where a piston sticks."""
+    """Return whether there are contacts, which a sticking piston needs."""
     return par.law == "sticking"
 
 
 def thresholds(par: Parameters, caliper: pads.Parameters) -> Thresholds:
-    r"""Return the pressure that the friction takes, :math:`F_{fr}/A`, minus roll-back outward."""
+    r"""Return the pressure held by the friction, :math:`F_{fr}/A`, minus roll-back outward."""
     taken = par.F_fr / caliper.A_pd
     return Thresholds(inward=taken, outward=(1.0 - par.rollback) * taken)
 
@@ -104,12 +104,12 @@ def compliance(pipeline: line.Parameters, fluid: brake_fluid.Parameters) -> Flow
 
 
 def flow(f: Forces) -> Flow:
-    """Return the flow into the caliper, whose piston sticks."""
+    """Return the flow into the caliper with a sticking piston."""
     return f.inward - f.outward
 
 
 def fluid_pressure(u: Input, par: Parameters, caliper: pads.Parameters) -> Pressure:
-    """Return the pressure in the caliper: that of the pads plus that which friction holds."""
+    """Return the pressure in the caliper: that of the pads plus the pressure held by friction."""
     if par.law == "off":
         return u.p_pads
     taken = thresholds(par, caliper)
@@ -119,9 +119,9 @@ def fluid_pressure(u: Input, par: Parameters, caliper: pads.Parameters) -> Press
 def power_loss(
     u: Input, f: Forces, par: Parameters, caliper: pads.Parameters, fluid: brake_fluid.Parameters
 ) -> Power:
-    """Return the heat of the friction, with the compression energy that the fluid gives up, >= 0.
+    """Return the heat of the friction, including released compression energy, >= 0.
 
-    It is the flow's power at the fluid's pressure minus that at the pressure of the pads.
+    It is the power of the flow at the fluid's pressure minus that at the pads' pressure.
     """
     if par.law == "off":
         return 0.0

@@ -17,7 +17,7 @@ Teeth = Annotated[float, Unit("1", 30.0), Field(ge=6, le=500, allow_inf_nan=Fals
 class Parameters(ParameterSet):
     """Rigid and massless; the teeth rub with a friction proportional to their load.
 
-    Several stages are several parts. Inertias belong to the shafts.
+    Each stage is a separate part. Inertias belong to the shafts.
     """
 
     z_sun: Teeth
@@ -25,7 +25,7 @@ class Parameters(ParameterSet):
     z_ring: Teeth
     """teeth of the ring"""
     eta: Fraction
-    """efficiency where the sun drives"""
+    """efficiency when the sun drives"""
 
     @model_validator(mode="after")
     def _planets_fit(self) -> Parameters:
@@ -38,7 +38,7 @@ class Parameters(ParameterSet):
 
 
 class Input(NamedTuple):
-    """Motion of the sun, and the load against it at the carrier."""
+    """Motion of the sun, and the opposing load at the carrier."""
 
     theta: Annotated[float, Signal("rad", "sun angle", 50.0)]
     omega: Annotated[float, Signal("rad/s", "sun speed", 100.0)]
@@ -46,7 +46,7 @@ class Input(NamedTuple):
 
 
 class Output(NamedTuple):
-    """Motion of the carrier, and the load that the sun feels, without friction."""
+    """Motion of the carrier, and load on the sun, without friction."""
 
     theta: Annotated[float, Signal("rad", "carrier angle", 10.0)]
     omega: Annotated[float, Signal("rad/s", "carrier speed", 20.0)]

@@ -1,4 +1,4 @@
-"""Brake circuit whose pressure follows its demand as a loop of second order does."""
+"""Brake circuit whose pressure follows its demand like a second-order system."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from bywire.core.signals import Pressure, Signal
 
 
 class Parameters(ParameterSet):
-    """Substitute for a brake by wire of which only the loop is known."""
+    """Substitute for a brake-by-wire of which only the loop's dynamics are known."""
 
     f_n: Frequency
     """natural frequency of the pressure loop"""
     zeta: Factor
-    """its damping ratio"""
+    """damping ratio of the pressure loop"""
 
 
 FAULTS = (ParameterFault("slow", "a slower loop: weak drive, cold fluid", ("f_n",), 0.3),)

@@ -21,9 +21,9 @@ class Parameters(ParameterSet):
     """Linear between the ends of its range, saturating there; no dynamics."""
 
     p_low: SignedPressure
-    """lowest absolute pressure that it shows"""
+    """lowest absolute pressure of the range"""
     p_high: SignedPressure
-    """highest absolute pressure that it shows"""
+    """highest absolute pressure of the range"""
     place: Literal["master-cylinder", "mid-pipeline"]
     """position; mid-pipeline measures the mean of the pressures at both ends"""
 
@@ -37,7 +37,7 @@ class Parameters(ParameterSet):
 
 
 class Input(NamedTuple):
-    """Absolute pressure that it is put to."""
+    """Absolute pressure at the sensor."""
 
     p: AbsolutePressure
 
@@ -54,8 +54,8 @@ def value(share: Reading, par: Parameters) -> AbsolutePressure:
 
 @row_by_row
 def watch(t: Array, u: Input, par: Parameters) -> list[str]:
-    """Return whether the pressure left the sensor's range, and when first."""
+    """Warn if the pressure leaves the sensor's range, with the first time."""
     span = f"{par.p_low / 1e5:g} to {par.p_high / 1e5:g} bar absolute"
     text = f"the pressure leaves the sensor's range, {span},"
     beyond = outside(u.p, par.p_low, par.p_high)
-    return first(t, beyond, text, ": the measured value stays at its end")
+    return first(t, beyond, text, ": the measured value stays at the end of the range")

@@ -16,11 +16,11 @@ class Parameters(ParameterSet):
     r_p: Length
     """pitch radius of the pinion"""
     eta: Fraction
-    """efficiency where the pinion drives"""
+    """efficiency when the pinion drives"""
 
 
 class Input(NamedTuple):
-    """Motion of the pinion, and the force against it at the rack."""
+    """Motion of the pinion, and the opposing force at the rack."""
 
     theta: Annotated[float, Signal("rad", "pinion angle", 1.0)]
     omega: Annotated[float, Signal("rad/s", "pinion speed", 5.0)]
@@ -28,7 +28,7 @@ class Input(NamedTuple):
 
 
 class Output(NamedTuple):
-    """Travel and speed of the rack, and the torque that the pinion feels, without friction."""
+    """Travel and speed of the rack, and torque on the pinion, without friction."""
 
     x: Annotated[float, Signal("m", "travel of the rack", 0.01)]
     v: Annotated[float, Signal("m/s", "speed of the rack", 0.05)]

@@ -17,10 +17,10 @@ Stroke = Annotated[float, Signal("m", "stroke from the retracted end", 1e-3)]
 class Parameters(ParameterSet):
     """Port between chamber and reservoir.
 
-    With either law the cup seal lets fluid in at once when the pressure would fall below
-    ambient (the model's one-sided limit). ``law = "dead-stroke"`` also opens an orifice while
-    the piston has not yet traveled ``x_port`` from its retracted end; with ``law = "leaking"`` the
-    cup seal lets fluid back at every stroke.
+    With any law, the cup seal admits fluid when the pressure would fall below ambient (the model's
+    one-sided limit). With ``law = "dead-stroke"``, an orifice is also open until the piston has
+    traveled ``x_port`` from its retracted end. With ``law = "leaking"``, the cup seal leaks fluid
+    back at every stroke.
     """
 
     law: Literal["makeup", "dead-stroke", "leaking"]
@@ -71,5 +71,5 @@ def output(u: Input, par: Parameters) -> Output:
 
 
 def power_loss(u: Input, par: Parameters, fluid: brake_fluid.Parameters) -> Power:
-    """Return the power that leaves with the flow into the reservoir, >= 0."""
+    """Return the power lost with the flow into the reservoir, >= 0."""
     return brake_fluid.convected_power(output(u, par).G * u.p, u.p, fluid)

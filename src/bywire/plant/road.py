@@ -1,4 +1,4 @@
-"""Road: surface and slope along the way."""
+"""Road: surface and slope as functions of the position."""
 
 from __future__ import annotations
 
@@ -38,14 +38,14 @@ SURFACES = {
     "snow": Surface(0.1946, 94.129, 0.0646, 39.04, 1.754, 0.19, 0.9312),
     "ice": Surface(0.05, 306.39, 1e-4, 148.1, 1.653, 0.05, 1.0),
 }
-"""values for car tyres as they circulate in open code under the name of M. Burckhardt,
+"""values for car tyres from open code, attributed there to M. Burckhardt,
 Fahrwerktechnik: Radschlupf-Regelsysteme (1993); c3 of ice circulates as 0, which has no peak. The
 Magic Formulas are fitted to these curves: the same peak at the same slip, and of all such those
 with the least squares from no slip to a locked wheel"""
 
 
 class Parameters(ParameterSet):
-    """Two stretches of road, one behind the other, and the first one again behind these."""
+    """Two successive stretches of road, followed by the first one again."""
 
     first: SurfaceParameters
     """surface of the first stretch"""
@@ -54,11 +54,11 @@ class Parameters(ParameterSet):
     grip: Factor
     """factor on the adhesion of every surface"""
     x_change: Distance
-    """where the further surface begins, from where the front wheel is at time zero"""
+    """start of the further surface, from the front wheel's position at time zero"""
     x_back: Distance
-    """where it ends"""
+    """end of the further surface, from the same origin"""
     ramp: Ramp
-    """length over which one surface and slope becomes the other"""
+    """length of the transition between surfaces and slopes"""
     gradient: Gradient
     """rise over run, uphill positive"""
     gradient_further: Gradient
@@ -74,24 +74,24 @@ class Parameters(ParameterSet):
         return self
 
 
-Place = Annotated[float, Signal("m", "place along the road", 30.0)]
+Place = Annotated[float, Signal("m", "position along the road", 30.0)]
 
 
 def share(x: Place, par: Parameters) -> Annotated[float, Signal("1", "share of the further road")]:
-    """Return how much of the further stretch there is at a place, 0 to 1."""
+    """Return the share of the further stretch at a position, 0 to 1."""
     begun = ops.clip((x - par.x_change) / par.ramp, 0.0, 1.0)
     return begun - ops.clip((x - par.x_back) / par.ramp, 0.0, 1.0)
 
 
 def surface(x: Place, par: Parameters) -> Surface:
-    """Return the coefficients of the adhesion at a place."""
+    """Return the coefficients of the adhesion at a position."""
     part, first, further = share(x, par), surface_of(par.first), surface_of(par.further)
     blend = Surface(*(a + part * (b - a) for a, b in zip(first, further, strict=True)))
     return blend._replace(c1=par.grip * blend.c1, c3=par.grip * blend.c3, D=par.grip * blend.D)
 
 
 def slope(x: Place, par: Parameters) -> Slope:
-    """Return the angle of the slope at a place, by its sine and cosine."""
+    """Return sine and cosine of the slope's angle at a position."""
     rise = par.gradient + share(x, par) * (par.gradient_further - par.gradient)
     cosine = 1.0 / ops.sqrt(1.0 + rise * rise)
     return Slope(rise * cosine, cosine)

@@ -1,4 +1,4 @@
-"""Wheel on the road: it turns, and brake and rolling resistance hold it as one dry friction."""
+"""Wheel on the road, with brake and rolling resistance combined in one dry friction."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Roller screw: rotation to travel, and a loss that depends on whether it drives or is driven."""
+"""Roller screw: rotation to travel, with different losses for driving and back-driven motion."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ class Parameters(ParameterSet):
     """Massless screw with friction proportional to its load.
 
     ``law``: ``"load"`` (reading A) makes the loss a friction by the axial force, set-valued at
-    rest; ``"drive"`` (reading B) takes (1 - eta_f) of the motor's torque whatever the direction.
+    rest; ``"drive"`` (reading B) loses (1 - eta_f) of the motor's torque in either direction.
     """
 
     lead: Length
     """travel per revolution"""
     eta_f: Fraction
-    """efficiency where the screw drives the load"""
+    """efficiency when the screw drives the load"""
     eta_b: BackEfficiency
-    """efficiency where the load drives the screw; 2 - 1/eta_f makes the loss independent of it"""
+    """efficiency when the load drives the screw; with 2 - 1/eta_f both losses are equal"""
     law: Literal["load", "drive"]
     """quantity to which the loss is proportional: the axial force or the motor's torque"""
 
@@ -72,8 +72,8 @@ def friction(u: Input, par: Parameters) -> Output:
 
     Notes
     -----
-    The paper states a loss (1 - eta) T_DRIVE that acts as friction. Law "load" follows from it
-    where the speed is steady, needs no algebraic loop and holds at rest.
+    The paper states a loss (1 - eta) T_DRIVE that acts as friction. Law "load" is equivalent at
+    constant speed, needs no algebraic loop, and holds at rest.
 
     References
     ----------

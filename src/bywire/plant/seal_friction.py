@@ -1,4 +1,4 @@
-"""Friction of the master cylinder's seals: Stribeck curve that grows with pressure."""
+"""Friction of the master cylinder's seals: a Stribeck curve that grows with pressure."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from bywire.core.signals import Power, Signal
 class Parameters(ParameterSet):
     """Asymmetric Stribeck friction, torques at the motor shaft.
 
-    Valid for pressures >= 0. At rest the friction is set-valued: it takes any value between
-    its two breakaway torques, and the piston truly sticks.
+    Valid for pressures >= 0. At rest the friction is set-valued: it can have any value between
+    its two breakaway torques, and the piston really sticks.
     """
 
     T_pr: Torque
@@ -43,7 +43,7 @@ class Parameters(ParameterSet):
 FAULTS = (
     ParameterFault(
         "swollen",
-        "more friction, the same multiple everywhere",
+        "more friction, by the same factor in both directions",
         ("T_pr", "f_cfr_p", "f_cfr_n"),
         1.9,
     ),
@@ -71,7 +71,7 @@ def output(u: Input, par: Parameters) -> Output:
         T_{fr} = \pm T_{cf} (1 + (k_{brk} - 1) e^{-c |\Omega|}) + \mu_T \Omega, \quad
         T_{cf} = T_{pr} + f_{cfr} p_{mc}
 
-    with k_brk and f_cfr of the direction. At rest these are the breakaway torques.
+    with k_brk and f_cfr for each direction. At rest these are the breakaway torques.
 
     References
     ----------

@@ -1,4 +1,4 @@
-"""Permanent-magnet servo motor: winding, rotor, cogging, copper and magnets that warm up."""
+"""Permanent-magnet servo motor: winding, rotor, cogging, and effects of temperature."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ DampingLoss = Annotated[
 
 
 class Parameters(ParameterSet):
-    """Averaged over commutation: one winding, one current. No saturation, no iron loss."""
+    """Motor averaged over commutation: one winding, one current, no saturation, no iron loss."""
 
     R_ref: Resistance
     """winding resistance at the reference temperature"""

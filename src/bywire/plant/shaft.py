@@ -1,4 +1,4 @@
-"""Rigid shaft that a motor turns, with viscous damping."""
+"""Rigid motor-driven shaft with viscous damping."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ Loss = Annotated[float, Signal("W", "viscous loss", role=Role("sink", "viscous d
 
 
 class Parameters(ParameterSet):
-    """Inertia and damping of all that turns with the shaft; no elasticity."""
+    """Inertia and damping of all bodies that turn with the shaft; no elasticity."""
 
     J: Inertia
     """inertia"""
@@ -64,7 +64,7 @@ def energy(x: State, par: Parameters) -> Energy:
 
 
 def power_in(x: State, u: Input, par: Parameters) -> Power:
-    """Return the power of all torques but the damping's."""
+    """Return the power of all torques except damping."""
     return (u.torque + u.friction) * x.omega
 
 

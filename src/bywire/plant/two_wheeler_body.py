@@ -1,4 +1,4 @@
-"""Body of a two-wheeler on a straight road: it brakes, leans on its front wheel, and may lift."""
+"""Body of a two-wheeler on a straight road: braking, load transfer, and lift of the rear wheel."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ _LEAST_FACTOR = 1e-9  # below, the load lies at one of its ends
 
 
 class Parameters(ParameterSet):
-    """Rigid body with rider, front contact on the ground.
+    """Rigid body with rider, with the front contact on the ground.
 
-    ``load``: ``"lagged"`` carries load from wheel to wheel as suspensions do, in ``tau_N``;
-    ``"rigid"`` at once.
+    ``load``: ``"lagged"`` transfers load between the wheels with the time constant ``tau_N``, like
+    suspensions; ``"rigid"`` transfers it immediately.
     """
 
     m: BodyMass
@@ -49,7 +49,7 @@ class Parameters(ParameterSet):
     g: Annotated[float, Unit("m/s**2", 9.81), Field(gt=0, allow_inf_nan=False)]
     """gravity"""
     load: Literal["lagged", "rigid"]
-    """how load is carried from wheel to wheel"""
+    """kind of load transfer between the wheels"""
     tau_N: Duration
     """time constant of the load transfer"""
 
@@ -64,7 +64,7 @@ class Parameters(ParameterSet):
 
 
 class State(NamedTuple):
-    """Place and speed of the body, load of the rear wheel, pitch about the front contact."""
+    """Position and speed of the body, load of the rear wheel, pitch about the front contact."""
 
     x: Annotated[float, Signal("m", "distance", 30.0)]
     v: Annotated[float, Signal("m/s", "vehicle speed", 20.0)]
@@ -88,13 +88,13 @@ class Balance(NamedTuple):
 
     x: Annotated[float, Signal("m/s", "vehicle speed", 20.0)]
     v: Annotated[float, Signal("N", "force", 1e3)]
-    N_lag: Annotated[float, Signal("N", "load to come", 1e3)]
+    N_lag: Annotated[float, Signal("N", "steady-state load", 1e3)]
     phi: Annotated[float, Signal("rad/s", "pitch rate", 0.2)]
     phi_rate: Annotated[float, Signal("N*m", "pitching torque", 500.0)]
 
 
 class Input(NamedTuple):
-    """Braking forces of both tyres together, slope, and the ground's force on the rear wheel."""
+    """Sum of both tyres' braking forces, slope, and the ground's force on the rear wheel."""
 
     F: Annotated[float, Signal("N", "braking force of both tyres", 1e3)]
     sine: Sine
@@ -110,7 +110,7 @@ class Loads(NamedTuple):
 
 
 class Place(NamedTuple):
-    """The center of gravity over the front contact."""
+    """Position of the center of gravity relative to the front contact."""
 
     l_f: Annotated[float, Signal("m", "distance behind the front contact", 0.7)]
     h: Annotated[float, Signal("m", "height", 0.6)]
@@ -122,7 +122,7 @@ def drag(x: State, par: Parameters) -> Annotated[float, Signal("N", "air drag", 
 
 
 def center(x: State, par: Parameters) -> Place:
-    """Return where the center of gravity is at a pitch."""
+    """Return the position of the center of gravity at a pitch."""
     sine, cosine = ops.sin(x.phi), ops.cos(x.phi)
     return Place(par.l_f * cosine - par.h * sine, par.h * cosine + par.l_f * sine)
 
@@ -155,16 +155,16 @@ def rigid_rear_load(
     cosine: Cosine,
     par: Parameters,
 ) -> Annotated[float, Signal("N", "load of the rear wheel", 1e3)]:
-    r"""Return `rear_load` where the braking forces follow the loads at once.
+    r"""Return `rear_load` for braking forces that follow the loads immediately.
 
     .. math::
         N_r \left(1 + (\mu_r - \mu_f) h/L\right)
             = (m g \cos\gamma\, (l_f - \mu_f h) - F_d (h - h_a))/L
 
-    Load on the rear wheel is missing on the front one, whose force then pitches less. Where the
-    factor on the left is not positive, no load between the ends is stable: a rear wheel that sinks
-    a little sinks further. It then carries no load where the right-hand side is negative, and the
-    whole weight where that is positive.
+    Load on the rear wheel reduces that of the front wheel, whose force then pitches less. If the
+    factor on the left is not positive, no load between the limits is stable: a rear wheel that
+    sinks slightly sinks further. It then carries no load if the right-hand side is negative, and
+    the whole weight if that is positive.
     """
     carried = mu_f * par.m * par.g * cosine * par.h + F_d * (par.h - par.h_a)
     left = static_load(cosine, par) - carried / par.L
@@ -177,7 +177,7 @@ def carried_load(
     cosine: Cosine,
     par: Parameters,
 ) -> Annotated[float, Signal("N", "load of the rear wheel", 1e3)]:
-    """Return a load of the rear wheel with which neither wheel pulls on the road."""
+    """Return a load of the rear wheel, limited so that neither wheel pulls on the road."""
     return ops.clip(N_r, 0.0, par.m * par.g * cosine)
 
 
@@ -186,7 +186,7 @@ def loads(
     cosine: Cosine,
     par: Parameters,
 ) -> Loads:
-    """Return the loads of both wheels, which carry the weight together."""
+    """Return the loads of both wheels, whose sum is the weight."""
     return Loads(front=par.m * par.g * cosine - N_r, rear=N_r)
 
 
@@ -233,7 +233,7 @@ def power_in(x: State, u: Input, par: Parameters) -> Power:
 
 
 def pitch_power(x: State, u: Input, par: Parameters) -> Power:
-    """Return the power of the forces' torque about the front contact, without the ground's."""
+    """Return the power of the torque about the front contact, without the ground's force."""
     at = center(x, par)
     torque = u.F * at.h + drag(x, par) * (par.h - par.h_a)
     flat = par.m * par.g * (1.0 - u.cosine) * at.l_f
@@ -247,10 +247,10 @@ def power_loss(x: State, par: Parameters) -> Drag:
 
 @row_by_row
 def watch(t: Array, x: State, par: Parameters) -> list[str]:
-    r"""Return whether the body falls over its front wheel.
+    r"""Warn if the body falls over its front wheel.
 
-    At the pitch :math:`\arctan(l_f/h)` the center of gravity is above the front contact. Beyond,
-    gravity pitches the body further, whatever the brakes do.
+    At the pitch :math:`\arctan(l_f/h)` the center of gravity is above the front contact. Beyond
+    it, gravity pitches the body further, regardless of the brakes.
     """
     limit = _DEGREES * ops.arctan(par.l_f / par.h)
     pitch = _DEGREES * x.phi

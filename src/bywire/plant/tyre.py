@@ -1,4 +1,4 @@
-"""Tyre, lengthwise: a deflection that relaxes as it rolls, and slides where adhesion ends."""
+"""Longitudinal tyre: a deflection that relaxes while rolling, and slides at the adhesion limit."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ Slip = Annotated[float, Signal("1", "slip", 0.1)]
 
 
 class Parameters(adhesion.Parameters):
-    """Carcass and tread together, as one deflection; its adhesion's numbers are the surface's."""
+    """Carcass and tread as one deflection; the surface determines the adhesion."""
 
     sigma: Length
     """relaxation length"""
     c_t: Annotated[float, Unit("s/m", 1.0), Field(ge=0, allow_inf_nan=False)]
-    """damping over load of the tyre that sticks, near standstill"""
+    """damping of the sticking tyre near standstill, relative to load"""
     v_low: Annotated[float, Unit("m/s", 2.0), Field(gt=0, allow_inf_nan=False)]
-    """speed above which that damping is gone"""
+    """speed above which the damping c_t is zero"""
     tau_slide: Duration
-    """time in which a sliding tyre gives up the deflection that it cannot hold"""
+    """time constant with which a sliding tyre loses the deflection beyond its limit"""
 
 
 class State(NamedTuple):
@@ -82,7 +82,7 @@ class Output(NamedTuple):
 def braking_slip(u: Contact, par: Parameters) -> Slip:
     """Return the slip, relative to the faster of vehicle and tread; 0 at standstill.
 
-    1 for a wheel that stands below a moving vehicle; never beyond -1 and 1.
+    It is 1 for a locked wheel of a moving vehicle, and always between -1 and 1.
     """
     faster = ops.fmax(ops.fabs(u.v), ops.fabs(u.v_wheel))
     slip = (u.v - u.v_wheel) / ops.where(faster > 0, faster, par.v_low)
@@ -92,7 +92,7 @@ def braking_slip(u: Contact, par: Parameters) -> Slip:
 def limits(u: Contact, par: Parameters) -> Limits:
     """Return the limits of the force: the peak up to its slip, the curve beyond.
 
-    The deflection is that which the rising branch of the curve needs for the adhesion.
+    The deflection is that of the rising branch of the curve for the adhesion.
     """
     mu, slip = adhesion.held(ops.fabs(braking_slip(u, par)), _ground(u), par)
     return Limits(mu, par.sigma * slip)
@@ -105,7 +105,7 @@ def _ground(u: Contact | Input) -> adhesion.Surface:
 def rate(x: State, u: Input, par: Parameters) -> Annotated[float, Signal("m/s", "rate", 0.5)]:
     r"""Return the rate of the deflection, :math:`\dot u = v - \omega r - |v| u/\sigma`.
 
-    It is pulled back to the limit where it slides.
+    While the tyre slides, the deflection returns to its limit.
     """
     beyond = x.u - ops.clip(x.u, -u.u_max, u.u_max)
     return u.v - u.v_wheel - ops.fabs(u.v) * x.u / par.sigma - beyond / par.tau_slide
@@ -119,12 +119,12 @@ def sliding(x: State, u: Input) -> Annotated[float, Signal("1", "tyre slides")]:
 def force_over_load(
     x: State, u: Input, par: Parameters
 ) -> Annotated[float, Signal("1", "braking force over load", 1.0)]:
-    """Return the force over the load: of the deflection up to the limit, damped near standstill.
+    """Return the force over the load: that of the limited deflection, damped near standstill.
 
     Damping does not raise the limit of the force.
     """
     slides = sliding(x, u)
-    # A magnitude would have no slope at zero, where a free wheel rolls.
+    # An absolute value would have no slope at zero, where a free wheel rolls.
     bent = ops.where(x.u < 0, -x.u, x.u)
     held = adhesion.adhesion(bent / par.sigma, _ground(u), par)
     size = ops.where(slides > 0, u.mu_max, ops.fmin(held, u.mu_max))
@@ -141,5 +141,5 @@ def output(x: State, u: Input, par: Parameters) -> Output:
 
 
 def work(x: State, u: Input, par: Parameters) -> Power:
-    """Return the power that the tyre takes: sliding, damping, and deflection that comes back."""
+    """Return the power into the tyre: sliding, damping, and recoverable deflection."""
     return output(x, u, par).F * (u.v - u.v_wheel)

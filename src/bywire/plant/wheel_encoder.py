@@ -1,4 +1,4 @@
-"""Pulse wheel on a road wheel, and the capture unit that stamps its edges with their time."""
+"""Pulse wheel on a road wheel, and the capture unit that time-stamps its edges."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ class Parameters(ParameterSet):
     """
 
     law: Literal["ideal", "pulses"]
-    """whether the angle is known between the edges"""
+    """whether the sensor measures edges only, or the angle at any time"""
     pulses: Annotated[float, Unit("1", 48.0), Field(ge=1, allow_inf_nan=False)]
     """pulses per revolution"""
     omega_min: Annotated[float, Unit("rad/s", 0.1), Field(gt=0, allow_inf_nan=False)]
-    """slowest speed whose edges are stamped right"""
+    """lowest speed at which time stamps of edges are correct"""
 
 
 class State(NamedTuple):
@@ -49,12 +49,12 @@ class Reading(NamedTuple):
 
 
 def rate(u: Input) -> WheelSpeed:
-    """Return how fast the angle grows."""
+    """Return the rate of the angle."""
     return u.omega
 
 
 def reading(x: State, u: Input, par: Parameters) -> Reading:
-    """Return the angle of the last edge and how long ago it was; of an ideal angle, just now."""
+    """Return the angle of the last edge and the time since; for an ideal angle, zero time."""
     if par.law == "ideal":
         return Reading(x.theta, 0.0)
     step = 2.0 * math.pi / par.pulses

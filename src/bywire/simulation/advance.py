@@ -1,4 +1,4 @@
-"""A run carried forward: chunk by chunk, and through changes of its parameters."""
+"""Advance of a run: chunk by chunk, and through changes of its parameters."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from bywire.simulation.schedule import Layout, Schedule
 Progress = Callable[[float], None]
 
 _CHUNK_SECONDS = 0.1
-_PART = 8.0  # ordinary substeps that a part of one takes about as long as
+_PART = 8.0  # ordinary substeps that take about as long as a part of a cut one
 
 
 def advance_all(
@@ -41,25 +41,25 @@ def advance_all(
     Parameters
     ----------
     engine, request
-        What computes, and what of.
+        Engine and its request.
     vector
-        State vector of the engine, renewed in place; where an interrupt ends the run it holds
-        the state after the frames that are done.
+        State vector of the engine, updated in place; after an interrupt it contains the state
+        after the finished frames.
     values
         Recorded rows from the first frame on, filled in place, shape (rows, signals).
     progress
         Called with the finished share, 0 to 1, after every chunk.
     begin, last
-        First frame, and the one at which to end; the run's by default.
+        First frame and end frame; those of the run by default.
     most
-        Work after which to fail; see `work_of`.
+        Work limit of the run; see `work_of`.
 
     Raises
     ------
     SolverError
-        When the trajectory leaves the numbers.
+        When a value of the trajectory is infinite or NaN.
     WorkLimitError
-        When it takes more work than it may.
+        When the run exceeds its work limit.
     """
     schedule = request.schedule
     first = -(-begin // schedule.record_frames)
@@ -76,7 +76,7 @@ def advance_all(
             vector[:] = saved
             return begin
         require_finite(
-            engine.layout, vector, f"the run left the numbers before t = {end * schedule.frame:g} s"
+            engine.layout, vector, f"the run diverged before t = {end * schedule.frame:g} s"
         )
         begin = end
         require_work(work_of(schedule, engine.layout, begin, vector), most)
@@ -93,16 +93,16 @@ def advance_all(
 
 
 def work_of(schedule: Schedule, layout: Layout, frames: int, vector: Array) -> Any:
-    """Return the work that runs took up to a frame, in ordinary substeps, of each of them.
+    """Return the work of each run up to a frame, in ordinary substeps.
 
-    Parts of substeps that are tried are computed alone, without what ordinary ones have in common.
+    Parts of cut substeps cost more, as they share no operations with ordinary substeps.
     """
     tries = vector[layout.start["counters"] + 2]
     return frames * schedule.substeps + _PART * tries
 
 
 def require_work(work: Any, most: Any) -> None:
-    """Raise ``WorkLimitError`` where runs took more work than they may."""
+    """Raise ``WorkLimitError`` if a run exceeds its work limit."""
     if np.any(work > most):
         raise WorkLimitError(
             f"the run takes more work than {np.min(most):.3g} substeps: contacts or frictions "
@@ -113,9 +113,9 @@ def require_work(work: Any, most: Any) -> None:
 
 
 def require_finite(layout: Layout, vector: Array, what: str) -> None:
-    """Raise ``SolverError`` unless all that a run, or several, carry on are numbers.
+    """Raise ``SolverError`` if a carried value of one or several runs is infinite or NaN.
 
-    Not the states alone: a friction whose force is no number would pass for one that sticks.
+    Checking the states alone is not enough: a friction whose force is NaN would seem to stick.
     """
     if not np.all(np.isfinite(vector[: layout.start["counters"]])):
         raise SolverError(
@@ -123,10 +123,10 @@ def require_finite(layout: Layout, vector: Array, what: str) -> None:
         )
 
 
-# --- Changes: between two frames, all states and memories kept
-# Where such a parameter belongs to a store of energy, the change does work. It is recorded, so
+# --- Changes: between two frames, with all states and memories kept
+# If such a parameter belongs to an energy store, the change does work. This work is recorded, so
 # that it is part of the energy balance, not of its closing error. A contact's loss is its work
-# minus its stored energy, and so includes the work of a change there.
+# minus its stored energy, and therefore includes the work of a change there.
 
 _PUT_IN = "E_change"
 _TOLERANCE = 1e-9
@@ -139,11 +139,11 @@ class Change:
     Parameters
     ----------
     time
-        Since the start of the run [s]; rounded up to a frame, which every tick and every recorded
-        row begins.
+        Time since the start of the run [s], rounded up to a frame. Every tick and every recorded
+        row begins a frame.
     par
-        All parameters from then on. Choices may differ where the model's states, its memory and
-        the sample times stay what they are.
+        All parameters from then on. Choices may differ if they leave the model's states, its
+        memory and the sample times unchanged.
     """
 
     time: float
@@ -158,9 +158,9 @@ def frame_of(change: Change, schedule: Schedule) -> int:
 def pieces(
     par: ParameterSet, changes: Sequence[Change], schedule: Schedule
 ) -> Iterator[tuple[int, int, ParameterSet]]:
-    """Yield the stretches of a run with equal parameters: first frame, end, and these.
+    """Yield the stretches of a run with equal parameters: first frame, end frame, parameters.
 
-    ``par``: what holds at the start.
+    ``par``: parameters at the start.
     """
     begin = 0
     for change in changes:
@@ -174,12 +174,12 @@ def pieces(
 
 
 def require_unchanged(changes: Sequence[Change], what: str) -> None:
-    """Reject changes of a run where they would be ignored.
+    """Reject changes of a run for results that would ignore them.
 
     Raises
     ------
     ParameterError
-        When there are any; ``what``: results that cannot be computed.
+        When the run has changes; ``what``: results that cannot be computed.
     """
     if changes:
         raise ParameterError(
@@ -191,9 +191,9 @@ def require_unchanged(changes: Sequence[Change], what: str) -> None:
 
 @cache
 def put_in_signals(output: type) -> Mapping[str, Signal]:
-    """Return the signals of the work of changes, one for each energy balance of an Output.
+    """Return the signals for the work of changes, one for each energy balance of an Output.
 
-    That of the first balance, the actuator's own if there is one, has the plain name.
+    The signal of the first balance, the actuator's own if there is one, has the plain name.
     """
     books = dict.fromkeys(_books(output).values())
     first = "" if "" in books else next(iter(books), "")
@@ -208,10 +208,10 @@ def put_in_signals(output: type) -> Mapping[str, Signal]:
 
 
 def energies(output: type, names: Sequence[str]) -> Array:
-    """Return which of some outputs are energies, and of which energy balance.
+    """Return which outputs are stored energies, and of which energy balance.
 
-    Integrals do not jump, stores do. Shape (books, outputs), 1 where an output is one of the
-    book's, in the order of `put_in_signals`.
+    Integrals do not jump at changes, stored energies do. Shape (balances, outputs), 1 if an output
+    belongs to the balance, in the order of `put_in_signals`.
     """
     books = _books(output)
     signals = put_in_signals(output).values()
@@ -229,7 +229,7 @@ def energy_of(engine: Engine, request: Request, vector: Array, books: Array) -> 
 
     ``books``: `energies` of all outputs.
     """
-    end = request.schedule.frames  # a stretch without frames: the row at its end alone
+    end = request.schedule.frames  # a stretch without frames: only the row at its end
     row = np.empty((1, books.shape[1]))
     asked = replace(request, selection=np.arange(books.shape[1], dtype=np.int32))
     engine.advance(asked, vector.copy(), end, end, row)

@@ -1,8 +1,8 @@
-"""Work that a kernel saves: values that change with a mode alone, branches not taken, ramps.
+"""Savings in a kernel: values that depend on a mode only, branches not taken, ramps.
 
-A mode is a handful of truth values. What depends on them and on parameters, such as the matrix of a
-substep, its pivots and their reciprocals, is computed when one of them changes: a few hundred times
-in a run of many thousand substeps.
+A mode is a set of a few truth values. Some values depend on these and on parameters only, such as
+the matrix of a substep, its pivots and their reciprocals. The kernel recomputes them when a truth
+value changes: a few hundred times in a run of many thousand substeps.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from bywire.simulation.quadrature import Levels
 
 _COMPARISONS = frozenset({"lt", "le", "eq", "ne"})
 _TRUTHS = _COMPARISONS | {"and", "or", "not"}
-_FREE = _TRUTHS | {"if_else_zero", "select", "neg"}  # as cheap as what finds out about a change
+_FREE = _TRUTHS | {"if_else_zero", "select", "neg"}  # about the cost of detecting a change
 _COST = {"inv": 8.0, "sqrt": 8.0, "exp": 40.0, "sin": 40.0, "cos": 40.0, "log": 40.0, "pow": 60.0}
 _WORTH_ATOM, _WORTH_MODE = 4.0, 0.15
 
@@ -28,11 +28,11 @@ class Modes:
     Parameters
     ----------
     first
-        Nodes from which the truth values follow, in order.
+        Nodes that determine the truth values, in order.
     atoms
-        The truth values; empty where a mode does not pay.
+        The truth values; empty if a mode does not pay.
     values
-        Nodes to renew when one of them changes, in order; no truth values.
+        Nodes to recompute when one of them changes, in order; no truth values.
     rest
         All other nodes, in order.
     """
@@ -43,7 +43,7 @@ class Modes:
     rest: list[Node]
 
     def without(self, known: Collection[Node]) -> Modes:
-        """Return the parts without nodes that are known already."""
+        """Return the parts without nodes that are already computed."""
         return Modes(
             *(
                 [n for n in each if n not in known]
@@ -87,16 +87,16 @@ def _is_truth(graph: Graph, node: Node) -> bool:
 
 
 def cost(graph: Graph, node: Node) -> float:
-    """Return about how long an operation takes, a product being 1."""
+    """Return the approximate cost of an operation, relative to a product."""
     return _COST.get(graph.nodes[node].op, 1.0)
 
 
 def _classified(
     graph: Graph, order: Sequence[Node], level: Levels, refused: Collection[Node]
 ) -> dict[Node, frozenset[Node]]:
-    """Return every node that a mode decides, and the truth values that it follows from."""
+    """Return every node that a mode determines, with the truth values that determine it."""
     deciding: dict[Node, frozenset[Node]] = {}
-    late: set[Node] = set()  # follows from such a node, but not from it alone
+    late: set[Node] = set()  # depends on such a node, but not only on it
     for node in order:
         changing = [a for a in graph.arguments(node) if level[a] > 0]
         if all(a in deciding for a in changing):
@@ -111,7 +111,7 @@ def _classified(
 def _poor_atoms(
     graph: Graph, order: Sequence[Node], deciding: dict[Node, frozenset[Node]]
 ) -> set[Node]:
-    """Return truth values from which too little follows."""
+    """Return truth values that determine too little to pay."""
     worth: dict[Node, float] = {}
     for node in order:
         price = 0.0 if graph.nodes[node].op in _FREE else cost(graph, node)
@@ -121,12 +121,12 @@ def _poor_atoms(
 
 
 # --- Branches and ramps
-# A selection computes both arms. Where only one of them needs costly functions, such as the curve
-# of a tyre that slides, the processor skips them while the other arm holds. Selections by one
-# condition share what their arms need together: the first computes it, the others take it over.
-# The values are the same.
+# A selection computes both arms. If only one arm needs costly functions, such as the curve of a
+# sliding tyre, the processor skips them while the other arm is selected. Selections with the same
+# condition share common nodes of their arms: the first selection computes them for all others.
+# The values do not change.
 
-_WORTH = 45.0  # of operations: a costly function and a little of what leads to it
+_WORTH = 45.0  # cost of operations: a costly function and a few before it
 _SELECTIONS = ("if_else_zero", "select")
 
 
@@ -139,7 +139,7 @@ class Arm:
     nodes
         Nodes computed in it, in order.
     kept
-        Those of them that a later selection by the same condition takes over.
+        Those of them that a later selection with the same condition takes over.
     taken
         Nodes taken over from earlier arms.
     """
@@ -155,7 +155,7 @@ Arms = tuple[Arm, Arm]
 def branched(
     graph: Graph, order: Sequence[Node], kept: Collection[Node]
 ) -> tuple[list[Node], dict[Node, Arms]]:
-    """Remove from an order the nodes that only arms of its selections need.
+    """Remove the nodes that only arms of selections need from an order of operations.
 
     Parameters
     ----------
@@ -164,12 +164,12 @@ def branched(
     order
         Operations, arguments first.
     kept
-        Those that are read from outside as well.
+        Those that are also read from outside.
 
     Returns
     -------
     tuple
-        The order without them; and by selection, what its two arms need.
+        The order without them, and the needs of both arms by selection.
     """
     users: dict[Node, list[Node]] = {}
     for node in order:
@@ -192,7 +192,7 @@ def branched(
         ]
         if len(alike) > 1 and (together := _together(graph, order, alike, users, fixed)):
             arms.update(together)
-            fixed.update(together)  # they stay where the first of them computes for all
+            fixed.update(together)  # they stay where the first selection computes them for all
             inside.update(n for each in together.values() for arm in each for n in arm.nodes)
             continue
         cones = [_cone(graph, (node,), place, users, fixed) for place in (1, 2)]
@@ -211,7 +211,7 @@ def _together(
     users: Mapping[Node, Sequence[Node]],
     kept: Collection[Node],
 ) -> dict[Node, Arms]:
-    """Return the arms of selections by one condition; none where they share nothing costly."""
+    """Return the arms of selections with one condition; none if they need nothing costly."""
     pinned = {*kept, *selections}
     cones, pays = [], False
     for place in (1, 2):
@@ -250,7 +250,7 @@ def _arm(graph: Graph, selection: Node, place: int) -> Node | None:
 
 
 def _needs(graph: Graph, end: Node | None, cone: Collection[Node]) -> set[Node]:
-    """Return the nodes of a cone that a value needs."""
+    """Return the nodes of a cone on which a value depends."""
     needs: set[Node] = set()
     stack = [] if end is None else [end]
     while stack:
@@ -264,7 +264,7 @@ def _needs(graph: Graph, end: Node | None, cone: Collection[Node]) -> set[Node]:
 def _read(
     graph: Graph, selection: Node, place: int, computed: Collection[Node], cone: Collection[Node]
 ) -> set[Node]:
-    """Return what of a cone the text of an arm names: truth values name what they compare."""
+    """Return the nodes of a cone that an arm's text names; truth values name their operands."""
     end = _arm(graph, selection, place)
     stack = [a for node in computed for a in graph.arguments(node)]
     stack += [] if end is None else [end]
@@ -279,7 +279,7 @@ def _read(
 
 
 def worth(graph: Graph, cone: Collection[Node]) -> bool:
-    """Return whether nodes cost more than the test of whether they are needed."""
+    """Return whether nodes cost more than testing whether they are needed."""
     if not any(graph.nodes[node].op in COSTLY for node in cone):
         return False
     return sum(cost(graph, node) for node in cone) > _WORTH
@@ -301,7 +301,7 @@ def _cone(
     cone: set[Node] = set()
     candidates = set(ends)
     while candidates:
-        node = max(candidates)  # arguments have lower numbers than who reads them
+        node = max(candidates)  # arguments have lower numbers than the nodes that read them
         candidates.discard(node)
         readers = set(users.get(node, ())) - ends.get(node, set())
         if node in kept or not graph.arguments(node) or not readers <= cone:
@@ -314,7 +314,7 @@ def _cone(
 def branch(
     graph: Graph, node: Node, arms: Arms, lines: tuple[Sequence[str], Sequence[str]], name: Namer
 ) -> list[str]:
-    """Return the statements of a selection whose arms need statements of their own: ``lines``."""
+    """Return the statements of a selection whose arms have statements, ``lines``."""
     truth, value, *other = graph.nodes[node].args
     ends = (as_number(graph, value, name), as_number(graph, other[0], name) if other else "0.0")
     texts = []
@@ -329,11 +329,11 @@ def branch(
     return [*declared, f"if ({test}) {{", *texts[0], "} else {", *texts[1], "}"]
 
 
-# --- Values that follow from ramps alone are kept while the ramps are constant
+# --- Values that depend only on ramps are kept while the ramps are constant
 # A ramp is a linear function of states between two limits, such as the share of a road's second
-# surface over the place. All but a short while it stands at a limit, and what follows from it and
-# from parameters, a peak of adhesion with its logarithm for one, need not be computed again. The
-# values are the same.
+# surface over the place. It is at a limit nearly all the time. Values that depend only on it and on
+# parameters, such as a peak of adhesion with its logarithm, then need not be recomputed. The
+# values do not change.
 
 _LINEAR = ("add", "sub", "neg", "mul")
 _OPPOSITE = {"fmin": "fmax", "fmax": "fmin"}
@@ -341,14 +341,14 @@ _OPPOSITE = {"fmin": "fmax", "fmax": "fmin"}
 
 @dataclass(frozen=True)
 class Remembered:
-    """Values that follow from the same ramps.
+    """Values that depend on the same ramps.
 
     Parameters
     ----------
     ramps
-        What they follow from.
+        The ramps.
     values
-        Nodes to renew where one of these moves, in order.
+        Nodes to recompute when a ramp moves, in order.
     read
         Those of them that are read elsewhere.
     """
@@ -365,7 +365,7 @@ def remembered(
     states: Collection[Node],
     level: Levels,
 ) -> tuple[list[Node], tuple[Remembered, ...], list[Node]]:
-    """Split a substep: values worth remembering, their inputs, and the rest.
+    """Split a substep into values worth keeping, their inputs, and the rest.
 
     Parameters
     ----------
@@ -374,16 +374,16 @@ def remembered(
     order
         Operations of a substep, arguments first.
     kept
-        Those that are read from outside as well.
+        Those that are also read from outside.
     states
-        Nodes that are there already, and linear in states.
+        Nodes that already exist and are linear in states.
     level
         How often each node changes, see ``stages.LEVEL``.
 
     Returns
     -------
     tuple
-        Operations to compute first, in order; groups to be renewed then, in order; and the others.
+        Operations to compute first, in order; then groups to update, in order; and the others.
     """
     follows: dict[Node, frozenset[Node]] = {}
     linear = set(states)
@@ -400,7 +400,7 @@ def remembered(
     for node, ramps in follows.items():
         if node not in ramps:
             groups.setdefault(ramps, []).append(node)
-    # Those of fewer ramps first: the others may follow from them.
+    # Groups with fewer ramps first: others may depend on them.
     chosen = [(r, groups[r]) for r in sorted(groups, key=len) if worth(graph, groups[r])]
     inside = {node for _, nodes in chosen for node in nodes}
     leading = {r for ramps, _ in chosen for r in ramps}
@@ -426,7 +426,7 @@ def _is_linear(
 
 
 def _is_ramp(graph: Graph, node: Node, linear: Collection[Node], level: Levels) -> bool:
-    """Return whether a node is a linear one between two limits."""
+    """Return whether a node is a linear function clipped to two limits."""
     opposite = _OPPOSITE.get(graph.nodes[node].op)
     if opposite is None:
         return False
@@ -443,7 +443,7 @@ def _is_ramp(graph: Graph, node: Node, linear: Collection[Node], level: Levels) 
 def _read_outside(
     graph: Graph, nodes: Sequence[Node], order: Collection[Node], kept: Collection[Node]
 ) -> tuple[Node, ...]:
-    """Return those that are read outside: directly, or by truth values written where they are."""
+    """Return the nodes that are read outside, directly or by truth values written inline."""
     inside = frozenset(nodes)
     outside = set(kept)
     for node in order:
@@ -459,7 +459,7 @@ def _read_outside(
 
 
 def declarations(groups: Sequence[Remembered], name: Namer) -> list[str]:
-    """Return the declarations of remembered values, unknown at first."""
+    """Return the declarations of kept values, which are undefined at first."""
     lines = []
     for k, group in enumerate(groups):
         lines.append(f"uint64_t known{k} = 0;")
@@ -471,7 +471,7 @@ def declarations(groups: Sequence[Remembered], name: Namer) -> list[str]:
 def renewal(
     graph: Graph, k: int, group: Remembered, computed: Sequence[str], name: Namer
 ) -> list[str]:
-    """Return the statements that renew a group where one of its ramps moved."""
+    """Return the statements that recompute a group when one of its ramps has moved."""
     same = " & ".join(f"({as_number(graph, n, name)} == at{n})" for n in group.ramps)
     return [
         f"if (__builtin_expect(!(known{k} & {same}), 0)) {{",

@@ -1,6 +1,6 @@
 """C text that kernels start with: elementary functions for one lane and for vectors of lanes.
 
-Both come from one text, so that a case has the same digits alone and in lanes, on every machine.
+Both use the same source, so that a case has the same digits alone and in lanes, on every machine.
 """
 
 from __future__ import annotations
@@ -161,11 +161,11 @@ static inline V each(double (*f)(double), V a) {
 #define CEIL(a) each(ceil, a)
 """
 
-# exp: x = k ln2 + r, |r| <= ln2/2, a polynomial to r^11 (error below 2 ulp), each part of which is
-# scaled by the exponent bits: a run waits for this function, and the scale is ready before the
-# polynomial. The rounding constant 1.5 * 2^52 leaves k in the low bits of the sum.
+# exp: x = k ln2 + r, |r| <= ln2/2, a polynomial to r^11 (error below 2 ulp). Each part of it is
+# scaled by the exponent bits: this function is on the critical path, and the scale is ready before
+# the polynomial. The rounding constant 1.5 * 2^52 leaves k in the low bits of the sum.
 # sin, cos: Cody-Waite reduction by multiples of pi/2 in three parts, good to |x| = 1e5; Taylor
-# on |r| <= pi/4 to r^16. What is beyond, and powers and logarithms next to zero, are the library's.
+# on |r| <= pi/4 to r^16. Larger arguments, and powers and logarithms near zero, use the library.
 _FUNCTIONS = r"""
 static IN_PLACE V N(exp_within)(V x) {
   const V t = x * 1.4426950408889634 + MAGIC;
@@ -238,7 +238,7 @@ static FUNCTION V N(pow)(V a, V b) {
 }
 """
 
-# One lane: functions of the kernel's own, too.
+# One lane: also with the kernel's own functions.
 ONE_LANE = (
     r"""
 #define MAGIC 6755399441055744.0
@@ -334,8 +334,7 @@ static inline V EXP_DECAYED(B c, V x) {
 """
 )
 
-# What NVRTC, which compiles C++ without headers, is to know before it reads a kernel: it has the
-# mathematical functions built in.
+# Declarations for NVRTC, which compiles C++ without headers; mathematical functions are built in.
 CUDA = r"""
 typedef int int32_t;
 typedef long long int64_t;

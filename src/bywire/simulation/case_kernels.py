@@ -1,6 +1,7 @@
-"""Kernels of many cases: in the lanes of the processor's vectors, or in threads of a graphics one.
+"""Kernels for many cases: lanes of the processor's vectors, or threads of a graphics processor.
 
-An engine's name says which; both are called alike, with as many cases as they take at a time.
+The engine's name selects the kind. Both have the same interface and compute a group of cases at a
+time.
 """
 
 from __future__ import annotations
@@ -24,18 +25,18 @@ if TYPE_CHECKING:
     from bywire.simulation.program import Program
 
 PAIRED = 32
-"""cases from which on kernels may carry on two vectors in turn: with fewer, lanes would be idle"""
+"""least number of cases for kernels that alternate two vectors: with fewer, lanes would be idle"""
 
 
 class CaseKernel(Protocol):
-    """What computes many cases, so many at a time.
+    """Kernel for many cases, a group at a time.
 
     Parameters
     ----------
     lanes
-        How many.
+        Number of cases in a group.
     at_once
-        By how many threads it is best called.
+        Best number of threads that call it.
     """
 
     layout: Layout
@@ -65,12 +66,12 @@ class CaseKernel(Protocol):
 class LaneKernel:
     """Compiled kernel for a group of cases and a selection of signals.
 
-    ``signals``: how many outputs it records; ``ends``: how many of them, the last ones, at both
-    ends of the rows alone.
+    ``signals``: number of recorded outputs; ``ends``: number of those, the last ones, that are
+    recorded in the first and last rows only.
     """
 
     ENTRY = "bw_run_lanes"
-    """its function in the library"""
+    """name of its function in the library"""
 
     def __init__(
         self, layout: Layout, library: Path, compiler: Compiler, signals: int, ends: int = 0
@@ -92,9 +93,9 @@ class LaneKernel:
         in_pairs: bool,
         ends: int = 0,
     ) -> LaneKernel:
-        """Emit the kernel of a program, and compile it unless the cache has it.
+        """Emit the kernel of a program, and compile it unless it is in the cache.
 
-        ``in_pairs``: whether there are cases enough for two vectors, should they pay; ``ends``: see
+        ``in_pairs``: whether there are enough cases for two vectors, if these pay; ``ends``: see
         `LaneKernel`.
         """
         from bywire.simulation.emit_lanes import emit_lanes, takes_turns
@@ -107,7 +108,7 @@ class LaneKernel:
         return cls(layout_of(stages), library, compiler, len(selection), ends)
 
     def rows(self, cases: int, rows: int) -> Array:
-        """Return room for what cases record; see `CaseKernel`."""
+        """Return an array for the recorded rows; see `CaseKernel`."""
         return np.empty((cases, rows, self._signals))
 
     def advance(
@@ -121,7 +122,7 @@ class LaneKernel:
         begin: int = 0,
         ends: Ends | None = None,
     ) -> None:
-        """Run frames begin..end of one group; renews ``vector`` and fills ``rows``.
+        """Run frames begin..end of one group: update ``vector`` and fill ``rows``.
 
         Parameters
         ----------
@@ -135,8 +136,8 @@ class LaneKernel:
             Shape (cases, recorded rows of these frames, signals), of any strides; lanes beyond
             the cases are not recorded.
         ends
-            Where the signals recorded at both ends alone go; None of a kernel without any, and
-            where no row is an end.
+            Destination of the signals of the first and last rows; None for a kernel without such
+            signals, and if no row is an end.
         """
         own = stimulus.ndim == 3
         apart = [stride // rows.itemsize for stride in rows.strides]
@@ -161,7 +162,7 @@ class LaneKernel:
 
 
 def is_side_by_side(engine: str) -> bool:
-    """Return whether an engine computes many cases side by side here.
+    """Return whether an engine computes many cases side by side on this machine.
 
     Raises
     ------
@@ -181,7 +182,7 @@ def case_kernel(
     schedule: Schedule,
     ends: int = 0,
 ) -> CaseKernel:
-    """Return the kernel of so many cases that records some outputs, by index.
+    """Return the kernel for a number of cases that records some outputs, by index.
 
     ``ends``: see `LaneKernel`; a graphics processor has none.
 
@@ -218,7 +219,8 @@ def lane_kernel(
 ) -> LaneKernel:
     """Return the kernel that records some outputs, by index; built once.
 
-    What an earlier command kept is taken as it is. ``in_pairs``, ``ends``: see `LaneKernel.of`.
+    A kernel kept by an earlier command is used unchanged. ``in_pairs``, ``ends``: see
+    `LaneKernel.of`.
     """
     place = None if prepared.place is None else prepared.place.in_lanes(selection, in_pairs, ends)
     kept = None if place is None else place.kept()

@@ -1,9 +1,10 @@
 """The C compiler, and the folder of compiled kernels: only the user may write there.
 
-A file is run only if it, its folder and every folder above belong to the user or to root, and
-nobody else may write to them; of the folders above, one like ``/tmp`` will do, where others cannot
-replace what is not theirs. Digests tell damage, not intent: who can write a library can write its
-digest. On Windows rights are not modes, and the user's folders are taken as they are.
+bywire runs a file only if it, its folder and every folder above belong to the user or to root, and
+nobody else may write to them. A folder above may also be one like ``/tmp``, in which others cannot
+replace files that are not theirs. Digests detect damage, not intent: anyone who can write a library
+can also write its digest. On Windows, permissions are not file modes, and bywire does not check the
+user's folders.
 """
 
 from __future__ import annotations
@@ -40,9 +41,9 @@ def cache_folder() -> Path:
 
 
 def usable_folder() -> Path:
-    """Return a folder for kernels that exists, can be written, and is the user's alone.
+    """Return an existing, writable folder for kernels that belongs to the user alone.
 
-    The cache folder, else a fresh temporary one for this process.
+    It is the cache folder if that is possible, else a new temporary folder for this process.
 
     Raises
     ------
@@ -50,7 +51,7 @@ def usable_folder() -> Path:
         When ``BYWIRE_CACHE`` names a folder that others may write to, or a relative one.
     """
     folder = cache_folder()
-    if not folder.is_absolute():  # in whatever folder one works, somebody else's perhaps
+    if not folder.is_absolute():  # relative to the working folder, which may be another user's
         if "BYWIRE_CACHE" in os.environ:
             raise CompilerError(
                 f"BYWIRE_CACHE = {folder} is relative, so that kernels of the working folder would "
@@ -61,7 +62,9 @@ def usable_folder() -> Path:
             )
         return process_folder()
     try:
-        for each in reversed((folder, *folder.parents)):  # each, or those above get other rights
+        for each in reversed(
+            (folder, *folder.parents)
+        ):  # one by one, or the folders above get other permissions
             each.mkdir(mode=0o700, exist_ok=True)
         with scratch_folder(folder):
             pass
@@ -88,12 +91,12 @@ def _warn_once(text: str) -> None:
 
 
 def open_to_others(path: Path) -> str:
-    """Return what others may write to of a file or folder and the folders above; else nothing.
+    """Return the first of a file and the folders above that others may write to, or None.
 
     Raises
     ------
     OSError
-        When it is not there.
+        When the file does not exist.
     """
     if sys.platform == "win32":
         return ""
@@ -115,7 +118,7 @@ def _is_closed(status: os.stat_result, is_above: bool) -> bool:
 
 
 def _is_private(group: int) -> bool:
-    """Return whether a group is a user's own, as many systems make one for each."""
+    """Return whether a group is the private group of a user, as many systems create."""
     if sys.platform == "win32":
         return True
     try:
@@ -133,17 +136,17 @@ def keep_text(path: Path, text: str) -> None:
 
 
 def is_intact(library: Path, entry: str) -> bool:
-    """Return whether a library is the user's, has a function, and is what its digest was made of.
+    """Return whether a library is the user's, has a function, and matches its digest.
 
     Parameters
     ----------
     entry
-        Name of the function; any library will do without.
+        Name of the function; if empty, no function is required.
     """
     try:
         content = _content(library)
         digest = _content(digest_of(library)).decode()
-    except (OSError, ValueError):  # missing, of somebody else, or no text at all
+    except (OSError, ValueError):  # missing, owned by another user, or not text
         return False
     is_same = hashlib.sha256(content).hexdigest() == digest
     return is_same and _is_whole(content) and f"{entry}\0".encode() in content
@@ -155,7 +158,7 @@ def digest_of(library: Path) -> Path:
 
 
 def _content(path: Path) -> bytes:
-    """Return the bytes of a file that only the user could have written."""
+    """Return the bytes of a file that only the user can have written."""
     place = open_to_others(path)
     if place:
         raise PermissionError(place)
@@ -163,7 +166,7 @@ def _content(path: Path) -> bytes:
 
 
 def _is_whole(content: bytes) -> bool:
-    """Return whether a library is as long as its header says: the system would crash on others."""
+    """Return whether a library is as long as its header states: loading others would crash."""
     if content[:4] != b"\x7fELF":
         return len(content) > 4  # of another system
     if len(content) < 64 or content[4] != 2:
@@ -174,14 +177,14 @@ def _is_whole(content: bytes) -> bool:
 
 
 def load(library: Path, entry: str) -> ctypes.CDLL:
-    """Load a library; whose it is, is looked at once more.
+    """Load a library, after checking its owner again.
 
-    Nobody but the user and root can then put another in its place in between.
+    Between check and loading, only the user and root can replace it.
 
     Raises
     ------
     CompilerError
-        When it is not the user's alone, or cannot be loaded.
+        When the library is not the user's alone, or cannot be loaded.
     """
     try:
         place = open_to_others(library)
@@ -206,9 +209,9 @@ def sha256(path: Path) -> str:
 
 # --- The compiler
 
-# Kernels compare and select all the time: without these, maxima become branches. A compiler that
-# fuses a product and a sum where it sees fit rounds a case in lanes otherwise than alone, and on
-# another processor otherwise again: 1 % of the time in lanes is not worth that.
+# Kernels compare and select all the time: without these flags, maxima become branches. A compiler
+# that may fuse products and sums rounds a case in lanes differently than alone, and differently on
+# another processor: saving 1 % of the time in lanes does not justify that.
 KERNEL_MATH = (
     "-fno-math-errno",
     "-fno-trapping-math",
@@ -218,25 +221,25 @@ KERNEL_MATH = (
 )
 _STRICT = ("-Werror=implicit-function-declaration",)
 _COMMON = ("-shared", "-fPIC", "-std=c11", *KERNEL_MATH, *_STRICT)
-# Packing a few scalars costs more than it saves. So does computing both sides of a choice that goes
-# the same way for thousands of substeps: with branches a run is a seventh quicker.
+# Packing a few scalars costs more than it saves. So does computing both arms of a selection that is
+# constant over thousands of substeps: branches make a run a seventh faster.
 _BRANCHES = ("-fno-if-conversion", "-fno-if-conversion2", "-mtune=native")
-# Values that are shared across a kernel's branches are shared already: looking for more takes an
-# eighth of the compiler's time, and registers.
+# The emitter already shares values across a kernel's branches: searching for more takes an eighth
+# of the compiler's time, and registers.
 _SHARED = ("-fno-tree-pre", "-fno-gcse")
 PLAIN = ("-O2", "-fno-tree-vectorize", *_BRANCHES, *_SHARED)
 _X86 = platform.machine().lower() in ("x86_64", "amd64")
 _HERE = ("-march=native",)
 _WIDE = (*_HERE, *(("-mprefer-vector-width=512",) if _X86 else ()))
-_SCHEDULED = ("-fschedule-insns", "-fsched-pressure")  # a tenth quicker
-# Of this processor a single run takes no vectors, but more registers, and instructions that keep
-# both operands. Only with these does scheduling pay here.
+_SCHEDULED = ("-fschedule-insns", "-fsched-pressure")  # a tenth faster
+# A single run does not use this processor's vectors, but its additional registers, and instructions
+# that keep both operands. Scheduling pays only with these.
 SINGLE = (*PLAIN, *_HERE, *_SCHEDULED)
 VECTOR = ("-O2", "-fopenmp-simd", *_WIDE, *_SCHEDULED)
-# Two vectors that take turns stand in the order in which they hide each other's waiting: scheduled
-# before registers are given out, they take 6 % longer.
+# The statements of two alternating vectors are already in the order that hides their latencies:
+# scheduling before register allocation makes them 6 % slower.
 IN_TURN = ("-O2", "-fopenmp-simd", *_WIDE)
-# Half the time of -O2, and kernels as quick as by -O1. What is rare in them is told to leave it.
+# Half the compile time of -O2, and kernels as fast as with -O1. Their rare functions opt out.
 _QUICK = ("-Og", "-fira-region=one", "-DQUICK")
 _GCC_ONLY = frozenset({*_BRANCHES, *_SHARED, *_SCHEDULED, "-fira-region=one"})
 TIMEOUT = 300.0
@@ -247,7 +250,7 @@ _OTHERWISE = (
 
 @dataclass(frozen=True)
 class Compiler:
-    """C compiler and how to call it.
+    """C compiler and its command.
 
     Parameters
     ----------
@@ -256,8 +259,8 @@ class Compiler:
     label
         Name in messages and recordings, with its version.
     quick
-        Whether it takes half the time for kernels that give the same digits by GCC and run a
-        tenth slower.
+        Whether to compile in half the time, for kernels that run a tenth slower, with the same
+        digits by GCC.
     """
 
     command: tuple[str, ...]
@@ -265,7 +268,7 @@ class Compiler:
     quick: bool = False
 
     def flags(self, wanted: tuple[str, ...]) -> tuple[str, ...]:
-        """Return what it is told of flags for GCC at full optimization."""
+        """Return its flags for those of GCC at full optimization."""
         if self.quick:
             rest = (each for each in wanted if each != "-O2" and each not in _SCHEDULED)
             wanted = (*_QUICK, *rest)
@@ -277,8 +280,8 @@ class Compiler:
 def find_compiler() -> Compiler | None:
     """Return the system's C compiler, else that of the extra ``bywire[compiler]``, else None.
 
-    ``BYWIRE_CC`` names another one; ``BYWIRE_CC=none`` does without; ``BYWIRE_CC_QUICK=1`` has
-    it compile quickly, for many kernels that run shortly.
+    ``BYWIRE_CC`` names another one; ``BYWIRE_CC=none`` disables compilation. ``BYWIRE_CC_QUICK=1``
+    makes it compile quickly, for many kernels with short runs.
     """
     wanted = os.environ.get("BYWIRE_CC", "")
     if wanted == "none":
@@ -300,23 +303,23 @@ def find_compiler() -> Compiler | None:
     if command := bundled_compiler():
         commands.append(command)
     for command in commands:
-        with contextlib.suppress(CompilerError):  # a broken one must not hide the next
+        with contextlib.suppress(CompilerError):  # a broken compiler must not hide the next one
             return _labeled(command, is_quick)
     return None
 
 
 def bundled_compiler() -> tuple[str, ...] | None:
-    """Return the command of the extra's C compiler, for all systems; None where it is missing."""
+    """Return the command of the extra's C compiler, for all systems; None if it is missing."""
     return module_command("ziglang", "cc")
 
 
 def _is_quick() -> bool:
-    """Return whether kernels shall be compiled quickly.
+    """Return whether to compile kernels quickly.
 
     Raises
     ------
     CompilerError
-        When ``BYWIRE_CC_QUICK`` says something else than 0 or 1.
+        When ``BYWIRE_CC_QUICK`` is neither 0 nor 1.
     """
     quick = os.environ.get("BYWIRE_CC_QUICK") or "0"
     if quick not in ("0", "1"):
@@ -347,12 +350,12 @@ def _labeled(command: tuple[str, ...], is_quick: bool) -> Compiler:
 def load_library(
     source: str, flags: tuple[str, ...], compiler: Compiler, entry: str
 ) -> tuple[ctypes.CDLL, Path]:
-    """Return the loaded library of a C source, and its file, which is compiled where it must be.
+    """Return the loaded library of a C source, and its file; compile it if necessary.
 
     Parameters
     ----------
     entry
-        Name of a function that it must have.
+        Name of a function that the library must have.
 
     Raises
     ------
@@ -362,7 +365,7 @@ def load_library(
     library = compile_library(source, flags, compiler, entry)
     try:
         return load(library, entry), library
-    except CompilerError:  # of another system, or garbled before its digest was made
+    except CompilerError:  # of another system, or damaged before its digest was written
         digest_of(library).unlink(missing_ok=True)
     library = compile_library(source, flags, compiler, entry)
     return load(library, entry), library
@@ -371,18 +374,18 @@ def load_library(
 def compile_library(
     source: str, flags: tuple[str, ...], compiler: Compiler, entry: str = ""
 ) -> Path:
-    """Return the file of the shared library of a C source, compiled unless the cache has it.
+    """Return the file of the shared library of a C source; compile it unless it is in the cache.
 
-    The library is written to a temporary name and renamed, so that processes which compile the
-    same kernel at once do not disturb each other. A digest beside it guards against damage.
+    The library is written to a temporary name and renamed, so that processes can compile the same
+    kernel at the same time. A digest beside it detects damage.
 
     Parameters
     ----------
     flags
-        ``SINGLE``, ``VECTOR`` for kernels that use the processor's vectors, ``PLAIN`` for what
-        leaves this machine, or others.
+        ``SINGLE``, ``VECTOR`` for kernels that use the processor's vectors, ``PLAIN`` for code
+        for other machines, or others.
     entry
-        Name of a function that it must have.
+        Name of a function that the library must have.
 
     Raises
     ------
@@ -412,7 +415,7 @@ def compile_library(
 
 
 def _compiled_into(library: Path, source: str, flags: tuple[str, ...], compiler: Compiler) -> bool:
-    """Write a library with its digest; return False if somebody deleted its folder meanwhile."""
+    """Write a library with its digest; return False if its folder was deleted meanwhile."""
     try:
         with scratch_folder(library.parent) as scratch:
             text, built, fresh = scratch / "kernel.c", scratch / "kernel.so", scratch / "digest"
@@ -437,7 +440,7 @@ def _compiled_into(library: Path, source: str, flags: tuple[str, ...], compiler:
 def processor() -> str:
     """Return a digest of the processor's features, for machines that share a cache folder."""
     try:
-        with Path("/proc/cpuinfo").open() as lines:  # of which there are many where cores are
+        with Path("/proc/cpuinfo").open() as lines:  # many lines: read only the first ones
             return next(line for line in lines if line.startswith(("flags", "Features"))).rstrip()
     except (OSError, StopIteration):
         return f"{platform.machine()} {platform.processor()}"

@@ -1,4 +1,4 @@
-"""Unilateral contacts: which are closed, their forces as a small complementarity problem."""
+"""Unilateral contacts: closed contacts and their forces from a small complementarity problem."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from bywire.simulation.symbols import SX, column, depends, nonlinear, scalars, s
 def active_stiffness(C: Any, d: Any) -> Any:
     """Return K of the active subset of a contact group, shape (n, n): forces are K times overlaps.
 
-    Rows and columns of inactive contacts are zero. The subset is the S that solves the problem:
-    finds S with F = C_SS^-1 d_S >= 0 and C F - d >= 0 outside S. Among all subsets the one with
-    the largest smallest slack is taken: choosing by "slack > 0" loses all force in exact ties.
-    The slacks of inactive contacts count in force units (divided by C_kk).
+    Rows and columns of inactive contacts are zero. The active subset S solves the problem
+    F = C_SS^-1 d_S >= 0 in S and C F - d >= 0 outside S. The function takes the subset whose
+    smallest slack is largest: choosing by "slack > 0" would lose all force in exact ties. Slacks
+    of inactive contacts are in force units (divided by C_kk).
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def _embedded_inverse(C: Any, subset: tuple[int, ...]) -> Any:
 
 
 def _inverse(M: Any) -> Any:
-    """Return the inverse by cofactors: straight-line, and groups are small."""
+    """Return the inverse by cofactors: code without branches, for small groups."""
     n = M.shape[0]
     if n == 1:
         return 1.0 / M
@@ -84,20 +84,20 @@ def _largest(cases: list[tuple[Any, Any]]) -> Any:
     return best
 
 
-# --- The contacts of a model: overlaps, stiffness of those that are closed, whether they fit
+# --- Contacts of a model: overlaps, stiffness of closed contacts, consistency
 
 
 def contact_forces(model: Model, par: ParameterSet, x: Any) -> Any:
-    """Return the forces of all contacts at an instant, which are recorded.
+    """Return the forces of all contacts at an instant, for recordings.
 
-    Those of a substep belong to its middle; recorded as they are, they would be half a substep old.
+    The forces of a substep hold at its midpoint: recorded, they would be half a substep old.
     """
     overlap = gaps(model, par, x, x)
     return stiffness(model, par, overlap, exact=True) @ overlap
 
 
 def _groups(model: Model, par: ParameterSet, exact: bool) -> list[tuple[Any, slice, bool]]:
-    """Return compliances, place among all contacts, and whether the pass takes them as open."""
+    """Return compliances, place among all contacts, and whether the pass assumes them open."""
     matrices, groups, at = model.compliance(par), [], 0
     rarely = model.usually_open or (False,) * len(matrices)
     for C, rare in zip(matrices, rarely, strict=True):
@@ -117,7 +117,7 @@ def stiffness(model: Model, par: ParameterSet, d: Any, exact: bool) -> Any:
     d
         Overlaps of all n contacts, shape (n,).
     exact
-        False: contacts that are usually open are taken as open.
+        If False, contacts that are usually open are assumed to be open.
     """
     blocks = [
         SX(*rows.shape) if is_open else active_stiffness(rows, d[place])
@@ -137,12 +137,13 @@ def overlaps(model: Model, par: ParameterSet) -> Callable[[Any, Any], Any]:
     Returns
     -------
     callable
-        Of the state and of where geometry is taken, shape (nx,) each; gives shape (n,).
+        Function of the state and of the state at which geometry is evaluated, shape (nx,) each. It
+        returns the overlaps, shape (n,).
 
     Raises
     ------
     SolverError
-        When they are not affine in the state.
+        When the overlaps are not affine in the state.
     """
     n = len(model.State._fields)
     state, fixed = SX.sym("x_", n), SX.sym("xe_", n)
@@ -165,8 +166,8 @@ def overlaps(model: Model, par: ParameterSet) -> Callable[[Any, Any], Any]:
 def violations(model: Model, par: ParameterSet, d: Any, F: Any, exact: bool) -> list[Any]:
     """Return values that are positive where a contact set contradicts the computed midpoint.
 
-    Forces of the assumed set that push, and overlaps outside it that they close, are the solution:
-    there is only one. Cheaper than to choose the set once more.
+    If all forces of the assumed set push, and no overlap outside it remains, they are the unique
+    solution. This check is cheaper than choosing the set again.
 
     Parameters
     ----------
@@ -181,27 +182,27 @@ def violations(model: Model, par: ParameterSet, d: Any, F: Any, exact: bool) -> 
         closed = rows @ force
         for k in range(overlap.shape[0]):
             lack = overlap[k] - closed[k]
-            # Where a force pushes, the lack is zero but for rounding.
+            # If a force pushes, the lack is zero except for rounding.
             wrong = ca.if_else(force[k] > 0, 0, ca.fmax(lack, -force[k]))
             violated.append(overlap[k] if is_open else wrong)
     return violated
 
 
-# --- Whether the step resolves the contacts: stiff, lightly damped ones rebound wrongly
-# Contact begins and ends with a substep, each time a little early or late. For a contact without
-# damping that swings at omega on its bodies, the rebound is then up to 3 % faster or slower than
-# the approach at h omega = 0.5, 11 % at 1, 25 % at 1.5, and 2.2 times faster at 4, though every
-# substep settles. Damping of about half the critical one or more keeps it bounded.
+# --- Resolution of the contacts by the step: stiff, lightly damped contacts rebound incorrectly
+# Contact begins and ends with a substep, each time slightly early or late. Consider a contact
+# without damping that oscillates at omega with its bodies. Its rebound is up to 3 % faster or
+# slower than the approach at h omega = 0.5, 11 % at 1, 25 % at 1.5, and 2.2 times faster at 4,
+# although every substep settles. Damping of at least about half the critical one keeps it bounded.
 
 SAFE, DAMPED = 1.0, 0.5  # h omega, and damping ratio
-# What a contact gives may bend with its force: then every slope counts, not only that at the start.
+# A contact's compliance may depend on its force: then every slope counts, not only the first.
 LOADS = (0.0, *(10.0 ** (0.5 * k) for k in range(-6, 15)))  # N or N m
 
 
 def contact_jacobians(model: Model, par: ParameterSet, x: Any, m: Any, p: Any) -> Any:
     """Return the function (x, m, p) -> Jacobians of dx/dt, contacts open and all closed.
 
-    Where the balance is not linear in the contact forces, closed at each of ``LOADS``.
+    If the balance is nonlinear in the contact forces, there is one for each of ``LOADS``.
     """
     groups = [C for C in model.compliance(par) if C]
     K = ca.diagcat(*(_stiffness(C) for C in groups)) if groups else SX(0, 0)
@@ -235,7 +236,7 @@ def unresolved(
     """
     texts = [""] * len(opened)
     for J in closed:
-        # Without contacts nothing changes by closing them, and nothing need be decomposed.
+        # Without contacts, both Jacobians are equal, and no decomposition is necessary.
         changed = (opened != J).any((1, 2)) & np.isfinite(opened + J).all((1, 2))
         cases = [k for k in np.flatnonzero(changed) if not texts[k]]
         for k, text in zip(cases, _too_fast(opened[cases], J[cases], step), strict=True):

@@ -1,8 +1,8 @@
-"""A plant in continuous time: equations between events, for solvers that locate these themselves.
+"""Plant in continuous time: equations between events, for solvers that locate the events.
 
 Set-valued forces become modes that only events change. A body with dry friction slides forward or
-back, or is stuck until the force on it leaves the bounds of the friction; a state with a limit is
-the same, its bounds no force and any push. A contact presses or is open.
+backward, or sticks until the force on it leaves the bounds of the friction. A state with a limit
+is similar: its force is any push away from the limit. A contact presses or is open.
 """
 
 from __future__ import annotations
@@ -28,16 +28,16 @@ class Continuous:
     modal
         States that carry a set-valued force: those with friction, then those with a limit.
     contacts
-        How many contacts there are.
+        Number of contacts.
     closing
-        ``(x, p) -> closed``: 1 of each contact that presses, else 0.
+        ``(x, p) -> closed``: 1 for each contact that presses, else 0.
     equations
         ``(x, m, p, closed) -> (balance, mass, low, high, pressed, lack)``: right-hand sides without
         set-valued forces and factors of the derivatives, (nx,) each; bounds of the set-valued
-        forces; of the contacts by how much the force on each presses it alone, and by how much it
-        overlaps beyond what it gives.
+        forces; for each contact the force that presses it alone, and its overlap minus its
+        elastic deflection.
     output
-        ``(x, m, p, closed, reaction, flow) -> o``: what is recorded; ``flow``: integrals.
+        ``(x, m, p, closed, reaction, flow) -> o``: recorded signals; ``flow``: integrals.
     """
 
     modal: tuple[str, ...]
@@ -55,7 +55,7 @@ def build_continuous(model: Model, par: ParameterSet) -> Continuous:
     model
         The system.
     par
-        Any parameter set of the wanted structure: its numbers become arguments.
+        Any parameter set of the required structure: its numbers become arguments.
     """
     names = tuple(par.leaves())
     p, x = SX.sym("p", len(names)), SX.sym("x", len(model.State._fields))
@@ -108,7 +108,7 @@ def _compliance(model: Model, par: ParameterSet) -> Any:
 
 
 def _forces(C: Any, overlap: Any, closed: Any) -> Any:
-    """Return the forces F of given contacts: C F = d of those that press, zero of the others."""
+    """Return the contact forces F: C F = d for contacts that press, zero for the others."""
     n = overlap.shape[0]
     if n == 0:
         return SX(0, 1)

@@ -1,7 +1,7 @@
-"""Many cases on a graphics processor, a thread each: CUDA C, its kernels, memory, and errors.
+"""Many cases on a graphics processor, one thread per case: CUDA C, kernels, memory, and errors.
 
-The compiler, NVIDIA's NVRTC in a library, needs no graphics processor and no driver. What it made
-is kept beside compiled kernels.
+The compiler, NVIDIA's NVRTC library, needs neither a graphics processor nor a driver. Its results
+are kept beside compiled kernels.
 """
 
 from __future__ import annotations
@@ -37,8 +37,8 @@ from bywire.simulation.program import Program
 from bywire.simulation.schedule import Layout, Schedule
 from bywire.simulation.stages import Stages, build_stages, layout_of, leaf_count
 
-# A product and a sum in one rounding would give other digits than the processor's kernels. And
-# kernels do not say of each of their functions that it runs there.
+# Fused products and sums would give other digits than the processor's kernels. The source does not
+# declare each function as one for the device.
 OPTIONS = ("--fmad=false", "--device-as-default-execution-space")
 OTHERWISE = "or take engine = 'auto', which computes on this machine's processor"
 
@@ -49,7 +49,7 @@ def bindings(name: str) -> ModuleType:
     Raises
     ------
     DeviceError
-        When the extra that brings it is not installed, with the command.
+        When the extra that contains it is not installed; the message names the command.
     """
     try:
         return importlib.import_module(f"cuda.bindings.{name}")
@@ -63,27 +63,28 @@ def bindings(name: str) -> ModuleType:
 
 
 def cuda_binary(source: str, capability: int, entry: str) -> bytes:
-    """Return the code of a kernel for a graphics processor, compiled unless it is kept.
+    """Return the code of a kernel for a graphics processor; compile it unless it is kept.
 
     Parameters
     ----------
     source
-        CUDA C, as ``emit_cuda`` writes it.
+        CUDA C of the kernel.
     capability
-        Of the processor, for instance 90: the major number ten times, and the minor one.
+        Compute capability of the processor, ten times the major number plus the minor one, for
+        instance 90.
     entry
-        Name of its function.
+        Name of the kernel's function.
 
     Returns
     -------
     bytes
-        Its own code; where the compiler does not know the processor yet, PTX, which the driver
-        compiles.
+        Machine code, or PTX for the driver to compile if the compiler does not support the
+        processor yet.
 
     Raises
     ------
     DeviceError
-        When the compiler is missing, or does not support a processor that old.
+        When the compiler is missing, or no longer supports the processor.
     CompilerError
         With the first lines of the compiler's message.
     """
@@ -91,7 +92,7 @@ def cuda_binary(source: str, capability: int, entry: str) -> bytes:
     try:
         _, *version = nvrtc.nvrtcVersion()
         _, known = nvrtc.nvrtcGetSupportedArchs()
-    except RuntimeError:  # the bindings are there, and the library is not
+    except RuntimeError:  # the bindings are installed, but the library is not
         raise DeviceError(
             f"NVIDIA's compiler NVRTC cannot be loaded: {how_to_install('gpu')}; {OTHERWISE}"
         ) from None
@@ -110,7 +111,7 @@ def cuda_binary(source: str, capability: int, entry: str) -> bytes:
     if is_intact(file, entry):
         return file.read_bytes()
     binary = _compiled(nvrtc, text, options, is_own)
-    if not is_own:  # the driver keeps what it makes of PTX
+    if not is_own:  # the driver caches the code that it compiles from PTX
         return binary
     with contextlib.suppress(OSError), scratch_folder(file.parent) as scratch:
         built, fresh = scratch / "kernel.cubin", scratch / "digest"
@@ -150,21 +151,21 @@ def _text(size_of: Any, fill: Any, program: Any) -> bytes:
 # --- The device and its driver
 
 VARIABLE = "BYWIRE_GPU"
-"""environment variable with the number of the graphics processor, where there are several"""
+"""environment variable with the number of the graphics processor, if there are several"""
 _NO_DRIVER = "the driver's library is not there"
 _OUT_OF_MEMORY = 2  # CUDA_ERROR_OUT_OF_MEMORY
 _MEGA = 1e6
 
 
 class CudaDevice:
-    """A graphics processor of NVIDIA's.
+    """NVIDIA graphics processor.
 
     Parameters
     ----------
     driver
         ``cuda.bindings.driver``, after ``cuInit``.
     number
-        Which one, >= 0.
+        Its number, >= 0.
     """
 
     def __init__(self, driver: Any, number: int) -> None:
@@ -197,13 +198,13 @@ class CudaDevice:
             return self._checked(self._driver.cuModuleGetFunction(module, entry.encode()))
 
     def free(self) -> int:
-        """Return how many bytes are free."""
+        """Return the number of free bytes."""
         with self._current():
             return int(self._checked(self._driver.cuMemGetInfo())[0])
 
     @contextmanager
     def working(self) -> Iterator[Memory]:
-        """Have the device for oneself, and memory of it that is given back in the end."""
+        """Reserve the device, with memory that is freed at the end."""
         with self._current():
             memory = Memory(self._driver, self._checked)
             try:
@@ -213,24 +214,24 @@ class CudaDevice:
 
     @contextmanager
     def _current(self) -> Iterator[None]:
-        """Have the calling thread alone work on the device: it is one queue anyway."""
+        """Let only the calling thread use the device, which has a single queue anyway."""
         with self._lock:
             self._checked(self._driver.cuCtxSetCurrent(self._context))
             yield
 
     def _checked(self, answer: Any, wanted: int = 0) -> Any:
-        """Return what a function of the driver gives behind its status.
+        """Return the results of a function of the driver, without its status.
 
         Raises
         ------
         DeviceError
-            When the status is an error's; ``wanted``: bytes that were asked for.
+            When the status is an error; ``wanted``: number of requested bytes.
         """
         status, *values = answer
         if not int(status):
             return values[0] if len(values) == 1 else values
         if int(status) == _OUT_OF_MEMORY:
-            unknown, *sizes = self._driver.cuMemGetInfo()  # it may have no room to begin with
+            unknown, *sizes = self._driver.cuMemGetInfo()  # it may have no free memory at all
             left = (
                 ""
                 if int(unknown)
@@ -254,7 +255,7 @@ class Memory:
     Parameters
     ----------
     driver, checked
-        The driver, and what raises an error for its statuses.
+        The driver, and a function that raises an error for its statuses.
     """
 
     def __init__(self, driver: Any, checked: Callable[..., Any]) -> None:
@@ -262,29 +263,29 @@ class Memory:
         self._places: list[Any] = []
 
     def room(self, size: int) -> Any:
-        """Return the place of so many bytes, whatever they hold.
+        """Return the address of a number of uninitialized bytes.
 
         Raises
         ------
         DeviceError
-            When there is no such room.
+            When there is not enough free memory.
         """
         place = self._checked(self._driver.cuMemAlloc(max(size, 8)), size)
         self._places.append(place)
         return place
 
     def put(self, place: Any, array: NDArray[Any]) -> None:
-        """Copy a C-contiguous array to a place."""
+        """Copy a C-contiguous array to an address."""
         if array.nbytes:
             self._checked(self._driver.cuMemcpyHtoD(place, pointer(array).value, array.nbytes))
 
     def get(self, place: Any, array: NDArray[Any]) -> None:
-        """Fill a C-contiguous array with what stands at a place."""
+        """Copy memory at an address into a C-contiguous array."""
         if array.nbytes:
             self._checked(self._driver.cuMemcpyDtoH(pointer(array).value, place, array.nbytes))
 
     def run(self, function: Any, blocks: int, threads: int, arguments: Sequence[Any]) -> None:
-        """Run a kernel to its end; its arguments are places, and floats."""
+        """Run a kernel to its end; its arguments are addresses and floats."""
         values = [
             ctypes.c_double(each) if isinstance(each, float) else ctypes.c_void_p(int(each))
             for each in arguments
@@ -298,21 +299,22 @@ class Memory:
         self._checked(self._driver.cuCtxSynchronize())
 
     def give_back(self) -> None:
-        """Free every place."""
-        for place in self._places:  # a kernel that failed has taken everything with it
+        """Free all memory."""
+        for place in self._places:  # a failed kernel has already invalidated everything
             self._driver.cuMemFree(place)
 
 
 @cache
 def find_device() -> CudaDevice:
-    """Return the graphics processor that computes: the first one, or that of ``BYWIRE_GPU``.
+    """Return the graphics processor to use: the first one, or that of ``BYWIRE_GPU``.
 
     Raises
     ------
     DeviceError
-        When there is none, or no driver, or the extra ``bywire[gpu]`` is not installed.
+        When there is no graphics processor or driver, or the extra ``bywire[gpu]`` is not
+        installed.
     ParameterError
-        When ``BYWIRE_GPU`` names none.
+        When ``BYWIRE_GPU`` is not the number of a graphics processor.
     """
     driver = bindings("driver")
     try:
@@ -344,21 +346,20 @@ def find_device() -> CudaDevice:
 
 
 # --- Kernels of many cases
-# Cases go to the processor in batches that its memory holds, and batches in pieces of time: what a
-# piece records is fetched before the next one, and no piece keeps a display waiting.
+# The processor computes cases in batches that fit into its memory, and a batch in pieces of time.
+# The rows of a piece are fetched before the next one, and no piece blocks a display for long.
 #
-# Every number of a case stands beside the same number of the next case, so that threads that run
-# together read and write neighbors; rows stand as who asks for them has them. A thread has
-# branches and cuts of its own, as a single run has.
+# Each number of a case is next to the same number of the next case, so that threads that run
+# together access adjacent memory. Rows have the layout of the caller's array. Each thread has its
+# own branches and cuts, like a single run.
 
 ENTRY = "bw_run_cases"
-"""name of its function"""
+"""name of the kernel's function"""
 THREADS = 64
-"""threads of a block, which share a processor's registers, of which each takes as many as it may"""
+"""threads of a block; they share a processor's registers, and each takes as many as possible"""
 
-# Behind `emission.PLAN`: how many cases, whether each has a stimulus of its own, which row of the
-# stimulus is the first in memory, and the distances between the entries of two cases, rows and
-# signals.
+# After `emission.PLAN`: number of cases, whether each has its own stimulus, the first row of the
+# stimulus in memory, and the distances between the entries of two cases, rows and signals.
 _BEGIN = """const int64_t cases = plan[8 + {tasks}], own = plan[9 + {tasks}];
   const int64_t ahead = plan[10 + {tasks}], by_case = plan[11 + {tasks}];
   const int64_t by_row = plan[12 + {tasks}], by_signal = plan[13 + {tasks}];
@@ -387,9 +388,9 @@ _THREADS = Caller(
 
 
 def emit_cuda(stages: Stages) -> str:
-    """Return the CUDA C of the kernel; before it stands what its compiler is to know first.
+    """Return the CUDA C of the kernel, with its compiler's prologue first.
 
-    That is ``c_runtime.CUDA`` for NVRTC.
+    The prologue for NVRTC is ``c_runtime.CUDA``.
     """
     return emit_single(stages, _THREADS)
 
@@ -397,9 +398,9 @@ def emit_cuda(stages: Stages) -> str:
 # --- The kernel
 
 MOST = 2**15
-"""cases of a batch: as many threads as the largest processors hold at once"""
+"""cases of a batch: number of threads that the largest processors hold at a time"""
 _SUBSTEPS = 5000  # of a piece of time
-_SHARE = 0.5  # of the free memory that a batch may take; threads' stacks and others take some
+_SHARE = 0.5  # share of the free memory for a batch; threads' stacks and other data also need some
 _FLOAT = 8  # bytes
 
 
@@ -411,11 +412,11 @@ class CudaKernel:
     device
         The graphics processor.
     stages
-        What is computed, of the signals that are wanted.
+        Stages of the kernel for the requested signals.
     """
 
     at_once = 2
-    """batches at a time: one is set up, or taken apart, while another is computed"""
+    """batches at a time: the host prepares or reads one while the device computes another"""
 
     def __init__(self, device: CudaDevice, stages: Stages) -> None:
         self.layout: Layout = layout_of(stages)
@@ -426,12 +427,12 @@ class CudaKernel:
         self._function = device.load(emit_cuda(stages), ENTRY)
 
     def for_cases(self, count: int, schedule: Schedule) -> CudaKernel:
-        """Return the kernel for batches of so many cases as memory holds, of about equal size.
+        """Return the kernel for batches that fit into memory, of about equal size.
 
         Raises
         ------
         DeviceError
-            When it does not hold a single case.
+            When memory does not hold a single case.
         """
         free = self._device.free()
         size = self._size(schedule)
@@ -447,7 +448,7 @@ class CudaKernel:
         return sized
 
     def rows(self, cases: int, rows: int) -> Array:
-        """Return room for what cases record, shape (cases, rows, signals), as the device has it."""
+        """Return an array for recorded rows, shape (cases, rows, signals), as on the device."""
         return np.empty((rows, self._signals, cases)).transpose(2, 0, 1)
 
     def advance(
@@ -463,12 +464,12 @@ class CudaKernel:
     ) -> None:
         """Run frames begin..end of one batch; see ``case_kernels.LaneKernel.advance``.
 
-        ``ends`` are none: all outputs are recorded in all rows.
+        ``ends`` is None: the kernel records all outputs in all rows.
 
         Raises
         ------
         DeviceError
-            When the device fails, or others have taken its memory meanwhile.
+            When the device fails, or other programs have taken its memory meanwhile.
         """
         own = int(stimulus.ndim == 3)
         with self._device.working() as memory:
@@ -497,7 +498,7 @@ class CudaKernel:
             memory.get(state, vector)
 
     def _size(self, schedule: Schedule) -> int:
-        """Return the bytes of a case with a stimulus of its own."""
+        """Return the bytes of a case with its own stimulus."""
         parameters, inputs = self._inputs
         stimulus = inputs * _stimulus_rows(schedule)
         recorded = self._signals * _most_rows(schedule)
@@ -510,9 +511,10 @@ def _frames(schedule: Schedule) -> int:
 
 
 class _Recording:
-    """Where the rows of a piece of time go: in the order of those who want them.
+    """Destination of the rows of a piece of time, in the order of the caller's array.
 
-    Straight into their array where the piece has it to itself, else through room of its own.
+    The rows go directly into the caller's array if the piece fills all of it, else through a
+    buffer.
     """
 
     def __init__(self, rows: Array, lanes: int, most: int) -> None:
@@ -523,7 +525,7 @@ class _Recording:
         self.begin(0)
 
     def begin(self, count: int) -> None:
-        """Take so many rows more."""
+        """Make room for a number of further rows."""
         shape = self._lanes, count, self._rows.shape[2]
         self._target = self._rows[:, self._at : self._at + count]
         own = self._room[: math.prod(shape)].reshape([shape[axis] for axis in self._order])
@@ -536,38 +538,38 @@ class _Recording:
         self._at += count
 
     def end(self) -> None:
-        """Have the rows where they are wanted."""
+        """Copy the rows into the caller's array."""
         if self._seen is not None:
             self._target[:] = self._seen[: len(self._target)]
 
 
 def rows_between(schedule: Schedule, begin: int, end: int) -> int:
-    """Return how many rows are recorded from frame begin to before end; at the run's end its row.
+    """Return the number of rows recorded from frame begin to before end, or to the run's end.
 
-    As the kernel counts them by its plan.
+    The kernel counts them in the same way, by its plan.
     """
     every = schedule.record_frames
     return -(-(end + int(end == schedule.frames)) // every) - -(-begin // every)
 
 
 def _stimulus_rows(schedule: Schedule) -> int:
-    """Return how many rows of a stimulus a piece of time reads at most."""
+    """Return the largest number of stimulus rows that a piece of time reads."""
     return _frames(schedule) // schedule.stimulus_frames + 2
 
 
 def _most_rows(schedule: Schedule) -> int:
-    """Return how many rows a piece records at most, that of the end among them."""
+    """Return the largest number of rows that a piece records, including the end's."""
     return _frames(schedule) // schedule.record_frames + 2
 
 
 def _pieces(schedule: Schedule, begin: int, end: int) -> list[tuple[int, int]]:
-    """Return the frames at which pieces begin and end; at the end of a run nothing but its row."""
+    """Return the frames at which pieces begin and end; at the end of a run only its row remains."""
     edges = [*range(begin, end, _frames(schedule)), end]
     return list(pairwise(edges)) or [(begin, end)]
 
 
 class CudaEngine:
-    """Single runs on the graphics processor: a batch of one, slow, with the digits of many."""
+    """Single runs on the graphics processor: a batch of one; slow, with the digits of a batch."""
 
     def __init__(self, program: Program) -> None:
         self._kernel = CudaKernel(find_device(), build_stages(program))

@@ -1,8 +1,7 @@
 """Kernel of an ensemble: as many cases side by side as the processor's vectors hold.
 
-Where the substep of a model is short it waits for chains of operations as long as it computes.
-Then two vectors are carried on in turn, statement by statement: each computes while the other
-waits.
+A short substep spends as much time on the latency of dependent operations as on computing. The
+kernel then alternates two vectors, statement by statement: each computes while the other waits.
 """
 
 from __future__ import annotations
@@ -30,9 +29,9 @@ from bywire.simulation.stages import (
 
 
 class Lanes:
-    """Statements of every stage, in vectors: of one of some that take turns.
+    """Statements of every stage for one of the alternating vectors.
 
-    ``at``: which one of ``turns``.
+    ``at``: number of this vector among ``turns``.
     """
 
     def __init__(self, stages: Stages, at: int = 0, turns: int = 1) -> None:
@@ -60,7 +59,7 @@ class Lanes:
         self._later = [n for n in self.mode.rest if n not in judged]
 
     def _read_by(self, roots: Iterable[Node]) -> frozenset[Node]:
-        """Return the operations that roots need, however often they are computed."""
+        """Return the operations that roots need, at all rates of change."""
         return frozenset(needed(self.graph, roots, lambda _: False))
 
     def _leaf(self, kind: str, index: int) -> str:
@@ -71,11 +70,11 @@ class Lanes:
         return "h" if kind == "h" else f"{kind}{index}{self.mark}"
 
     def row(self, index: int) -> int:
-        """Return which vector in memory is the one of an entry."""
+        """Return the vector in memory that belongs to an entry."""
         return index * self.turns + self.at
 
     def marked(self, *names: str) -> list[str]:
-        """Return the names of variables that every vector has for itself."""
+        """Return the names of variables that every vector has separately."""
         return [f"{name}{self.mark}" for name in names]
 
     def _value(self, node: Node) -> str:
@@ -83,12 +82,12 @@ class Lanes:
         return f"{name}{self.mark}"
 
     def block(self, roots: Sequence[Node], below: int) -> list[str]:
-        """Return the statements that results need, apart from what is computed less often."""
+        """Return the statements that results need, without those computed less often."""
         order = needed(self.graph, roots, lambda n: self.level[n] < below)
         return self.lines(order)
 
     def lines(self, order: Sequence[Node], later: Sequence[Node] = ()) -> list[str]:
-        """Return the statements of nodes; ``later``: those that read them, too."""
+        """Return the statements of nodes; ``later``: further nodes that read them."""
         return branching_statements(self.graph, order, self.name, "const V ", VECTOR_C, later)
 
     def number(self, node: Node) -> str:
@@ -110,16 +109,16 @@ class Lanes:
         return self.lines([n for n in order if self.level[n] == 1 and n not in own])
 
     def mode_state(self) -> list[str]:
-        """Return the declarations of values that change with the mode alone, and of the mode."""
+        """Return the declarations of values that depend on the mode only, and of the mode."""
         if not self.mode.atoms:
             return []
         values = [f"V {self.name(n)} = SET(0.0);" for n in self.mode.values]
         return [*values, *(f"B b{n} = (B){{0}};" for n in self.mode.atoms), "int fresh = 1;"]
 
     def judged(self) -> list[str]:
-        """Return the statements that decide whether one pass suffices for a substep.
+        """Return the statements that determine whether one pass suffices for a substep.
 
-        What hangs on the mode is renewed with it.
+        Values that depend on the mode are recomputed with it.
         """
         mode = self.mode
         rest = self.lines(self._judged, self._later)
@@ -140,7 +139,7 @@ class Lanes:
         ]
 
     def sums(self) -> list[str]:
-        """Return the statements of the integrands, each added to its sum as soon as it is there."""
+        """Return the statements of the integrands, each added to its sum as soon as possible."""
         lines, rest = [], self._later
         for k, product in enumerate(self.products):
             read = self._read_by([product])
@@ -151,21 +150,20 @@ class Lanes:
     def finished(self, is_summed: bool = True) -> list[str]:
         """Return the statements of the results that the flag does not need.
 
-        ``is_summed``: whether those of `sums` are there.
+        ``is_summed``: whether those of `sums` are already written.
         """
         there = self._read_by(self.products if is_summed else ())
         wanted = self._read_by(self.results.values()) - there
         return self.lines([n for n in self._later if n in wanted])
 
 
-# --- Lanes whose substep one ordinary pass does not serve, beside others that it does
-# They raise a flag, and are settled one by one. The other lanes' results and integrands are
-# computed after that, for all lanes alike; what the settled ones have instead is then put in its
-# place.
+# --- Lanes for whose substep one ordinary pass does not suffice, next to others
+# These lanes raise a flag and are settled one by one. The remaining results and integrands are then
+# computed for all lanes, and those of the settled lanes are replaced.
 
 
 def repeated_lanes(t: Lanes) -> list[str]:
-    """Return, in one piece, what becomes of lanes that raise their flag."""
+    """Return the code for lanes that raise their flag."""
     flagged, is_rare, settled = t.marked("flagged", "is_rare", "settled")
     return [
         f"const B {flagged} = {condition(t.graph, t.flag, t.name, VECTOR_C)};\n"
@@ -179,9 +177,9 @@ def repeated_lanes(t: Lanes) -> list[str]:
 
 
 def repeated_results(t: Lanes) -> list[str]:
-    """Return the statements that take over the results where lanes were settled.
+    """Return the statements that take over the results of settled lanes.
 
-    Of these, the integrands of the pass are taken from the sums again.
+    For these lanes, they subtract the integrands of the pass from the sums again.
     """
     new, before, settled = t.marked("new", "before", "settled")
     return [
@@ -194,8 +192,8 @@ def repeated_results(t: Lanes) -> list[str]:
 def settling_function(t: Lanes) -> str:
     """Return the C function that settles the flagged lanes one by one.
 
-    It works on copies: a vector whose lanes are addressed would live in memory everywhere. Of a
-    lane that is not in doubt the velocities of the ordinary pass are known.
+    It works on copies: a vector whose lanes are addressed would always stay in memory. For a lane
+    that is not in doubt, the velocities of the ordinary pass are valid.
     """
     stages, nx = t.stages, t.layout.length["x"]
     targets = {name: k for k, name in enumerate(t.results)}
@@ -275,9 +273,9 @@ int64_t bw_run_lanes(const double *restrict p, double h_, const double *restrict
     double *restrict state, const int64_t *restrict plan, double *restrict rec,
     double *restrict ends)"""
 
-# As `emission.PLAN`; then whether each lane has a stimulus of its own, how many lanes are recorded,
-# the distances between the entries of two lanes, rows and signals, the frames at which the signals
-# recorded at both ends alone are, and the distance between two of these.
+# As `emission.PLAN`; then whether each lane has its own stimulus, the number of recorded lanes, the
+# distances between the entries of two lanes, rows and signals, the frames of the first and last
+# rows, and the distance between two signals recorded in these rows only.
 PLAN = """const int64_t begin = plan[0], end = plan[1], last = plan[2], substeps = plan[3];
   const int64_t stim = plan[4], every = plan[5];
   const int64_t own = plan[{at}], used = plan[{at} + 1], by_lane = plan[{at} + 2];
@@ -285,8 +283,8 @@ PLAN = """const int64_t begin = plan[0], end = plan[1], last = plan[2], substeps
   const int64_t end0 = plan[{at} + 5], end1 = plan[{at} + 6], by_end = plan[{at} + 7];"""
 
 
-# Rows are put down eight at a time: a signal of a lane is a line of memory then, and one page of
-# a hundred or more that are touched in turn.
+# Rows are written eight at a time: a signal of a lane then fills a cache line, on one of a hundred
+# or more pages that are written in turn.
 _PUT = """#define HELD 8
 
 static __attribute__((noinline)) void put_rows(const V *held, int64_t signals, int64_t rows,
@@ -299,21 +297,21 @@ static __attribute__((noinline)) void put_rows(const V *held, int64_t signals, i
 """
 
 
-# Operations of a substep up to which two vectors take turns: more do not fit into registers.
+# Largest number of operations of a substep with two vectors: more do not fit into registers.
 _SHORT = 160
 
 
 def takes_turns(stages: Stages) -> bool:
-    """Return whether a substep is so short that two vectors in turn are quicker than one."""
+    """Return whether a substep is so short that two alternating vectors are faster than one."""
     t = Lanes(stages)
     return not t.mode.atoms and len(t.lines(t.mode.rest)) <= _SHORT
 
 
 def emit_lanes(stages: Stages, in_turn: bool = False, ends: int = 0) -> str:
-    """Return the C source of the kernel for one vector of cases, or for two that take turns.
+    """Return the C source of the kernel for one vector of cases, or for two that alternate.
 
-    It ends earlier where it takes long, and returns the frame at which it goes on.
-    ``ends``: how many of the signals, the last ones, are recorded at both ends alone.
+    A long call of the kernel ends early and returns the frame at which to continue.
+    ``ends``: number of signals, the last ones, that are recorded in the first and last rows only.
     """
     t = Lanes(stages)
     turns = [Lanes(stages, at, 2) for at in (0, 1)] if in_turn else [t]
@@ -373,7 +371,7 @@ def emit_lanes(stages: Stages, in_turn: bool = False, ends: int = 0) -> str:
 
 
 def _begin(t: Lanes) -> list[str]:
-    """Return the declarations of what every vector has, with its values at the start."""
+    """Return the declarations of every vector's variables, with their initial values."""
     parameters, m = leaf_count(t.stages, "p"), t.mark
     return [
         f"V U{m}[{max(leaf_count(t.stages, 'u'), 1)}];",
@@ -403,10 +401,10 @@ def _ahead(t: Lanes) -> list[str]:
 
 
 def _commit(t: Lanes) -> list[str]:
-    """Return, in one piece, what takes over the results.
+    """Return the code that takes over the results.
 
-    Those that no flag waits for are computed only here: nothing reads the values before them any
-    longer, so that each takes the place of its own. Earlier, both would have to be kept.
+    Results on which no flag depends are computed only here. Nothing reads the previous values any
+    longer, so each result can overwrite its own. Earlier, both would have to be kept.
     """
     results = [
         *t.finished(),
@@ -471,7 +469,7 @@ def _put(t: Lanes, ends: int) -> list[str]:
 
 
 def _record_ends(t: Lanes, roots: Sequence[Node]) -> list[str]:
-    """Return, in one piece, what records the signals of both ends alone where a row is one."""
+    """Return the code that records the signals of the first and last rows."""
     first, numbers = f"{t.at} * W", [f"e[{j}] = {t.number(n)};" for j, n in enumerate(roots)]
     lines = [
         *t.block(roots, 1),

@@ -1,10 +1,9 @@
 """C text of rare substeps, for which one ordinary pass does not suffice.
 
-Its functions stand alone and compute for any length of a step what does not follow from
-parameters alone. A substep in which a velocity with dry friction changes its sign is cut where
-it passes zero: friction jumps there, and with it the acceleration. Within each part every
-velocity keeps its sign; what has come to zero rests or moves on in the next part, as its bounds
-decide.
+Its functions are self-contained. For any step length, they compute all values that do not depend on
+parameters only. A substep in which a velocity with dry friction changes its sign is cut at the
+zero crossing, where friction and acceleration jump. Within each part every velocity keeps its sign.
+In the next part, a velocity that has reached zero rests or moves on, depending on its bounds.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ from bywire.simulation.schedule import ATTEMPTS, CAP, CLOSE, EDGE, NEAR, STILL, 
 from bywire.simulation.scheme import FITTING, NEVER, NOTHING, RESIDUAL
 from bywire.simulation.stages import STATE, Stages, indented, leaf_namer, statements
 
-# The same as ``set_valued.project_exact``, which says why, in a loop: that is a tenth of the code.
+# The same as ``scheme.project_exact``, which explains it, but as a loop: a tenth of the code.
 PROJECTION = """
 // Solve S w = b of the rows that move, by elimination on the diagonal; where none does, nothing.
 static inline void with_signs(const double *S, const double *c, const double *low,
@@ -118,8 +117,8 @@ static APART int project(const double *posed, double *w, double *force) {
 }
 """
 
-# A pass gives o: x, d, r, q, jump, doubt. Where the ordinary one is in doubt, the exact one is
-# repeated from its own increment until its contact sets reproduce.
+# A pass returns o: x, d, r, q, jump, doubt. If the ordinary pass is in doubt, the exact pass is
+# repeated from its own increment until its contact sets no longer change.
 CUT = """
 static APART int settle(const double *c, double h, const double *m, const double *x, double *d,
     double *o) {
@@ -281,16 +280,16 @@ static APART int located(const double *c, double h, const double *m, const doubl
 """
 
 
-# --- What depends on the model
+# --- Code that depends on the model
 
 _TRIES = 200_000
-APART = "__attribute__((noinline))"  # but fast: what is cold is compiled to be short
+APART = "__attribute__((noinline))"  # but fast: compilers optimize cold functions for size
 
 
 def rare_substep(stages: Stages) -> str:
     """Return the C functions of a substep that is repeated or cut.
 
-    ``constants(p, c)`` fills c, shape (CONSTANTS,), with what they read of the parameters p.
+    ``constants(p, c)`` fills c, shape (CONSTANTS,), with values that depend on the parameters p.
     """
     slots = _constants(stages)
     return f"""
@@ -308,15 +307,15 @@ enum {{ CONSTANTS = {len(slots)}, POSED = {len(stages.posed)} }};
 
 
 def most_tries(stages: Stages) -> int:
-    """Return after how many tried parts of substeps a call of a kernel ends: tens of milliseconds.
+    """Return the number of tried parts of substeps in a call of a kernel: tens of milliseconds.
 
-    A part takes an exact pass or a few, in which all combinations of signs may be tried.
+    A part takes one or a few exact passes, each of which may try all combinations of signs.
     """
     return max(_TRIES // (10 + int(3**stages.rows)), 1)
 
 
 def rare_header(stages: Stages) -> str:
-    """Return what the C text that is the same for every model is told of a model."""
+    """Return the definitions of a model for the C text that all models share."""
     nx, nr, nq = (len(stages.exact[kind]) for kind in ("x", "r", "q"))
     velocities = stages.velocities
     return f"""#define APART {APART}
@@ -340,12 +339,12 @@ def rare_results(results: dict[str, list[Node]]) -> list[Node]:
 
 
 def rare_roots(stages: Stages) -> list[Node]:
-    """Return all that the passes of a rare substep compute."""
+    """Return all nodes that the passes of a rare substep compute."""
     return [*rare_results(stages.fast), *stages.posed, *rare_results(stages.exact)]
 
 
 def _constants(stages: Stages) -> dict[Node, int]:
-    """Return the places of what follows from parameters alone and is read beside other things."""
+    """Return the indices of values that depend on parameters only and are read by other nodes."""
     graph, level = stages.graph, Levels(stages.graph, {"p": 0})
     roots = rare_roots(stages)
     order = needed(graph, roots, lambda _: False)
@@ -373,7 +372,7 @@ def _constants_function(graph: Graph, slots: dict[Node, int]) -> str:
 
 
 def _exact(stages: Stages, slots: dict[Node, int]) -> list[str]:
-    """Return the statements of the exact pass, between whose halves forces are looked for."""
+    """Return the statements of the exact pass, which solves for the forces between its halves."""
     posed = _lines(stages, stages.posed, slots, "posed")
     known = frozenset(needed(stages.graph, stages.posed, slots.__contains__))
     after = _lines(stages, rare_results(stages.exact), slots, "o", known)
@@ -394,7 +393,7 @@ def _lines(
     target: str = "o",
     known: Collection[Node] = frozenset(),
 ) -> list[str]:
-    """Return the statements that compute roots, of which some operations are known."""
+    """Return the statements that compute roots, some of whose operations are already computed."""
     graph = stages.graph
     other = leaf_namer(graph, _leaf, lambda node: f"v{node}")
 

@@ -1,7 +1,7 @@
-"""Kernel of a single run: everything in local scalars, one function.
+"""Kernel of a single run: one function with local scalars only.
 
-What stands around its statements depends on who calls it: a run of the processor, or a thread of
-a graphics processor for each of many cases.
+The code around its statements depends on the caller: a run on the processor, or a graphics
+processor's thread for each of many cases.
 """
 
 from __future__ import annotations
@@ -45,23 +45,23 @@ SIGNATURE = """{} bw_run(const double *restrict p, double h, const double *restr
 
 @dataclass(frozen=True)
 class Caller:
-    """Who calls a kernel of scalars, and how memory is laid out there, as C text.
+    """Caller of a kernel of scalars, with its memory layout, as C text.
 
     Parameters
     ----------
     runtime, head
-        What the source starts with; the function's head.
+        Beginning of the source, and the function's head.
     begin
-        Statements after the plan, which leave the parameters in ``p``.
+        Statements after the plan, which store the parameters in ``p``.
     stimulus, entry
-        Format strings of number ``k`` of a stimulus' row ``uk`` and of the state vector.
+        Format strings of number ``k`` of a stimulus row ``uk`` and of the state vector.
     row
-        Where the stimulus' row begins; ``nu``: its length.
+        Start of the stimulus row; ``nu``: its length.
     record
-        Statements that keep the outputs ``o``; ``count``: how many.
+        Statements that record the outputs ``o``; ``count``: their number.
     pause, end
-        Statements at the beginning of a frame ``f``, before which ``most`` parts of substeps may
-        have been tried, and after the last one.
+        Statements at the beginning of a frame ``f``, for a pause after ``most`` tried parts of
+        substeps, and statements after the last frame.
     """
 
     runtime: str
@@ -85,7 +85,7 @@ EXPORTED = Caller(
     record="""double *row = rec + (f / every - row0) * chosen;
       for (int64_t j = 0; j < chosen; ++j) row[j] = o[selection[j]];""",
 )
-"""one run, all frames that it is told of"""
+"""one run, with all frames of its plan"""
 ONE_RUN = replace(
     EXPORTED,
     head=SIGNATURE.format("int64_t"),
@@ -93,14 +93,14 @@ ONE_RUN = replace(
     pause="if (__builtin_expect(tries > most, 0) && f > begin && f < end) break;",
     end="return f;",
 )
-"""one run, ended earlier where it takes long: it returns the frame at which it goes on"""
+"""one run; a long call ends early and returns the frame at which to continue"""
 
 
 def emit_single(stages: Stages, caller: Caller = ONE_RUN) -> str:
     """Return the C source of the kernel for one run.
 
-    What depends on parameters alone is computed once, what depends on the tick's data once a
-    frame, the rest in every substep.
+    Values that depend on parameters only are computed once, those that depend on a tick once per
+    frame, the others in every substep.
     """
     graph, level, layout = stages.graph, stages.level(), layout_of(stages)
 
@@ -224,14 +224,14 @@ def emit_single(stages: Stages, caller: Caller = ONE_RUN) -> str:
 
 
 def _mode_state(mode: Modes, name: Namer) -> list[str]:
-    """Return the declarations of values that change with the mode alone, and of an unknown mode."""
+    """Return the declarations of values that depend on the mode only, and of an unknown mode."""
     if not mode.atoms:
         return []
     return [*(f"double {name(n)} = 0.0;" for n in mode.values), "uint64_t mode = 0, fresh = 1;"]
 
 
 def _mode_change(mode: Modes, graph: Graph, name: Namer) -> list[str]:
-    """Return the statements that renew it where the mode is another one."""
+    """Return the statements that recompute these values when the mode has changed."""
     if not mode.atoms:
         return []
     bits = [f"(uint64_t){condition(graph, n, name)} << {k}" for k, n in enumerate(mode.atoms)]
@@ -246,7 +246,7 @@ def _mode_change(mode: Modes, graph: Graph, name: Namer) -> list[str]:
 
 
 def _entries(layout: Layout, caller: Caller) -> list[tuple[str, str]]:
-    """Return the name of each entry of the state vector, and where it is kept."""
+    """Return the name of each entry of the state vector, and its place in memory."""
     places = [
         (f"{kind}{k}", layout.start[kind] + k)
         for kind, count in layout.length.items()

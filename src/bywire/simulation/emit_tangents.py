@@ -1,8 +1,8 @@
 """Kernel of a run with exact forward sensitivities: the value once, its tangents in lanes.
 
-Where a substep is cut, the instant moves with what is differentiated: t follows from v(t) = 0, and
-the parts before and behind get longer and shorter with it. That is how the jump of the acceleration
-reaches derivatives (saltation), together with all that is computed on both sides of it.
+The instant at which a substep is cut depends on the differentiated quantity: v(t) = 0 determines t,
+and the parts before and after become longer and shorter with it. In this way derivatives include
+the jump of the acceleration (saltation), with all computations before and after it.
 """
 
 from __future__ import annotations
@@ -116,7 +116,7 @@ static APART int located_tangents(const double *p, const double *c, double h, co
 
 
 def exact_tangents(stages: Stages) -> str:
-    """Return the C functions of the rare pass with tangents, and of the substep made of it."""
+    """Return the C functions of the rare pass with tangents, and of the substep that uses it."""
     graph = stages.graph
     lane = stages.varies(SEEDS)
     roots = [node for kind in (*STATE, "jump") for node in stages.exact_t[kind]]
@@ -146,7 +146,7 @@ static APART void exact_tangents(int lanes, const double *restrict p, double h,
 
 
 def located_statements(layout: Layout) -> list[str]:
-    """Return the statements that repeat or cut a substep and take over the result."""
+    """Return the statements that repeat or cut a substep and take over its result."""
     nx, nm, q, m = (layout.length["x"], layout.length["m"], layout.start["q"], layout.start["m"])
     names = [f"{kind}{k}" for kind in STATE for k in range(layout.length[kind])]
     return [
@@ -171,7 +171,7 @@ SIGNATURE = """int64_t bw_run_tangents(const double *restrict p, double h, const
 
 
 class _Tangents:
-    """Sorted statements of every stage: values first, then what differs between lanes."""
+    """Sorted statements of every stage: first values, then nodes that differ between lanes."""
 
     def __init__(self, stages: Stages) -> None:
         self.stages, self.graph, self.level = stages, stages.graph, stages.level()
@@ -188,7 +188,7 @@ class _Tangents:
         self.framed = [n for n in framed if self.level[n] == 1]
         hoisted = [n for n in (*self.once, *self.framed) if self.lane[n]]
         self.slot = {node: k for k, node in enumerate(hoisted)}
-        # Compilers do not vectorize what nested selections by truth values of all lanes become:
+        # Compilers do not vectorize nested selections by truth values that all lanes share:
         # in the substep each lane has its own, as a number.
         operations = (self.graph.nodes[n] for n in self.block(self.pass_roots, 2) if self.lane[n])
         truths = [o.args[0] for o in operations if o.op in ("select", "if_else_zero")]
@@ -227,7 +227,7 @@ class _Tangents:
         ]
 
     def lines(self, order: Sequence[Node], lane: bool, dialect: Dialect = PLAIN_C) -> list[str]:
-        """Return the statements of the nodes that differ between lanes, or of those that do not."""
+        """Return the statements of the nodes that differ between lanes, or of the others."""
         chosen = [n for n in order if self.lane[n] == lane]
         stored = [n for n in chosen if n in self.slot]
         local = [n for n in chosen if n not in self.slot]
@@ -240,14 +240,14 @@ class _Tangents:
         return lines
 
     def results(self, roots: Sequence[Node], prefix: str) -> list[str]:
-        """Return the declarations of results under names of their own."""
+        """Return the declarations of results under separate names."""
         return [
             f"const double {prefix}{k} = {as_number(self.graph, n, self.name)};"
             for k, n in enumerate(roots)
         ]
 
     def block(self, roots: Sequence[Node], below: int) -> list[Node]:
-        """Return what must be computed for results, apart from what is hoisted already."""
+        """Return the nodes to compute for results, without those that are already hoisted."""
         return needed(self.graph, roots, lambda n: self.level[n] < below)
 
 
@@ -260,7 +260,7 @@ def emit_tangents(stages: Stages, lanes: int) -> str:
     loads = [f"double {name} = state[{at}];" for name, at in declared]
     stores = [f"state[{at}] = {name};" for name, at in declared]
     substep = t.block(t.pass_roots, 2)
-    before = start["m"]  # tangents that a substep renews
+    before = start["m"]  # tangents that a substep updates
     commits = [
         f"{name} {'+=' if name[0] == 'q' else '='} s{k};"
         for k, (name, _) in enumerate(declared[:before])

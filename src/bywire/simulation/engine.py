@@ -1,13 +1,13 @@
-"""Programs and kernels of models, built once per structure, and which engine serves.
+"""Programs and kernels of models, built once per structure, and the choice of the engine.
 
 To find the compiled kernel of a model, a command would have to build, simplify and emit its whole
-graph again. So an earlier command keeps what runs need beside the library: its name and digest,
-the layout of the state vector, and the Jacobians that judge the contacts; of kernels in lanes one
-for every choice of outputs. All else is built when it is asked for.
+graph again. Each command therefore keeps the data that runs need next to the library: its name and
+digest, the layout of the state vector, and the Jacobians for checking the contacts. For kernels in
+lanes there is one entry for every selection of outputs. Everything else is built on demand.
 
-A stale entry would be a wrong number in silence. So kept are only our own models, whose files are
-all in `source_state`: what another's model is made of, tables read from elsewhere for instance,
-cannot be known. A model that fails a check is never kept.
+A stale entry would silently give wrong numbers. bywire therefore keeps kernels of its own models
+only, whose files are all in `source_state`: a user's model may depend on unknown files, for
+instance on tables. A model that fails a check is never kept.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ if TYPE_CHECKING:
 
 
 class Keepable(Protocol):
-    """A kernel, as far as it can be kept."""
+    """Kernel, with the data that can be kept."""
 
     ENTRY: str
     layout: Layout
@@ -62,23 +62,23 @@ class Keepable(Protocol):
 
 
 class Identity(int):
-    """Address of an object, which distinguishes structures within this process."""
+    """Address of an object, which identifies it within this process."""
 
 
 @dataclass(frozen=True)
 class KeptKernel:
-    """A kernel that an earlier command built.
+    """Kernel that an earlier command built.
 
     Parameters
     ----------
     library
-        None where that command needed no kernel for single runs: the model is sound all the same.
+        None if that command needed no kernel for single runs; the model still passed its checks.
     compiler
-        Label of the compiler that made it.
+        Label of the compiler that compiled it.
     jacobians
-        ``Program.contact_jacobians``, as CasADi writes a function down; empty in lanes.
+        ``Program.contact_jacobians``, serialized by CasADi; empty for lanes.
     digest
-        Of the kernel's C; empty in lanes.
+        Digest of the kernel's C; empty for lanes.
     """
 
     layout: Layout
@@ -100,7 +100,7 @@ class Place:
     Parameters
     ----------
     file
-        In the folder of compiled kernels; one for every structure, so that they do not pile up.
+        File in the folder of compiled kernels, one per structure, so that files do not accumulate.
     state
         Digest of the sources.
     """
@@ -109,12 +109,12 @@ class Place:
     state: str
 
     def in_lanes(self, selection: tuple[int, ...], in_pairs: bool, ends: int) -> Place:
-        """Return where the kernel in lanes is kept that records some outputs, by index."""
+        """Return the place of the kernel in lanes that records some outputs, by index."""
         name = _digest(repr((self.file.name, selection, in_pairs, ends)))[:32]
         return Place(self.file.with_name(f"lanes-{name}.json"), self.state)
 
     def kept(self) -> KeptKernel | None:
-        """Return the kept content; None if it is missing, stale or damaged."""
+        """Return the kept kernel; None if it is missing, stale or damaged."""
         try:
             digest, _, text = self.file.read_text(encoding="utf-8").partition("\n")
             if digest != _digest(text):
@@ -150,7 +150,7 @@ class Place:
         )
 
     def keep_model(self, contact_jacobians: Any, digest: str) -> None:
-        """Keep that a model is sound, with its contacts' Jacobians and digest, but no kernel."""
+        """Record that a model passed its checks, with Jacobians and digest but no kernel."""
         self._keep(contact_jacobians, {"library": "", "text": digest})
 
     def _keep(self, contact_jacobians: Any, kernel: dict[str, Any]) -> None:
@@ -162,12 +162,12 @@ class Place:
 
 
 def place_of(model: Model, structure: tuple[object, ...]) -> Place | None:
-    """Return where the kernel of a structure is kept; None where it must not be.
+    """Return the place of the kernel of a structure; None if it must not be kept.
 
     Parameters
     ----------
     structure
-        As ``engine.structure_of`` returns it, with the types of the model and of its parameters.
+        Result of ``engine.structure_of``, with the types of the model and of its parameters.
     """
     types = _types(structure)
     if type(model) not in types or not all(map(_is_ours, types)) or _identities(structure):
@@ -184,13 +184,13 @@ def place_of(model: Model, structure: tuple[object, ...]) -> Place | None:
 
 
 def _running_state() -> str:
-    """Return the digest of the sources if this process is sure to run them; else nothing."""
+    """Return the digest of the sources if this process certainly runs them; else an empty text."""
     state = source_state()
     return state.digest if state.is_running else ""
 
 
 def _is_ours(kind: type) -> bool:
-    """Return whether a class and all that it inherits from bywire stand where they say."""
+    """Return whether a class and its bases in bywire are defined in the modules that they name."""
     for base in kind.__mro__:
         if base.__module__.partition(".")[0] in ("builtins", "typing", "pydantic"):
             continue
@@ -202,21 +202,21 @@ def _is_ours(kind: type) -> bool:
 
 
 def _types(value: object) -> list[type]:
-    """Return the classes in a structure, those of models within models too."""
+    """Return the classes in a structure, including those of nested models."""
     if isinstance(value, tuple):
         return [kind for each in value for kind in _types(each)]
     return [value] if isinstance(value, type) else []
 
 
 def _without_types(value: object) -> object:
-    """Return a structure without its classes, whose addresses say nothing in another process."""
+    """Return a structure without its classes, whose addresses are invalid in other processes."""
     if isinstance(value, tuple):
         return [_without_types(each) for each in value if not isinstance(each, type)]
     return value
 
 
 def _identities(value: object) -> bool:
-    """Return whether a structure holds the address of an object."""
+    """Return whether a structure contains the address of an object."""
     if isinstance(value, tuple):
         return any(_identities(each) for each in value)
     return isinstance(value, Identity)
@@ -229,7 +229,7 @@ def _digest(text: str) -> str:
 # --- Engines
 
 CUDA = "cuda"
-"""engine that computes on a graphics processor"""
+"""name of the engine on a graphics processor"""
 
 _LOCK = threading.RLock()
 _P = ParamSpec("_P")
@@ -237,7 +237,7 @@ _T = TypeVar("_T")
 
 
 def built_once(build: Callable[_P, _T]) -> Callable[_P, _T]:
-    """Return a function that builds once per arguments; threads that ask meanwhile wait for it."""
+    """Return a function that builds once per arguments, while other threads wait for the result."""
     cached = cache(build)
 
     @wraps(build)
@@ -249,7 +249,7 @@ def built_once(build: Callable[_P, _T]) -> Callable[_P, _T]:
 
 
 def engine_names() -> tuple[str, ...]:
-    """Return the names of all engines: those of the simulation, then declared ones."""
+    """Return the names of all engines: those of the simulation, then declared engines."""
     return ("auto", "compiled", "virtual-machine", CUDA, *declared_engines())
 
 
@@ -274,14 +274,14 @@ class Engine(Protocol):
 class Prepared:
     """Program and engines of one structure of a model.
 
-    The program is built at once, so that a model that fails a check fails here, unless an earlier
-    command did so and kept the kernel; else when it is asked for.
+    The program is built immediately, so that an invalid model fails here. If an earlier command
+    kept the kernel, the program is built on demand.
 
-    ``place`` is where kernels of this structure are kept; None where they must not be.
+    ``place``: place of kept kernels of this structure; None if they must not be kept.
     """
 
     def __init__(self, model: Model, par: ParameterSet) -> None:
-        self.model = model  # alive as long as what is known by its identity
+        self.model = model  # kept alive while their addresses identify structures
         self._par = par
         self._program: Program | None = None
         self._engines: dict[str, Engine] = {}
@@ -320,9 +320,9 @@ class Prepared:
 
     @property
     def digest(self) -> str:
-        """What tells the equations of this structure from any others: that of its kernel's C.
+        """Digest of the equations of this structure: that of its kernel's C.
 
-        How the source is written does not matter: comments, names and files leave no trace in C.
+        Comments, names and files of the Python source do not affect the C.
         """
         with _LOCK:
             if not self._digest:
@@ -333,7 +333,7 @@ class Prepared:
             return self._digest
 
     def keep_model(self) -> None:
-        """Keep that the model is sound, unless that is kept, or will be with a kernel."""
+        """Record that the model passed its checks, unless that is or will be kept with a kernel."""
         if self.place is not None and self._kept is None and not self._engines:
             self.place.keep_model(self.program.contact_jacobians, self._digest)
 
@@ -343,9 +343,9 @@ class Prepared:
         Parameters
         ----------
         kind
-            ``"compiled"``, ``"virtual-machine"``, or ``"auto"``: compiled where there is a
-            compiler, else the virtual machine, with one warning; ``"cuda"``: a graphics
-            processor; or a declared one, see `core.engines`.
+            ``"compiled"``, ``"virtual-machine"``, or ``"auto"``: compiled if there is a compiler,
+            else the virtual machine, with one warning; ``"cuda"``: a graphics processor; or a
+            declared engine, see `core.engines`.
 
         Raises
         ------
@@ -356,7 +356,7 @@ class Prepared:
         DeviceError
             For ``"cuda"`` without a graphics processor, its driver or the extra.
         ModelError
-            Where a declared engine cannot serve the model.
+            When a declared engine does not support the model.
         """
         names = engine_names()
         if kind not in names:
@@ -418,9 +418,9 @@ def structure_of(model: Model, par: ParameterSet) -> tuple[object, ...]:
 
 
 def are_alike(model: Model, par: ParameterSet, like: Model, like_par: ParameterSet) -> bool:
-    """Return whether two models are of one structure, as `structure_of` tells, but without a key.
+    """Return whether two models have the same structure (`structure_of`), without computing keys.
 
-    Thousands of cases a second share the model and the choices.
+    This is fast: thousands of cases per second share the model and the choices.
     """
     is_same = model is like or _makeup(model) == _makeup(like)
     return is_same and type(par) is type(like_par) and par.has_choices_of(like_par)
@@ -438,7 +438,7 @@ def _in_order(choices: tuple[tuple[str, Any], ...]) -> tuple[tuple[str, str], ..
 
 
 def _fingerprint(value: object) -> object:
-    """Return the key of a model's own value: its contents, else its identity."""
+    """Return the key of a model's own value: its content, else its identity."""
     if isinstance(value, np.ndarray):
         return (value.shape, value.dtype.str, value.tobytes())
     if isinstance(value, (str, int, float, bool, type(None))):
@@ -447,7 +447,7 @@ def _fingerprint(value: object) -> object:
         return tuple(_fingerprint(v) for v in value)
     if isinstance(value, Mapping):
         return tuple((str(k), _fingerprint(v)) for k, v in value.items())
-    if hasattr(value, "balance") and hasattr(value, "tasks"):  # a model inside another one
+    if hasattr(value, "balance") and hasattr(value, "tasks"):  # a nested model
         return _makeup(cast(Model, value))
     return Identity(id(value))  # kept alive by the model that Prepared holds
 

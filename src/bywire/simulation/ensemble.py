@@ -1,7 +1,8 @@
 """Many cases of one model, side by side in lanes on all cores, or on a graphics processor.
 
-An ensemble varies parameters of one run. Here every run has initial values and a stimulus of its
-own as well, as the cases of a bench have whose equilibrium or set point follows what is varied.
+An ensemble varies parameters of one run. In a group of runs, each run also has its own initial
+values and stimulus, like the cases of a bench whose equilibrium or set point depends on the varied
+parameters.
 """
 
 from __future__ import annotations
@@ -45,8 +46,8 @@ from bywire.simulation.run import (
 )
 from bywire.simulation.schedule import COUNTERS, Schedule
 
-# Pieces of a run, between which progress and interrupts are handled: their largest number, and
-# their least number of substeps. A piece costs as much as a hundred substeps.
+# Pieces of a run, between which progress and interrupts are handled: largest number of pieces, and
+# least number of substeps per piece. The overhead of a piece equals a hundred substeps.
 _CHUNKS, _SUBSTEPS = 20, 20_000
 
 
@@ -76,8 +77,8 @@ class RunGroup(Sequence[Trajectory]):
     time
         Times of the rows [s], shape (rows,).
     values
-        Signals, each of all runs in one piece, shape (signals, runs, rows). Where runs have changes
-        and the stored energy is recorded, the last one is the work of the changes.
+        Signals, each contiguous over all runs, shape (signals, runs, rows). If runs have changes
+        and the stored energy is recorded, the last signal is the work of the changes.
     names
         Signals, in the order of the first axis.
     vectors
@@ -85,7 +86,7 @@ class RunGroup(Sequence[Trajectory]):
     kernel
         Kernel that computed them.
     ends, end_names
-        Signals of which the first and the last row alone were recorded, shape (signals, runs, 2).
+        Signals with recorded first and last rows only, shape (signals, runs, 2), and their names.
     """
 
     runs: tuple[Run, ...]
@@ -154,10 +155,10 @@ def simulate_group(
     first
         Rows at the beginning that are not recorded, for instance those of a settling time.
     engine
-        ``auto`` and ``compiled``: in lanes, ``cuda``: on a graphics processor.
+        ``auto`` and ``compiled``: in lanes; ``cuda``: on a graphics processor.
     ends
-        Further outputs, of which the first and the last of the rows recorded are wanted alone; of
-        runs without changes, in lanes.
+        Further outputs, for which only the first and last recorded rows are needed. They need runs
+        without changes, in lanes.
 
     Raises
     ------
@@ -166,9 +167,9 @@ def simulate_group(
     UnknownNameError
         When a signal is unknown.
     SolverError
-        When a trajectory leaves the numbers.
+        When a value of a trajectory is infinite or NaN.
     WorkLimitError
-        When a run takes more work than it may.
+        When a run exceeds its work limit.
     DeviceError
         For ``cuda`` without a graphics processor, or without enough memory on it.
     """
@@ -223,7 +224,7 @@ def simulate_group(
 def _edges(schedule: Schedule, first: int, runs: Sequence[Run]) -> list[int]:
     """Return the frames at which pieces of a run begin and end.
 
-    One is the first row recorded, others are where a run has changes.
+    They include the first recorded row and the changes of the runs.
     """
     every = schedule.record_frames
     count = min(_CHUNKS, schedule.frames * schedule.substeps // _SUBSTEPS + 1)
@@ -250,7 +251,7 @@ class _Watch:
 def _stimuli(group: Sequence[Run], schedule: Schedule, width: int) -> Array:
     """Return the rows of the stimuli of runs, shape (rows, nu, width); (rows, nu) of equal ones."""
     t = schedule.stimulus_times
-    signals = np.zeros((width, len(group[0].model.Stimulus._fields), t.size))  # each in one piece
+    signals = np.zeros((width, len(group[0].model.Stimulus._fields), t.size))  # each contiguous
     for lane, run in enumerate(group):
         put_into(signals[lane].T, run, t)
     signals[len(group) :] = signals[len(group) - 1]
@@ -260,13 +261,13 @@ def _stimuli(group: Sequence[Run], schedule: Schedule, width: int) -> Array:
     )
     if not is_usual:
         for run in group:
-            sampled_stimulus(run, schedule)  # says which and when
+            sampled_stimulus(run, schedule)  # raises the error that names the signal and the time
     is_shared = all(np.array_equal(signals[0], other) for other in signals[1:])
     return (signals[0].T if is_shared else signals.transpose(2, 1, 0)).copy()
 
 
 class _Carried:
-    """Runs that are carried on side by side.
+    """Runs that advance side by side.
 
     ``jumping``: energies among the signals that jump at changes, by balance; see `energies`.
     """
@@ -277,7 +278,7 @@ class _Carried:
         self._kernel, self._schedule, self._jumping = kernel, schedule, jumping
         self._books = len(jumping) if jumping.any() else 0
         self._count, width = len(group), kernel.lanes
-        filled = [*group, *[group[-1]] * (width - len(group))]  # idle lanes repeat the last
+        filled = [*group, *[group[-1]] * (width - len(group))]  # idle lanes repeat the last run
         states, memories = [run.state for run in filled], [run.memory for run in filled]
         self._vector = initial_vectors(kernel.layout, states, memories).T.copy()
         self._parameters = leaf_table([run.par for run in filled]).T.copy()
@@ -291,9 +292,9 @@ class _Carried:
     def to_the_end(
         self, values: Array, edges: Sequence[int], skipped: int, watch: _Watch, ends: Ends | None
     ) -> Array:
-        """Carry the runs on to their end; fill ``values``, return the state vectors."""
+        """Advance the runs to their end: fill ``values``, and return the state vectors."""
         schedule, every = self._schedule, self._schedule.record_frames
-        silent = replace(schedule, record_frames=schedule.frames + 1)  # but for the first row
+        silent = replace(schedule, record_frames=schedule.frames + 1)  # except for the first row
         for begin, end in pairwise(edges):
             first = -(-begin // every) - skipped
             self._change(begin, values[:, :, max(first, 0) :])
@@ -308,7 +309,7 @@ class _Carried:
             require_finite(
                 self._kernel.layout,
                 self._vector,
-                f"one of {self._count} runs left the numbers before t = {end * schedule.frame:g} s",
+                f"one of {self._count} runs diverged before t = {end * schedule.frame:g} s",
             )
             require_work(work_of(schedule, self._kernel.layout, end, self._vector), self._most)
             watch.piece()
@@ -350,8 +351,8 @@ Variations = Mapping[str, Array | Sequence[float]]
 def case_matrix(run: Run, variations: Variations) -> Array:
     """Return the parameter vectors of all cases, shape (parameters, cases).
 
-    Ranges are checked for every value, rules within a group of parameters for every case, rules
-    across groups at the extremes of each parameter.
+    The function checks ranges for every value, rules within a group of parameters for every case,
+    and rules across groups at the extremes of each parameter.
 
     Raises
     ------
@@ -397,7 +398,7 @@ def _check_extremes(run: Run, name: str, array: Array) -> None:
 
 
 def _check_group(par: ParameterSet, group: str, arrays: Mapping[str, Array], count: int) -> None:
-    """Check the rules between the parameters of a group for every case, where it has rules."""
+    """Check the rules between the parameters of a group, if it has any, for every case."""
     node: Any = getattr(par, group)
     varied = {
         name.partition(".")[2]: v for name, v in arrays.items() if name.startswith(f"{group}.")
@@ -433,7 +434,8 @@ class Ensemble:
     names
         Signals, in the order of the last axis.
     unsettled, repeated
-        Per case, substeps that hit the cap and that took more than one pass; shape (cases,).
+        Number of substeps per case that hit the cap, and that took more than one pass; shape
+        (cases,).
     """
 
     time: Array
@@ -462,16 +464,17 @@ def simulate_ensemble(
     run
         Model, parameters, initial values, stimulus, steps.
     variations
-        Dotted name of a parameter -> its value in each case, shape (cases,). What is not named
-        keeps its value. Sample times cannot vary. All cases start from the state and memory of
-        ``run``: where a varied parameter moves the equilibrium, let the run settle first.
+        Dotted name of a parameter -> its value in each case, shape (cases,). Other parameters
+        keep their values. Sample times cannot vary. All cases start from the state and memory of
+        ``run``: if a varied parameter moves the equilibrium, let the run settle first.
     signals
         Outputs to record.
     threads
         Threads to use, >= 1; all cores by default.
     engine
-        ``auto`` and ``compiled``: in lanes, ``cuda``: on a graphics processor, a thread for each
-        case, both side by side; others, and ``auto`` without a compiler, one after the other.
+        ``auto`` and ``compiled`` compute cases side by side in lanes, ``cuda`` on a graphics
+        processor with a thread per case. Others, and ``auto`` without a compiler, compute one case
+        after the other.
 
     Returns
     -------
@@ -483,7 +486,7 @@ def simulate_ensemble(
     UnknownNameError
         When a parameter, a signal or an engine is unknown.
     SolverError
-        When a trajectory leaves the numbers.
+        When a value of a trajectory is infinite or NaN.
     ParameterError
         When a value is out of range, lengths differ, or a sample time varies.
     CompilerError
@@ -514,7 +517,7 @@ def simulate_ensemble(
         rows = values[cases[0] : cases[-1] + 1]
         kernel.advance(schedule, columns, stimulus, vector, rows, schedule.frames)
         last = min(cases[-1], count - 1)
-        require_finite(kernel.layout, vector, f"one of cases {first} to {last} left the numbers")
+        require_finite(kernel.layout, vector, f"one of cases {first} to {last} diverged")
         counters[:, cases] = vector[kernel.layout.start["counters"] :]
 
     with thread_pool(threads or kernel.at_once) as pool:
@@ -532,7 +535,7 @@ def simulate_ensemble(
 def _one_by_one(
     run: Run, variations: Variations, signals: tuple[str, ...], engine: str
 ) -> Ensemble:
-    """Serve engines without lanes, and without a compiler: the cases one after the other."""
+    """Compute the cases one after the other, for engines without lanes, or without a compiler."""
     arrays = {name: np.atleast_1d(values) for name, values in variations.items()}
     count = next(iter(arrays.values())).size
     runs = [

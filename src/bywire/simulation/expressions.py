@@ -1,4 +1,4 @@
-"""C text of single operations, for scalars and for vectors, and the order to compute nodes in."""
+"""C text of single operations, for scalars and for vectors, and the order of computation."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ Namer = Callable[[Node], str]
 _INFIX = {"add": "+", "sub": "-", "mul": "*"}
 _LIBRARY = ("sqrt", "fabs", "floor", "ceil", "tan", "atan", "tanh", "copysign")
 OWN = frozenset({"exp", "log", "sin", "cos"})
-COSTLY = OWN | {"pow", "constpow"}  # worth a branch around them
-EXPONENT_RANGE = 708.0  # by which the exponential's argument may lie below zero
+COSTLY = OWN | {"pow", "constpow"}  # costly enough for a branch around them
+EXPONENT_RANGE = 708.0  # range of the exponential's argument below zero
 
 
 @dataclass(frozen=True)
@@ -27,10 +27,10 @@ class Dialect:
     select, compare, both, either, negation, extreme, inverse
         Format strings of selections, comparisons, truth values, maxima and reciprocals.
     exp_where, exp_decayed
-        Format strings of "c ? exp(a) : 0" where that is one operation, and of the same where c says
-        that a, which is not above zero, is in the function's range.
+        Format strings of "c ? exp(a) : 0" as one operation: in general, and if c implies that a,
+        which is <= 0, is in the function's range.
     kept
-        Condition of a truth value that is kept as a number, empty where it is not.
+        Condition of a truth value that is stored as a number; empty if it is not.
     """
 
     calls: dict[str, str]
@@ -91,17 +91,17 @@ VECTOR_C = Dialect(
 
 
 def needed(graph: Graph, roots: Iterable[Node], stop: Callable[[Node], bool]) -> list[Node]:
-    """Return the operations that the roots need, arguments first, down to nodes that stop.
+    """Return the operations that the roots need, arguments first, down to given nodes.
 
-    Of a node's arguments that which takes most registers comes first, so that values wait as
-    little as they can (Sethi and Ullman, Journal of the ACM 17, 1970).
+    The argument that needs most registers comes first, which keeps the lifetime of values short
+    (Sethi and Ullman, Journal of the ACM 17, 1970).
     """
     order: list[Node] = []
     seen: set[Node] = set()
     stack = list(roots)[::-1]
     while stack:
         node = stack.pop()
-        if node < 0:  # everything that it needs is there
+        if node < 0:  # all its arguments are in the order
             order.append(~node)
             continue
         if node in seen:
@@ -142,7 +142,7 @@ def text(graph: Graph, node: Node, name: Namer, dialect: Dialect = PLAIN_C) -> s
             b=number(other[0]) if other else dialect.zero,
         )
     if op in dialect.extreme:
-        # Constants second: so written, compilers see the processor's own maximum.
+        # Constants second: compilers then use the processor's own maximum.
         ordered = sorted(operation.args, key=lambda x: graph.nodes[x].op == "const")
         a, b = (number(x) for x in ordered)
         return dialect.extreme[op].format(a=a, b=b)

@@ -1,7 +1,8 @@
 """Expression graph shared by all stages of a kernel: every value once, divisions as products.
 
-CasADi's instruction lists go in; common subexpressions meet across stages, constants fold, a/b
-becomes a times a reciprocal that others can share, and paired selections become one.
+The input is CasADi's instruction lists. The graph merges common subexpressions across stages and
+folds constants. It turns a/b into a times a reciprocal that others can share, and merges paired
+selections.
 """
 
 from __future__ import annotations
@@ -20,18 +21,18 @@ COMMUTATIVE = frozenset({"add", "mul", "eq", "ne", "and", "or", "fmin", "fmax"})
 
 
 class Operation(NamedTuple):
-    """One node: a leaf (``args`` = kind and index), a constant, or an operation on nodes."""
+    """Node: a leaf (``args`` = kind and index), a constant, or an operation on nodes."""
 
     op: str
     args: tuple[Any, ...]
 
 
-# --- Signs: which values cannot be negative, as far as that follows from parameter ranges
+# --- Signs: values that cannot be negative, according to parameter ranges
 
 
 @dataclass(frozen=True)
 class Interval:
-    """A closed interval that a value lies in."""
+    """Closed interval that contains a value."""
 
     low: float = -math.inf
     high: float = math.inf
@@ -52,9 +53,9 @@ NOT_NEGATIVE = Interval(0.0)
 
 
 def interval_of(op: str, arguments: list[Interval]) -> Interval:
-    """Return an interval of an operation's result; wide where nothing is known.
+    """Return an interval of an operation's result; infinite if nothing is known.
 
-    Only signs are read from intervals, and rounding never changes the sign of a sum whose exact
+    Only the signs of intervals are used, and rounding never changes the sign of a sum whose exact
     bound is zero.
     """
     rule = _RULES.get(op)
@@ -149,7 +150,7 @@ def _add(graph: Graph, a: Node, b: Node) -> Node | None:
 
 
 def _gathered(graph: Graph, op: str, a: Node, b: Node) -> Node | None:
-    """Turn a + (b + x) into (a + b) + x where a and b are fixed and x is not; likewise a b x."""
+    """Turn a + (b + x) into (a + b) + x if a and b are fixed and x is not; likewise a b x."""
     for fixed, other in ((a, b), (b, a)):
         inner = graph.nodes[other]
         if not graph.fixed[fixed] or graph.fixed[other] or inner.op != op:
@@ -216,9 +217,10 @@ def _of_a_tie(graph: Graph, a: Node, b: Node) -> Node | None:
 
 
 def _distributed(graph: Graph, a: Node, b: Node) -> Node | None:
-    """Turn a (b + x) into a b + a x where a and b are fixed and x is not.
+    """Turn a (b + x) into a b + a x if a and b are fixed and x is not.
 
-    As many operations, but chains of such factors collapse into one product and one sum.
+    The number of operations is the same, but chains of such factors collapse into one product and
+    one sum.
     """
     for factor, other in ((a, b), (b, a)):
         inner = graph.nodes[other]
@@ -368,18 +370,18 @@ _FOLD: dict[str, Callable[..., float]] = {
 
 @dataclass
 class Graph:
-    """A growing set of nodes; equal operations on equal arguments are the same node.
+    """Growing set of nodes; equal operations on equal arguments are the same node.
 
     Parameters
     ----------
     ranges
-        What is known of leaves, by kind and index; limits that a value cannot cross vanish.
+        Ranges of leaves, by kind and index; the graph drops limits that a value cannot cross.
     fixed_leaves
-        Kinds of leaves that change rarely: values of these alone are gathered, a + (b + x)
-        becoming (a + b) + x, so that they are computed rarely too.
+        Kinds of leaves that change rarely. Values that depend on these only are grouped:
+        a + (b + x) becomes (a + b) + x, so that a + b is also computed rarely.
     operands, registers
-        Of every node: its arguments, that which takes most registers last, and how many it takes
-        when these are computed first.
+        For every node: its arguments, with the one that needs most registers last, and the number
+        of registers if these are computed first.
     """
 
     ranges: Mapping[tuple[str, int], Interval] = field(default_factory=dict)
@@ -408,12 +410,12 @@ class Graph:
         function
             SX function without free variables.
         inputs
-            For each argument the nodes of its entries.
+            Nodes of the entries of each argument.
 
         Returns
         -------
         list of list of int
-            For each result the nodes of its entries.
+            Nodes of the entries of each result.
         """
         work: dict[int, Node] = {}
         results: list[list[Node]] = [
@@ -452,12 +454,12 @@ class Graph:
         return self.nodes[node].op in BOOLEAN
 
     def arguments(self, node: Node) -> tuple[Node, ...]:
-        """Return the nodes that a node is computed from."""
+        """Return the arguments of a node."""
         operation = self.nodes[node]
         return () if operation.op in ("leaf", "const") else operation.args
 
     def read_by(self, roots: Iterable[Node]) -> frozenset[Node]:
-        """Return all nodes, leaves and constants too, that values are computed from."""
+        """Return all nodes, including leaves and constants, on which values depend."""
         seen: set[Node] = set()
         stack = list(roots)
         while stack:
@@ -468,7 +470,7 @@ class Graph:
         return frozenset(seen)
 
     def intern(self, operation: Operation) -> Node:
-        """Return the node of an operation as it stands."""
+        """Return the node of an operation, not simplified."""
         known = self._known.get(operation)
         if known is None:
             known = len(self.nodes)
@@ -495,7 +497,7 @@ class Graph:
         return interval_of(operation.op, [self.intervals[a] for a in operation.args])
 
     def value(self, node: Node) -> float | None:
-        """Return the number that a node is, or None."""
+        """Return the number of a constant node; None for others."""
         operation = self.nodes[node]
         return float(operation.args[0]) if operation.op == "const" else None
 
@@ -503,20 +505,21 @@ class Graph:
         try:
             value = _FOLD[op](*values)
         except (ArithmeticError, ValueError):
-            return None  # let the run show it
+            return None  # the run reports it
         return self.constant(value)
 
 
-# --- Whether a number that cannot be negative is above zero, without computing it
-# The flag of a pass is the largest of what must not be passed: gaps, distances from the ends of
-# tables, products of speeds before and behind. A kernel only asks whether it is up: comparisons,
-# which wait for nothing, in place of differences and maxima.
+# --- Test whether a number that cannot be negative is above zero, without computing it
+# The flag of a pass is the maximum of several violations: gaps, distances beyond the ends of
+# tables, products of speeds before and after. A kernel only tests whether the flag is raised. It
+# uses comparisons, which are independent, in place of differences and maxima.
 
 
 def raised(graph: Graph, node: Node) -> Node:
-    """Return the truth value of ``node > 0``; of ``node != 0`` where it may be negative.
+    """Return the truth value of ``node > 0``, or of ``node != 0`` if it may be negative.
 
-    A difference is above zero exactly where its terms differ so: numbers near zero are not cut off.
+    A difference is above zero exactly if its terms compare so, as tiny differences do not
+    underflow.
     """
     if not graph.intervals[node].positive:
         return graph.apply("ne", node, graph.constant(0.0))
@@ -525,7 +528,7 @@ def raised(graph: Graph, node: Node) -> Node:
 
 
 def _terms(graph: Graph, node: Node) -> list[Node]:
-    """Return what a maximum is the largest of, less constants that are not above zero."""
+    """Return the operands of a maximum, without constants <= 0."""
     operation = graph.nodes[node]
     if operation.op == "fmax":
         return [term for a in operation.args for term in _terms(graph, a)]

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from bywire.simulation.program import Program
 
 CHUNK = 50_000
-"""substeps after which a call of a kernel ends: tens of milliseconds"""
+"""substeps in a call of a kernel: tens of milliseconds"""
 
 _COMMENT = re.compile(r"/\*.*?\*/|//[^\n]*", re.S)
 
@@ -49,14 +49,14 @@ class Request:
 
 @dataclass(frozen=True)
 class Ends:
-    """Destination of the signals that are recorded in the first and last rows alone.
+    """Destination of the signals that are recorded in the first and last rows only.
 
     Parameters
     ----------
     values
-        Shape (signals, cases, 2), those of a signal in one piece.
+        Shape (signals, cases, 2), contiguous for each signal.
     frames
-        Those of the first and the last row.
+        Frames of the first and the last row.
     """
 
     values: Array
@@ -93,10 +93,10 @@ def run_in_calls(
     Parameters
     ----------
     call
-        ``call(first, last, row)``: runs frames, writes rows from this one on, and returns the
-        frame it came to, which may be an earlier one than the last.
+        ``call(first, last, row)``: runs frames, writes rows from ``row`` on, and returns the
+        reached frame, which may be before ``last``.
     most
-        Substeps of a call; a frame of more is one call.
+        Substeps of a call; a longer frame is a single call.
 
     Raises
     ------
@@ -120,7 +120,7 @@ def pointer(array: NDArray[Any]) -> ctypes.c_void_p:
 
 
 def text_digest(text: str) -> str:
-    """Digest of a kernel's C without comments."""
+    """Return the digest of a kernel's C without comments."""
     return hashlib.sha256(_COMMENT.sub("", text).encode()).hexdigest()
 
 
@@ -139,7 +139,7 @@ class SingleKernel:
 
     @classmethod
     def of(cls, program: Program, compiler: Compiler) -> SingleKernel:
-        """Emit the kernel of a program, and compile it unless the cache has it."""
+        """Emit the kernel of a program, and compile it unless it is in the cache."""
         from bywire.simulation.emit_single import emit_single
         from bywire.simulation.stages import build_stages, layout_of
 
@@ -149,7 +149,7 @@ class SingleKernel:
         return cls(layout_of(stages), library, compiler, text_digest(text))
 
     def advance(self, request: Request, state: Array, begin: int, end: int, rows: Array) -> None:
-        """Run frames begin..end: renews ``state`` and fills ``rows`` in place.
+        """Run frames begin..end: update ``state`` and fill ``rows`` in place.
 
         Parameters
         ----------
@@ -180,12 +180,12 @@ class SingleKernel:
 
 
 class BufferedCall:
-    """A function that is called many times, by one caller at a time.
+    """Function for many calls, by one caller at a time.
 
     Parameters
     ----------
     function
-        CasADi function, of dense arguments and results.
+        CasADi function with dense arguments and results.
     """
 
     def __init__(self, function: Any) -> None:

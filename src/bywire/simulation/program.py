@@ -1,4 +1,4 @@
-"""Symbolic functions of a model: source of the kernels, and evaluated by the virtual machine."""
+"""Symbolic functions of a model, from which kernels are emitted; the virtual machine runs them."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def check_model(model: Model, par: ParameterSet) -> None:
     Raises
     ------
     ModelError
-        Naming the model, the part, and what is valid.
+        When a part is invalid; the message names the model, the part, and the valid shape.
     """
     for part in ("State", "Memory", "Stimulus", "Flow", "Output"):
         _annotated(model, part)
@@ -77,7 +77,7 @@ def _check_equations(model: Model, par: ParameterSet) -> None:
 def _evaluated(model: Model, part: str, *arguments: Any) -> Any:
     try:
         value = getattr(model, part)(*arguments)
-        if _holds_nan(value):  # what math.exp and the like make of a symbol
+        if _holds_nan(value):  # raised by math.exp and similar functions of a symbol
             raise TypeError("a symbol was turned into a number")
         return value
     except (AttributeError, NotImplementedError, RuntimeError, TypeError) as error:
@@ -135,14 +135,14 @@ class Program:
     Parameters
     ----------
     parameter_ranges
-        Names in the order of the parameter vector, each with its admissible range.
+        Names in the order of the parameter vector, each with its valid range.
     contact_jacobians
         ``(x, m, p)`` -> Jacobians of dx/dt, see ``contacts.contact_jacobians``.
     fast, exact
         ``(x, d, m, p, h) -> (x, d, reaction, flow, jump, flag, doubt)``, see ``scheme.Pass``; the
-        flag is up where the pass is in doubt or a velocity turns round.
+        flag is raised if the pass is in doubt or a velocity reverses.
     before, after
-        The exact pass in two: ``(x, d, m, p, h) -> (S, c, low, high)``, row by row, and
+        The exact pass in two parts: ``(x, d, m, p, h) -> (S, c, low, high)``, row by row, and
         ``(x, d, m, p, h, w, force, failed)`` -> results, with the solution of that problem.
     ticks
         One ``(x, m, u, p) -> m`` per task.
@@ -191,8 +191,7 @@ def build_program(model: Model, par: ParameterSet) -> Program:
     model
         The system.
     par
-        Any parameter set of the structure: its numbers are not used, they become
-        arguments.
+        Any parameter set of the structure: its numbers become arguments.
     """
     check_model(model, par)
     names = tuple(par.leaves())

@@ -1,8 +1,8 @@
-"""Integrals of powers: few running sums in the substep, combined once a frame.
+"""Integrals of powers: a few running sums in the substep, combined once per frame.
 
-A rate such as the copper loss R i^2 is a coefficient that does not change within a frame times a
-product that does. The substep sums the products (i^2, i omega, omega^2, ...), which several rates
-share; the frame's end multiplies the sums.
+A rate such as the copper loss R i^2 is a coefficient that is constant within a frame, times a
+product that is not. The substep sums the products (i^2, i omega, omega^2, ...), which several rates
+share. At the end of a frame, the sums are multiplied by the coefficients.
 """
 
 from __future__ import annotations
@@ -14,26 +14,26 @@ from dataclasses import dataclass
 from bywire.simulation.graph import Graph, Node
 
 Terms = dict[Node | None, Node]  # product (None: the number one) -> coefficient
-_MOST = 4  # terms that multiplying out may give; beyond, the product stays as it is
+_MOST = 4  # largest number of terms of an expanded product
 
 
 @dataclass(frozen=True)
 class Quadrature:
-    """Sums and how the integrals follow from them.
+    """Running sums, and the integrals as their combinations.
 
     Parameters
     ----------
     products
         Nodes that every substep adds up.
     combinations
-        Per integral, pairs of a coefficient and the index of its product.
+        Pairs of a coefficient and the index of its product, for each integral.
     """
 
     products: list[Node]
     combinations: list[list[tuple[Node, int]]]
 
     def of(self, wanted: Sequence[bool]) -> Quadrature:
-        """Return the nodes that the given integrals need; others stay unchanged."""
+        """Return the sums for some integrals; the other integrals stay unchanged."""
         chosen = [
             pairs if is_wanted else []
             for pairs, is_wanted in zip(self.combinations, wanted, strict=True)
@@ -55,7 +55,7 @@ def factored(
     rates
         Nodes of the rates.
     computed
-        Nodes that the substep computes anyhow: such a sum is not multiplied out.
+        Nodes that the substep computes in any case: such sums are not expanded.
     level
         How often each node changes, see ``stages.LEVEL``.
     """
@@ -76,7 +76,7 @@ def factored(
 
 
 def collapsed(graph: Graph, roots: Sequence[Node], level: Levels) -> list[Node]:
-    """Return the same values, each as a sum of coefficient times value where that is shorter."""
+    """Return the same values, each as a sum of coefficient times value if that is shorter."""
     new = list(roots)
     needs = [_moving(graph, [root], level) for root in roots]
     users = Counter(node for each in needs for node in each)
@@ -84,7 +84,7 @@ def collapsed(graph: Graph, roots: Sequence[Node], level: Levels) -> list[Node]:
         users.subtract(needs[k])
         for node in needs[k]:
             if not users[node]:
-                del users[node]  # what is left, the other roots compute
+                del users[node]  # the other roots compute the rest
         if root not in users:
             alone = len(needs[k] - users.keys())
             terms = _Expansion(graph, users, level).terms(root)
@@ -133,7 +133,7 @@ class Levels:
         return self._known[node]
 
     def rare(self) -> Callable[[Node], bool]:
-        """Return what tells of every node until now whether it changes less than every substep."""
+        """Return a function that tests whether a node changes less often than every substep."""
         self._extend()
         return self._rare.__getitem__
 

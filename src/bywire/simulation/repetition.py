@@ -1,4 +1,4 @@
-"""Periodic excitation: the same window again and again, until the response repeats itself."""
+"""Periodic excitation: the same window, repeated until the response repeats itself."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ Advance = Callable[[Array, Array, Array, Array, int], None]
 """``advance(parameters, stimulus, vectors, rows, frames)``: all tasks run at the first instant"""
 
 CHUNK = 10_000
-"""substeps after which an interrupt is looked for: tens of milliseconds compiled, a second without
-a compiler"""
+"""substeps between checks for an interrupt: tens of milliseconds compiled, a second without a
+compiler"""
 
 
 def advance_window(
@@ -40,9 +40,9 @@ def advance_window(
     vector: Array,
     values: Array,
 ) -> None:
-    """Run one window in parts, which take little memory; renews vector and values in place."""
+    """Run one window in parts, which need little memory; update vector and values in place."""
     every, held = schedule.record_frames, schedule.stimulus_frames
-    # All tasks run at the beginning of a part, as at the beginning of a run.
+    # All tasks run at the beginning of a part, like at the beginning of a run.
     common = math.lcm(every, *schedule.task_frames)
     size = max(CHUNK // (schedule.substeps * common), 1) * common
     for first in range(0, schedule.frames, size):
@@ -53,12 +53,12 @@ def advance_window(
 
 
 def given_rows(stimuli: Array | Stimuli, count: int, schedule: Schedule) -> Stimuli:
-    """Return a function for rows of the stimulus, which exist or are computed.
+    """Return a function for rows of the stimulus, which are stored or computed.
 
     Raises
     ------
     ParameterError
-        When the shape does not fit.
+        When the shape is not valid.
     """
     if callable(stimuli):
         return stimuli
@@ -69,7 +69,7 @@ def given_rows(stimuli: Array | Stimuli, count: int, schedule: Schedule) -> Stim
 
 
 def one_by_one(run: Run, schedule: Schedule, selection: NDArray[np.int32]) -> Advance:
-    """Serve without a compiler: one lane, slowly."""
+    """Advance cases without a compiler: one lane, slowly."""
     engine = prepare(run.model, run.par).engine("auto")
 
     def advance(p: Array, u: Array, vector: Array, values: Array, frames: int) -> None:
@@ -82,7 +82,7 @@ def one_by_one(run: Run, schedule: Schedule, selection: NDArray[np.int32]) -> Ad
     return advance
 
 
-# --- Cases that share the lanes in turn: where one has ended, the next one begins
+# --- Cases that share the lanes: when one has ended, the next one begins in its lane
 
 
 class Lanes:
@@ -91,7 +91,7 @@ class Lanes:
     Parameters
     ----------
     queue
-        Cases that wait, shared by all who take from it.
+        Waiting cases, shared by all threads.
     width
         Number of lanes.
     matrix, starts
@@ -101,12 +101,12 @@ class Lanes:
     Attributes
     ----------
     columns, vector
-        The same of the cases in the lanes, shapes (parameters, lanes) and (entries, lanes).
+        The same for the cases in the lanes, shapes (parameters, lanes) and (entries, lanes).
     case
-        Which case each lane holds, shape (lanes,).
+        Index of the case in each lane, shape (lanes,).
     seen
-        By lane whose case has not ended, the figures of all its windows. Other lanes run along
-        unread, for a vector has no shorter form.
+        Figures of all windows, by lane with an unfinished case. Other lanes also run, because
+        vectors have a fixed length, but their results are not used.
     """
 
     def __init__(self, queue: deque[int], width: int, matrix: Array, starts: Array) -> None:
@@ -120,7 +120,7 @@ class Lanes:
                 self._load(lane, int(self.case[0]))
 
     def passed(self, figures: Complex, tolerance: float, most: int) -> dict[int, bool]:
-        """Take up a window's figures, and return the lanes whose case has ended: if it repeats.
+        """Add a window's figures, and return the lanes with ended cases: whether each repeats.
 
         Parameters
         ----------
@@ -138,7 +138,7 @@ class Lanes:
         return ended
 
     def release(self, lane: int) -> None:
-        """Let the next case into a lane whose case has ended."""
+        """Start the next case in a lane whose case has ended."""
         del self.seen[lane]
         self._took(lane)
 
@@ -165,22 +165,22 @@ def _same(before: Complex, now: Complex, tolerance: float) -> bool:
 Figures = Callable[[Array], Complex]
 
 KEPT = 8
-"""windows whose figures are kept: the last ones"""
+"""number of last windows whose figures are kept"""
 
 
 @dataclass(frozen=True)
 class Repeated:
-    """The last window of every case.
+    """Last window of every case.
 
     Parameters
     ----------
     time, values
         Shapes (rows,) and (cases, rows, signals); the window's end is not among the rows.
     figures
-        What `repeat` was asked to compare, of the last `KEPT` windows, shape (cases, KEPT, n); NaN
-        in front where a case took fewer.
+        Compared figures of the last `KEPT` windows, shape (cases, KEPT, n); NaN first if a case
+        took fewer windows.
     windows
-        Windows that each case took, shape (cases,).
+        Number of windows of each case, shape (cases,).
     repeats
         Whether the last window repeated the one before, shape (cases,).
     unsettled
@@ -207,44 +207,44 @@ def repeat(
     starts: Sequence[tuple[Sequence[float], Sequence[float]]] | None = None,
     lanes: bool = True,
 ) -> Repeated:
-    """Run every case window after window until it repeats.
+    """Run every case, window after window, until it repeats.
 
-    A case ends by itself, and the next takes its lane: what becomes of it depends on no other.
+    Each case ends independently of all others, and the next one then takes its lane.
 
     Parameters
     ----------
     run
-        Its duration is one window: whole sample times and recording intervals. Its own stimulus
-        is not used.
+        Its duration is one window: a multiple of all sample times and of the recording interval.
+        Its own stimulus is not used.
     matrix
         Parameter vectors, shape (parameters, cases); see ``variations.case_matrix``.
     stimuli
         One window of each case, shape (cases, rows, nu), rows at ``schedule.stimulus_times``
         without the end. Or ``stimuli(cases, first, last)``, which returns these rows of some
-        cases, shape (cases, last - first, nu): a long window never lies in memory as a whole.
+        cases, shape (cases, last - first, nu), so that a long window need not fit into memory.
     signals
         Outputs to record.
     figures
-        ``figures(window) -> complex``, shapes (lanes, rows, signals) and (lanes, n): what a window
-        is judged by.
+        ``figures(window) -> complex``, shapes (lanes, rows, signals) and (lanes, n): figures by
+        which windows are compared.
     tolerance
-        A window repeats the one before when the norm of the difference of their figures is at
+        A window repeats the previous one if the norm of the difference of their figures is at
         most this share of the norm of the figures.
     most
-        Windows after which a case is given up, >= 2.
+        Largest number of windows of a case, >= 2.
     starts
-        State and memory that each case starts from; by default those of the run.
+        Initial state and memory of each case; by default those of the run.
     lanes
-        False: one case after another on one core, as in a simulator without ensembles.
+        If False, one case after another on one core, as in a simulator without ensembles.
 
     Raises
     ------
     StepError
         When a window is not a multiple of the sample times.
     ParameterError
-        When the shapes do not fit.
+        When the shapes do not match.
     SolverError
-        When a trajectory leaves the numbers.
+        When a value of a trajectory is infinite or NaN.
     KeyboardInterrupt
         When interrupted, or stopped in a thread.
     """
@@ -254,7 +254,7 @@ def repeat(
     prepared = prepare(run.model, run.par)
     selection = selected(tuple(prepared.outputs), signals)
     compiler = find_compiler()
-    # One frame too many: the end of a window is the beginning of the next, and ticks only there.
+    # Without the last frame: the end of a window is the start of the next, and ticks only there.
     open_end = replace(schedule, frames=schedule.frames + 1)
     if compiler is None or not lanes:
         advance, width = one_by_one(run, open_end, selection), 1
@@ -283,7 +283,7 @@ def repeat(
             counted = sorted(taken.seen)
             which = ", ".join(str(taken.case[lane]) for lane in counted)
             ends = taken.vector[:, counted]
-            require_finite(layout, ends, f"one of cases {which} left the numbers")
+            require_finite(layout, ends, f"one of cases {which} diverged")
             for lane, repeats in taken.passed(figures(now), tolerance, most).items():
                 case, unsettled = int(taken.case[lane]), float(taken.vector[counters, lane])
                 values[case], done[case] = now[lane], (taken.seen[lane], repeats, unsettled)
@@ -294,7 +294,7 @@ def repeat(
         try:
             list(pool.map(turns, range(workers)))
         finally:
-            queue.clear()  # where one failed, what waits is not begun
+            queue.clear()  # after a failure, waiting cases do not start
     seen, repeats, unsettled = zip(*(done[k] for k in range(count)), strict=True)
     return Repeated(
         time=np.asarray(np.arange(rows) * schedule.record_frames * schedule.frame, np.float64),

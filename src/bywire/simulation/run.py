@@ -1,4 +1,4 @@
-"""One run: initial values and stimulus in, trajectory out."""
+"""Run: a trajectory from initial values and a stimulus."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ Status = Literal["done", "interrupted", "unsettled"]
 
 @dataclass(frozen=True)
 class Run:
-    """Run to compute.
+    """Run of a model to compute.
 
     Parameters
     ----------
@@ -52,9 +52,9 @@ class Run:
     duration, step, record
         Length of the run, substep and recording interval [s].
     changes
-        Parameters that replace those before at some times, in order of time: see `Change`.
+        Changes of all parameters at some times, in order of time; see `Change`.
     most_work
-        Work after which it fails, in substeps; see `Trajectory.work`.
+        Work limit, in substeps, beyond which the run fails; see `Trajectory.work`.
     """
 
     model: Model
@@ -91,10 +91,10 @@ class Trajectory:
     names
         Signals, in the order of the columns.
     status
-        ``done``; ``unsettled`` when some substeps hit the cap of the contact iteration;
-        ``interrupted`` when the user stopped it (rows end there).
+        ``done``; ``unsettled`` if some substeps hit the cap of the contact iteration;
+        ``interrupted`` if the user stopped it (the rows end there).
     unsettled, repeated
-        Substeps that hit the cap, and that took more than one pass.
+        Numbers of substeps that hit the cap, and that took more than one pass.
     work
         Computing effort in ordinary substeps, the same on every machine.
     vector
@@ -114,7 +114,7 @@ class Trajectory:
 
     @cached_property
     def doubt(self) -> str:
-        """Reason why the result may be wrong although every substep settled; empty without one."""
+        """Reason why the result may be wrong although every substep settled; empty if none."""
         return doubts_of([self.run])[0]
 
     def __getitem__(self, name: str) -> Array:
@@ -128,7 +128,7 @@ def initial_vector(layout: Layout, state: Sequence[float], memory: Sequence[floa
 
 
 def initial_vectors(layout: Layout, states: Sequence[Any], memories: Sequence[Any]) -> Array:
-    """Return the same of several runs, shape (runs, entries)."""
+    """Return the state vectors at the start of several runs, shape (runs, entries)."""
     vectors = np.zeros((len(states), layout.total))
     for kind, values in (("x", np.array(states)), ("m", np.array(memories))):
         vectors[:, layout.start[kind] :][:, : values.shape[1]] = values
@@ -177,9 +177,9 @@ def simulate(
     StepError
         When steps and sample times do not divide each other.
     SolverError
-        When the trajectory leaves the numbers.
+        When a value of the trajectory is infinite or NaN.
     WorkLimitError
-        When it takes more work than it may.
+        When the run exceeds its work limit.
     ParameterError
         When the stimulus is not finite.
     UnknownNameError
@@ -220,7 +220,7 @@ def simulate(
 def _advanced_in_pieces(
     run: Run, kind: str, request: Request, vector: Array, values: Array, progress: Progress | None
 ) -> tuple[int, Array]:
-    """Carry a run through its changes; return frames done and the energy that those put in.
+    """Advance a run through its changes; return finished frames and the energy of the changes.
 
     Raises
     ------
@@ -256,9 +256,9 @@ def _advanced_in_pieces(
 
 
 def doubts_of(runs: Sequence[Run]) -> list[str]:
-    """Return why the step may be too long for the contacts, judged at the start of each run.
+    """Return why the step may be too long for the contacts, evaluated at the start of each run.
 
-    ``runs``: of one structure and one step.
+    ``runs``: runs of one structure and one step.
     """
     first = runs[0]
     if not first.model.compliance(first.par):
@@ -277,7 +277,7 @@ def doubts_of(runs: Sequence[Run]) -> list[str]:
 
 
 def _matrices(pattern: Any, entries: Array) -> Array:
-    """Return square matrices of one pattern of their entries, shape (count, size, size)."""
+    """Return square matrices from entries of a common pattern, shape (count, size, size)."""
     rows, columns = pattern.get_triplet()
     matrices = np.zeros((len(entries), *pattern.shape))
     matrices[:, rows, columns] = entries
@@ -290,7 +290,7 @@ def sampled_stimulus(run: Run, schedule: Schedule) -> Array:
     Raises
     ------
     ParameterError
-        When one of them is not finite, or outside the range of its signal.
+        When a value is not finite, or outside the range of its signal.
     """
     rows = np.ascontiguousarray(run.stimulus(schedule.stimulus_times), dtype=np.float64)
     is_finite = np.isfinite(rows)
@@ -322,15 +322,15 @@ def sampled_stimulus(run: Run, schedule: Schedule) -> Array:
 
 
 def stimulus_ranges(model: Model) -> list[tuple[int, float, float]]:
-    """Return index and range of the stimuli that declare one: controllers take no others."""
+    """Return index and range of the stimuli with a declared range of valid values."""
     fields = model.Stimulus._fields
     return [(fields.index(n), *ends) for n, ends in ranges_of(model.Stimulus).items()]
 
 
 def put_into(rows: Array, run: Run, t: Array) -> None:
-    """Put the stimulus of a run at times [s] into rows of zeros, shape (len(t), nu).
+    """Write the stimulus of a run at times [s] into rows of zeros, shape (len(t), nu).
 
-    A stimulus that knows how, by ``put_into(rows, t)``, leaves out what is zero.
+    A stimulus with a method ``put_into(rows, t)`` may leave out signals that are zero.
     """
     put = getattr(run.stimulus, "put_into", None)
     if put is None:

@@ -1,4 +1,4 @@
-"""Steps and sample times of a run: how they divide each other; its state vector."""
+"""Steps and sample times of a run, which must divide each other; layout of the state vector."""
 
 from __future__ import annotations
 
@@ -14,10 +14,12 @@ from numpy.typing import NDArray
 from bywire.core.errors import StepError, not_valid
 
 _TOLERANCE = 1e-9
-_REST = 1e-6  # of a step, that an interval may differ from whole steps
-_MOST = 2**53  # substeps in an interval or a run: a float cannot count more
-_FRAME = 100_000  # substeps of a frame at most: between two frames a run heeds an interrupt
-_TRIALS = 10_000  # divisors that are tried for one that is short to write
+_REST = 1e-6  # of a step: largest deviation of an interval from whole steps
+_MOST = 2**53  # substeps in an interval or a run: floats cannot represent more
+_FRAME = (
+    100_000  # largest number of substeps in a frame: a run checks for interrupts between frames
+)
+_TRIALS = 10_000  # number of divisors to try for one with few digits
 
 
 @dataclass(frozen=True)
@@ -25,7 +27,7 @@ class Schedule:
     """Integer plan of a run.
 
     A frame is the longest interval that divides all sample times and the recording interval, or a
-    part of it where it is very long; it is cut into ``substeps`` equal steps.
+    part of it if it is very long. It has ``substeps`` equal steps.
 
     Parameters
     ----------
@@ -49,17 +51,17 @@ class Schedule:
 
     @property
     def stimulus_frames(self) -> int:
-        """Frames per row of the stimulus: what divides the intervals of all tasks."""
+        """Frames per row of the stimulus: the common divisor of all tasks' intervals."""
         return math.gcd(*self.task_frames)
 
     @property
     def stimulus_rows(self) -> int:
-        """Rows that the stimulus needs, the end included."""
+        """Number of rows of the stimulus, including the end."""
         return self.frames // self.stimulus_frames + 1
 
     @property
     def rows(self) -> int:
-        """Recorded rows, start and end included."""
+        """Number of recorded rows, including start and end."""
         return self.frames // self.record_frames + 1
 
     @property
@@ -96,13 +98,12 @@ def plan(duration: float, step: float, periods: Mapping[str, float], record: flo
     Raises
     ------
     StepError
-        When the step does not divide a sample time or the recording interval, or is much too
-        short for it.
+        When the step does not divide a sample time or the recording interval, or is far too short.
     """
     return _planned(duration, step, tuple(periods.items()), record)
 
 
-@lru_cache(maxsize=256)  # the cases of a study ask for the same one, several times each
+@lru_cache(maxsize=256)  # each case of a study requests the same plan several times
 def _planned(
     duration: float, step: float, periods: tuple[tuple[str, float], ...], record: float
 ) -> Schedule:
@@ -124,7 +125,7 @@ def _planned(
 
 
 def _divided(frame: int) -> int:
-    """Return the largest divisor of a frame's substeps that is not too long."""
+    """Return the largest divisor of a frame's substeps within the limit."""
     shares = range(-(-frame // _FRAME), math.isqrt(frame) + 1)
     share = next((each for each in shares if frame % each == 0), frame)
     return frame // share
@@ -157,9 +158,10 @@ def _whole(period: float, step: float, name: str) -> int:
 
 
 def _divisor(period: float, step: float) -> float:
-    """Return a step [us] that divides a period, at most the given one and short to write.
+    """Return a step [us] with few digits that divides a period and is not longer than a given one.
 
-    Whole nanoseconds if that is possible: then they divide a period of whole nanoseconds.
+    It is a whole number of nanoseconds if possible, which then divides a period of whole
+    nanoseconds.
     """
     least = max(math.ceil(period / step - _TOLERANCE), 1)
     whole, longest = (Fraction(f"{time:.15g}") * 10**9 for time in (period, step))
@@ -179,18 +181,18 @@ def _divisor(period: float, step: float) -> float:
 
 COUNTERS = 3  # at the end of the state vector, see `Layout`
 CAP = 8  # passes through one substep before it is counted as unsettled
-JUMP, FLAG, DOUBT = 4, 5, 6  # places among the results of a pass, behind x, d, r, q
-# Where a substep is cut: how often the instant is tried, within which share of the substep's change
-# of velocity it counts as met, or as so near that a line leads there, and the least share of a part
-# that is cut off or left.
+JUMP, FLAG, DOUBT = 4, 5, 6  # indices among the results of a pass, after x, d, r, q
+# Search for the instant at which a substep is cut: largest number of attempts; shares of the
+# substep's change of velocity within which it is reached, or close enough for linear interpolation;
+# and the least share of a part that is cut off or remains.
 ATTEMPTS, CLOSE, NEAR, EDGE = 12, 1e-12, 1e-9, 1e-9
 STILL = 1e-9  # share of its speed below which another velocity counts as zero at the same instant
 
 
 def most_cuts(velocities: int) -> int:
-    """Return into how many parts a substep is cut before it is counted as unsettled.
+    """Return the number of parts of a substep after which it counts as unsettled.
 
-    Each velocity with dry friction may turn, and turn once more when others have.
+    Each velocity with dry friction may reverse, and reverse again after others have.
     """
     return 2 * velocities + 2
 
@@ -199,8 +201,8 @@ def most_cuts(velocities: int) -> int:
 class Layout:
     """Start of each part of the state vector.
 
-    The vector holds x, d, r, q, the memory m, and the counters: substeps that did not settle,
-    substeps that were repeated, and parts of substeps that were tried for that.
+    The vector contains x, d, r, q, the memory m, and three counters: substeps that did not settle,
+    repeated substeps, and parts of substeps that were tried for them.
     """
 
     start: dict[str, int]

@@ -1,8 +1,8 @@
-"""One substep, symbolically: implicit midpoint with set-valued forces on the velocity level.
+"""One substep, symbolically: implicit midpoint rule with set-valued forces at velocity level.
 
-The state carries the last increment, from which the midpoint is predicted; bounds of frictions,
-geometry and contact sets are taken there, linear terms are solved exactly, and nonlinear ones get
-one Newton step. Second order in smooth phases and through stick-slip.
+The state contains the last increment, which predicts the midpoint. There the scheme evaluates
+bounds of frictions, geometry and contact sets. It solves linear terms exactly, and nonlinear terms
+with one Newton step. The scheme is of second order in smooth phases and through stick-slip.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ from bywire.simulation.symbols import SX, column, depends, nonlinear, scalars, s
 # anything in [lo_k, hi_k] where w_k = 0, find the end-of-step velocities w.
 
 
-NEVER = 1e30  # more than any misfit
-NOTHING = 1e-318  # makes exactly zero of a misfit below 1e-6
-FITTING = 1e-12  # share of a row's own scale below which signs that were guessed are taken
+NEVER = 1e30  # larger than any misfit
+NOTHING = 1e-318  # rounds a misfit below 1e-6 to exactly zero
+FITTING = 1e-12  # share of a row's own scale below which guessed signs are accepted
 RESIDUAL = 1e-9  # share of a row's own scale above which a projection counts as failed
 
 
@@ -35,8 +35,8 @@ RESIDUAL = 1e-9  # share of a row's own scale above which a projection counts as
 class Projection:
     """End-of-step velocities and forces, shape (m,) each, and whether they solve the problem.
 
-    ``failed`` is 1.0 where they do not. Forces lie within their bounds to the last digit: what
-    rounding leaves of one must not turn a loss into a gain.
+    ``failed`` is 1.0 if they do not. Forces are within their bounds to the last digit, so that
+    rounding cannot turn a loss into a gain.
     """
 
     w: Any
@@ -75,7 +75,7 @@ def soft(z: Any, a: Any, b: Any) -> Any:
 def sliding(v: Any, low: Any, high: Any) -> Any:
     """Return the force on moving rows: a velocity keeps the sign from the start of the substep.
 
-    Where it does not, the substep is cut.
+    If it would change its sign, the substep is cut.
     """
     return ca.if_else(v > 0, low, high)
 
@@ -83,8 +83,8 @@ def sliding(v: Any, low: Any, high: Any) -> Any:
 def project_fast(S: Any, c: Any, low: Any, high: Any, v: list[Any]) -> Projection:
     """Solve with all resting rows at rest, and check that their bounds can hold them.
 
-    One row is exact. Several take one linear solve, whose matrix changes with what rests alone;
-    where a force at rest leaves its bounds, a body breaks away: ``failed``.
+    One row is exact. Several rows need one linear solve, whose matrix depends only on which rows
+    rest. If a force at rest leaves its bounds, a body breaks away: ``failed``.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def project_fast(S: Any, c: Any, low: Any, high: Any, v: list[Any]) -> Projectio
     resting = [speed == 0 for speed in v]
     slide = [sliding(v[k], low[k], high[k]) for k in range(m)]
     if m == 1:
-        # Compilers make a branch of it, which moving bodies pass without what could hold them.
+        # Compilers turn this into a branch: moving bodies skip the computation of holding forces.
         force = ca.if_else(resting[0], _within(-c, low, high), slide[0])
         return Projection((c + force) / S, force, ca.SX(0))
     M, b = ca.SX(S), ca.SX(c)
@@ -116,15 +116,15 @@ def project_fast(S: Any, c: Any, low: Any, high: Any, v: list[Any]) -> Projectio
         beyond = ca.fmax(force[k] - high[k], low[k] - force[k])
         wrong = ca.fmax(wrong, ca.if_else(resting[k], beyond, 0))
         force[k] = ca.if_else(resting[k], _within(force[k], low[k], high[k]), slide[k])
-        # Else a row at rest would be zero but for rounding.
+        # Otherwise, a row at rest would be zero only up to rounding.
         w[k] = ca.if_else(resting[k], 0, w[k])
     return Projection(w, force, wrong > 0)
 
 
 def project_exact(S: Any, c: Any, low: Any, high: Any) -> Projection:
-    """Solve by trying every combination of signs and taking the one that fits best.
+    """Solve by trying every combination of signs, and take the one that fits best.
 
-    3^m combinations: for the rare substeps in which ``project_fast`` does not serve.
+    There are 3^m combinations, for the rare substeps in which ``project_fast`` fails.
     """
     m = c.shape[0]
     if m == 0:
@@ -136,12 +136,12 @@ def project_exact(S: Any, c: Any, low: Any, high: Any) -> Projection:
 def _exact(m: int) -> Any:
     """Return the projection of m rows as a function of S, c, low, high.
 
-    Evaluated on symbols: writing out all combinations for every model takes half of its set-up.
+    It is a function of symbols: writing all combinations for every model takes half of its set-up.
     """
     S = ca.SX.sym("S", m, m)
     c, low, high = (ca.SX.sym(name, m) for name in ("c", "low", "high"))
-    # Where both bounds are one force, that acts at zero, too: a velocity that happens to end there
-    # does not rest, and its derivatives are those of a moving one.
+    # If both bounds are equal, the force is the same at zero: a velocity that happens to end
+    # there does not rest, and its derivatives are those of a moving body.
     forced = [ca.if_else(low[k] < high[k], 0, 1) for k in range(m)]
     best, best_misfit = ca.SX.zeros(m), ca.SX(NEVER)
     for signs in product((0, 1, -1), repeat=m):
@@ -152,8 +152,8 @@ def _exact(m: int) -> Any:
         better = misfit < best_misfit
         best = ca.if_else(better, w, best)
         best_misfit = ca.if_else(better, misfit, best_misfit)
-    # Forces that are no numbers must not pass for rest, and compilers need not compare them right:
-    # the misfit of what was chosen tells, of which nothing else is added.
+    # NaN forces must not count as rest, but compilers need not compare NaN correctly. The misfit
+    # of the chosen combination shows them; nothing else is added to it.
     best = best + _misfit(S, c, low, high, best) * NOTHING
     results = [best, _within(S @ best - c, low, high), best_misfit > RESIDUAL]
     return ca.Function("exact_projection", [S, c, low, high], results)
@@ -176,8 +176,8 @@ def _with_signs(S: Any, c: Any, low: Any, high: Any, signs: tuple[int, ...]) -> 
 
 
 def _misfit(S: Any, c: Any, low: Any, high: Any, w: Any) -> Any:
-    # A row is judged by the largest of what it adds up: where forces cancel (a body squeezed from
-    # both sides), what is left of them is rounding. A sum, for a maximum skips what is no number.
+    # The scale of a row is that of its largest terms: where forces cancel (a body squeezed from
+    # both sides), the remainder is rounding. It is a sum, because a maximum ignores NaN.
     total = ca.SX(0)
     m = c.shape[0]
     for k in range(m):
@@ -188,7 +188,7 @@ def _misfit(S: Any, c: Any, low: Any, high: Any, w: Any) -> Any:
 
 
 def solve_small(M: Any, b: Any) -> Any:
-    """Return M^-1 b by elimination on the diagonal, shape (m,); straight-line."""
+    """Return M^-1 b by elimination on the diagonal, shape (m,), without branches."""
     m = b.shape[0]
     M, b = ca.SX(M), ca.SX(b)
     for k in range(m):
@@ -211,22 +211,22 @@ def solve_small(M: Any, b: Any) -> Any:
 class Form:
     """``sum_j coefficient_j x_j + rest``.
 
-    The coefficients do not change from substep to substep, so that the kernel hoists them and
-    the sum takes one product per state.
+    The coefficients are constant from substep to substep. The kernel therefore hoists them, and
+    the sum needs one product per state.
 
     Parameters
     ----------
     coefficients
-        By index of the state.
+        Coefficients by index of the state.
     rest
-        Everything else.
+        Remaining terms.
     """
 
     coefficients: dict[int, Any]
     rest: Any
 
     def value(self, x: Any) -> Any:
-        """Return the number that the form stands for at the states x."""
+        """Return the value of the form at the states x."""
         total = self.rest
         for index, coefficient in self.coefficients.items():
             total = total + coefficient * x[index]
@@ -258,7 +258,7 @@ def forms(f: Any, J: Any, x: Any, changing: Any, curved: list[bool]) -> list[For
     changing
         Symbols that change from substep to substep.
     curved
-        For each row whether it is nonlinear in x: it stays as it is.
+        Whether each row is nonlinear in x; such rows stay unchanged.
     """
     at_zero = ca.substitute(f, x, SX.zeros(x.shape[0]))
     rows = []
@@ -285,9 +285,9 @@ Entries = dict[tuple[int, int], Any]
 
 @dataclass(frozen=True)
 class Step:
-    """One eliminated row: pivot row's entries in the columns that were left, and its reciprocal.
+    """Eliminated row: entries of the pivot row in the remaining columns, and its reciprocal.
 
-    In the columns ``alike`` the right-hand side has the same factors, with the other sign.
+    In the columns ``alike`` the right-hand side has the same factors with the opposite sign.
     """
 
     pivot: int
@@ -298,7 +298,7 @@ class Step:
 
 @dataclass(frozen=True)
 class Reduced:
-    """System that is left for the kept rows, and what is needed to get the others back.
+    """Remaining system of the kept rows, with the data for back substitution.
 
     Parameters
     ----------
@@ -307,9 +307,9 @@ class Reduced:
     matrix
         Schur complement, shape (m, m).
     right
-        Right-hand sides of all rows as they stand after the elimination.
+        Right-hand sides of all rows after the elimination.
     x, changing
-        The states that the forms are linear in; symbols that change from substep to substep.
+        The states in which the forms are linear; symbols that change from substep to substep.
     """
 
     kept: tuple[int, ...]
@@ -328,9 +328,9 @@ class Reduced:
         return Form(coefficients, form.rest).value(self.x)
 
     def back_substitute(self, known: dict[int, Any], middle: dict[int, Any]) -> None:
-        """Add all unknowns to those of the kept rows, and the states plus the unknowns.
+        """Return all unknowns from those of the kept rows, and the states plus the unknowns.
 
-        Where a state and its unknown have one factor, their sum takes it.
+        If a state and its unknown have the same factor, their sum is multiplied once.
         """
         for step in reversed(self.steps):
             value = self.right[step.pivot].times(step.reciprocal, self.x, self.changing)
@@ -358,13 +358,13 @@ def eliminate(
     x
         The states.
     changing
-        Symbols that change from substep to substep: among pivots of equal fill, one that does
-        not depend on them comes first, for then its reciprocal is hoisted.
+        Symbols that change from substep to substep. Among pivots of equal fill, one that does not
+        depend on them comes first, because its reciprocal can be hoisted.
     """
     n = A.shape[0]
     entries: Entries = {(i, j): A[i, j] for i in range(n) for j in range(n) if _present(A[i, j])}
     right = dict(right)
-    # The matrix is a diagonal minus the coefficients of the states in linear rows.
+    # The matrix is a diagonal matrix minus the coefficients of the states in linear rows.
     alike = {(i, j) for i, form in right.items() for j in form.coefficients if j != i}
     left = [i for i in range(n) if i not in keep]
     steps = []
@@ -406,7 +406,7 @@ def _pivot(
     for i, below in column.items():
         del entries[i, pivot]
         factor = below * reciprocal
-        sums = not depends(SX(factor), changing)  # else the form becomes a number
+        sums = not depends(SX(factor), changing)  # otherwise, the form becomes a number
         for j in (row.keys() | right[pivot].coefficients.keys()) - {i}:
             is_free = (i, j) not in entries and j not in right[i].coefficients
             if not (sums and (pivot, j) in alike and (is_free or (i, j) in alike)):
@@ -426,8 +426,7 @@ def _pivot(
 class Symbols:
     """Arguments of a substep: state, predicted half increment, memory, parameters, step.
 
-    Half of what the state gains over the substep is what the equations use everywhere: x + d is
-    the midpoint.
+    All equations use half the increment of the state over the substep: x + d is the midpoint.
     """
 
     x: Any
@@ -450,13 +449,13 @@ class Pass:
     flow
         Rates of the integrals at the midpoint.
     doubt
-        Positive where the pass must be repeated: a contact set changed, a limit was crossed, or the
-        projection of the frictions failed.
+        Positive if the pass must be repeated: a contact set changed, a velocity crossed a limit, or
+        the projection of the frictions failed.
     jump
-        By how much half the increment of each velocity with dry friction is less behind a change
-        of its sign, by its mass alone, shape (m,).
+        Decrease of half the increment of each velocity with dry friction after a change of its
+        sign, by its mass alone, shape (m,).
     turn
-        Positive where a velocity with dry friction does: where that jumps, the substep is cut.
+        Positive if a velocity with dry friction reverses: if friction jumps, the substep is cut.
     problem
         Problem to solve outside an exact pass; None in other passes.
     """
@@ -473,10 +472,10 @@ class Pass:
 
 @dataclass(frozen=True)
 class _Linearized:
-    """The model's smooth part and its Jacobian, evaluated where the substep needs them.
+    """Smooth part of the model and its Jacobian, evaluated for the substep.
 
-    ``rows[i] + J[i, :] d`` is the balance at the midpoint x + d: exactly in rows that are linear,
-    to second order in the error of the predicted midpoint in the others.
+    ``rows[i] + J[i, :] d`` is the balance at the midpoint x + d: exact in linear rows, and of
+    second order in the error of the predicted midpoint in the others.
     """
 
     rows: list[Form]
@@ -491,13 +490,13 @@ def build_pass(model: Model, par: ParameterSet, s: Symbols, exact: bool) -> Pass
     model
         The system.
     par
-        Its parameters with the entries of ``s.p`` as numbers.
+        Its parameters, with the entries of ``s.p`` as numbers.
     s
         Arguments of the pass.
     exact
-        False: the pass of nearly every substep, which leaves one-sided limits alone and only
-        checks them, and keeps at rest what rests. True: the repeated pass, with limits, in which
-        every combination of signs is tried: outside, see `Problem`.
+        If False, the pass of nearly every substep, which only checks one-sided limits and keeps
+        resting bodies at rest. If True, the repeated pass, which enforces limits; every combination
+        of signs is tried outside, see `Problem`.
     """
     y = s.x + s.d
     changing = ca.vertcat(s.x, s.d)
@@ -536,7 +535,7 @@ def build_pass(model: Model, par: ParameterSet, s: Symbols, exact: bool) -> Pass
     doubts.append(ca.if_else(projection.failed, 1, 0))
     if not exact:
         doubts += [-x[_index(model, name)] for name in model.limits]
-    # A maximum and no logical or: compilers do not vectorize selections between truth values.
+    # A maximum instead of a logical or: compilers do not vectorize selections between truth values.
     doubt = SX(0)
     for one in doubts:
         doubt = ca.fmax(doubt, one)
@@ -545,7 +544,7 @@ def build_pass(model: Model, par: ParameterSet, s: Symbols, exact: bool) -> Pass
 
 
 def _turn(model: Model, start: Any, end: Any) -> Any:
-    """Return values that are positive where a velocity with dry friction changes its sign."""
+    """Return values that are positive if a velocity with dry friction changes its sign."""
     turn = SX(0)
     for name in model.frictions:
         k = _index(model, name)
@@ -575,8 +574,8 @@ def _linearize(
     slopes = ca.substitute(J, ca.vertcat(x, xe), ca.vertcat(at, y))
     rows = []
     for i, row in enumerate(forms(with_contact, J, x, changing, bent)):
-        # Linear rows start from x. The others were taken at the predicted midpoint in the states
-        # that they are nonlinear in, so the part of J d that leads there comes off again.
+        # Linear rows start from x. The others were evaluated at the predicted midpoint of states
+        # in which they are nonlinear, so that part of J d is subtracted again.
         point = at if bent[i] else s.x
         rest = ca.substitute(row.rest, ca.vertcat(x, xe), ca.vertcat(point, y))
         if bent[i]:
@@ -605,7 +604,7 @@ def _index(model: Model, name: str) -> int:
 
 
 def _acting(v: Any, low: Any, high: Any) -> tuple[Any, Any]:
-    """Return the bounds of a friction at rest, where it moves twice the force that acts."""
+    """Return the bounds of a friction at rest, where the force counts twice."""
     moving = sliding(v, low, high)
     return ca.if_else(v == 0, low, moving), ca.if_else(v == 0, high, moving)
 
@@ -613,7 +612,7 @@ def _acting(v: Any, low: Any, high: Any) -> tuple[Any, Any]:
 def _project(
     model: Model, s: Symbols, reduced: Reduced, bounds: list[Any], exact: bool
 ) -> tuple[Projection, Any, Problem | None]:
-    """Return end-of-step values of the set-valued states, all reactions, and what is left open."""
+    """Return end-of-step values of the set-valued states, all reactions, and the open problem."""
     pairs = bounds
     if exact:
         pairs = [_acting(s.x[k], *pair) for k, pair in zip(reduced.kept, bounds, strict=False)]
@@ -632,7 +631,7 @@ def _project(
         projection = project_fast(half, c, low, high, [s.x[k] for k in reduced.kept])
     reaction = ca.SX(projection.force)
     first = len(model.frictions)
-    for k in range(first, reaction.shape[0]):  # away from its limit a state feels nothing of it
+    for k in range(first, reaction.shape[0]):  # away from its limit, a state is not affected
         reaction[k] = ca.if_else(projection.w[k] > 0, 0, ca.fmax(reaction[k], 0))
     if not exact:
         reaction = ca.vertcat(reaction, SX.zeros(len(model.limits)))
@@ -640,7 +639,7 @@ def _project(
 
 
 def _increments(s: Symbols, reduced: Reduced, projection: Projection) -> tuple[Any, Any]:
-    """Return half the increments, and the midpoints: the mean of start and end comes sooner."""
+    """Return half the increments, and the midpoints as means, which are available earlier."""
     ends = {k: projection.w[a] for a, k in enumerate(reduced.kept)}
     known = {k: 0.5 * (w - s.x[k]) for k, w in ends.items()}
     middle = {k: 0.5 * (s.x[k] + w) for k, w in ends.items()}

@@ -32,11 +32,11 @@ from bywire.simulation.schedule import Layout
 from bywire.simulation.stages import Stages, build_stages, layout_of
 
 DIRECTIONS = 8
-_CHUNK = 5_000  # substeps after which a call of the kernel ends
+_CHUNK = 5_000  # substeps in a call of the kernel
 
 
 def rounds(stages: Stages) -> bool:
-    """Return whether a sampled value of the plant is rounded, as a converter does."""
+    """Return whether a sampled value of the plant is rounded, as by a converter."""
     graph = stages.graph
     moving = stages.varies(frozenset({"x"}))
     order = needed(graph, [n for task in stages.ticks for n in task], lambda _: False)
@@ -93,16 +93,16 @@ class TangentKernel:
         tangents: Array,
         rows_t: Array,
     ) -> None:
-        """Run frames begin..end; renews ``state`` and ``tangents``, fills ``rows`` and ``rows_t``.
+        """Run frames begin..end: update ``state`` and ``tangents``, fill ``rows`` and ``rows_t``.
 
         Parameters
         ----------
         seeds
-            What moves along each direction, shape (seeded parameters and stimuli, directions).
+            Changes along each direction, shape (seeded parameters and stimuli, directions).
         tangents
             Derivatives of the state vector, shape (entries, directions).
         rows_t
-            Those of the rows, shape (rows, signals, directions).
+            Derivatives of the rows, shape (rows, signals, directions).
         """
 
         def call(first: int, last: int, row: int) -> int:
@@ -134,15 +134,15 @@ def simulate_with_sensitivities(
 ) -> Sensitivity:
     """Compute a run and the derivatives of its signals.
 
-    Beside parameters, directions may be an initial state, ``initial.omega``, and a constant that
-    is added to a stimulus, ``stimulus.i_set``; or anything, ``start.p``, that acts through the
-    given derivatives of the start alone.
+    A direction may also be an initial state, ``initial.omega``, or a constant added to a stimulus,
+    ``stimulus.i_set``. Any other direction, ``start.p``, acts only through the given derivatives of
+    the start.
 
-    Forward differentiation through every substep, friction and contact decisions included:
-    exact derivatives of what is computed. Across stick-slip the instants of breakaway move with
-    the parameters only as finely as sampled inputs change: there, let tasks and ideal sources
-    tick as often as the step (the first slips of a ramp are then within 2 % at 20 us). Where a
-    body turns round or stops, the substep is cut there, and the instant moves with the parameters.
+    The derivatives are exact for the computed run: forward differentiation through every substep,
+    including friction and contact decisions. With stick-slip, instants of breakaway move with the
+    parameters only as finely as sampled inputs change. In this case, let tasks and ideal sources
+    tick as often as the step; the first slips of a ramp are then within 2 % at 20 us. When a body
+    reverses or stops, the substep is cut there, and the instant moves with the parameters.
 
     Parameters
     ----------
@@ -156,7 +156,7 @@ def simulate_with_sensitivities(
         Derivatives of the initial state with respect to the parameters, shape
         (states, parameters); zero by default.
     memory
-        The same of the initial memory, shape (memories, parameters).
+        Derivatives of the initial memory, shape (memories, parameters).
 
     Returns
     -------
@@ -169,7 +169,7 @@ def simulate_with_sensitivities(
     UnknownNameError
         When a parameter or a signal is unknown.
     SolverError
-        When the trajectory leaves the numbers.
+        When a value of the trajectory is infinite or NaN.
     CompilerError
         When there is no compiler.
     """
@@ -212,7 +212,7 @@ def simulate_with_sensitivities(
             tangents[at : at + len(memory), :here] = memory[:, lanes]
         rec_t = np.empty((schedule.rows, selection.size, DIRECTIONS))
         kernel.advance(request, vector, 0, schedule.frames, values, seeds, tangents, rec_t)
-        require_finite(kernel.layout, vector, "the run left the numbers")
+        require_finite(kernel.layout, vector, "the run diverged")
         derivatives[:, :, first : first + here] = rec_t[:, :, :here]
     counters = vector[kernel.layout.start["counters"] :]
     trajectory = Trajectory(
@@ -265,7 +265,7 @@ def _directions(run: Run, wanted: Sequence[str], known: Sequence[str]) -> _Direc
     for name in wanted:
         if name not in (*known, *states, *stimuli) and not name.startswith("start."):
             raise unknown_name("parameter", name, (*known, *states, *stimuli))
-    own = [name for name in wanted if name in known] or [known[0]]  # a kernel has one at least
+    own = [name for name in wanted if name in known] or [known[0]]  # a kernel has at least one
     seeded = [*own, *stimuli]
     seeds = np.array([[float(row == name) for name in wanted] for row in seeded])
     initial = np.array([[float(row == name) for name in wanted] for row in states])

@@ -1,8 +1,8 @@
-"""A program as one expression graph: which node is when computed, and its C text.
+"""Program as one expression graph: when to compute each node, and its C text.
 
-A substep is one long chain of dependent operations, and the processor waits for it. Sums and
-products of three and more are therefore rebuilt such that a late operand passes through as few
-operations as possible, and k a + k b as k (a + b) where k changes rarely. Only rounding changes.
+A substep is one long chain of dependent operations, whose latency limits the speed. Sums and
+products of three or more operands are therefore reordered so that a late operand passes through as
+few operations as possible. k a + k b becomes k (a + b) if k changes rarely. Only rounding changes.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ from bywire.simulation.program import Program
 from bywire.simulation.quadrature import Levels, Quadrature, collapsed, factored
 from bywire.simulation.schedule import Layout
 
-# Cycles from operands to result, about right for the processors of the last ten years.
+# Cycles from operands to result, approximate for processors of the last ten years.
 _LATENCY = {"inv": 13, "sqrt": 18, "exp": 40, "sin": 50, "cos": 50, "log": 40, "pow": 80}
 _USUAL = 4
 _SUMS = ("add", "sub", "neg")
 
 
 class _Balance:
-    """Rebuilds nodes bottom-up."""
+    """Bottom-up rebuilding of nodes."""
 
     def __init__(self, graph: Graph, roots: Sequence[Node], level: Levels) -> None:
         self._graph, self._level = graph, level
@@ -66,7 +66,7 @@ class _Balance:
         ]
 
     def _joined(self, parts: list[tuple[int, Node]]) -> list[tuple[int, Node]]:
-        """Return summands rebuilt: what is there twice, or has a rare factor in common, as one."""
+        """Return rebuilt summands: equal ones, and those with a common rare factor, merged."""
         groups: dict[Node, list[tuple[int, int, Node, Node]]] = {}
         joined: list[tuple[int, Node]] = []
         for (sign, node), times in Counter(parts).items():
@@ -90,7 +90,7 @@ class _Balance:
     def _split(self, node: Node) -> tuple[int, Node, Node] | None:
         """Return a rare factor and the rest of a product that nothing else needs.
 
-        Of two factors a - b and b - a the same is taken for both, and the sign that this turns.
+        The factors a - b and b - a count as the same one, with a change of sign.
         """
         nodes, level = self._graph.nodes, self._level
         if nodes[node].op != "mul" or level[node] < 2 or self._uses[node] > 1:
@@ -138,17 +138,17 @@ class _Balance:
 
 
 def balanced(graph: Graph, roots: Sequence[Node], level: Levels) -> list[Node]:
-    """Return nodes with the same values, in an order of operations with less waiting."""
+    """Return nodes with the same values, in an order of operations with less latency."""
     balance = _Balance(graph, roots, level)
     return [balance.node(root) for root in roots]
 
 
 # --- Stages
 
-# When a leaf changes: 0 once a run, 1 once a frame (a tick may change it), 2 every substep.
+# When a leaf changes: 0 once per run, 1 once per frame (a tick may change it), 2 every substep.
 LEVEL = {"p": 0, "h": 0, "sp": 0, "su": 0, "m": 1, "sm": 1}
 SEEDS = frozenset({"sp", "su", "sm", "sx", "sd", "sr", "sq", "sh"})
-STATE = ("x", "d", "r", "q")  # renewed in every substep, in the order of the state vector
+STATE = ("x", "d", "r", "q")  # updated in every substep, in the order of the state vector
 
 
 @dataclass(frozen=True)
@@ -159,12 +159,12 @@ class Stages:
     ----------
     fast, exact
         Nodes per result of a pass: x, d, r (reactions), q (flows), jump, flag, doubt; see
-        ``Program``. Flag and ``doubtful`` of the fast one are truth values; the exact one
-        follows from what solves ``posed``, of kinds w, force and failed.
+        ``Program``. Flag and ``doubtful`` of the fast pass are truth values. The exact pass uses
+        the solution of ``posed``, leaves of kinds w, force and failed.
     posed
         Nodes of S, row by row, c, low and high, for the set-valued forces of the exact pass.
     rows
-        How many of these forces there are.
+        Number of these forces.
     ticks
         Nodes of the memory after each task.
     output
@@ -172,10 +172,10 @@ class Stages:
     velocities
         Indices of the states that carry dry friction.
     quadrature
-        How the integrals of the fast pass follow from running sums.
+        Integrals of the fast pass as combinations of running sums.
     fast_t, exact_t, ticks_t, output_t
-        Tangents of the same along one direction; empty lists without sensitivities. Those of the
-        exact pass also along the length of the step, at which a cut substep is cut.
+        Tangents along one direction; empty lists without sensitivities. Those of the exact pass
+        also along the length of the step, as the instant of a cut may move.
     """
 
     graph: Graph
@@ -217,10 +217,10 @@ def build_stages(
     program
         The symbolic functions.
     directions
-        Indices of the parameters that tangents are taken along; empty for none.
+        Indices of the parameters along which tangents are computed; empty for none.
     outputs
-        Indices of the signals to compute; all by default. Integrals that none of them reads
-        stay zero.
+        Indices of the signals to compute; all by default. Integrals that no signal reads stay
+        zero.
     """
     n = program.sizes
     ranges = {("p", k): Interval(*r) for k, r in enumerate(program.parameter_ranges.values())}
@@ -266,7 +266,7 @@ def build_stages(
     substep = frozenset(needed(graph, _all_but(fast, "q"), lambda _: False))
     quadrature = factored(graph, fast["q"], substep, level)
     fast, quadrature = _balanced(graph, fast, quadrature, level)
-    if outputs is not None:  # only now: the order of operations is that of all outputs
+    if outputs is not None:  # only now, so that the order of operations is that of all outputs
         read = graph.read_by(output)
         wanted, zero = [leaf in read for leaf in leaves["q"]], graph.constant(0.0)
         quadrature = quadrature.of(wanted)
@@ -297,7 +297,7 @@ def _all_but(results: dict[str, list[Node]], left_out: str) -> list[Node]:
 def _balanced(
     graph: Graph, fast: dict[str, list[Node]], quadrature: Quadrature, level: Levels
 ) -> tuple[dict[str, list[Node]], Quadrature]:
-    """Return the fast pass with its sums and products in a quicker order."""
+    """Return the fast pass with its sums and products in a faster order."""
     kinds = [(kind, len(nodes)) for kind, nodes in fast.items() if kind != "q"]
     roots = [*_all_but(fast, "q"), *quadrature.products]
     new = iter(balanced(graph, collapsed(graph, roots, level), level))
@@ -308,9 +308,9 @@ def _balanced(
 
 
 def _renewed(graph: Graph, roots: list[Node], known: dict[Node, Node]) -> list[Node]:
-    """Return nodes with others in place of those that they are computed from.
+    """Return nodes with other arguments.
 
-    As they are written, rates of losses cannot be negative; as sums of products they can, in the
+    Rates of losses cannot be negative as they are written. As sums of products they can, in the
     last digit.
     """
     new = dict(known)
@@ -323,7 +323,7 @@ def _renewed(graph: Graph, roots: list[Node], known: dict[Node, Node]) -> list[N
 
 
 def _with_tangents(function: Any, kinds: str, directions: Sequence[int], fixed: str) -> Any:
-    """Return the function of the tangents: the same arguments, then seeds of all but the fixed."""
+    """Return the function of the tangents: the same arguments, then seeds of all changing ones."""
     arguments = function.sx_in()
     seeds, points, extra = [], [], []
     for kind, argument in zip(kinds, arguments, strict=True):
@@ -349,8 +349,8 @@ def _with_tangents(function: Any, kinds: str, directions: Sequence[int], fixed: 
 
 # --- C statements of a stage
 
-# plan: first frame, end frame, whether the end is recorded, substeps a frame, frames a stimulus
-# row, frames a recorded row, first recorded row, recorded signals, frames a tick of each task.
+# plan: first frame, end frame, whether the end is recorded, substeps per frame, frames per stimulus
+# row, frames per recorded row, first recorded row, recorded signals, frames per tick of each task.
 PLAN = """const int64_t begin = plan[0], end = plan[1], last = plan[2], substeps = plan[3];
   const int64_t stim = plan[4], every = plan[5], row0 = plan[6], chosen = plan[7];"""
 """C text that reads a run's plan"""
@@ -359,7 +359,7 @@ PLAN = """const int64_t begin = plan[0], end = plan[1], last = plan[2], substeps
 def unread(stages: Stages) -> frozenset[str]:
     """Return the half increments and reactions that no stage reads.
 
-    They need not be kept. Those of velocities with dry friction are read where a substep is cut.
+    They need not be kept. A cut substep reads those of velocities with dry friction.
     """
     roots = [
         node for pass_ in (stages.fast, stages.exact) for nodes in pass_.values() for node in nodes
@@ -375,10 +375,10 @@ def unread(stages: Stages) -> frozenset[str]:
 
 
 def midpoints(graph: Graph, order: Iterable[Node]) -> dict[Node, int]:
-    """Return the nodes that are a state plus its half increment, and which state it is.
+    """Return the nodes that are a state plus its half increment, with the index of the state.
 
-    A kernel carries these from substep to substep: the next one begins with them. Half increments
-    alone only cut substeps read.
+    A kernel carries these from substep to substep, as the next one begins with them. Only cut
+    substeps read half increments alone.
     """
     chosen = {}
     for node in order:
@@ -390,7 +390,7 @@ def midpoints(graph: Graph, order: Iterable[Node]) -> dict[Node, int]:
 
 
 def leaf_count(stages: Stages, kind: str) -> int:
-    """Return how many inputs of a kind there are, for instance ``"u"`` for the stimulus."""
+    """Return the number of inputs of a kind, for instance ``"u"`` for the stimulus."""
     return sum(1 for op in stages.graph.nodes if op.op == "leaf" and op.args[0] == kind)
 
 
@@ -415,7 +415,7 @@ def literal(graph: Graph, node: Node) -> str:
 def leaf_namer(
     graph: Graph, leaf: Callable[[str, int], str], other: Namer, constant: str = "{}"
 ) -> Namer:
-    """Return the namer that knows constants and leaves and leaves operations to another."""
+    """Return a function that names constants and leaves, and calls another for operations."""
 
     def name(node: Node) -> str:
         operation = graph.nodes[node]
@@ -435,7 +435,7 @@ def statements(
     declare: str,
     dialect: Dialect = PLAIN_C,
 ) -> list[str]:
-    """Return one declaration per operation; truth values are written where they are used."""
+    """Return one declaration per operation; truth values are written inline."""
     return [
         f"{declare}{name(node)} = {text(graph, node, name, dialect)};"
         for node in order

@@ -1,4 +1,4 @@
-"""Shims around CasADi's SX, so that the scheme reads like its description."""
+"""Thin functions around CasADi's SX, so that the scheme reads like its description."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ SX = ca.SX
 
 
 def column(values: Sequence[Any]) -> Any:
-    """Return a column of scalars as one SX, also of none."""
+    """Return a column of scalars as one SX, also for no scalars."""
     return ca.vertcat(*(SX(v) for v in values)) if values else SX(0, 1)
 
 
@@ -28,7 +28,7 @@ def symbol_tuple(tuple_type: type, vector: Any) -> Any:
 _JUMPS = frozenset(
     (ca.OP_FLOOR, ca.OP_CEIL, ca.OP_SIGN, ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE, ca.OP_NOT)
 )
-"""operations whose derivative is zero wherever it exists"""
+"""operations whose derivative is zero wherever it is defined"""
 
 
 def nonlinear(expression: Any, variables: Any) -> list[bool]:
@@ -41,14 +41,14 @@ def nonlinear(expression: Any, variables: Any) -> list[bool]:
 
 
 def _jumping(expression: Any, variables: Any) -> set[int]:
-    """Return the variables with which an expression jumps, which no derivative shows."""
+    """Return the variables with which an expression jumps, as no derivative shows it."""
     known = {each.element_hash() for each in ca.symvar(variables)}
     others = [each for each in ca.symvar(expression) if each.element_hash() not in known]
     function = ca.Function("jumps", [variables, ca.vertcat(*others)], [ca.densify(expression)])
     codes = range(function.n_instructions())
     if not any(function.instruction_id(k) in _JUMPS for k in codes):
         return set()
-    reads: dict[int, frozenset[int]] = {}  # by register
+    reads: dict[int, frozenset[int]] = {}  # by number of the register
     found: set[int] = set()
     for k in codes:
         code = function.instruction_id(k)

@@ -1,9 +1,9 @@
-"""A model whose signals between plant and controllers can be falsified, and whose tasks can rest.
+"""Model with falsifiable signals between plant and controllers, and tasks that can miss ticks.
 
-What a sensor shows, what is demanded and what a controller gives out passes a *tap*, which returns
-``(1 + gain) y + offset``, what it returned last where it is held, or what it got some ticks ago.
-Gains, offsets and the rest are further signals of the stimulus: where they are zero the model is
-the one inside, and runs with and without a fault are of one structure.
+Sensor readings, demands and controller outputs pass a *tap*. A tap returns ``(1 + gain) y +
+offset``, its last value if it is held, or its input some ticks ago. Gains, offsets and the others
+are additional signals of the stimulus. If they are zero, the model equals the inner model, so runs
+with and without a fault have the same structure.
 """
 
 from __future__ import annotations
@@ -19,25 +19,25 @@ from bywire.core.model import Model, Task, Wrapping
 from bywire.core.signals import Signal, ranges_of, signals_of
 
 DEAD = 2.0
-"""of the stimulus by which a task fails: it has lost its memory"""
+"""value of the stimulus by which a task fails: the task has lost its memory"""
 
 
 class Tap(NamedTuple):
-    """A signal that can be falsified.
+    """Signal that can be falsified.
 
     Parameters
     ----------
     name
-        Of its stimulus, see `controls`.
+        Prefix of its stimuli, see `controls`.
     side
         ``"reading"``: a state as the tasks read it. ``"demand"``: a field of the stimulus.
-        ``"drive"``: a field of the memory as the plant feels it.
+        ``"drive"``: a field of the memory as the plant receives it.
     field
-        Which one.
+        Name of that state or field.
     task
-        Of a drive that may be late: the task that renews it.
+        Task that computes a drive which may be late.
     late
-        Of a drive: ticks of that task by which it comes late where its ``late`` is 1.
+        Delay of a drive in ticks of that task, while its stimulus ``late`` is 1.
     """
 
     name: str
@@ -47,7 +47,7 @@ class Tap(NamedTuple):
     late: int = 0
 
     def controls(self) -> dict[str, str]:
-        """Return the names of the stimuli that falsify it, by what they do."""
+        """Return the names of the stimuli that falsify the signal, by their effect."""
         kinds = ("gain", "offset", "held", "late") if self.late else ("gain", "offset", "held")
         return {kind: f"tap_{self.name}_{kind}" for kind in kinds}
 
@@ -55,23 +55,23 @@ class Tap(NamedTuple):
 def rests(task: str) -> str:
     """Return the name of the stimulus by which a task fails.
 
-    Where it is 1 the task misses its tick, and what it held stays; where it is `DEAD`, all that the
-    task renews is as at rest: it has no memory, and begins anew when it runs again.
+    If it is 1, the task misses its tick, and its outputs hold their values. If it is `DEAD`, all
+    values that the task computes are as at rest: it has no memory, and starts again later.
     """
     return f"rest_{task.replace('-', '_')}"
 
 
 class Tapped(Wrapping):
-    """A model with taps; a drive is recorded as the plant feels it.
+    """Model with taps, which records a drive as the plant receives it.
 
     Parameters
     ----------
     inner
-        The model as it is.
+        The model without taps.
     taps
         Signals that can be falsified.
     resting
-        Tasks that can miss their ticks, by name.
+        Names of the tasks that can miss ticks.
     """
 
     def __init__(self, inner: Model, taps: tuple[Tap, ...], resting: tuple[str, ...] = ()) -> None:
@@ -79,7 +79,7 @@ class Tapped(Wrapping):
         self.taps, self.resting = taps, resting
 
     def __getattr__(self, name: str) -> Any:
-        """Return what the model inside has beside the protocol: parts, what it records."""
+        """Return an attribute of the inner model beyond the protocol, such as its parts."""
         if name.startswith("__") or name == "inner":
             raise AttributeError(name)
         return getattr(self.inner, name)
@@ -91,7 +91,7 @@ class Tapped(Wrapping):
 
     @property
     def Stimulus(self) -> type[NamedTuple]:
-        """That of the model inside, then what falsifies."""
+        """Stimulus of the inner model, then the signals that falsify."""
         controls = [
             (name, Signal("1", name.replace("_", " ")))
             for tap in self.taps
@@ -104,7 +104,7 @@ class Tapped(Wrapping):
         return _extended(self.inner.Stimulus, (*controls, *tasks))
 
     def started(self, state: Any, memory: Any) -> Any:
-        """Return the memory at a start, of that of the model inside and the state."""
+        """Return the memory at a start, from the memory of the inner model and the state."""
         last: dict[str, Any] = {}
         for tap in self.taps:
             source = state if tap.side == "reading" else memory
@@ -113,16 +113,16 @@ class Tapped(Wrapping):
         return self.Memory(*memory, **last)
 
     def rest(self, par: Any) -> tuple[Any, Any]:
-        """Return where the model inside rests."""
+        """Return the rest of the inner model."""
         state, memory = self.inner.rest(par)
         return state, self.started(state, memory)
 
     def tasks(self, par: Any) -> tuple[Task, ...]:
-        """Return the controllers behind their taps."""
+        """Return the controllers with their taps."""
         return self.behind_taps(self.inner.tasks(par))
 
     def behind_taps(self, tasks: Iterable[Task]) -> tuple[Task, ...]:
-        """Return controllers of the model inside, however they compute, behind their taps."""
+        """Return controllers of the inner model, from any source, with their taps."""
         return tuple(
             Task(task.name, task.period, partial(self._tick, task.name, task.tick))
             for task in tasks
@@ -149,7 +149,7 @@ class Tapped(Wrapping):
         if name in self.resting:
             fails = getattr(stimulus, rests(name))
             empty = self.inner.rest(par)[1]
-            # What a task hands on as it was is no memory of its own.
+            # Values that a task passes on unchanged are not its own memory.
             after = type(after)(
                 *(
                     new if new is old else _failing(fails, old, new, none)
@@ -163,7 +163,7 @@ class Tapped(Wrapping):
         return self.Memory(*after, **{**kept, **last})
 
     def _inside_range(self, field: str, demand: Any) -> Any:
-        """Return a falsified demand within its range: a switch has no third position."""
+        """Return a falsified demand, limited to its range: a switch has no third position."""
         low, high = ranges_of(self.inner.Stimulus).get(field, (-math.inf, math.inf))
         above = demand if low == -math.inf else ops.fmax(demand, low)
         return above if high == math.inf else ops.fmin(above, high)
@@ -172,7 +172,7 @@ class Tapped(Wrapping):
         return self.inner.Memory._make(memory[: len(self.inner.Memory._fields)])
 
     def memory_inside(self, memory: Any) -> Any:
-        """Return the memory as the plant feels it: with the drives behind their taps."""
+        """Return the memory as the plant receives it, with the drives after their taps."""
         drives = {
             t.field: getattr(memory, f"last_{t.name}") for t in self.taps if t.side == "drive"
         }
@@ -180,11 +180,11 @@ class Tapped(Wrapping):
 
 
 def _tapped(tap: Tap, source: Any, memory: Any, stimulus: Any, last: dict[str, Any]) -> Any:
-    """Return what a tap gives, and note what it keeps."""
+    """Return the output of a tap, and store the values that it keeps."""
     control = {kind: getattr(stimulus, name) for kind, name in tap.controls().items()}
     value = getattr(source, tap.field)
     held, *line = _fields(tap)
-    for k, name in enumerate(line):  # the oldest last
+    for k, name in enumerate(line):  # oldest value last
         last[name] = value if k == 0 else getattr(memory, line[k - 1])
     if line:
         value = _either(control["late"], getattr(memory, line[-1]), value)
@@ -198,12 +198,12 @@ def _either(flag: float, old: float, new: float) -> float:
 
 
 def _failing(fails: float, old: float, new: float, none: float) -> float:
-    """Return what a task holds that runs, misses its tick, or is dead."""
+    """Return the memory of a task that runs, misses its tick, or is dead."""
     return ops.where(fails > 0.5 * (1.0 + DEAD), none, _either(fails, old, new))
 
 
 def _fields(tap: Tap) -> tuple[str, ...]:
-    """Return the fields of the memory that a tap keeps: its last value, then those under way."""
+    """Return the fields of the memory that a tap keeps: its last value, then delayed values."""
     return (f"last_{tap.name}", *(f"late_{tap.name}_{k + 1}" for k in range(tap.late)))
 
 
@@ -219,7 +219,7 @@ def _memory(
     for tap in taps:
         signal = signals_of(sides[tap.side])[tap.field]
         kept += [
-            (name, Signal(signal.unit, f"{signal.label} behind its tap", signal.nominal))
+            (name, Signal(signal.unit, f"{signal.label} after its tap", signal.nominal))
             for name in _fields(tap)
         ]
     return _extended(memory, tuple(kept))

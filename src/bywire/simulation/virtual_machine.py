@@ -1,6 +1,6 @@
 """Fallback without a compiler: CasADi's virtual machine evaluates the same functions.
 
-A substep in which a velocity passes zero is cut there, as the C text of ``emit_rare`` cuts it.
+It cuts a substep at the zero crossing of a velocity, like the C text of ``emit_rare``.
 """
 
 from __future__ import annotations
@@ -37,12 +37,13 @@ Settle = Callable[[Array, Array, Array, Array, float], tuple[list[Array], bool]]
 
 
 class CutSubstep:
-    """One substep, in as many parts as it takes.
+    """One substep, in as many parts as necessary.
 
     Parameters
     ----------
     settle
-        What a step of any length gives: x, d, r, q, jump, ..., and whether it did not settle.
+        Function that computes a step of any length: x, d, r, q, jump, ..., and whether it did not
+        settle.
     velocities
         Indices of the states that carry dry friction.
     m, p
@@ -53,7 +54,7 @@ class CutSubstep:
     Attributes
     ----------
     tries
-        How many parts were tried.
+        Number of tried parts.
     """
 
     def __init__(
@@ -81,7 +82,9 @@ class CutSubstep:
             unsettled |= failed
             before, x, d = x, o[0], o[1] * (h / t)
             for k, jump in self._jumps(o):
-                if k == turns or abs(x[k]) < STILL * abs(before[k]):  # alike bodies stop at once
+                if k == turns or abs(x[k]) < STILL * abs(
+                    before[k]
+                ):  # equal bodies stop at the same instant
                     x[k], d[k] = 0.0, _turned_back(float(d[k]), jump * (h / t))
             flow = flow + o[3] * (t / h)
             left -= t
@@ -94,11 +97,11 @@ class CutSubstep:
         return self._settle(x, d * (t / self._h), self._m, self._p, t)
 
     def _jumps(self, o: list[Array]) -> Iterator[tuple[int, float]]:
-        """Return which states carry dry friction, and by how much it would change."""
+        """Return the states with dry friction, and the changes of their increments by its jump."""
         return zip(self._velocities, o[JUMP], strict=True)
 
     def _first_turn(self, x: Array, o: list[Array]) -> tuple[int, float]:
-        """Return which velocity is the first to change its sign, -1 if none, and when."""
+        """Return the first velocity to change its sign, -1 if none, and the instant."""
         first, share = -1, 1.0
         for k, jump in self._jumps(o):
             v, w = float(x[k]), float(o[0][k])
@@ -109,9 +112,9 @@ class CutSubstep:
     def _locate(
         self, x: Array, d: Array, o: list[Array], length: float
     ) -> tuple[list[Array], float, int, bool]:
-        """Return a part that ends where the first velocity is zero.
+        """Return a part that ends at the first zero of a velocity.
 
-        Its length, which velocity it is, and whether it did not settle.
+        It has a length, the index of the velocity, and whether it did not settle.
         """
         first, final = EDGE * length, (1.0 - EDGE) * length
         turns, _ = self._first_turn(x, o)
@@ -133,13 +136,13 @@ class CutSubstep:
             w = float(o[0][turns])
             (P, at_P), (Q, at_Q) = points
             if abs(w) <= CLOSE * change or not first < t < final or t in (P, Q) or n == ATTEMPTS:
-                break  # with what this length gives
+                break  # with the result for this length
             low, high = (t, high) if w * x[turns] > 0.0 else (low, t)
             slope = (w - at_P) / (t - P) + (w - at_Q) / (t - Q) - (at_Q - at_P) / (Q - P)
             following = t - w / slope
             is_near = abs(w) <= NEAR * change and first < following < final
             if is_near and before is not None:
-                # The rest is on the line through two attempts.
+                # The remaining search is on the line through two attempts.
                 share = (following - t) / (t - before[0])
                 moved = [now + share * (now - was) for now, was in zip(o, before[1], strict=True)]
                 return [*moved[:JUMP], *o[JUMP:]], following, turns, failed
@@ -150,14 +153,14 @@ class CutSubstep:
 
 
 def _turned_back(before: float, jump: float) -> float:
-    """Return half the increment behind a zero of what had another before it."""
+    """Return half the increment after a zero of the velocity."""
     return math.copysign(max(abs(before) - jump, 0.0), before)
 
 
 def _zero_of(v: float, t: float, w: float, before: float, h: float) -> float:
-    """Return where a velocity that goes from v to w within t is zero.
+    """Return the time at which a velocity that changes from v to w within t is zero.
 
-    On the parabola that has the mean slope ``before`` over an earlier length h, too.
+    It is the zero of the parabola that also has the mean slope ``before`` over an earlier length h.
     """
     mean = (w - v) / t
     linear = -v / mean
@@ -171,7 +174,7 @@ def _zero_of(v: float, t: float, w: float, before: float, h: float) -> float:
 
 
 class VirtualMachine:
-    """The kernel's loops in Python, its functions in CasADi's virtual machine."""
+    """Kernel with loops in Python and functions in CasADi's virtual machine."""
 
     label = "virtual machine (no C compiler)"
 
@@ -195,7 +198,7 @@ class VirtualMachine:
         self._lock = threading.Lock()  # the functions' buffers serve one run at a time
 
     def advance(self, request: Request, state: Array, begin: int, end: int, rows: Array) -> None:
-        """Run frames begin..end: renews ``state`` and fills ``rows`` in place."""
+        """Run frames begin..end: update ``state`` and fill ``rows`` in place."""
         with self._lock:
             self._advance(request, state, begin, end, rows)
 
@@ -227,7 +230,7 @@ class VirtualMachine:
             cut = CutSubstep(self._settled, self._velocities, part["m"], p, float(h[0]))
             is_known = int(result[DOUBT][0] == 0.0)
             result, failed = cut.results(part["x"].copy(), part["d"].copy())
-            # Of a step that has settled a kernel knows the velocities, and does not try it again.
+            # The velocities of a settled step are final, so a kernel does not try it again.
             part["counters"] += failed, 1.0, cut.tries - is_known
         for kind, value in zip(("x", "d", "r"), result, strict=False):
             part[kind][:] = value
@@ -236,7 +239,7 @@ class VirtualMachine:
     def _settled(
         self, x: Array, d: Array, m: Array, p: Array, h: float
     ) -> tuple[list[Array], bool]:
-        """Return what a step of any length gives, and whether it did not settle."""
+        """Return the result of a step of any length, and whether it did not settle."""
         guess, step = d, np.array([h])
         result = self._fast(x, guess, m, p, step)
         if result[DOUBT][0] != 0.0:

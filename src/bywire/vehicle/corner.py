@@ -45,7 +45,7 @@ class Corner(Assembly[ParT, MemoryT]):
         "J", "tyre: slip and deflection", role=Role("sink", "tyre", book=BOOK, returns="taken")
     )
     W_slope = Integral("J", "work of gravity", role=Role("source", "slope", book=BOOK))
-    t_locked = Integral("s", "time in which the wheel stands")
+    t_locked = Integral("s", "time during which the wheel is locked")
 
     F_x = Wire("N", "braking force of the tyre", 1e3)
     N_x = Wire("N", "load of the wheel", 4e3)

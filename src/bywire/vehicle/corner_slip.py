@@ -1,4 +1,4 @@
-"""Slip control of a car's corner: it lowers the moment that is demanded of any brake.
+"""Slip control of a car's corner: it lowers the moment demand of any brake.
 
 The laws use pressures. For a brake that follows a moment, its demand is converted to the pressure
 of a brake with ``slip.k_hat``, and the lowered pressure is converted back.
@@ -51,10 +51,10 @@ class Parameters(ParameterSet):
 class Memory(NamedTuple):
     """Memory of slip control between its ticks."""
 
-    M_left: Annotated[float, Signal("N*m", "moment that slip control left", 300.0)]
-    M_most: Annotated[float, Signal("N*m", "moment demand, build-up limited", 300.0)]
+    M_left: Annotated[float, Signal("N*m", "remaining moment after slip control", 300.0)]
+    M_most: Annotated[float, Signal("N*m", "moment demand after build-up limit", 300.0)]
     v_hat: Annotated[float, Signal("m/s", "reference speed", 20.0, set_point_of="v_x")]
-    slip_hat: Annotated[float, Signal("1", "slip as the ECU sees it", 0.1)]
+    slip_hat: Annotated[float, Signal("1", "slip estimated by the ECU", 0.1)]
     a_hat: Annotated[float, Signal("m/s**2", "measured deceleration", 10.0)]
     abs: Annotated[float, Signal("1", "slip control acts")]
     tread_hat: Annotated[float, Signal("m/s", "measured speed of the tread", 20.0)]
@@ -65,9 +65,9 @@ class Memory(NamedTuple):
     slip_integral: Annotated[float, Signal("Pa", "integral part of the slip PI", 1e6)]
     phase_x: Annotated[float, Signal("1", "phase of the rules", 3.0)]
     since_x: Annotated[float, Signal("s", "time since the rules' last phase or step", 0.1)]
-    p_left_x: Annotated[float, Signal("Pa", "demand that rules left", 1e6)]
-    p_hat_x: Annotated[float, Signal("Pa", "pressure as rules estimate it", 1e6)]
-    p_held_x: Annotated[float, Signal("Pa", "pressure that the wheel's road held", 1e6)]
+    p_left_x: Annotated[float, Signal("Pa", "remaining demand after the rules", 1e6)]
+    p_hat_x: Annotated[float, Signal("Pa", "pressure estimated by the rules", 1e6)]
+    p_held_x: Annotated[float, Signal("Pa", "last pressure that the wheel's road could hold", 1e6)]
     rise_x: Annotated[float, Signal("Pa", "next step of the pressure", 1e5)]
     slowing_x: Annotated[float, Signal("m/s**2", "wheel's deceleration, filtered", 10.0)]
 
@@ -80,7 +80,7 @@ class Readings(NamedTuple):
     angle: Annotated[float, Signal("rad", "angle of the last edge", 100.0)]
     age: Annotated[float, Signal("s", "time since the last edge", 1e-3)]
     weight: Annotated[float, Signal("m/s**2", "gravity along the road", 0.5)]
-    touches: Annotated[float, Signal("1", "pads are on the disc")]
+    touches: Annotated[float, Signal("1", "pads touch the disc")]
 
 
 def awake(v: float, par: Parameters) -> dict[str, float]:
@@ -125,8 +125,8 @@ def tick(r: Readings, m: Any, M_set: float, par: Parameters) -> Any:
         rules, out = abs_rules.output(rules, view, par.T_s, par.rules)  # type: ignore[assignment]
         m = m._replace(**{f"{name}_x": value for name, value in rules._asdict().items()})
     left = ops.fmax(k * out.p, ops.fmin(par.M_least, m.M_most))
-    # Near standstill, slip is a car that rocks on its tyre: the motors would follow it against a
-    # brake that the standing disc holds. The lowered moment stays, unless the demand is lower.
+    # Near standstill, slip comes from a car that rocks on its tyre, and the motors would follow it
+    # against the standing disc. The lowered moment stays, unless the demand is lower.
     holds = ops.where(m.v_hat < par.vehicle_speed.v_still, before.abs, 0.0)
     kept = ops.fmin(before.M_left, m.M_most)
     left = ops.where(holds > 0.5, kept, left)
@@ -134,7 +134,7 @@ def tick(r: Readings, m: Any, M_set: float, par: Parameters) -> Any:
 
 
 def _measured(r: Readings, m: Any, par: Parameters) -> Any:
-    """Return the memory with speeds, slip and deceleration as the ECU sees them."""
+    """Return the memory with speeds, slip and deceleration estimated by the ECU."""
     T = par.T_s
     wheel = wheel_speed.output(
         wheel_speed.State(m.edge, m.age, m.omega_hat),

@@ -1,4 +1,4 @@
-"""The best stop that road, tyres and body allow: every wheel at its peak, no time lost."""
+"""Ideal stop for road, tyres and body: every wheel at its peak, without delay."""
 
 from __future__ import annotations
 

@@ -71,8 +71,8 @@ class TwoWheeler(Assembly[ParT, MemoryT]):
     W_pitch = Integral(
         "J", "work of the braking forces on pitching", role=Role("source", "pitching", book=BOOK)
     )
-    t_locked_f = Integral("s", "time in which the front wheel stands")
-    t_locked_r = Integral("s", "time in which the rear wheel stands")
+    t_locked_f = Integral("s", "time during which the front wheel is locked")
+    t_locked_r = Integral("s", "time during which the rear wheel is locked")
 
     F_f = Wire("N", "braking force of the front tyre", 1e3)
     F_r = Wire("N", "braking force of the rear tyre", 1e3)

@@ -255,29 +255,29 @@ def test_what_functions_share_is_computed_once_and_may_be_undefined(written):
 
 REFUSED = {
     "power": ("return y[0] ** 2", 0, "arithmetic is + - * /"),
-    "sine": ("return math.sin(y[0])", 0, "it calls functions of loops"),
+    "sine": ("return math.sin(y[0])", 0, "it can call functions of this kind"),
     "else of a loop": ("for x in y:\n    pass\nelse:\n    return 1.0\nreturn 0.0", 0, "else"),
-    "try": ("try:\n    return y[0]\nfinally:\n    pass", 0, "it knows assignments"),
-    "a number as condition": ("if len(y):\n    return 1.0\nreturn 0.0", 0, "a condition is a bool"),
-    "a narrowing": ("k = 0\nk = y[0]\nreturn 1.0 * k", 1, "it is float, and int is needed"),
-    "a counter that moves": ("for k in range(9):\n    k = 3\nreturn 0.0", 1, "counts a loop"),
+    "try": ("try:\n    return y[0]\nfinally:\n    pass", 0, "valid statements are"),
+    "a number as condition": ("if len(y):\n    return 1.0\nreturn 0.0", 0, "must be a bool"),
+    "a narrowing": ("k = 0\nk = y[0]\nreturn 1.0 * k", 1, "it is float, but it must be int"),
+    "a counter that moves": ("for k in range(9):\n    k = 3\nreturn 0.0", 1, "a loop's counter"),
     "a counter after its loop": ("for k in range(9):\n    pass\nreturn 1.0 * k", 2, "no value yet"),
     "a list in a loop": ("for k in range(9):\n    z = list(y)\nreturn 0.0", 1, "within a loop"),
-    "a signal that is changed": ("y[0] = 1.0\nreturn y[0]", 0, "a list of this function can"),
+    "a signal that is changed": ("y[0] = 1.0\nreturn y[0]", 0, "only a list created in this"),
     "a list that is changed late": (
         "z = list(y)\na = z[1:]\nz[2] = 9.0\nreturn a[1]",
         2,
-        "sliced, handed on or renamed",
+        "sliced, passed on or renamed",
     ),
     "a list that a loop hands on": (
         "z = list(y)\nfor k in range(9):\n    z[k] = 1.0\n    a = integral(t, z)\nreturn 0.0",
         2,
         "change it before",
     ),
-    "a list of any length": ("z = [0.0] * 999\nreturn z[0]", 0, "a number for each sample"),
+    "a list of any length": ("z = [0.0] * 999\nreturn z[0]", 0, "one number per sample"),
     "a list of other numbers": ("z = [1.0] * len(y)\nreturn z[0]", 0, "must start as [0.0]"),
-    "a text": ("return 1.0 if setting.y == 'y' else 0.0", 0, "'y' is not a field with a type"),
-    "a text of parts": ("return Undefined('a' + WORDS)", 0, "a text is written out"),
+    "a text": ("return 1.0 if setting.y == 'y' else 0.0", 0, "'y' is not a field with a C type"),
+    "a text of parts": ("return Undefined('a' + WORDS)", 0, "write the text as one"),
     "a number without format": ("return Undefined(f'{y[0]}')", 0, "numbers in it like"),
     "too many numbers": (
         "return Undefined(f'{y[0]:g} {y[0]:g} {y[0]:g} {y[0]:g}')",
@@ -287,14 +287,14 @@ REFUSED = {
     "a list in a comparison": (
         "return 1.0 if 0.0 < max(moving_average(t, y, 1.0)) < 1.0 else 0.0",
         0,
-        "a number that has a name",
+        "assign this number to a name",
     ),
-    "infinity": ("return math.inf", 0, "only a finite number is a constant"),
-    "a name in several": ("a = b = 1.0\nreturn a", 0, "it knows assignments"),
-    "a sum": ("return sum(y)", 0, "`sum(y)` in C: it calls functions of loops"),
+    "infinity": ("return math.inf", 0, "a constant must be a finite number"),
+    "a name in several": ("a = b = 1.0\nreturn a", 0, "valid statements are"),
+    "a sum": ("return sum(y)", 0, "`sum(y)` in C: it can call functions"),
     "a starred call": ("return integral(*[t, y])", 0, "without * and **"),
     "what is never nothing": ("return 1.0 if y is None else 0.0", 0, "this is never None"),
-    "a lambda": ("f = lambda x: x\nreturn 0.0", 0, "not among the expressions"),
+    "a lambda": ("f = lambda x: x\nreturn 0.0", 0, "may compute this expression"),
     "an unknown name": ("return unknown", 0, "it has no value yet"),
 }
 
@@ -310,7 +310,7 @@ def test_what_has_no_translation_is_refused_with_its_line(written, body, line, w
 
 def test_a_function_that_calls_itself_and_an_unknown_type_are_refused(written):
     again = "def g(x: float) -> float:\n    return g(x)\n"
-    with pytest.raises(ModelError, match="does not call itself"):
+    with pytest.raises(ModelError, match="must not call itself"):
         written(again, figure("return g(y[0])")).translate()
     with pytest.raises(ModelError, match="the type of 'x' is <class 'str'>"):
         written("def g(x: str) -> float:\n    return 1.0\n", figure("return g('a')")).translate()

@@ -149,7 +149,7 @@ def test_derating_keeps_a_motor_below_its_limit_that_would_pass_it() -> None:
     hot = {**WARM, "motor_heat.T_a": "100 degC"}
     known = {**KNOWN, "ecu.derating.T_a_hat": "100 degC"}
     free, derated = duty(options, **hot), duty(options, **hot, **known)
-    assert any("the winding passes 155 degC, its limit, at t = " in w for w in free.warnings)
+    assert any("the winding exceeds 155 degC, its limit, at t = " in w for w in free.warnings)
     assert not any("winding" in w for w in derated.warnings)
     assert free.kpi("time_derated").value == 0.0
     assert free.kpi("derated_after").note == "the motor is never derated"

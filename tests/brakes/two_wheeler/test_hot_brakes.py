@@ -193,7 +193,7 @@ def test_fluid_that_gets_too_hot_is_reported():
     old = {"options.stops": "2", "front.heat.T_wet": "22 degC"}
     result = bywire.run("repeated-stops", old, estimate_error=False)
     (text,) = [text for text in result.warnings if text.startswith("course-temperatures")]
-    assert "front brake: the brake fluid passes the boiling point of wet fluid, 22 degC" in text
+    assert "front brake: the brake fluid exceeds the boiling point of wet fluid, 22 degC" in text
 
 
 def test_the_time_of_the_peak_is_that_of_the_fluid_and_not_of_a_row():

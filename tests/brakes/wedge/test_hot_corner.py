@@ -95,4 +95,4 @@ def test_faded_pads_take_more_force_and_the_motors_what_the_road_gave(cold, fade
 
 def test_a_disc_hotter_than_the_numbers_hold_is_reported():
     result = stop(**{"options.T_disc": "700 degC"})
-    assert any("the discs pass 650 degC" in text for text in result.warnings)
+    assert any("the discs exceed 650 degC" in text for text in result.warnings)

@@ -1,9 +1,9 @@
-"""Operating points on corners of a model: which operation, on which line, and which side counts.
+"""Operating points on corners of a model: the operation, its line, and the side to use.
 
-A minimum, a limit, a dead band or a magnitude has two derivatives where its sides meet. There,
-algorithmic differentiation returns a mean of both, which is the slope of neither side. A linear
-model is therefore compared with those right beside its operating point. Where they differ, the
-operations on their corners are named, and a stated side is taken.
+A minimum, a limit, a dead band or an absolute value has two derivatives where its sides meet.
+There, algorithmic differentiation returns a mean of both, which is the slope of neither side. A
+linear model is therefore compared with those next to its operating point. If they differ, bywire
+names the operations on their corners, and takes the side that the user states.
 """
 
 from __future__ import annotations
@@ -32,17 +32,17 @@ from bywire.core.signals import signals_of
 from bywire.core.typing import Array
 
 ABOVE, BELOW = "above", "below"
-"""the tested quantity is above its corner, or below: the first argument of a minimum, a maximum or
-a comparison minus the second, the argument of a magnitude"""
+"""side of the tested quantity: above or below its corner. The tested quantity is the first argument
+of a minimum, a maximum or a comparison minus the second, or the argument of an absolute value"""
 REACH = 1e-9
-"""how near a corner counts as at the operating point, of the signals' usual magnitudes: operating
-points are solved to 1e-10 of these, so that nobody can say on which side of a nearer corner they
-are; and what is smooth changes by as little over such a distance"""
-_FINER = 1.0 / 4.0  # what is smooth differs by a quarter at a quarter of the distance
-_LASTING = 0.4  # share of a difference that remains nearby, from which a corner explains it
-_SAME = 1e-6  # of an entry of a Jacobian: what differs by no more is compared no further
-_SMALL = 1e-8  # of the largest entry in its row, each by a usual magnitude: the same
-_EQUAL = 1e-5  # of a response: models that differ by no more are one
+"""distance within which a corner counts as at the operating point, relative to the signals' usual
+magnitudes: operating points are solved to 1e-10 of these, so that the side of a nearer corner is
+unknown; and smooth functions hardly change over such a distance"""
+_FINER = 1.0 / 4.0  # smooth functions differ by a quarter at a quarter of the distance
+_LASTING = 0.4  # remaining share of a difference nearby, above which a corner explains it
+_SAME = 1e-6  # of an entry of a Jacobian: smaller differences need no further comparison
+_SMALL = 1e-8  # the same, of the largest entry in its row, scaled by usual magnitudes
+_EQUAL = 1e-5  # of a response: models with smaller differences are equal
 _ACROSS = 0.02  # of the reach: on either side of a corner
 _TURNS = 8
 _FREQUENCIES = 40
@@ -50,7 +50,7 @@ _OPS_FILE = ops.__file__
 
 
 class CornerError(ParameterError):
-    """The operating point lies on a corner whose sides have different linear models."""
+    """Operating point on a corner whose sides have different linear models."""
 
 
 @dataclass(frozen=True)
@@ -60,16 +60,16 @@ class Sides:
     Parameters
     ----------
     usual
-        ``"above"``, ``"below"``, or empty: refuse.
+        ``"above"``, ``"below"``, or empty to reject corners.
     at
-        Sides of single places, ``"FILE:LINE"`` with the end of the file's path at least.
+        Sides of single places, ``"FILE:LINE"``, where FILE is at least the end of the path.
     """
 
     usual: str = ""
     at: Mapping[str, str] = field(default_factory=dict)
 
     def of(self, place: str) -> str:
-        """Return the side of a place; empty where none is stated."""
+        """Return the side of a place; empty if none is stated."""
         for known, side in self.at.items():
             if place == known or place.endswith(f"/{known}"):
                 return side
@@ -77,7 +77,7 @@ class Sides:
 
 
 def read_sides(text: str) -> Sides:
-    """Return sides as a user writes them: ``"above"``, or ``"valve.py:42=below, above"``.
+    """Return the sides in a user's text: ``"above"``, or ``"valve.py:42=below, above"``.
 
     Raises
     ------
@@ -108,9 +108,9 @@ _STATED: ContextVar[Sides] = ContextVar("sides", default=Sides())  # noqa: B039 
 
 @contextmanager
 def taking(side: str) -> Iterator[None]:
-    """Take a side of every corner in linear models that are made within; see `read_sides`.
+    """Set the side of every corner for linear models computed in this context; see `read_sides`.
 
-    An empty text keeps what is stated around.
+    An empty text keeps the sides of the enclosing context.
     """
     if not side:
         yield
@@ -129,11 +129,11 @@ class Jacobians:
     Parameters
     ----------
     slopes
-        By the free signals, times their usual magnitudes, shape (rows, free).
+        Derivatives by the free signals, times their usual magnitudes, shape (rows, free).
     values
-        Rates, outputs and renewed memory, shape (rows,).
+        Rates, outputs and new memory, shape (rows,).
     names
-        Of the rows: a state, ``NAME[k]`` of the memory; empty for an output.
+        Names of the rows: a state, ``NAME[k]`` of the memory; empty for an output.
     """
 
     slopes: Array
@@ -143,16 +143,16 @@ class Jacobians:
 
 @dataclass(frozen=True, eq=False)
 class Linearization:
-    """Linear model as a function of the point at which it is computed.
+    """Linear model as a function of its operating point.
 
     Parameters
     ----------
     point
         Operating point.
     free
-        Which of state, memory and stimulus, in a row, the model lets move.
+        Mask of the free signals among state, memory and stimulus, in one vector.
     jacobians
-        Its numbers at a point.
+        Its matrices at a point.
     models
         The linear models at a point.
     outputs, ticks
@@ -169,16 +169,16 @@ class Linearization:
 
 @dataclass(frozen=True, eq=False)
 class Kink:
-    """An operation near its corner.
+    """Operation near its corner.
 
     Parameters
     ----------
     place, source
-        ``"FILE:LINE"``, and what is written there.
+        ``"FILE:LINE"``, and the source code there.
     excess
-        What is tested: above the corner where it is positive.
+        Tested quantity, positive above the corner.
     slope
-        Of the excess by the free signals, in their usual magnitudes.
+        Derivative of the excess by the free signals, in their usual magnitudes.
     corner
         Value of both arguments at the corner.
     order
@@ -194,15 +194,15 @@ class Kink:
 
     @property
     def side(self) -> str:
-        """On which side of its corner the operation is."""
+        """Side of the corner on which the operation is."""
         return ABOVE if self.excess > 0.0 else BELOW
 
 
 def magnitudes(point: SmoothPoint) -> Array:
-    """Return what state, memory and stimulus, in a row, are displaced by, over `REACH`.
+    """Return the displacements of state, memory and stimulus, in one vector, divided by `REACH`.
 
-    Usual magnitudes, or the values where they are larger; of a sliding velocity so little that its
-    direction, which says on which side it is, stays.
+    These are usual magnitudes, or larger values. The displacement of a sliding velocity is so small
+    that its direction, which determines its side, does not change.
     """
     model = point.model
     known = [*map(signals_of, (model.State, model.Memory, model.Stimulus))]
@@ -217,14 +217,14 @@ def magnitudes(point: SmoothPoint) -> Array:
 
 
 def beside_point(point: SmoothPoint, free: NDArray[np.bool_]) -> Array:
-    """Return how far state, memory and stimulus are displaced to be beside corners, in a row."""
+    """Return the displacements of state, memory and stimulus to leave corners, in one vector."""
     by = np.zeros(free.size)
     by[free] = REACH * _generic(int(free.sum()))[0] * magnitudes(point)[free]
     return by
 
 
 def _generic(count: int) -> Array:
-    """Return two directions in which no corner lies by chance, shape (2, count)."""
+    """Return two generic directions, along which no corner lies by chance, shape (2, count)."""
     rng = np.random.default_rng(20)
     return np.asarray(rng.uniform(0.5, 1.0, (2, count)) * rng.choice([-1.0, 1.0], (2, count)))
 
@@ -237,14 +237,14 @@ def kinks_at(
     Parameters
     ----------
     point, free, outputs, ticks
-        As of `Linearization`.
+        As in `Linearization`.
     usual
         See `magnitudes`.
 
     Returns
     -------
     list
-        In the order in which they are computed; none of equations that take no other numbers.
+        Operations in the order of computation; empty for equations that accept floats only.
     """
     values = np.concatenate([point.state, point.memory, point.stimulus])
     watch = _Watch()
@@ -258,7 +258,7 @@ def kinks_at(
 
 
 def _evaluate(point: SmoothPoint, numbers: list[Any], outputs: bool, ticks: bool) -> None:
-    """Evaluate everything that is linearized."""
+    """Evaluate all linearized functions."""
     model, par = point.model, point.par
     n, m = point.state.size, point.memory.size
     x = cast(Any, model.State)(*numbers[:n])
@@ -298,7 +298,7 @@ def linear_models(of: Linearization) -> tuple[LinearModel, ...]:
 
 
 def _limits_reached(of: Linearization) -> list[str]:
-    """Return the free states that are on their one-sided limits, at 0."""
+    """Return the free states at their one-sided limit, 0."""
     point = of.point
     fields, usual = point.model.State._fields, magnitudes(point)
     places = {name: fields.index(name) for name in point.model.limits}
@@ -306,7 +306,7 @@ def _limits_reached(of: Linearization) -> list[str]:
 
 
 class _Corner:
-    """Search for the corners at an operating point; directions are those of the free signals."""
+    """Search for the corners at an operating point, along directions of the free signals."""
 
     def __init__(self, of: Linearization) -> None:
         self.of = of
@@ -334,14 +334,14 @@ class _Corner:
         return self.of.models(self.moved(direction))
 
     def is_near(self) -> bool:
-        """Return whether anything breaks between the point and its surroundings."""
+        """Return whether any slope or value jumps between the point and its surroundings."""
         if not self.here.size:
             return False
         first, _, opposite, _ = self.generic
         return self.breaks(first, opposite, self.here) or self.breaks(first, self.here, self.here)
 
     def breaks(self, one: Array, other: Array, middle: Array) -> bool:
-        """Return whether slopes differ at two places however near to a middle, or values jump."""
+        """Return whether slopes differ arbitrarily close to a middle point, or values jump."""
         a, b = self.jacobians(one), self.jacobians(other)
         if not (np.isfinite(a.slopes).all() and np.isfinite(b.slopes).all()):
             return True
@@ -356,7 +356,7 @@ class _Corner:
         return bool((np.abs(a.slopes - b.slopes) > _LASTING * apart)[seen].any())
 
     def differ(self, one: Array, other: Array, middle: Array) -> bool:
-        """Return whether models answer differently at two places however near to a middle."""
+        """Return whether the models' responses differ arbitrarily close to a middle point."""
         pairs = [*zip(self.models(one), self.models(other), strict=True)]
         seen = [_apart(*pair) for pair in pairs]
         if not any((apart > least).any() for apart, least in seen):
@@ -376,7 +376,7 @@ class _Corner:
         return tuple(a.names[k] or "an output" for k in np.flatnonzero(jump))
 
     def chosen(self) -> tuple[LinearModel, ...]:
-        """Return the models of the stated side, or those of all sides where they agree."""
+        """Return the models of the stated side, or the common ones if all sides agree."""
         sides = _STATED.get()
         found: dict[str, Kink] = {}
         for direction in self.generic:
@@ -389,7 +389,7 @@ class _Corner:
         return self.taken(sides)
 
     def agreed(self) -> tuple[LinearModel, ...]:
-        """Return the model that all sides have in common."""
+        """Return the common model of all sides."""
         first, *others = self.generic
         found = self.models(first)
         finite = all(np.isfinite(model.A).all() and np.isfinite(model.D).all() for model in found)
@@ -400,7 +400,7 @@ class _Corner:
         return found if self.differ(first, self.here, self.here) else self.models(self.here)
 
     def taken(self, sides: Sides) -> tuple[LinearModel, ...]:
-        """Return the models on the stated sides; of corners that exclude each other, the first."""
+        """Return the models on the stated sides; if corners exclude each other, by the first."""
         rows: dict[tuple[str, int], tuple[Array, float, float]] = {}
         direction = self.generic[0]
         for _ in range(_TURNS):
@@ -420,14 +420,14 @@ class _Corner:
         return tuple(replace(model, corners=texts) for model in self.models(direction))
 
     def kinks(self, direction: Array) -> list[Kink]:
-        """Return the operations whose corner, crossed near a direction, changes the models."""
+        """Return the operations whose corner changes the models when crossed near a direction."""
         known: dict[tuple[bytes, float], bool] = {}
         return [each for each in self.near(direction) if self._matters(each, direction, known)]
 
     def _matters(
         self, kink: Kink, direction: Array, known: dict[tuple[bytes, float], bool]
     ) -> bool:
-        """Return `matters`, which is one for all operations that test the same quantity."""
+        """Return `matters`, computed once for all operations that test the same quantity."""
         largest = kink.slope[np.abs(kink.slope).argmax()]
         away = round(self.offset(kink, direction) / float(largest), 6)
         key = ((kink.slope / largest).round(9).tobytes(), away)
@@ -440,7 +440,7 @@ class _Corner:
         largest = np.abs(kink.slope).max()
         c = kink.slope / largest
         missing = c @ direction + self.offset(kink, direction) / largest
-        along = direction - c * missing / (c @ c)  # right on the corner
+        along = direction - c * missing / (c @ c)  # exactly on the corner
         one, other = along + _ACROSS * c, along - _ACROSS * c
         if not self.breaks(one, other, along):
             return False
@@ -451,7 +451,7 @@ class _Corner:
         return any(name in felt or name == "an output" for name in jumping)
 
     def near(self, direction: Array) -> list[Kink]:
-        """Return the operations with a corner near the point, as a displaced point shows them."""
+        """Return the operations with a corner near the point, evaluated at a displaced point."""
         usual = magnitudes(self.of.point)
         kinks = kinks_at(
             self.moved(direction),
@@ -463,7 +463,7 @@ class _Corner:
         return [each for each in kinks if abs(self.offset(each, direction)) <= _size(each.slope)]
 
     def offset(self, kink: Kink, direction: Array) -> float:
-        """Return the excess at the operating point itself, over the reach."""
+        """Return the excess at the operating point itself, relative to the reach."""
         return kink.excess / REACH - float(kink.slope @ direction)
 
     def refusal(self, kinks: Sequence[Kink]) -> str:
@@ -486,7 +486,7 @@ class _Corner:
 
 
 def _direction(rows: Sequence[tuple[Array, float, float]], generic: Array) -> Array:
-    """Return a direction in which excesses have their signs; the first ones, where not all can."""
+    """Return a direction with given signs of excesses; of the first ones if not all can be met."""
     from scipy.optimize import linprog
 
     n, kept = generic.size, np.zeros((0, generic.size))
@@ -502,7 +502,7 @@ def _direction(rows: Sequence[tuple[Array, float, float]], generic: Array) -> Ar
             continue
         *_, least = solution = np.asarray(answer.x)
         if least > 1e-6:
-            # A little of the generic one, so that no other corner is met by chance.
+            # A small share of the generic direction avoids other corners.
             best = solution[:n] + 0.3 * min(float(least), 1.0) * generic
             kept, offsets = tried, beyond
     return np.asarray(best)
@@ -545,14 +545,14 @@ class _Watch:
         self.count = 0
 
     def see(self, excess: float, slope: Array, corner: float) -> None:
-        """Note an operation whose corner can be reached."""
+        """Record an operation whose corner can be reached."""
         self.count += 1
         if np.isfinite(slope).all() and slope.any():
             self.kinks.append(Kink(*_place(), excess, slope, corner, self.count))
 
 
 def _place() -> tuple[str, str]:
-    """Return the line outside elementary functions that computes, and what is written there."""
+    """Return the computing line outside elementary functions, and its source code."""
     frame = sys._getframe(2)
     while frame.f_back and frame.f_code.co_filename in (__file__, _OPS_FILE):
         frame = frame.f_back
@@ -572,10 +572,10 @@ def _shown_file(name: str) -> str:
 
 
 class _Number:
-    """A number with its slopes by the free signals."""
+    """Number with its derivatives by the free signals."""
 
     __slots__ = ("slope", "value", "watch")
-    __array_ufunc__ = None  # NumPy's scalars hand operations over to this class
+    __array_ufunc__ = None  # NumPy's scalars pass operations on to this class
 
     def __init__(self, value: float, slope: Array, watch: _Watch) -> None:
         self.value, self.slope, self.watch = float(value), slope, watch

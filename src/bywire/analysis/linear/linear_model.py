@@ -18,7 +18,7 @@ _COUPLED = 1e-9  # of the largest entry of A: below it a dropped state does not 
 
 @dataclass(frozen=True, eq=False)
 class LinearModel:
-    r"""Deviations from an operating point.
+    r"""Linear model of deviations from an operating point.
 
     .. math:: \dot x = A x + B u, \quad y = C x + D u
 
@@ -39,8 +39,8 @@ class LinearModel:
     period
         Sample time [s]; 0 for a continuous model.
     corners
-        On which side of an operation's corner the model is taken, where the operating point lies
-        on one; see `bywire.analysis.linear.corners`.
+        Side of an operation's corner for which the model holds, if the operating point is on one;
+        see `bywire.analysis.linear.corners`.
     """
 
     name: str
@@ -59,11 +59,11 @@ class LinearModel:
     corners: tuple[str, ...] = ()
 
     def state_space(self) -> Any:
-        """Return it as ``control.StateSpace`` with named signals, for any of its methods.
+        """Return the model as ``control.StateSpace`` with named signals, for any of its methods.
 
-        States that no input reaches or no output sees are left out: integrators among them would
-        spoil margins and steady gains. Each state is in a unit of its own, a power of two of SI,
-        so that entries are of like size.
+        Uncontrollable and unobservable states are left out: integrators among them would distort
+        margins and steady gains. Each state has its own unit, a power of two of SI, so that entries
+        have similar magnitudes.
         """
         import control
 
@@ -85,13 +85,13 @@ class LinearModel:
     def transfer_function(self, input: str = "", output: str = "") -> Any:
         """Return one path as ``control.TransferFunction`` with named signals.
 
-        What cancels exactly is left out. `transfer` has its zeros, poles and gain, without the
-        rounding of polynomials.
+        Exact cancellations are removed. `transfer` returns zeros, poles and gain, without the
+        rounding errors of polynomials.
 
         Parameters
         ----------
         input, output
-            Names of the signals; the first ones where empty.
+            Names of the signals; the first ones if empty.
 
         Raises
         ------
@@ -108,7 +108,7 @@ class LinearModel:
         Parameters
         ----------
         input, output
-            Names of the signals; the first ones where empty.
+            Names of the signals; the first ones if empty.
 
         Raises
         ------
@@ -155,7 +155,7 @@ class LinearModel:
 
     @property
     def live(self) -> tuple[str, ...]:
-        """States that anything moves, or anything feels: no temperatures while heat is off."""
+        """States with any coupling to others: no temperatures while heat is off."""
         A, B, C = (values != 0.0 for values in (self.A, self.B, self.C))
         felt = A.any(axis=0) | A.any(axis=1) | B.any(axis=1) | C.any(axis=0) | (self.rate != 0.0)
         return tuple(name for name, kept in zip(self.states, felt, strict=True) if kept)
@@ -168,8 +168,8 @@ class LinearModel:
         states
             States to keep.
         held
-            Whether the others are held at the operating point, as a locked rotor; else they
-            must not act on the kept ones or on the outputs.
+            Whether the others are held at the operating point, like a locked rotor. Otherwise they
+            must not act on the kept states or on the outputs.
 
         Raises
         ------
@@ -229,7 +229,7 @@ class LinearModel:
         )
 
     def together(self, inputs: Sequence[str]) -> LinearModel:
-        """Return the model with some inputs moving as one, named after the first of them."""
+        """Return the model with some inputs combined into one, named after the first of them."""
         columns = [self.inputs.index(name) for name in inputs]
         first = columns[0]
         return replace(
@@ -253,7 +253,7 @@ class LinearModel:
         Raises
         ------
         ParameterError
-            When it is so long that the model's numbers overflow.
+            When the sample time is so long that the model's numbers overflow.
         """
         from scipy.linalg import expm
 
@@ -261,7 +261,7 @@ class LinearModel:
         acting = np.flatnonzero(self.B.any(axis=0))  # an exponential's cost is that of all columns
         size = n + acting.size
         whole = np.zeros((size, size))
-        # Van Loan: the exponential of [[A, B], [0, 0]] holds both integrals, A singular or not.
+        # Van Loan: the exponential of [[A, B], [0, 0]] contains both integrals, for any A.
         whole[:n, :n], whole[:n, n:] = self.A, self.B[:, acting]
         with np.errstate(all="ignore"):
             step = expm(whole * period)
@@ -297,7 +297,7 @@ class LinearModel:
         return np.asarray(self.C[:, k] @ inner + self.D)
 
     def effective(self) -> list[int]:
-        """Return the states that inputs reach and that reach outputs: the others cost time only."""
+        """Return the states that inputs reach and that reach outputs; others only cost time."""
         forward, backward = self.B.any(axis=1), self.C.any(axis=0)
         coupled = self.A != 0
         for _ in range(len(self.states)):
@@ -319,7 +319,7 @@ def _places(kind: str, names: Sequence[str], known: tuple[str, ...]) -> list[int
 # --- Poles of sampled models as rates of continuous motions
 
 DEAD = 1e-9
-"""poles below this magnitude are deadbeat: their motion ends within a sample"""
+"""poles below this magnitude are deadbeat: their response ends within a sample"""
 STILL = 1e-6
 """rates below this magnitude [1/s] count as zero: integrators at rest"""
 
@@ -351,7 +351,7 @@ def rates(model: LinearModel) -> Complex:
 
 # --- Transfer functions
 
-_ROUNDING = 100.0 * float(np.finfo(float).eps)  # of the largest entry: what counts as zero
+_ROUNDING = 100.0 * float(np.finfo(float).eps)  # of the largest entry: smaller values count as zero
 
 
 @dataclass(frozen=True, eq=False)

@@ -56,16 +56,16 @@ def linearize(
     model, par
         The system and its parameters.
     state, memory
-        Operating point: the model's State, and the Memory that the tasks hold.
+        Operating point: the model's State, and the Memory of the tasks.
     inputs
         Fields of Memory that drive the continuous part, for instance ``("i_source",)``.
     outputs
         Fields of Output or State; if both have the name, that of Output.
     friction
-        ``"removed"``: as if there were none. ``"sliding"``: for motion about steady sliding, the
-        force of the sliding direction with its slope; every friction's velocity must be nonzero.
+        ``"removed"``: without friction. ``"sliding"``: for motion about steady sliding, the force
+        of the sliding direction with its slope; every friction's velocity must be nonzero.
         ``"stuck"``: every velocity with friction stays zero. Or one of these by the name of each
-        velocity, removed where it is not named.
+        velocity; friction of other velocities is removed.
 
     Raises
     ------
@@ -126,7 +126,7 @@ def smooth_point(
 def free_signals(
     point: SmoothPoint, states: Sequence[str], memory: Sequence[str], stimulus: Sequence[str]
 ) -> NDArray[np.bool_]:
-    """Return which of state, memory and stimulus, in a row, are named and do not stick."""
+    """Return which of state, memory and stimulus, in one vector, are named and do not stick."""
     model = point.model
     stuck = [name for name, g in zip(model.frictions, point.moving, strict=True) if not g]
     moving = {*states} - {*stuck}
@@ -141,7 +141,7 @@ def jacobians(
     free: NDArray[np.bool_],
     ticks: Sequence[Sequence[Array]] = (),
 ) -> Jacobians:
-    """Return the numbers of a linear model by its free signals, see `Jacobians`."""
+    """Return the matrices of a linear model by its free signals, see `Jacobians`."""
     model = point.model
     A, B, C, D, rate, y = plant
     C, D = _rows(model, outputs, C, D)
@@ -272,13 +272,12 @@ def closed_contacts(model: Model, par: ParameterSet, state: NamedTuple) -> list[
 
 
 def _active(C: Array, d: Array) -> tuple[float, Array, Array]:
-    """Return what the closed contacts of a group leave: the subset whose least slack is largest.
+    """Return the result of a group's closed contacts: the subset whose least slack is largest.
 
     Returns
     -------
     tuple
-        Least slack, by how much each contact is closed or open [m], and the closed contacts'
-        stiffness.
+        Least slack, overlap or gap of each contact [m], and stiffness of the closed contacts.
     """
     stiffness = C.diagonal()
     # Closed contacts must press, open ones gap: the subset that satisfies both has positive slack.
@@ -322,7 +321,7 @@ def _require_known(kind: str, names: Sequence[str], known: Sequence[str]) -> Non
 # --- Operating points at which nothing accelerates, found from a start nearby by Newton's method
 
 _TURNS = 30
-_SETTLED = 1e-10  # of a signal's usual magnitude: a step that changes nothing any more
+_SETTLED = 1e-10  # of a signal's usual magnitude: negligible step
 _LEFT = 1e-6  # of the rate that one usual magnitude of anything would make: no equilibrium
 
 
@@ -345,16 +344,16 @@ def equilibrium(
     model, par
         The system and its parameters.
     state, memory
-        Where the search starts.
+        Start of the search.
     given
-        States that keep their value: they say which equilibrium is meant.
+        States that keep their value and so determine the equilibrium.
     inputs
-        Fields of Memory that may change: what holds the system there.
+        Fields of Memory that may change to hold the system there.
     running
-        States that keep their value and may go on changing, for instance a disc's angle.
+        States that keep their value and may have a rate, for instance a disc's angle.
     tied
-        States of one unit that keep their differences, for instance two angles and so the
-        preload between them.
+        States of one unit that keep their differences, for instance two angles with a preload
+        between them.
     friction
         As in `linearize`.
 
@@ -365,8 +364,8 @@ def equilibrium(
 
     Notes
     -----
-    Where several are as good, the one that changes least is taken, every signal in its usual
-    magnitude.
+    If there are several equilibria, the result is the one with the smallest change, every signal
+    scaled by its usual magnitude.
     """
     known = signals_of(model.State) | signals_of(model.Memory)
     fixed = (*given, *running, *tied[1:])
@@ -375,7 +374,7 @@ def equilibrium(
     names = [*(model.State._fields[k] for k in free), *inputs]
     size = np.array([known[name].nominal for name in names])
     for _ in range(_TURNS):
-        # On a corner any side will do: the search only passes there.
+        # On a corner, any side is suitable, because the search only crosses it.
         at = plant_model(smooth_point(model, par, (state, memory, None), friction), inputs, ())
         A = at.A.copy()
         if tied:
@@ -384,7 +383,7 @@ def equilibrium(
         J = np.hstack([A[np.ix_(still, free)], at.B[still]]) * size
         weight = np.maximum(np.abs(J).max(axis=1), np.finfo(float).tiny)
         left = at.rate[still] / weight
-        # Least norm: rigid motions (a preload without friction) have no equilibrium of their own.
+        # Least norm: rigid motions (a preload without friction) have no unique equilibrium.
         change = np.linalg.lstsq(J / weight[:, None], -left, rcond=1e-12)[0]
         if np.abs(change).max() < _SETTLED:
             break

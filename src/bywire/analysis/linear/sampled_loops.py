@@ -30,12 +30,12 @@ from bywire.core.signals import signals_of
 
 Jacobians = list[Any]
 """of the new memory by states, memory and inputs"""
-_WHOLE = 1e-9  # of a step: what a sample time may differ from a multiple
+_WHOLE = 1e-9  # of a step: largest deviation of a sample time from a multiple
 
 
 @dataclass(frozen=True, eq=False)
 class SampledSystem:
-    """A system between two instants at which any of its tasks runs.
+    """System between two instants at which any of its tasks runs.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ def sampled_models(
     point
         State, Memory and Stimulus; None for a stimulus of zeros.
     build
-        Makes the models of a system.
+        Function that builds the models of a system.
     inputs, outputs, locked, step
         As in ``closed_loop``.
 
@@ -188,8 +188,8 @@ def stepped(model: LinearModel, period: float, step: float) -> LinearModel:
         \begin{pmatrix} x_k \\ u \end{pmatrix}, \quad
         W = \begin{pmatrix} A & B \\ 0 & 0 \end{pmatrix}
 
-    Where friction, limits and changes of contacts stay out, a run of a linear plant follows it to
-    rounding: what then still differs from the exact model is the error of the step.
+    Without friction, limits and changes of contacts, a run of a linear plant follows it to rounding
+    error. Its difference from the exact model is the numerical error of the step.
 
     Parameters
     ----------
@@ -252,8 +252,8 @@ def closed_loop(
     Parameters
     ----------
     model, par
-        The system and its parameters. What jumps (a quantizer, a dither's
-        waveform) has no slope: switch it off.
+        The system and its parameters. Discontinuous functions (a quantizer, a dither's waveform)
+        have no slope: switch them off.
     state, memory
         Operating point.
     inputs
@@ -263,11 +263,11 @@ def closed_loop(
     locked
         States held at the operating point, for instance angle and speed of a locked rotor.
     stimulus
-        Stimulus at the operating point, where a limit of the controller depends on it; zero by
+        Stimulus at the operating point, needed if a limit of the controller depends on it; zero by
         default.
     step
-        Substep [s] of the simulation's midpoint rule, which then takes the place of the exact
-        A_d, B_d; 0 for none.
+        Substep [s] of the simulation's midpoint rule, which then replaces the exact A_d, B_d;
+        0 for none.
 
     Raises
     ------
@@ -333,17 +333,17 @@ def open_loop(
 ) -> LinearModel:
     """Return the loop gain L of a sampled loop with its delays, filters and other loops.
 
-    The loop is cut where one controller reads a state or hands a value on; everything else stays
+    The loop is cut where one controller reads a state or writes a value; everything else stays
     closed. Margins of L (negative feedback: the closed loop has 1 + L) are those of the real loop
-    at that place.
+    at this cut.
 
     Parameters
     ----------
     model, par, state, memory, stimulus, locked
         As in ``closed_loop``.
     cut
-        Field of State that a controller reads, or field of Memory that it hands to the plant or
-        to another controller.
+        Field of State that a controller reads, or field of Memory that it writes for the plant or
+        another controller.
 
     Returns
     -------
@@ -355,8 +355,8 @@ def open_loop(
     UnknownNameError
         When the field is unknown.
     ParameterError
-        When no controller reads or writes the field, several do, another one runs more slowly,
-        or nobody takes what is handed on.
+        When no controller or several controllers read or write the field, another controller runs
+        more slowly, or nothing reads the written value.
     CornerError
         As `bywire.analysis.linear.linearize.linearize`.
     """
@@ -383,7 +383,7 @@ def cut_open(model: Model, system: SampledSystem, cut: str) -> LinearModel:
     size = len(states) + len(fields)
     A, B = np.eye(size), np.zeros((size, 1))
     for f in range(system.common):
-        tick = first  # the input acts there alone: its controller runs once in the common period
+        tick = first  # the input acts only there: its controller runs once in the common period
         if f > 0:
             X, M, _ = system.in_a_row(system.due(f))
             tick = [X, M, np.zeros((len(fields), 1))]
@@ -410,7 +410,7 @@ def cut_open(model: Model, system: SampledSystem, cut: str) -> LinearModel:
 
 
 def _is_without_gain(system: SampledSystem, cut: str) -> bool:
-    """Return whether a field would be read or taken, but for gains or openings of 0."""
+    """Return whether a field would be read if gains or openings were not 0."""
     if cut not in system.plant.inputs:
         is_read = cut in system.plant.states and any(
             X[:, system.plant.states.index(cut)].any() for X, _, _ in system.ticks
@@ -424,7 +424,7 @@ def _is_without_gain(system: SampledSystem, cut: str) -> bool:
 
 
 def _nothing(model: Model, cut: str, period: float) -> LinearModel:
-    """Return the gain of a loop that feeds nothing back."""
+    """Return the zero gain of a loop without feedback."""
     unit = (signals_of(model.State) | signals_of(model.Memory))[cut].unit
     return LinearModel(
         f"{model.name}, cut at {cut}",
@@ -485,7 +485,7 @@ def _cut_writing(system: SampledSystem, row: int, cut: str) -> tuple[Jacobians, 
     X, M, _ = system.in_a_row(system.due(0)[: owner + 1])
     written = np.concatenate([X[row], M[row]])[None]
     U = np.zeros((M.shape[0], 1))
-    # Whoever comes later at the same instant already takes the input.
+    # Later tasks at the same instant already read the input.
     X[row], M[row], U[row] = 0.0, 0.0, 1.0
     for k in later:
         M_x, M_m, _ = system.ticks[k]
@@ -518,10 +518,10 @@ def analog_gain(
     cut: str,
     locked: Sequence[str] = (),
 ) -> LinearModel:
-    r"""Return the exact gain of a loop that is cut open at a state; sampled controllers hold.
+    r"""Return the exact gain of a loop cut open at a state, with sampled controllers held.
 
-    With the state :math:`x_c` and all others :math:`x_o`, whatever reads the state is handed an
-    input u in its place:
+    With the state :math:`x_c` and all others :math:`x_o`, all readers of the state receive an input
+    u in its place:
 
     .. math:: \dot x_o = A_{oo} x_o + A_{oc} u, \quad \dot x_c = A_{co} x_o + A_{cc} x_c, \quad
         L = -x_c / u
@@ -531,7 +531,7 @@ def analog_gain(
     model, par, state, memory, locked
         As in ``closed_loop``; dry friction is removed.
     cut
-        Field of State, for instance what an analog controller's sensor shows.
+        Field of State, for instance the reading of an analog controller's sensor.
 
     Returns
     -------
@@ -556,12 +556,12 @@ def analog_gain(
         return _nothing(model, cut, 0.0)
     k = plant.states.index(cut)
     A, B = plant.A.copy(), plant.A[:, k : k + 1].copy()
-    B[k] = 0.0  # the state's own decay is no feedback through the controller: it stays
+    B[k] = 0.0  # the state's own decay is not feedback through the controller, so it stays
     A[:, k] -= B[:, 0]
     if not B.any():
         by = smooth_functions(model, par).driven[0][:, model.State._fields.index(cut)]
         readers = {name for name, reads in zip(model.State._fields, by, strict=True) if reads}
-        if readers - {cut, *locked}:  # it is read, but for gains of 0
+        if readers - {cut, *locked}:  # it is read, but gains are 0
             return _nothing(model, cut, 0.0)
         raise ParameterError(
             f"{cut} cannot be cut: nothing in {model.name} reads it", name="cut", value=cut

@@ -1,4 +1,4 @@
-"""A model's smooth part and its controllers as functions of the parameters, built once."""
+"""Smooth part of a model and its controllers as functions of the parameters, built once."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _BUILT: dict[tuple[object, ...], SmoothFunctions] = {}
 
 @dataclass(frozen=True, eq=False)
 class SmoothFunctions:
-    """Functions of CasADi, for any numbers of one structure.
+    """CasADi functions of a model, for any numbers of one structure.
 
     Parameters
     ----------
@@ -32,16 +32,16 @@ class SmoothFunctions:
         ``(x, p) -> (C of each group..., all overlaps)``.
     plant
         ``(x, m, p, K, s, g) -> (A, B, C, D, rate, y)`` with the stiffness K of closed contacts,
-        the direction s of each friction (0: removed) and g, 0 for each velocity that is stuck and
-        1 else; B and D by all of the Memory, C, D and y for all of the Output.
+        the direction s of each friction (0: removed) and g, 0 for each stuck velocity, else 1;
+        B and D by all of the Memory, C, D and y for all of the Output.
     ticks
         ``(x, m, u, p) -> (by x, by m, by u, renewed)``: each task's new memory and its Jacobians.
     reads
-        Of each task, which states its new memory may depend on, whatever the parameters.
+        For each task, the states on which its new memory may depend, for any parameters.
     driven
-        Which states' rates may depend on which states, and on which fields of the Memory.
+        For the rates of states, the states and fields of the Memory on which they may depend.
     model
-        What they were made of: kept alive, for its parts tell structures apart by identity.
+        Model of the functions, kept alive because the addresses of its parts identify structures.
     """
 
     contacts: Any
@@ -63,7 +63,7 @@ class SmoothFunctions:
 
 
 class _Evaluated:
-    """A function of dense results on arrays; converting CasADi's matrices takes most of a call."""
+    """Function with dense results on arrays; converting CasADi's matrices takes most of a call."""
 
     def __init__(self, function: Any) -> None:
         self._call, self._lock = BufferedCall(function), Lock()
@@ -141,7 +141,7 @@ def _plant(
 
 
 def _pattern(matrix: Any) -> NDArray[np.bool_]:
-    """Return which entries of a symbolic matrix are there."""
+    """Return which entries of a symbolic matrix are nonzero."""
     pattern = np.zeros(matrix.shape, dtype=bool)
     pattern[tuple(matrix.sparsity().get_triplet())] = True
     return pattern
@@ -168,9 +168,9 @@ def equations(
     contact
         Forces of the contacts.
     directions, moving
-        Of each friction: its direction, 0 where it is removed; 0 where its velocity is stuck.
+        For each friction: its direction, 0 if it is removed; and 0 if its velocity is stuck.
     outputs
-        Whether outputs are wanted; else there are none.
+        Whether to compute outputs.
     """
     x, held = at
     force = dict(zip(x._fields, model.balance(x, x, held, par, contact), strict=True))
@@ -213,7 +213,7 @@ class SmoothPoint:
     K
         Stiffness of the closed contacts.
     directions, moving
-        As of `equations`.
+        As in `equations`.
     """
 
     model: Model
@@ -226,7 +226,7 @@ class SmoothPoint:
     moving: Sequence[float]
 
     def moved(self, by: Array) -> SmoothPoint:
-        """Return the point displaced in state, memory and stimulus, in a row."""
+        """Return the point displaced in state, memory and stimulus, given in one vector."""
         n, m = self.state.size, self.memory.size
         return replace(
             self,
@@ -247,6 +247,6 @@ class SmoothPoint:
         )
 
     def ticks(self) -> list[list[Array]]:
-        """Return of each task its Jacobians by state, memory and stimulus, and the new memory."""
+        """Return each task's Jacobians by state, memory and stimulus, and the new memory."""
         at = (self.state, self.memory, self.stimulus, vector(self.par))
         return [tick(*at) for tick in smooth_functions(self.model, self.par).ticks_at]

@@ -35,7 +35,7 @@ from bywire.simulation.run import Run
 HARMONICS = 9
 """highest harmonic that counts as distortion"""
 STILL = 1e-12
-"""peak to peak, as a share of the output's usual magnitude, up to which it counts as still"""
+"""largest peak-to-peak value of an output at rest, as a share of its usual magnitude"""
 
 
 def require_stable(closed: LinearModel) -> None:
@@ -87,11 +87,11 @@ def frequency_response(
     xarray.Dataset
         Dimensions ``variant``, ``amplitude``, ``frequency`` [Hz]; variables ``gain`` (output over
         input, SI), ``phase`` [degree], ``distortion`` (total harmonic, share), ``coherence``
-        (share of the output's power, its mean left out, at the excited line), ``scatter`` (of the
+        (share of the output's power without its mean at the excited line), ``scatter`` (of the
         complex amplitude, see `spread_of`), ``windows``, ``settled`` (0 or 1), and
         ``share_FLAG`` for every flag and saturation. Gain and phase are NaN where the output does
-        not move at all: what sticks has no gain. Where it never repeats, they are means of the
-        last windows.
+        not move at all, because a stuck mechanism has no gain. If the output never repeats, they
+        are means of the last windows.
 
     Raises
     ------
@@ -101,7 +101,7 @@ def frequency_response(
         When frequencies or amplitudes are not positive, or a frequency is above half the rate at
         which the slowest controller samples.
     SolverError
-        When a trajectory leaves the numbers.
+        When a value of a trajectory is infinite or NaN.
     """
     require_measurable(run, sweep)
     cases = cases_of(run, sweep, points)
@@ -209,8 +209,9 @@ def with_step_errors(response: xr.Dataset, finer: xr.Dataset, share: float) -> x
     Returns
     -------
     xarray.Dataset
-        With ``NAME_step_error`` beside each figure, in its unit: NaN where neither of both has it,
-        infinite where one has. What never repeats counts, too: a limit cycle's gain differs.
+        Response with ``NAME_step_error`` for each figure, in its unit: NaN if neither response has
+        the figure, infinite if only one has. Responses that never repeat also count, as the gain of
+        a limit cycle differs.
     """
     return response.assign(
         {
@@ -225,7 +226,7 @@ def with_step_errors(response: xr.Dataset, finer: xr.Dataset, share: float) -> x
 
 
 def _apart(value: Array, other: Array, name: str) -> Array:
-    """Return distances; a phase has no whole turns, what lies beyond the band twice none either."""
+    """Return distances: phases without whole turns, and 0 if both values are beyond the band."""
     with np.errstate(invalid="ignore"):
         apart = np.abs(value - other)
     if name == "phase":
@@ -237,7 +238,7 @@ def _apart(value: Array, other: Array, name: str) -> Array:
 
 
 def largest(response: xr.Dataset) -> str:
-    """Return how large the errors from the step are at most, in a sentence; empty for none."""
+    """Return a sentence on the largest errors from the step; empty without errors."""
     if "gain_step_error" not in response:
         return ""
     with np.errstate(invalid="ignore"):
@@ -264,13 +265,13 @@ class Broadband:
     Parameters
     ----------
     kind
-        ``"multisine"``: the wanted frequencies with equal amplitudes and random phases.
-        ``"chirp"``: a sine whose frequency rises exponentially from the lowest to the highest
-        wanted one, again and again.
+        ``"multisine"``: the requested frequencies with equal amplitudes and random phases.
+        ``"chirp"``: a periodic sine whose frequency rises exponentially from the lowest to the
+        highest requested one.
     seed
-        Of the random phases.
+        Seed of the random phases.
     realizations
-        How many multisines of other phases are averaged; a chirp is always the same.
+        Number of multisines with different phases to average; all chirps are equal.
     """
 
     kind: Literal["multisine", "chirp"] = "multisine"
@@ -297,8 +298,8 @@ def broadband_response(
         \gamma_k^2 = \frac{|\sum Y_k U_k^*|^2}{\sum |U_k|^2 \sum |Y_k|^2}
 
     over the realizations and the last windows. For a nonlinear loop G is the best linear
-    approximation for an excitation of this kind and size, which is not the response to a sine of
-    this amplitude: frequencies share what a limit leaves.
+    approximation for an excitation of this kind and size. It is not the response to a sine of this
+    amplitude, because all frequencies share the range within a limit.
 
     Parameters
     ----------
@@ -329,7 +330,7 @@ def broadband_response(
     InputError
         As in ``frequency_response``, for frequencies that do not ascend, and without realization.
     SolverError
-        When a trajectory leaves the numbers.
+        When a value of a trajectory is infinite or NaN.
     """
     require_measurable(run, sweep)
     if excitation.count < 1:
@@ -380,7 +381,7 @@ def _excitations(windowed: Run, lines: list[int], excitation: Broadband) -> Arra
 def _chirp(share: Array, lines: list[int]) -> Array:
     """Return a sine over the window whose frequency rises; it ends where it began, with peak 1.
 
-    What lies outside the band is cut off: slow controllers would fold it back into the band.
+    Components outside the band are removed: slow controllers would alias them into the band.
     """
     ratio = max(lines[-1] / lines[0], 1.0 + 1e-9)
     turns = lines[0] * (ratio**share - 1.0) / math.log(ratio)

@@ -1,8 +1,8 @@
 r"""Bandwidth and crossover of a measured loop by amplitude, small and large signal.
 
-The controller is linear between its limits. Be C_r its response to the set point and C_y that to
-the output, both plants' linear closed loop T_0 and loop gain L_0 tell their ratio H, whatever
-friction and limits make of the rest:
+The controller is linear between its limits. Let C_r be its response to the set point, and C_y that
+to the output. The linear closed loop T_0 and loop gain L_0 determine their ratio H, for any effect
+of friction and limits on the rest:
 
 .. math:: H = \frac{C_r}{C_y} = T_0 \frac{1 + L_0}{L_0}, \qquad L = \frac{T}{H - T}
 
@@ -38,14 +38,14 @@ from bywire.core.typing import Array, Complex
 
 @dataclass(frozen=True)
 class Variant:
-    """A loop at an operating point.
+    """Loop at an operating point.
 
     Parameters
     ----------
     loop, par, value
         Loop, parameters and operating point [SI].
     label
-        Value of what is varied [SI]; NaN where nothing is.
+        Value of the varied quantity [SI]; NaN if none is.
     """
 
     loop: Loop
@@ -102,7 +102,7 @@ class Width:
     ----------
     bandwidth
         Frequency at which the gain has fallen 3 dB below that of the linear loop at standstill
-        [Hz]; 0 where it is below from the lowest frequency on, infinity beyond the highest.
+        [Hz]; 0 if it is below from the lowest frequency on, infinity beyond the highest.
     crossover, phase_margin
         Of the loop gain's describing function [Hz, degree]; NaN where the frequencies hold no
         crossover or more than one controller acts, crossover infinity beyond the highest.
@@ -131,7 +131,7 @@ def width(variant: Variant, response: xr.Dataset) -> Width:
     start = float(np.abs(variant.linear(np.zeros(1))[0]))
     values, f = complex_values(response), response["frequency"].values
     bandwidth, known = fall(response["gain"].values, f, start), np.isfinite(values)
-    if start == 0.0:  # the output does not answer: nothing falls
+    if start == 0.0:  # the output does not respond, so its gain cannot fall
         bandwidth = math.nan
     if not variant.loop.single or not known.any():
         return Width(bandwidth, math.nan, math.nan)
@@ -184,19 +184,19 @@ if TYPE_CHECKING:
 
 
 def leaving(loop: Loop, par: ParameterSet, value: float, amplitude: float) -> str:
-    """Return why a sine around an operating point leaves the brake's range; empty where it stays.
+    """Return why a sine around an operating point leaves the brake's range; empty if it does not.
 
     Parameters
     ----------
     loop, par, value
         The loop and its operating point.
     amplitude
-        Of the sine [SI unit of the first input].
+        Amplitude of the sine [SI unit of the first input].
 
     Notes
     -----
-    Only set points of the quantity that the operating point is given by can be judged: both
-    ends of the sine are tried as operating points.
+    The check applies only to set points of the quantity that defines the operating point: it tries
+    both ends of the sine as operating points.
     """
     stimulus = loop.point(par, value).model.Stimulus
     if signals_of(stimulus)[loop.inputs[0]].unit != loop.at.unit:

@@ -67,28 +67,29 @@ class Sweep:
     inputs
         Signals of the Stimulus that are excited together; the first determines the unit.
     output
-        Signal of the Output that answers.
+        Responding signal of the Output.
     frequencies
-        Wanted frequencies [Hz], ascending; each is rounded so that a window holds whole periods.
+        Requested frequencies [Hz], ascending; each is rounded so that a window contains whole
+        periods.
     amplitudes
         Amplitudes of the sine, in the input's SI unit, > 0.
     variations
         Dotted name of a parameter -> one value per variant; empty for the run's own parameters.
     flags
-        Outputs that are 0 or 1, whose share of the time is reported, such as ``"stuck"``.
+        Outputs with values 0 or 1, whose share of the time is reported, such as ``"stuck"``.
     saturations
-        Limits that the model has no such output for, reported likewise.
+        Limits without such an output of the model, reported likewise.
     least
-        Periods in a window, at least.
+        Least number of periods in a window.
     shortest
-        Length of a window [s], at least.
+        Least length of a window [s].
     whole
-        Other frequencies [Hz] of which a window holds whole periods, such as that of a dither.
+        Other frequencies [Hz] of which a window contains whole periods, such as that of a dither.
     tolerance
-        A response is settled when the complex amplitude of a window differs from that of the one
-        before by less than this share. An encoder's resolution alone may scatter it by 0.3 %.
+        A response is settled if the complex amplitude of a window differs from that of the previous
+        one by less than this share. An encoder's resolution alone may scatter it by 0.3 %.
     most
-        Number of windows after which a response is abandoned.
+        Largest number of windows of a response.
     """
 
     inputs: Sequence[str]
@@ -116,7 +117,7 @@ class Sweep:
         Parameters
         ----------
         values
-            What was recorded, shape (cases, rows, signals).
+            Recorded signals, shape (cases, rows, signals).
         matrix, names
             Parameter vectors, shape (parameters, cases), and the names of their rows.
         """
@@ -284,7 +285,7 @@ def _require_alike(run: Run, sweep: Sweep, points: Sequence[Run]) -> None:
 MOST_SAMPLES = 10_000_000
 """samples of a window: 160 MB, at a kilohertz the period of a frequency of 0.2 mHz twice"""
 _LOWEST = 10  # periods of the lowest frequency in a window of lines: it is rounded to one of them
-_CHOICES = 24  # numbers of periods tried for a window close to the wanted frequency
+_CHOICES = 24  # numbers of periods tried for a window close to the requested frequency
 _CLOSE = 1e-4  # share that a frequency may be off before a longer window is worth its time
 
 
@@ -347,9 +348,9 @@ def common_interval(run: Run, whole: Sequence[float]) -> float:
 def sine_window(run: Run, f: float, sweep: Sweep) -> tuple[float, int]:
     """Return length [s] and periods of a window close to a frequency [Hz].
 
-    What is measured is told of the frequency that the window holds. Windows that come within 1e-4
-    of the wanted one are alike; up to twice as long as the shortest of them, the closest counts.
-    Where none does, the closest of all.
+    A measurement is reported at the frequency of its window. Windows within 1e-4 of the requested
+    frequency are equivalent; among those up to twice as long as the shortest, the closest one is
+    chosen. Without such a window, the closest of all is chosen.
     """
     common = common_interval(run, sweep.whole)
     least = max(sweep.least, math.ceil(sweep.shortest * f))

@@ -60,7 +60,7 @@ def build(tested: TestedModel) -> Experiment:
 
 GENERIC = GenericExperiment(
     name="release",
-    summary="any input falls: time until the output is empty, and what is left of it",
+    summary="any input falls: time until the output is released, and its residual",
     options=Options,
     signals={"input": "stimulus", "output": "recording"},
     defaults={

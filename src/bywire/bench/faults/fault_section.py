@@ -36,7 +36,7 @@ class Course(ParameterSet):
     lasts: TimeConstant
     """duration; 0: permanent"""
     ramp: TimeConstant
-    """time in which it grows to its full size, and in which it disappears; 0: at once"""
+    """time in which it grows to its full size, and in which it disappears; 0: immediately"""
     every: TimeConstant
     """period of an intermittent fault; 0: not intermittent"""
     share: Share

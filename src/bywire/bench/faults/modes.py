@@ -75,32 +75,32 @@ class Mode:
 
 
 _READING = {
-    "stuck": ("shows one value", "level"),
-    "stuck-at-last": ("shows what it showed last", ""),
-    "offset": ("shows too much", "offset"),
-    "gain": ("shows a multiple", "factor"),
-    "drift": ("shows ever more, per second", "rate"),
-    "noise": ("shows noise, by its standard deviation", "offset"),
+    "stuck": ("is stuck at a value", "level"),
+    "stuck-at-last": ("holds its last value", ""),
+    "offset": ("has an offset", "offset"),
+    "gain": ("is scaled by a factor", "factor"),
+    "drift": ("drifts at a constant rate", "rate"),
+    "noise": ("has noise of a standard deviation", "offset"),
     "dropout": ("misses samples, with a probability", "probability"),
-    "swapped": ("shows the opposite sign", ""),
+    "swapped": ("has the opposite sign", ""),
 }
 _DRIVE = {
-    "stuck": ("gives one value", "level"),
-    "stuck-at-last": ("gives what it gave last", ""),
-    "gain": ("gives a multiple", "factor"),
-    "late": ("comes some ticks late", "ticks"),
+    "stuck": ("is stuck at a value", "level"),
+    "stuck-at-last": ("holds its last value", ""),
+    "gain": ("is scaled by a factor", "factor"),
+    "late": ("arrives some ticks late", "ticks"),
 }
 _DEMAND = {
-    "lost": ("stays what it was last", ""),
-    "stuck": ("becomes one value", "level"),
-    "offset": ("comes with an offset", "offset"),
+    "lost": ("is lost and holds its last value", ""),
+    "stuck": ("is stuck at a value", "level"),
+    "offset": ("has an offset", "offset"),
 }
 _TASK = {
-    "frozen": ("misses every tick, what it gave out stays", "", 0.0),
-    "dropped": ("runs only every so many ticks", "ticks", 2.0),
+    "frozen": ("misses every tick, and its outputs hold their last values", "", 0.0),
+    "dropped": ("runs only once in a number of ticks", "ticks", 2.0),
     "missed": ("misses ticks, with a probability", "probability", 0.2),
-    "dead": ("runs no more, all it renews is as at rest; then begins with empty memory", "", 0.0),
-    "restarted": ("begins anew with empty memory, after a time", "duration", 0.05),
+    "dead": ("stops with its outputs at rest; afterward it restarts with empty memory", "", 0.0),
+    "restarted": ("restarts with empty memory, after a downtime", "duration", 0.05),
 }
 _VALUES = {"factor": 0.5, "probability": 0.2, "ticks": 5.0}
 
@@ -117,7 +117,7 @@ def modes_of(model: Model, par: ParameterSet) -> dict[str, Mode]:
     for mode in _every(model, par):
         if mode.name in modes:
             raise ModelError(
-                f"{model.name}: there are two faults {mode.name!r}: rename one", name=mode.name
+                f"{model.name}: two faults have the name {mode.name!r}: rename one", name=mode.name
             )
         modes[mode.name] = mode
     return modes

@@ -87,7 +87,7 @@ class Loop:
         span, height = float(np.ptp(self.drive)), float(np.ptp(self.response))
         if span == 0.0 or height == 0.0:
             constant = "the drive" if span == 0.0 else "the response"
-            return f"{constant} is constant: there is no loop"
+            return f"{constant} is constant, so it has no loop"
         apart = abs(float(self.drive[-1] - self.drive[0]))
         if apart > _OPEN * span:
             return (

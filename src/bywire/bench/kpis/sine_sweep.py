@@ -63,7 +63,7 @@ class Sweep:
         """Reason why no figure is defined."""
         broken = defect(self.t, self.drive, self.response)
         if not broken and not self.frequencies.size:
-            return "no whole period is recorded"
+            return "the recording contains no whole period"
         return broken
 
     @property

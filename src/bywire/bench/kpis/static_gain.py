@@ -62,7 +62,7 @@ def response(t: Samples, signal: Samples, setting: Setting) -> Response | Undefi
 def static_gain(response: Response, setting: Setting) -> float | Undefined:
     """Change of the mean level per height of the step."""
     if setting.drive == 0.0:
-        return Undefined("nothing is stepped")
+        return Undefined("the step height is zero")
     unseen = why_unseen(response)
     if unseen is not None:
         return unseen

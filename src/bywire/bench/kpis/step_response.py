@@ -237,7 +237,7 @@ def steady_state_error(response: Response) -> float | Undefined:
     step. Ripple averages out except for an incomplete period.
     """
     if not response.is_tracking:
-        return Undefined("no set point is given")
+        return Undefined("the experiment has no set point")
     if not response.has_window:
         return _without_window(response.low, response.high)
     moving = _why_unsteady(response)
@@ -277,7 +277,7 @@ def why_unseen(response: Response) -> Undefined | None:
         return still
     if abs(response.end - response.start) <= response.band:
         return Undefined(
-            "the response changes by less than its ripple: no step is seen", is_open=True
+            "the response changes by less than its ripple, which hides any step", is_open=True
         )
     return _why_unsteady(response)
 
@@ -322,7 +322,9 @@ def _why_unsteady(response: Response) -> Undefined | None:
 
 
 def _without_window(low: float, high: float) -> Undefined:
-    return Undefined(f"the steady state's window, {low:g} to {high:g} s, holds < 2 samples")
+    return Undefined(
+        f"the steady state's window, {low:g} to {high:g} s, contains fewer than 2 samples"
+    )
 
 
 def _has_height(start: float, end: float) -> bool:

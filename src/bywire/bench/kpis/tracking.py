@@ -84,7 +84,7 @@ class Tracking:
         bounds = (max(best - delays[1], 0.0), min(best + delays[1], _LONGEST_LAG))
         fine = optimize.minimize_scalar(misfit, bounds=bounds, method="bounded")
         if misfit(0.0) <= fine.fun:
-            return Undefined("no delay fits better than none")
+            return Undefined("no delay fits better than a delay of zero")
         if misfit(_LONGEST_LAG) <= fine.fun:
             return Undefined(f"the delay that fits best is not below {_LONGEST_LAG:g} s")
         return float(fine.x)

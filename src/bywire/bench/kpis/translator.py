@@ -1,15 +1,19 @@
 """C from typed Python functions that loop over samples, statement by statement.
 
-A key figure that many cases or a page ask for is such a function; Python runs it as it stands. The
-translator knows int, float and bool, `Samples`, NamedTuples of these, the numbers of a family's
-``Setting``, ``| None`` and ``| Undefined``; ``for`` over a range or samples, ``while``, ``if``,
-``break``, ``continue``, ``return``; arithmetic, comparisons, slices, lists of a number for each
-sample; other functions of this kind, and some of Python. Whatever else a function holds is an error
-that names its line.
+A key figure for many cases or for a page is such a function; Python runs it unchanged. The
+translator supports the following:
 
-C and Python give the same bits, but for signs of zero, because every operation is written as it
-stands and compilers may not regroup it. So a function whose digits depend on the library of the
-machine (``sin``, ``**``) is refused too.
+* int, float and bool, `Samples`, NamedTuples of these, the numbers of a family's ``Setting``,
+  ``| None`` and ``| Undefined``;
+* ``for`` over a range or samples, ``while``, ``if``, ``break``, ``continue``, ``return``;
+* arithmetic, comparisons, slices, lists with one number per sample;
+* other functions of this kind, and some of Python's.
+
+Any other code in a function raises an error that names its line.
+
+C and Python give the same bits, except for signs of zero: every operation is translated as it is
+written, and compilers may not regroup it. The translator therefore also rejects functions whose
+digits depend on the machine's library (``sin``, ``**``).
 """
 
 from __future__ import annotations
@@ -47,7 +51,7 @@ _OPERATORS: dict[type, str] = {
     ast.NotEq: "!=",
 }
 _MOST_NUMBERS = 3
-"""numbers in the text of an undefined figure, as `bw_undefined` of loops.h has them"""
+"""largest number of numbers in the text of an undefined figure, as in `bw_undefined` of loops.h"""
 _C_WORDS = (
     "auto case char const default do double enum extern float goto inline int long register "
     "restrict short signed sizeof static struct switch typedef union unsigned void volatile"
@@ -56,7 +60,7 @@ _C_WORDS = (
 
 @dataclass(frozen=True)
 class Kind:
-    """Type in C: ``base`` is a class, ``list`` for samples, or ``tuple`` for a pair of numbers."""
+    """C type: ``base`` is a class, ``list`` for samples, or ``tuple`` for a pair of numbers."""
 
     base: type
     or_none: bool = False
@@ -87,7 +91,7 @@ PAIR = Kind(tuple)
 
 @dataclass(frozen=True)
 class Value:
-    """Expression in C, and its type."""
+    """C expression and its type."""
 
     text: str
     kind: Kind
@@ -104,9 +108,9 @@ class Function:
     parameters, returns
         Types of its parameters, by name, and of its result.
     text
-        Its C.
+        Its C source.
     arrays
-        How many lists of a number for each sample it makes, with all that it calls.
+        Number of lists with one number per sample that it and the functions it calls create.
     """
 
     name: str
@@ -118,10 +122,10 @@ class Function:
 
 @dataclass
 class Unit:
-    """The C of some functions and of all that they call.
+    """C source of some functions and of all functions that they call.
 
-    ``reasons``: texts of undefined figures, as `str.format` takes them, with whether they leave the
-    figure open; a figure's reason is the place of its text here, from 1 on.
+    ``reasons``: texts of undefined figures as templates for `str.format`, each with whether it
+    leaves the figure open. A figure's reason is the number of its text here, from 1 on.
     """
 
     reasons: dict[tuple[str, bool], int] = field(default_factory=dict)
@@ -132,7 +136,7 @@ class Unit:
 
     @property
     def text(self) -> str:
-        """The types and functions, in an order that C takes."""
+        """Types and functions, each after those that it uses."""
         types = (declared for _, declared in self._types.values() if declared)
         return "\n".join([*types, *(function.text for function in self._functions.values())])
 
@@ -142,7 +146,7 @@ class Unit:
         Raises
         ------
         ModelError
-            When it cannot be translated, with the line.
+            When the function cannot be translated; the message names the line.
         """
         if not isinstance(function, FunctionType):
             raise ModelError(f"{function!r} is not a function in a source file")
@@ -152,27 +156,27 @@ class Unit:
         return self._functions[function]
 
     def is_begun(self, function: FunctionType) -> bool:
-        """Return whether a function's translation is waiting for that of one that it calls."""
+        """Return whether a function's translation has begun but is not complete."""
         return function in self._begun and function not in self._functions
 
     def new_name(self, stem: str) -> str:
-        """Return a name for a function or type that no other one has."""
+        """Return a unique name for a function or type."""
         name = stem if stem not in self._names else f"{stem}_{len(self._names)}"
         self._names.add(name)
         return name
 
     def ctype(self, kind: Kind) -> str:
-        """Return a type in C, which is declared where it has to be."""
+        """Return the C name of a type, and declare the type if necessary."""
         if kind not in self._types:
             self._types[kind] = self._declared(kind)
         return self._types[kind][0]
 
     def reason(self, text: str, is_open: bool) -> int:
-        """Return the number of a text."""
+        """Return the number of a reason's text."""
         return self.reasons.setdefault((text, is_open), len(self.reasons) + 1)
 
     def _declared(self, kind: Kind) -> tuple[str, str]:
-        """Return the name of a type in C, and its declaration."""
+        """Return the C name of a type and its declaration."""
         if kind.is_wrapped:
             value = self.ctype(kind.inner)
             stem = value.removeprefix("bw_")
@@ -188,12 +192,12 @@ class Unit:
 
 
 def c_name(name: str) -> str:
-    """Return a name as C admits it."""
+    """Return a name that is valid in C."""
     return f"{name}_" if name in _C_WORDS.split() or name.startswith("bw_") else name
 
 
 def kind_of(hint: Any) -> Kind | None:
-    """Return the type that an annotation says; None where it says none that C has."""
+    """Return the type of an annotation; None if C has no such type."""
     if isinstance(hint, types.UnionType) or typing.get_origin(hint) is typing.Union:
         parts = [part for part in typing.get_args(hint) if part is not NoneType]
         beside = [part for part in parts if part is not Undefined] or parts[:1]
@@ -212,7 +216,7 @@ def kind_of(hint: Any) -> Kind | None:
 
 
 def fields_of(record: type) -> dict[str, Kind]:
-    """Return the types of a NamedTuple's fields, or of those numbers that a setting has."""
+    """Return the types of a NamedTuple's fields, or of a setting's numbers."""
     kinds = {name: kind_of(hint) for name, hint in _hints(record).items()}
     return {name: kind for name, kind in kinds.items() if kind is not None}
 
@@ -223,13 +227,13 @@ def _hints(of: Any) -> dict[str, Any]:
         return typing.get_type_hints(of)
     except NameError as error:
         raise ModelError(
-            f"{of.__module__}: the types of {of.__name__} are not known at run time: {error}",
+            f"{of.__module__}: an annotation of {of.__name__} has no value at run time: {error}",
             name=of.__name__,
         ) from None
 
 
 class _Writer:
-    """The translation of one function."""
+    """Translation of one function."""
 
     def __init__(self, unit: Unit, function: FunctionType) -> None:
         self.unit, self.function = unit, function
@@ -245,17 +249,17 @@ class _Writer:
             ) from None
         self.kinds: dict[str, Kind] = {}
         self.locals: dict[str, Kind] = {}
-        self.arrays: set[str] = set()  # lists that this function makes
-        self.counters: list[str] = []  # variables of loops that are being run through
+        self.arrays: set[str] = set()  # lists that this function creates
+        self.counters: list[str] = []  # variables of the enclosing loops
         self.loops = 0
-        self.values: dict[ast.expr, Value] = {}  # of expressions that have been translated
+        self.values: dict[ast.expr, Value] = {}  # of translated expressions
         self.made: Function
 
     def translated(self) -> Function:
-        """Return the function in C."""
+        """Return the translated function."""
         node = self.node
         if not isinstance(node, ast.FunctionDef) or node.name != self.function.__name__:
-            self.refuse(node, "it is not a function, or its file was changed since it was loaded")
+            self.refuse(node, "it is not a function, or its file has changed since it was loaded")
         a = node.args
         for each in (a.vararg, a.kwarg, *a.kwonlyargs, *a.posonlyargs):
             if each is not None:
@@ -278,18 +282,18 @@ class _Writer:
         return self.made
 
     def unreached(self, returns: Kind) -> str:
-        """Return the end of a function whose last statement is a choice: mypy sees that it ends."""
+        """Return the end of a function whose last statement is a branch; it is unreached."""
         return f"return ({self.unit.ctype(returns)}){'0' if returns.is_number else '{0}'};"
 
     def annotated(self, node: ast.AST, name: str) -> Kind:
-        """Return the type that a parameter, or the result, is declared to have."""
+        """Return the declared type of a parameter or of the result."""
         kind = kind_of(self.hints[name]) if name in self.hints else None
         if kind is None or (kind.or_none and kind.or_undefined):
-            said = self.hints.get(name, "nothing")
+            hint = self.hints.get(name, "missing")
             self.refuse(
                 node,
-                f"the type of {name!r} is {said}; C has int, float, bool, Samples, NamedTuples of "
-                "them, and these with `| None` or `| Undefined`",
+                f"the type of {name!r} is {hint}; C has int, float, bool, Samples, NamedTuples of "
+                "them, and each of these with `| None` or `| Undefined`",
             )
         return kind
 
@@ -342,17 +346,17 @@ class _Writer:
                 return ["continue;"]
         self.refuse(
             node,
-            "it knows assignments, for, while, if, break, continue and return of a value, without "
-            "else after a loop",
+            "valid statements are assignments, for, while, if, break, continue and return of a "
+            "value, without else after a loop",
         )
 
     def assigned(self, node: ast.stmt, name: str, value: ast.expr, kind: Kind | None) -> list[str]:
-        """Return the lines that give a variable its value, and its type with the first one."""
+        """Return the lines of an assignment; the first one determines the variable's type."""
         if name in self.counters:
-            self.refuse(node, f"{name!r} counts a loop, and the loop changes its value")
+            self.refuse(node, f"{name!r} is a loop's counter, which the loop must not change")
         lines, given = self.list_made(value)
         if name in self.arrays and not lines:
-            self.refuse(node, f"{name!r} is a list of this function: give this another name")
+            self.refuse(node, f"{name!r} is already a list of this function: choose another name")
         kind = kind or self.kinds.get(name) or given.kind
         if kind == _NOTHING:
             self.refuse(node, "annotate the variable: `name: float | None = None`")
@@ -363,7 +367,7 @@ class _Writer:
         return [*lines, f"{c_name(name)} = {self.coerced_value(value, given, kind)};"]
 
     def list_made(self, node: ast.expr) -> tuple[list[str], Value]:
-        """Return the lines that make a list of a number for each sample; none for other values."""
+        """Return the lines that create a list of one number per sample; none for other values."""
         match node:
             case ast.BinOp(ast.List([ast.Constant(float(start))]), ast.Mult(), count):
                 if start != 0.0:
@@ -378,7 +382,7 @@ class _Writer:
         return [], self.value(node)
 
     def array(self, node: ast.AST) -> int:
-        """Return 1, of a list that is made once."""
+        """Return 1 for a list that is created once; reject a list within a loop."""
         if self.loops:
             self.refuse(node, "a list must not be created within a loop")
         return 1
@@ -386,7 +390,7 @@ class _Writer:
     def comprehension(
         self, node: ast.ListComp, element: ast.expr, name: str, over: ast.expr
     ) -> tuple[list[str], Value]:
-        """Return the lines that make a list by an expression."""
+        """Return the lines that create a list from an expression."""
         self.made.arrays += self.array(node)
         array, k = (f"bw_{each}_{self.made.arrays}" for each in ("list", "place"))
         outer = self.kinds.get(name)
@@ -419,35 +423,39 @@ class _Writer:
         ], Value(f"(bw_samples){{{array}, {count}}}", SAMPLES)
 
     def bounds_of_list(self, over: ast.expr) -> tuple[str, str]:
-        """Return where a list's range begins and ends; it is not longer than what is recorded."""
+        """Return begin and end of a list's range, which is no longer than the recording."""
         match getattr(over, "args", ()):
             case [end]:
                 begin = "0"
             case [ast.Constant(int(first)), end]:
                 begin = str(first)
             case _:
-                self.refuse(over, "the range of a list is range(len(...)) or range(1, len(...))")
+                self.refuse(
+                    over, "the range of a list must be range(len(...)) or range(1, len(...))"
+                )
         match end:
             case ast.BinOp(ast.Call() as length, ast.Sub(), ast.Constant(int(less))):
                 return begin, f"({self.length(length)} - {less})"
         return begin, self.length(end)
 
     def length(self, node: ast.expr) -> str:
-        """Return how many samples a list is for."""
+        """Return the number of samples of a list."""
         if self.calls(node, len):
             return self.value(node).text
-        self.refuse(node, "a list holds a number for each sample: len(...)")
+        self.refuse(node, "a list must have one number per sample: len(...)")
 
     def stored(self, target: ast.Subscript) -> str:
-        """Return the place of a list in which a number is stored."""
+        """Return the list element to which a number is assigned."""
         if not isinstance(target.value, ast.Name) or target.value.id not in self.arrays:
-            self.refuse(target, "only a list of this function can be changed")
+            self.refuse(target, "only a list created in this function can be changed")
         return f"((double *){c_name(target.value.id)}.at)[{self.index(target.value, target.slice)}]"
 
     def loop(self, node: ast.For, name: str, over: ast.expr, body: Sequence[ast.stmt]) -> list[str]:
-        """Return the lines of a loop over a range or over samples; its bounds are known at once."""
+        """Return the lines of a loop over a range or over samples, whose bounds are fixed first."""
         if name in self.kinds:
-            self.refuse(node, f"{name!r} is in use: give the loop's variable another name")
+            self.refuse(
+                node, f"{name!r} is already in use: choose another name for the loop's variable"
+            )
         k = c_name(name)
         if self.calls(over, range):
             head, self.kinds[name] = [f"{{ {self.range_head(over, k)}"], INT
@@ -481,9 +489,11 @@ class _Writer:
             case [first, end, ast.Constant(int(step))]:
                 begin = self.whole(first)
             case _:
-                self.refuse(over, "the step of a range is a number: range(begin, end, -1)")
+                self.refuse(
+                    over, "the step of a range must be a literal number: range(begin, end, -1)"
+                )
         if step == 0:
-            self.refuse(over, "the step of a range is not zero")
+            self.refuse(over, "the step of a range must not be zero")
         goes_on = f"{k} {'<' if step > 0 else '>'} bw_end_{k}"
         bounds = f"int64_t {k} = {begin}, bw_end_{k} = {self.whole(end)}"
         return f"for ({bounds}; {goes_on}; {k} += {step}) {{"
@@ -491,39 +501,41 @@ class _Writer:
     # expressions
 
     def plain(self, node: ast.expr) -> Value:
-        """Return an expression, of one that may be nothing the value that is there."""
+        """Return an expression; for one that may be None or undefined, its value."""
         return _plain(self.value(node))
 
     def number(self, node: ast.expr) -> str:
-        """Return an expression that is a number."""
+        """Return a numeric expression."""
         value = self.plain(node)
         if not value.kind.is_number:
-            self.refuse(node, "a number is needed here")
+            self.refuse(node, "this must be a number")
         return value.text
 
     def whole(self, node: ast.expr) -> str:
-        """Return an expression that is a whole number."""
+        """Return an integer expression."""
         value = self.plain(node)
         if value.kind not in (INT, BOOL):
-            self.refuse(node, "an int is needed here")
+            self.refuse(node, "this must be an int")
         return value.text
 
     def condition(self, node: ast.expr) -> str:
-        """Return an expression that holds or does not."""
+        """Return a Boolean expression."""
         value = self.value(node)
         if value.kind != BOOL:
-            self.refuse(node, "a condition is a bool: compare, for instance with != 0 or `is None`")
+            self.refuse(
+                node, "a condition must be a bool: compare, for instance with != 0 or `is None`"
+            )
         return value.text
 
     def samples(self, node: ast.expr) -> str:
-        """Return an expression that is samples."""
+        """Return an expression for samples."""
         value = self.plain(node)
         if value.kind != SAMPLES:
-            self.refuse(node, "samples are needed here")
+            self.refuse(node, "this must be Samples")
         return value.text
 
     def coerced(self, node: ast.expr, kind: Kind) -> str:
-        """Return an expression as a type."""
+        """Return an expression converted to a type."""
         return self.coerced_value(node, self.value(node), kind)
 
     def coerced_value(self, node: ast.expr, value: Value, kind: Kind) -> str:
@@ -549,7 +561,7 @@ class _Writer:
         is_narrower = kind == FLOAT and value.kind.is_number
         if value.kind == kind or is_narrower or (kind, value.kind) == (INT, BOOL):
             return value.text
-        self.refuse(node, f"it is {_said(value.kind)}, and {_said(kind)} is needed")
+        self.refuse(node, f"it is {_annotation(value.kind)}, but it must be {_annotation(kind)}")
 
     def value(self, node: ast.expr) -> Value:
         """Return an expression with its type."""
@@ -593,21 +605,21 @@ class _Writer:
                 return self.choice(node, test, body, orelse)
             case ast.Call():
                 return self.call(node)
-        self.refuse(node, "it is not among the expressions that C and Python compute alike")
+        self.refuse(node, "C and Python may compute this expression differently")
 
     def constant(self, node: ast.expr, constant: Any) -> Value:
-        """Return a number that is written out, or that a module names."""
+        """Return a literal number or a constant of a module."""
         if isinstance(constant, (bool, int)):
             return Value(str(int(constant)), BOOL if isinstance(constant, bool) else INT)
         if isinstance(constant, float) and math.isnan(constant):
             return Value("bw_no_number()", FLOAT)
         if isinstance(constant, float) and math.isfinite(constant):
             return Value(repr(constant), FLOAT)
-        self.refuse(node, "only a finite number is a constant")
+        self.refuse(node, "a constant must be a finite number")
 
     def evaluated(self, node: ast.expr) -> Any:
-        """Return what a name, an attribute or a type stands for outside the function."""
-        known = self.function.__globals__
+        """Return the value of a name, an attribute or a type outside the function."""
+        names = self.function.__globals__
         match node:
             case ast.Constant(value):
                 return value
@@ -617,13 +629,13 @@ class _Writer:
                 return self.evaluated(of)[tuple(map(self.evaluated, parts))]
             case ast.Subscript(of, part):
                 return self.evaluated(of)[self.evaluated(part)]
-            case ast.Name(name) if name in known:
-                return known[name]
+            case ast.Name(name) if name in names:
+                return names[name]
             case ast.Name(name) if hasattr(builtins, name):
                 return getattr(builtins, name)
-            case ast.Attribute(of, name) if hasattr(found := self.evaluated(of), name):
-                return getattr(found, name)
-        self.refuse(node, "it has no value yet, or only in a loop that is over")
+            case ast.Attribute(of, name) if hasattr(owner := self.evaluated(of), name):
+                return getattr(owner, name)
+        self.refuse(node, "it has no value yet, or only within a loop that has ended")
 
     def attribute(self, node: ast.Attribute) -> Value:
         """Return a field, or a constant of a module."""
@@ -632,16 +644,16 @@ class _Writer:
         value = self.plain(node.value)
         kind = fields_of(value.kind.base).get(node.attr) if value.kind.base not in _SIMPLE else None
         if kind is None:
-            self.refuse(node, f"{node.attr!r} is not a field with a type that C has")
+            self.refuse(node, f"{node.attr!r} is not a field with a C type")
         return Value(f"{value.text}.{c_name(node.attr)}", kind)
 
     def index(self, of: ast.expr, at: ast.expr) -> str:
-        """Return the place of a sample."""
+        """Return the index of a sample."""
         value = self.plain(of)
         if value.kind == PAIR and isinstance(at, ast.Constant) and at.value in (0, 1):
             return str(at.value)
         if value.kind != SAMPLES:
-            self.refuse(of, "samples are needed here")
+            self.refuse(of, "this must be Samples")
         return self.whole(at)
 
     def arithmetic(self, node: ast.BinOp) -> Value:
@@ -652,7 +664,7 @@ class _Writer:
             return Value(f"bw_floor_divide({a}, {b})", INT)
         sign = _OPERATORS.get(type(node.op))
         if sign is None:
-            self.refuse(node, "arithmetic is + - * /, and // of ints")
+            self.refuse(node, "valid arithmetic is + - * /, and // of ints")
         if sign == "/":
             return Value(f"({'(double)' if is_whole else ''}{a} / {b})", FLOAT)
         return Value(f"({a} {sign} {b})", INT if is_whole else FLOAT)
@@ -669,10 +681,10 @@ class _Writer:
         before = self.made.arrays
         sides = [self.number(each) for each in (node.left, *node.comparators)]
         if len(sides) > 2 and self.made.arrays > before:  # C would compute the middle one twice
-            self.refuse(node, "compare a number that has a name")
+            self.refuse(node, "assign this number to a name first, and compare the name")
         signs = [_OPERATORS.get(type(op)) for op in node.ops]
         if None in signs:
-            self.refuse(node, "comparisons are < <= > >= == != of numbers, and `is None`")
+            self.refuse(node, "valid comparisons are < <= > >= == != of numbers, and `is None`")
         parts = [f"{a} {s} {b}" for a, s, b in zip(sides, signs, sides[1:], strict=False)]
         return Value(f"({' && '.join(parts)})", BOOL)
 
@@ -680,7 +692,7 @@ class _Writer:
         sides = [self.value(body), self.value(orelse)]
         kind = _joint(sides[0].kind, sides[1].kind)
         if kind is None:
-            self.refuse(node, "both values of a choice have the same type")
+            self.refuse(node, "both values of a conditional expression must have the same type")
         yes, no = (
             self.coerced_value(each, value, kind)
             for each, value in zip((body, orelse), sides, strict=True)
@@ -690,20 +702,20 @@ class _Writer:
     # calls
 
     def calls(self, node: ast.expr, function: Any) -> bool:
-        """Return whether an expression calls a function of Python."""
+        """Return whether an expression calls a given function of Python."""
         is_call = isinstance(node, ast.Call) and self.is_outside(node.func)
         return is_call and self.evaluated(node.func) is function  # type: ignore[attr-defined]
 
     def is_outside(self, node: ast.expr) -> bool:
-        """Return whether a name, or one in a module, stands for something outside the function."""
+        """Return whether a name, or one in a module, is defined outside the function."""
         while isinstance(node, ast.Attribute):
             node = node.value
         return isinstance(node, ast.Name) and node.id not in self.kinds
 
     def call(self, node: ast.Call) -> Value:
-        """Return what a function gives, or a record that is made."""
+        """Return the result of a function, or a new record."""
         if not self.is_outside(node.func):
-            self.refuse(node, "only functions of modules are called")
+            self.refuse(node, "only functions of modules can be called")
         called = self.evaluated(node.func)
         if called is isinstance:
             return self.is_undefined(node)
@@ -713,7 +725,7 @@ class _Writer:
             return self.built_in(node, _BUILT_IN[called])
         if isinstance(called, FunctionType):
             if self.unit.is_begun(called):
-                self.refuse(node, "a function does not call itself")
+                self.refuse(node, "a function must not call itself")
             made = self.unit.function(called)
             if made.arrays:
                 self.made.arrays += made.arrays * self.array(node)
@@ -722,8 +734,8 @@ class _Writer:
             return Value(f"{made.name}({', '.join([*rooms, *args.values()])})", made.returns)
         kind = kind_of(called) if isinstance(called, type) else None
         if kind is None or not hasattr(called, "_fields"):
-            known = ", ".join(each.__name__ for each in _BUILT_IN)
-            self.refuse(node, f"it calls functions of loops, NamedTuples, and {known}")
+            names = ", ".join(each.__name__ for each in _BUILT_IN)
+            self.refuse(node, f"it can call functions of this kind, NamedTuples, and {names}")
         args = self.arguments(node, called, fields_of(called))
         given = ", ".join(f".{c_name(n)} = {text}" for n, text in args.items())
         return Value(f"({self.unit.ctype(kind)}){{{given}}}", kind)
@@ -734,7 +746,7 @@ class _Writer:
         """Return the arguments of a call by the names of its parameters."""
         keywords = {each.arg: each.value for each in node.keywords}
         if None in keywords or any(isinstance(each, ast.Starred) for each in node.args):
-            self.refuse(node, "arguments are written out, without * and **")
+            self.refuse(node, "list the arguments one by one, without * and **")
         signature = inspect.signature(called)
         try:
             bound = signature.bind(*node.args, **keywords)  # type: ignore[arg-type]
@@ -745,13 +757,13 @@ class _Writer:
                 bound.arguments[name] = ast.copy_location(ast.Constant(parameter.default), node)
         missing = [name for name in bound.arguments if name not in wanted]
         if missing:
-            self.refuse(node, f"the type of {missing[0]!r} is none that C has")
+            self.refuse(node, f"the type of {missing[0]!r} does not exist in C")
         return {name: self.coerced(bound.arguments[name], wanted[name]) for name in wanted}
 
     def built_in(
         self, node: ast.Call, forms: Sequence[tuple[tuple[Kind, ...], Kind, str]]
     ) -> Value:
-        """Return what a function of Python gives."""
+        """Return the result of a function of Python."""
         values = [self.plain(each) for each in node.args]
         given = tuple(each.kind for each in values)
         if given in ((INT, FLOAT), (FLOAT, INT)):
@@ -759,9 +771,9 @@ class _Writer:
         for takes, gives, text in forms:
             if takes == given and not node.keywords:
                 return Value(f"{text}({', '.join(each.text for each in values)})", gives)
-        known = ", or ".join(" and ".join(map(_said, takes)) for takes, *_ in forms)
-        alone = "it stands only in a for, or alone on the right of an assignment"
-        self.refuse(node, f"it takes {known}" if known else alone)
+        valid = ", or ".join(" and ".join(map(_annotation, takes)) for takes, *_ in forms)
+        alone = "it is valid only in a for, or alone on the right of an assignment"
+        self.refuse(node, f"its arguments must be {valid}" if valid else alone)
 
     def is_undefined(self, node: ast.Call) -> Value:
         match node.args:
@@ -769,29 +781,29 @@ class _Writer:
                 value = self.value(tested)
                 if value.kind.or_undefined:
                     return Value(f"({value.text}.none.reason != 0)", BOOL)
-        self.refuse(node, "isinstance asks whether a `... | Undefined` is Undefined")
+        self.refuse(node, "use isinstance only to test whether a `... | Undefined` is Undefined")
 
     def undefined(self, node: ast.Call) -> Value:
-        """Return why a figure is not defined: the number of its text, and the numbers in that."""
+        """Return the reason for an undefined figure: number of its text, and the numbers in it."""
         match node:
             case ast.Call(_, [reason], []):
                 is_open = False
             case ast.Call(_, [reason], [ast.keyword("is_open", ast.Constant(bool(is_open)))]):
                 pass
             case _:
-                self.refuse(node, "it is Undefined(text) or Undefined(text, is_open=True)")
+                self.refuse(node, "write Undefined(text) or Undefined(text, is_open=True)")
         if isinstance(reason, ast.Constant) and re.search(r"\{[{:]", str(reason.value)):
-            self.refuse(node, "a text with numbers is an f-string")
+            self.refuse(node, "a text with numbers must be an f-string")
         numbers: list[str] = []
         text = "".join(self.pieces(node, reason, numbers))
         if len(numbers) > _MOST_NUMBERS:
-            self.refuse(node, f"a text holds at most {_MOST_NUMBERS} numbers")
+            self.refuse(node, f"a text can contain at most {_MOST_NUMBERS} numbers")
         place = self.unit.reason(text, is_open)
         listed = f", {{{', '.join(numbers)}}}" if numbers else ", {0}"
         return Value(f"(bw_undefined){{{place}{listed}}}", Kind(Undefined))
 
     def pieces(self, node: ast.Call, reason: ast.expr, numbers: list[str]) -> Iterator[str]:
-        """Yield the pieces of a text, as `str.format` takes them; its numbers go to a list."""
+        """Yield the pieces of a template for `str.format`, and add its numbers to a list."""
         for part in reason.values if isinstance(reason, ast.JoinedStr) else [reason]:
             match part:
                 case ast.Constant(str(text)):
@@ -805,36 +817,37 @@ class _Writer:
                 case ast.Name() if isinstance(text := self.evaluated(part), str):
                     yield text.replace("{", "{{").replace("}", "}}")
                 case _:
-                    self.refuse(node, "a text is written out, numbers in it like {level:.3g}")
+                    self.refuse(
+                        node, "write the text as one literal, with numbers in it like {level:.3g}"
+                    )
 
 
 class _ArraysFinished(ast.NodeVisitor):
-    """The rule that keeps slices alike: in Python they are copies, in C places in the same list.
+    """Rule that makes slices equivalent: in Python they are copies, in C views of the same list.
 
-    A list that a function makes is changed only before it is sliced, handed on or given another
-    name.
+    A function may change its own list only before the list is sliced, passed on or renamed.
     """
 
     def __init__(self, writer: _Writer) -> None:
         self.writer = writer
-        self.loops: list[int] = []  # the first lines of those around
-        self.read: dict[str, int] = {}  # the line from which on a list is handed on
+        self.loops: list[int] = []  # first lines of the enclosing loops
+        self.read: dict[str, int] = {}  # line from which a list is passed on
         self.changed: list[tuple[str, ast.Subscript]] = []
 
     def check(self, node: ast.FunctionDef) -> None:
-        """Refuse a change of a list that was handed on before."""
+        """Reject a change of a list that was passed on before."""
         self.visit(node)
         for name, change in self.changed:
             line = self.read.get(name, change.lineno)
             if line < change.lineno:
                 self.writer.refuse(
                     change,
-                    f"{name!r} is sliced, handed on or renamed, in line "
+                    f"{name!r} is sliced, passed on or renamed, in line "
                     f"{self.writer.first + line - 1} or the loop there: change it before that",
                 )
 
     def visit_For(self, node: ast.For | ast.While) -> None:
-        """Look at a loop: what it reads comes before what it changes in its next turn."""
+        """Visit a loop, whose reads precede the changes of its next iteration."""
         self.loops.append(node.lineno)
         self.generic_visit(node)
         self.loops.pop()
@@ -842,7 +855,7 @@ class _ArraysFinished(ast.NodeVisitor):
     visit_While = visit_For
 
     def visit_Subscript(self, node: ast.Subscript) -> None:
-        """Look at one sample, which is no other name for the list."""
+        """Visit a single sample, which is not another name for the list."""
         if not isinstance(node.value, ast.Name) or isinstance(node.slice, ast.Slice):
             self.generic_visit(node)
             return
@@ -851,14 +864,14 @@ class _ArraysFinished(ast.NodeVisitor):
         self.visit(node.slice)
 
     def visit_Call(self, node: ast.Call) -> None:
-        """Look at a call: those of len, min and max keep nothing."""
+        """Visit a call; calls of len, min and max keep no reference to the list."""
         keeps = not (isinstance(node.func, ast.Name) and node.func.id in ("len", "min", "max"))
         for each in (*node.args, *(keyword.value for keyword in node.keywords)):
             if keeps or not isinstance(each, ast.Name):
                 self.visit(each)
 
     def visit_Name(self, node: ast.Name) -> None:
-        """Take down a list that is handed on."""
+        """Note a list that is passed on."""
         if isinstance(node.ctx, ast.Load):
             first = min([node.lineno, *self.loops[:1]])
             self.read[node.id] = min(first, self.read.get(node.id, first))
@@ -877,7 +890,7 @@ def _plain(value: Value) -> Value:
 
 
 def _joint(one: Kind, other: Kind) -> Kind | None:
-    """Return the type of what is the one or the other; None where C has none."""
+    """Return the common type of two alternatives; None if C has none."""
     if one == other:
         return one
     or_none = _NOTHING in (one, other) or one.or_none or other.or_none
@@ -891,8 +904,8 @@ def _joint(one: Kind, other: Kind) -> Kind | None:
     return Kind(base, or_none, or_undefined and base is not Undefined)
 
 
-def _said(kind: Kind) -> str:
-    """Return a type as its annotation says it."""
+def _annotation(kind: Kind) -> str:
+    """Return a type as in an annotation."""
     names: dict[type, str] = {list: "Samples", tuple: "tuple[float, float]", NoneType: "None"}
     beside = " | None" * kind.or_none + " | Undefined" * kind.or_undefined
     return names.get(kind.base, kind.base.__name__) + beside
@@ -925,4 +938,4 @@ _BUILT_IN: dict[Any, list[tuple[tuple[Kind, ...], Kind, str]]] = {
     ],
     range: [],
 }
-"""functions of Python by what they take: what they give, and their names in C"""
+"""C forms of functions of Python: types of the arguments, type of the result, and name in C"""

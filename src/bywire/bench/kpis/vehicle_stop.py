@@ -1,4 +1,4 @@
-"""How a vehicle with two wheels stops: how far, how smoothly, and what its wheels did meanwhile."""
+"""Key figures of a two-wheeler's stop: distance, deceleration, wheel slip, and disc heat."""
 
 from __future__ import annotations
 
@@ -13,23 +13,23 @@ from bywire.bench.kpis.samples import Samples, moving_average, value_at
 from bywire.core.typing import Array
 
 SLOW = 2.5
-"""speed [m/s] below which a wheel may lock, and slip is not judged"""
-_ROUNDING = 1e-9  # s: of time zero
-_FILTER, _BUILD_UP = 0.02, 0.3  # s: averaging of the deceleration, and what is no jerk of control
-_NO_STOP = "the vehicle does not stop in the recorded time: give a longer options.duration"
-_NO_WAY = "the vehicle makes no way"
+"""speed [m/s] below which a wheel may lock, and no figure counts its slip"""
+_ROUNDING = 1e-9  # s, rounding error of time zero
+_FILTER, _BUILD_UP = 0.02, 0.3  # s: average of the deceleration; its build-up, without jerk
+_NO_STOP = "the vehicle does not stop within the recording: give a longer options.duration"
+_NO_WAY = "the vehicle does not move"
 
 
 @dataclass(frozen=True)
 class Setting:
-    """What a stop is measured by, and names of the signals in the recording.
+    """References for a stop, and names of the signals in the recording.
 
     Parameters
     ----------
     ideal
         Ideal stopping distance [m].
     peak_slip
-        Slip of the largest adhesion.
+        Slip at the largest adhesion.
     """
 
     ideal: float = math.nan
@@ -48,9 +48,9 @@ class Setting:
 
 
 class Stop(NamedTuple):
-    """A stop that begins at time zero: times, speed, and the rows from there to the standstill.
+    """Stop that begins at time zero: times, speed, and its rows until standstill.
 
-    ``end``: first standstill [s], where ``does_stop``.
+    ``end``: first standstill [s], if ``does_stop``.
     """
 
     t: Samples
@@ -68,17 +68,17 @@ def stop(t: Samples, v: Samples) -> Stop | Undefined:
     begin = bisect_left(t, -_ROUNDING)
     until = bisect_right(t, end) if does_stop else len(t)
     if begin >= until:
-        return Undefined("nothing is recorded from time zero on")
+        return Undefined("the recording contains nothing from time zero on")
     return Stop(t, v, begin, until, end, does_stop)
 
 
 def standstill(t: Array, v: Array) -> float:
-    """Return when a speed is zero for the first time after zero [s]; NaN where it never is."""
+    """Return the first time after zero at which a speed is zero [s]; NaN if there is none."""
     return _first_standstill(t.tolist(), v.tolist())
 
 
 def _first_standstill(t: Samples, v: Samples) -> float:
-    """When a speed is zero for the first time after zero [s]; NaN where it never is."""
+    """First time after zero at which a speed is zero [s]; NaN if there is none."""
     for k in range(1, len(t)):
         if v[k] <= 0.0 and v[k - 1] > 0.0 and t[k] > 0.0:
             return t[k - 1] + (t[k] - t[k - 1]) * v[k - 1] / (v[k - 1] - v[k])
@@ -93,24 +93,24 @@ def stopping_distance(stop: Stop, x: Samples) -> float | Undefined:
 
 @measure("s")
 def stopping_time(stop: Stop) -> float | Undefined:
-    """Time from zero to the first standstill."""
+    """Time from time zero to the first standstill."""
     return stop.end if stop.does_stop else Undefined(_NO_STOP)
 
 
 @measure("%")
 def braking_efficiency(stop: Stop, x: Samples, setting: Setting) -> float | Undefined:
-    """Ideal stopping distance on this road over the distance."""
+    """Ideal stopping distance on this road, relative to the actual one."""
     if not stop.does_stop:
         return Undefined(_NO_STOP)
     if not isfinite(setting.ideal):
-        return Undefined("tyres do not hold the vehicle on this road, so no stop is ideal")
+        return Undefined("the tyres cannot hold the vehicle on this road, so it has no ideal stop")
     distance = _distance(stop, x)
     return 100.0 * setting.ideal / distance if distance > 0.0 else Undefined(_NO_WAY)
 
 
 @measure("m/s**2")
 def mean_deceleration(stop: Stop, x: Samples) -> float | Undefined:
-    """Mean fully developed deceleration: over the way from 0.8 to 0.1 of the speed."""
+    """Mean fully developed deceleration: over the distance from 0.8 to 0.1 of the speed."""
     if not stop.does_stop:
         return Undefined(_NO_STOP)
     start = value_at(stop.t, stop.v, 0.0)
@@ -122,7 +122,7 @@ def mean_deceleration(stop: Stop, x: Samples) -> float | Undefined:
 
 @measure("m/s**3")
 def jerk(stop: Stop, a: Samples) -> float:
-    """Largest rate of the deceleration, averaged over 0.02 s, from 0.3 s on above 2.5 m/s."""
+    """Largest rate of the deceleration (0.02 s average), from 0.3 s on, above 2.5 m/s."""
     t = stop.t
     mean = moving_average(t, a, _FILTER)
     last = len(t) - 1
@@ -145,13 +145,13 @@ def jerk(stop: Stop, a: Samples) -> float:
 
 @measure("rad")
 def peak_pitch(stop: Stop, phi: Samples) -> float:
-    """Largest pitch, nose down, beyond that at time zero."""
+    """Largest nose-down pitch, relative to that at time zero."""
     return max(phi[stop.begin : stop.until]) - value_at(stop.t, phi, 0.0)
 
 
 @measure("s")
 def lift_time(stop: Stop, support: Samples) -> float:
-    """Time in which the rear wheel is off the ground."""
+    """Time during which the rear wheel is off the ground."""
     lasted = 0.0
     for k in range(stop.begin, min(stop.until, len(stop.t) - 1)):
         if support[k] <= 0.0:
@@ -161,7 +161,7 @@ def lift_time(stop: Stop, support: Samples) -> float:
 
 @measure("J")
 def disc_energy(stop: Stop, heat_front: Samples, heat_rear: Samples) -> float:
-    """Heat of all brake discs."""
+    """Heat into all brake discs."""
     return _heat(stop, heat_front) + _heat(stop, heat_rear)
 
 
@@ -179,59 +179,59 @@ def peak_slip_rear(stop: Stop, slip_rear: Samples) -> float:
 
 @measure("s")
 def excess_slip_time_front(stop: Stop, slip_front: Samples, setting: Setting) -> float:
-    """Time with twice the peak's slip above 2.5 m/s."""
+    """Time with more than twice the slip of largest adhesion, above 2.5 m/s."""
     return _excess_slip_time(stop, slip_front, setting.peak_slip)
 
 
 @measure("s")
 def excess_slip_time_rear(stop: Stop, slip_rear: Samples, setting: Setting) -> float:
-    """Time with twice the peak's slip above 2.5 m/s."""
+    """Time with more than twice the slip of largest adhesion, above 2.5 m/s."""
     return _excess_slip_time(stop, slip_rear, setting.peak_slip)
 
 
 @measure("s")
 def locked_time_front(stop: Stop, omega_front: Samples) -> float:
-    """Time in which the wheel stands, above 2.5 m/s."""
+    """Time during which the wheel is locked, above 2.5 m/s."""
     return _locked_time(stop, omega_front)
 
 
 @measure("s")
 def locked_time_rear(stop: Stop, omega_rear: Samples) -> float:
-    """Time in which the wheel stands, above 2.5 m/s."""
+    """Time during which the wheel is locked, above 2.5 m/s."""
     return _locked_time(stop, omega_rear)
 
 
 @measure("s")
 def longest_lock_front(stop: Stop, omega_front: Samples) -> float:
-    """Longest time in which the wheel stands at once, above 2.5 m/s."""
+    """Longest uninterrupted time during which the wheel is locked, above 2.5 m/s."""
     return _longest_lock(stop, omega_front)
 
 
 @measure("s")
 def longest_lock_rear(stop: Stop, omega_rear: Samples) -> float:
-    """Longest time in which the wheel stands at once, above 2.5 m/s."""
+    """Longest uninterrupted time during which the wheel is locked, above 2.5 m/s."""
     return _longest_lock(stop, omega_rear)
 
 
 @measure("%")
 def disc_share_front(stop: Stop, heat_front: Samples, heat_rear: Samples) -> float | Undefined:
-    """Share of the discs' heat that this wheel's take."""
+    """Share of the disc heat that goes into this wheel's discs."""
     return _share(_heat(stop, heat_front), _heat(stop, heat_rear))
 
 
 @measure("%")
 def disc_share_rear(stop: Stop, heat_front: Samples, heat_rear: Samples) -> float | Undefined:
-    """Share of the discs' heat that this wheel's take."""
+    """Share of the disc heat that goes into this wheel's discs."""
     return _share(_heat(stop, heat_rear), _heat(stop, heat_front))
 
 
 def _distance(stop: Stop, x: Samples) -> float:
-    """Way from time zero to the standstill [m]."""
+    """Distance from time zero to standstill [m]."""
     return value_at(stop.t, x, stop.end) - value_at(stop.t, x, 0.0)
 
 
 def _fallen(x: Samples, v: Samples, level: float) -> float:
-    """Where a speed that falls to zero is at a level for the first time [m]."""
+    """Position at which a falling speed first reaches a level [m]."""
     k = 0
     while k < len(v) and not v[k] <= level:
         k += 1
@@ -243,13 +243,13 @@ def _fallen(x: Samples, v: Samples, level: float) -> float:
 
 
 def _heat(stop: Stop, energy: Samples) -> float:
-    """Heat of a wheel's discs [J]."""
+    """Heat into a wheel's discs [J]."""
     return energy[stop.until - 1] - energy[stop.begin]
 
 
 def _share(this: float, other: float) -> float | Undefined:
     every = this + other
-    return 100.0 * this / every if every > 0.0 else Undefined("no brake takes heat")
+    return 100.0 * this / every if every > 0.0 else Undefined("no brake takes up heat")
 
 
 def _peak_slip(stop: Stop, slip: Samples) -> float:

@@ -1,4 +1,4 @@
-"""How warm motors get, and how long they are derated."""
+"""Key figures of warm motors: temperatures, derating, and output when warm."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ class Setting:
     Parameters
     ----------
     output
-        What the motors bring about.
+        Output that the motors produce, for instance a pressure.
     winding
-        Beginning of the names of the windings' temperatures: of several motors the hottest counts.
+        Prefix of the names of the winding temperatures; the hottest motor counts.
     derated
-        The mode of the ECU.
+        Mode "derated" of the ECU, 0 or 1.
     """
 
     output: str
@@ -42,13 +42,13 @@ class Warming:
     t
         Times [s], increasing, shape ``(n,)``.
     output
-        What the motors bring about, in SI, shape ``(n,)``.
+        Output that the motors produce, in SI, shape ``(n,)``.
     unit
         Its unit.
     winding
-        Temperature of the hottest winding [K], shape ``(n,)``, or None where no motor warms up.
+        Temperature of the hottest winding [K], shape ``(n,)``, or None if no motor warms up.
     derated
-        1 while motors are derated, else 0; shape ``(n,)``, or None where it is not recorded.
+        1 while motors are derated, else 0; shape ``(n,)``, or None if it is not recorded.
     """
 
     t: Array
@@ -59,23 +59,23 @@ class Warming:
 
     @property
     def units(self) -> Mapping[str, str]:
-        """The output's unit stands for a level."""
+        """Unit of the placeholder ``level``: that of the output."""
         return {"level": self.unit}
 
     @cached_property
     def defect(self) -> str:
-        """Why no figure is defined."""
-        given = (self.output, self.winding, self.derated)
-        return defect(self.t, *(s for s in given if s is not None))
+        """Reason why no figure is defined."""
+        signals = (self.output, self.winding, self.derated)
+        return defect(self.t, *(s for s in signals if s is not None))
 
     @property
     def note(self) -> str:
-        """Nothing is treated."""
+        """Empty: the samples are raw."""
         return ""
 
 
 def select(recording: xr.Dataset, setting: Setting) -> Warming:
-    """Return what the figures need; a signal that is not recorded leaves its figure undefined."""
+    """Return the samples for the figures; a missing signal leaves its figures undefined."""
     t, _ = signal(recording, "time")
     output, unit = signal(recording, setting.output)
     names = [str(name) for name in recording if str(name).startswith(setting.winding)]
@@ -88,9 +88,9 @@ def select(recording: xr.Dataset, setting: Setting) -> Warming:
 
 @measure("K", needs=("winding",))
 def peak_winding(data: Warming) -> float | Undefined:
-    """Highest temperature of a motor's winding."""
+    """Highest winding temperature of any motor."""
     if data.winding is None:
-        return Undefined("no temperature of a winding is recorded")
+        return Undefined("no winding temperature is recorded")
     return float(np.max(data.winding))
 
 
@@ -98,13 +98,13 @@ def peak_winding(data: Warming) -> float | Undefined:
 def final_winding(data: Warming) -> float | Undefined:
     """Temperature of the hottest winding at the end."""
     if data.winding is None:
-        return Undefined("no temperature of a winding is recorded")
+        return Undefined("no winding temperature is recorded")
     return float(data.winding[-1])
 
 
 @measure("s", needs=("derated",))
 def time_derated(data: Warming) -> float | Undefined:
-    """Time in which the motor's current is limited for its temperature.
+    """Time during which the motor's current is limited because of its temperature.
 
     Trapezoidal integral of the mode's samples: a change counts as halfway between two samples.
     """
@@ -115,7 +115,7 @@ def time_derated(data: Warming) -> float | Undefined:
 
 @measure("s", needs=("derated",))
 def derated_after(data: Warming) -> float | Undefined:
-    """Time of the first sample in which the motor is derated."""
+    """Time of the first sample at which the motor is derated."""
     if data.derated is None:
         return Undefined("the mode 'derated' is not recorded")
     on = data.derated > 0.5
@@ -126,6 +126,6 @@ def derated_after(data: Warming) -> float | Undefined:
 
 @measure("level")
 def final_output(data: Warming) -> float:
-    """Mean of the output in the last tenth of the time."""
+    """Mean of the output over the last tenth of the recording."""
     late = data.t >= data.t[-1] - 0.1 * (data.t[-1] - data.t[0])
     return total(data.output[late].tolist()) / np.count_nonzero(late)
