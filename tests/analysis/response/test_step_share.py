@@ -45,7 +45,7 @@ def test_half_steps_that_do_not_run_are_said_to(monkeypatch: pytest.MonkeyPatch)
 
     monkeypatch.setattr(use_case, "_measured", fragile)
     found = bywire.frequency_response("current", **ASKED)
-    assert any("not known" in text and "left the numbers" in text for text in found.warnings)
+    assert any("unknown" in text and "left the numbers" in text for text in found.warnings)
     assert "gain_step_error" not in found.data
 
 
