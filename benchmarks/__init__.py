@@ -1,1 +1,1 @@
-"""How fast bywire is, against hand-written C and against what users would pick instead."""
+"""How fast bywire is, against hand-written C and against other simulators."""

@@ -46,7 +46,7 @@ def test_a_failed_check_is_warned_of() -> None:
             "friction-model", synthetic=1, options={"law": "viscous", "duration": 4.0}
         )
     assert not found.holds
-    assert "Do not use it as it is" in found._repr_html_()
+    assert "Do not use this result" in found._repr_html_()
 
 
 def test_signals_in_memory_are_a_measurement() -> None:
@@ -57,7 +57,7 @@ def test_signals_in_memory_are_a_measurement() -> None:
     assert again.put_in == {}
     with pytest.raises(bywire.BywireError, match="give only one of"):
         bywire.identify("seal-friction", made.data, synthetic=2)
-    with pytest.raises(bywire.BywireError, match="unknowns is for methods of any bench"):
+    with pytest.raises(bywire.BywireError, match="unknowns is only for methods of any bench"):
         bywire.identify("seal-friction", made.data, question=bywire.Question(unknowns="A"))
 
 
@@ -98,7 +98,7 @@ def test_a_recording_is_replayed_from_memory(tmp_path: Path) -> None:
     assert set(found.recording) == {"x_measured", "x_modeled", "M_set"}
     difference = found.recording["x_modeled"] - found.recording["x_measured"]
     assert float(np.abs(difference).max()) < 1e-6
-    assert found.tables()["How well it fits"]["nrmse"].to_list()[0] < 2.0
+    assert found.tables()["Fit"]["nrmse"].to_list()[0] < 2.0
     assert {path.name for path in found.write(tmp_path)} == {
         "replay.nc",
         "x.png",

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import bywire
+from bywire.core.errors import UnknownNameError
+from raising import raises
 
 QUICK = {"options.duration": "40 ms", "options.settle": "10 ms"}
 
@@ -20,7 +22,7 @@ def test_what_was_changed_and_the_verdict_come_first_and_figures_before_tables()
         "Key figures",
         "Energy",
         "Schematic",
-        "How it was made",
+        "Settings",
     ]
     required, changed = [block.table for block in result.document().page[0].blocks[:2]]
     assert [row[0].text for row in required.rows] == ["overshoot"]
@@ -34,7 +36,9 @@ def test_what_was_changed_and_the_verdict_come_first_and_figures_before_tables()
 def test_errors_of_temperatures_are_differences():
     result = bywire.run("hard-braking", QUICK)
     tables = result.document().page[-1].blocks
-    (errors,) = [b for b in tables if getattr(b, "title", "").startswith("Error of recorded")]
+    (errors,) = [
+        b for b in tables if getattr(b, "title", "").startswith("Numerical error of recorded")
+    ]
     rows = {row[1].text: row[2].text for row in errors.blocks[0].table.rows}
     assert rows["T_winding"] == "0 K"
 
@@ -43,3 +47,13 @@ def test_a_run_of_the_cited_set_says_that_nothing_was_changed():
     result = bywire.run("seal-stribeck", estimate_error=False)
     (said,) = [block.text for block in result.document().page[0].blocks]
     assert said.startswith("Nothing was changed: all parameters are those of dardanelli2010")
+
+
+def test_a_figure_of_the_report_is_drawn_by_its_name():
+    result = bywire.run("hard-braking", estimate_error=False)
+    assert len(result.plot("time-traces").axes) > len(result.plot("step-response").axes) > 0
+    first = result.plot().axes[0].get_ylabel()
+    assert first == result.plot("step-response").axes[0].get_ylabel() != ""
+    with raises(UnknownNameError, name="figure", value="nyquist", valid="time-traces"):
+        result.plot("nyquist")
+    assert bywire.margins("pressure").plot("pressure-nyquist").axes

@@ -53,16 +53,16 @@ def test_a_bench_file_says_what_failed_and_what_it_cannot_do(
     arguments = ("identify", "motor-winding", "--synthetic", "1", "--option", "duration=0.2 s")
     good = bywire(*arguments, "--out", tmp_path / "good")
     assert good.status == 0
-    assert "does not replay it" in good.err
+    assert "cannot replay it" in good.err
     said = (tmp_path / "good" / "parameters.toml").read_text()
     assert "CHECK FAILED" not in said
-    assert "does not replay it" in said
+    assert "cannot replay it" in said
     data = tmp_path / "good" / "measurement.nc"
     other = ("--set", "anti_alias.f_aa=120 Hz", "--out", tmp_path / "wrong")
     wrong = bywire("identify", "motor-winding", data, *other, "--json")
     assert wrong.status == 1
     first = (tmp_path / "wrong" / "parameters.toml").read_text().splitlines()[0]
-    assert first.startswith("# CHECK FAILED, do not use it as it is: residual_over_noise = ")
+    assert first.startswith("# CHECK FAILED, do not use this file: residual_over_noise = ")
     assert wrong.object["options"] == {}  # all of them only simulate
     refused(
         bywire("identify", "motor-winding", data, "--option", "rotor=turning"),
@@ -112,7 +112,7 @@ def test_an_older_result_does_not_stay_beside_a_new_one(bywire: Bywire, tmp_path
     again = bywire(*seal, data, "--out", tmp_path)
     assert again.status == 0
     assert data.exists()
-    assert "no parameters.toml is written" in again.err
+    assert "bywire writes no parameters.toml" in again.err
 
 
 def test_a_study_keeps_out_of_other_folders(bywire: Bywire, tmp_path: Path) -> None:
@@ -189,7 +189,7 @@ def test_refusals(bywire: Bywire, tmp_path: Path) -> None:
     for flag in ("--map", "--holdout"):
         refused(
             bywire("identify", "seal-friction", "--study", "5", flag, "x.csv"),
-            f"{flag} is for measurement files",
+            f"{flag} is only for measurement files",
         )
     refused(bywire("identify", "seal-friction", "--synthetic", "1", "--set", "a.b=1"), "--set")
     refused(
@@ -238,7 +238,7 @@ def test_parameters_go_on_as_a_bench_file(tmp_path: Path, dither: str) -> None:
     path.write_text(other)
     load(path)
     driven = parameter_file("motor-open-loop", "dardanelli2010", par, {"motor.R_m": 0.321})
-    assert "# experiment 'motor-open-loop' wants more than this file says" in driven
+    assert "# experiment 'motor-open-loop' needs more than this file says" in driven
     path.write_text(driven)
     assert load(path).par.leaves()["motor.R_m"] == 0.321
 

@@ -113,7 +113,7 @@ def test_every_experiment_says_what_it_drives(bywire: Bywire) -> None:
         assert rows or one.static is not None, name
     text = bywire("list", "hard-braking").out
     assert "p_set   bar   pressure demand  motorcycle-brake" in text
-    assert "'bywire list motorcycle-brake': the signals that a recording holds" in text
+    assert "'bywire list motorcycle-brake': the signals in a recording" in text
 
 
 def test_every_loop_and_plant_says_input_output_and_states(bywire: Bywire) -> None:
@@ -194,7 +194,7 @@ def test_a_word_finds_what_is_declared_to_mean_it(
     found = bywire("list", word, "--json").object["found"]
     assert (kind, name) in {(one["kind"], one["name"]) for one in found}
     text = bywire("list", word).out
-    assert text.startswith(f"nothing is called {word!r}; it is mentioned by")
+    assert text.startswith(f"nothing has the name {word!r}; these mention it")
     assert len(text.splitlines()) <= 40
 
 

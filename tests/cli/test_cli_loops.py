@@ -169,7 +169,7 @@ def test_a_disc_that_would_stop_is_driven_and_that_is_said(bywire):
 def test_a_sine_beyond_the_end_stop_is_told(bywire):
     asked = ("frequency-response", "pressure", "--frequencies", "20 Hz", "--amplitudes")
     outcome = bywire(*asked, "3 bar, 32 bar", "--json")
-    told = [line for line in outcome.lines if "out of the brake's range" in line]
+    told = [line for line in outcome.lines if "leave the brake's range" in line]
     assert len(told) == 1
     assert "amplitude 32 bar" in told[0]
 

@@ -53,7 +53,7 @@ def test_a_full_disk_is_said_with_place_and_next_step(bywire, bench, monkeypatch
     assert outcome.status == 3
     assert outcome.lines == [
         "bywire: error: somewhere/file: No space left on device: make room there, or name "
-        "another place with --out or TMPDIR"
+        "another folder with --out or TMPDIR"
     ]
 
 

@@ -199,15 +199,15 @@ def test_refusals(bywire: Bywire, bench: Path, tmp_path: Path) -> None:
         bywire(
             *method, "--synthetic", "1", "--holdout", data, "--bench", bench, *OUTPUTS, *UNKNOWNS
         ),
-        "--holdout is for measurement files",
+        "--holdout is only for measurement files",
     )
     refused(
         bywire("identify", "friction-ramp", "--synthetic", "1", "--unknown", "motor.R_m"),
-        "--unknown is for methods of any bench (output-error)",
+        "--unknown is only for methods of any bench (output-error)",
     )
     refused(
         bywire("identify", "friction-ramp", "--synthetic", "1", "--loss", "huber"),
-        "--loss is for methods of any bench (output-error)",
+        "--loss is only for methods of any bench (output-error)",
     )
     refused(
         bywire(*given, "--holdout", tmp_path / ".." / tmp_path.name / "run.csv"),

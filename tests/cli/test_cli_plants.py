@@ -39,14 +39,14 @@ def test_texts_and_figures(bywire, tmp_path):
     figure = "motorcycle-plant-p_mc.png"
     assert names >= {"motorcycle-plant-linear-model.json", figure, "report.html"}
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
-    for text in ("largest error up to", "other poles: 1 at 0", "How it was made"):
+    for text in ("largest error up to", "other poles: 1 at 0", "Settings"):
         assert text in page
     assert "other poles: 1 at 0" in outcome.out
 
 
 def test_friction_of_a_plant(bywire):
     stuck = bywire("linearize", "wedge-plant", "--friction", "stuck")
-    assert "what friction holds, rests" in stuck.out
+    assert "friction holds the plant at rest" in stuck.out
     slides = bywire(
         "linearize", "motorcycle-plant", "--friction", "sliding", "--speed", "5 rad/s", "--json"
     ).object

@@ -39,7 +39,7 @@ def test_undefined_kpi_is_null_and_meets_nothing(bywire, bench):
     assert outcome.object["kpis"]["settling_time"]["value"] is None
     (requirement,) = outcome.object["requirements"]
     assert (requirement["value"], requirement["met"]) == (None, False)
-    assert "requirement not met: settling_time is not defined, wanted <= 10 s" in outcome.err
+    assert "requirement not met: settling_time is not defined, limit <= 10 s" in outcome.err
     assert "never settles" in outcome.err
 
 

@@ -114,7 +114,7 @@ def test_a_graphics_processor_that_is_not_there_is_no_study(bywire, study, tmp_p
     driver.count = 0
     with emulated(driver):
         outcome = bywire("study", "run", study, "--out", tmp_path / "out", "--engine", "cuda")
-    refused(outcome, "finds no graphics processor", "nvidia-smi", status=3)
+    refused(outcome, "finds no NVIDIA graphics processor", "nvidia-smi", status=3)
     assert not (tmp_path / "out").exists()
     refused(bywire("study", "run", study, "--engine", "cudo"), "did you mean 'cuda'")
 
@@ -135,7 +135,9 @@ def test_the_name_of_a_study_file_is_no_sizing_study(
     (tmp_path / place).mkdir(exist_ok=True)
     study.rename(tmp_path / there)
     (tmp_path / "tolerance.toml").write_text('life = "wedge-pads"\n')  # near, and no study
-    refused(bywire("study", word), f"the study file {there} is run by 'bywire study run {there}'")
+    refused(
+        bywire("study", word), f"to run the study file {there}, type 'bywire study run {there}'"
+    )
     refused(bywire("study", "run", word), f"did you mean {there}?")
     assert not (tmp_path / word).exists()
 

@@ -23,7 +23,7 @@ def ramp(slope: float, step: float, end: float) -> xr.Dataset:
 def test_differences_stand_at_the_times_of_the_first_as_far_as_both_go() -> None:
     apart = differences_from_first({"a": ramp(1.0, 0.1, 3.0), "b": ramp(3.0, 0.07, 2.0)})
     (less,) = apart.values()
-    assert list(apart) == ["b less a"]
+    assert list(apart) == ["b minus a"]
     assert set(less.data_vars) == {"p", "T"}
     assert float(less["time"][-1]) == pytest.approx(1.9)
     np.testing.assert_allclose(less["p"].values, 2.0 * less["time"].values, atol=1e-12)

@@ -149,14 +149,14 @@ def test_facts_that_do_not_exist_are_not_drawn(recording: xr.Dataset) -> None:
 
 
 def test_a_step_of_no_height_is_refused() -> None:
-    with pytest.raises(ParameterError, match="no step"):
+    with pytest.raises(ParameterError, match="they must differ"):
         StepLimits(start=0.0, before=1.0, after=1.0)
 
 
 def test_stuck_phases_and_saturation_are_named(recording: xr.Dataset) -> None:
     drawn = time_traces(recording)
     # under dither, which shakes it loose
-    again = "shaft stuck again and again, 11 % of the shade"
+    again = "shaft stuck repeatedly, 11 % of the shaded time"
     assert again in legend_of(drawn.axes[0])
     assert "saturated" in legend_of(drawn.axes[1])
 

@@ -200,7 +200,7 @@ def test_poles_that_a_table_leaves_out_are_counted() -> None:
     assert len(rows) == 2
     assert rows[1][2:] == ["500 (f_s/2)", "-"]
     assert left_out(model) == [
-        "other poles: 1 at 0 (not driven, or not brought back), 2 over within a sample"
+        "other poles: 1 at 0 (not driven, or without restoring force), 2 that decay within a sample"
     ]
     own = replace(model, A=np.diag([0.9, 0.8, 0.7, 0.6, 0.5]))
     assert left_out(own) == []

@@ -177,7 +177,7 @@ def test_a_convergence_shows_what_decides() -> None:
     met[[70, 130]] = False
     shares = running_share(met, 0.95, 100)
     figure = drawn(convergence({"a": shares, "b": shares}, {"a": 0.99, "b": None}, first=64))
-    assert entries(figure) == ["estimate", "interval", "wanted"]
+    assert entries(figure) == ["estimate", "interval", "required"]
     assert_readable(figure)
     for axes in figure.axes:
         low, high = axes.get_ylim()
@@ -343,7 +343,7 @@ def test_what_is_thinned_is_said_with_its_numbers() -> None:
     assert (cases.met.size, cases.missed.size) == (400, 10)
     assert np.all(met[cases.met])
     assert not np.any(met[cases.missed])
-    said = "Drawn are 400 of 990 cases that meet the limit and all that miss it (10)."
+    said = "The figure shows 400 of 990 cases that meet the limit and all that miss it (10)."
     assert cases.caption("meet the limit", "miss it") == said
     assert drawn_cases(met, 990).caption("meet the limit", "miss it") == ""
 

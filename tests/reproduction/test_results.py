@@ -123,7 +123,7 @@ def test_folder_is_complete_and_self_contained(made_up: Reproduction, tmp_path: 
     html = paths[2].read_text(encoding="utf-8")
     assert "0 agree, 2 disagree, 1 without verdict" in html
     assert "Tables differ. [1 disagreement]" in html
-    for text in ("5 % of what is stated", "0.1 s", "two digits", "&lt;= 1", "printed"):
+    for text in ("5 % of the stated value", "0.1 s", "two digits", "&lt;= 1", "printed"):
         assert text in html
     assert "Table &lt;2&gt;" in html
     assert "<svg" in html

@@ -35,7 +35,7 @@ def test_the_link_gives_a_cookie_and_leads_on_without_the_token(visit):
 
 @pytest.mark.parametrize(("method", "path"), sorted(addresses()))
 def test_nothing_is_answered_without_the_token(visit, method, path):
-    for token, word in ("", "missing"), ("x" * 43, "a new one is made"), ("\xe4", "token"):
+    for token, word in ("", "missing"), ("x" * 43, "each start creates"), ("\xe4", "token"):
         answer = visit(method, path, token=token)
         assert answer.status == 401
         assert word.encode() in answer.body

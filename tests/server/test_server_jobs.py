@@ -108,7 +108,7 @@ def test_canceled_and_killed_jobs_leave_nothing(visit):
 @pytest.mark.usefixtures("standin")
 def test_a_study_is_computed_once_at_a_time(visit):
     (visit.folder / "some.toml").write_text('bench = "curve.toml"\n[vary]\n"motor.R_m" = "+-5 %"\n')
-    assert b"Nothing of it is computed yet" in visit("GET", "/study?of=some.toml").body
+    assert b"No case is computed yet" in visit("GET", "/study?of=some.toml").body
     assert visit("GET", "/study?of=curve.toml").status == 400
     begun = visit.begin("study", study="some.toml")
     assert begun.object["folder"] == "results/some"

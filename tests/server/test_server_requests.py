@@ -213,7 +213,7 @@ def test_the_port_of_http_is_left_out_by_browsers():
     ]:
         headers = Message()
         headers["Host"], headers["Origin"] = host, f"http://{host.lower().removesuffix(':80')}"
-        with nullcontext() if is_known else pytest.raises(RefusedError, match="answers as"):
+        with nullcontext() if is_known else pytest.raises(RefusedError, match="answers only as"):
             require_place("POST", headers, port)
 
 

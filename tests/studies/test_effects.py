@@ -65,7 +65,7 @@ def test_what_takes_the_figure_away_comes_first(findings):
     assert lost.drivers("peak_current") == ["adc.law", "motor.R_m", "motor.K_e"]
     assert [e.lacking for e in lost.effects("peak_current")] == [1, 0, 0]
     (tornado,) = (b for b in study_figures(lost, dict) if getattr(b, "name", "") == "tornado")
-    assert "A triangle: the figure is not defined at some" in tornado.caption
+    assert "Triangle: the figure is not defined at some" in tornado.caption
     assert any(
         text.get_text() == "not defined at a level"
         for text in tornado.figure.legends[0].get_texts()
@@ -90,6 +90,6 @@ def test_a_figure_that_nothing_moves_has_a_sentence_in_place_of_a_table(findings
     assert unmoved(findings) == []
     assert len(effect_tables(findings)) == 1
     still = Findings(findings.plan, findings.cases.assign(peak_current=20.0), ())
-    assert unmoved(still) == ["nothing moves peak_current: the same in every case"]
+    assert unmoved(still) == ["the same in every case: peak_current"]
     assert effect_tables(still) == []
     assert "tornado" not in [getattr(each, "name", "") for each in study_figures(still, dict)]

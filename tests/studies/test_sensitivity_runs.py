@@ -82,12 +82,12 @@ def test_a_simulated_study_has_the_shares_of_its_closed_form(axis):
         assert indices[name].first.value == pytest.approx(first, abs=0.05)
         assert holds(indices[name].total, first)  # next to nothing together
     assert study.notes == [
-        "256 cases in place of 300: they come in whole groups",
-        "sobol-indices: cases share values, so that shares of them are no probabilities",
-        "overshoot: 64 groups do not tell shares within +-0.15; name more cases in the study file, "
-        "and run it into another folder",
+        "256 cases in place of 300, because cases come in whole groups",
+        "sobol-indices: cases share values, so shares of them are not probabilities",
+        "overshoot: 64 groups do not determine shares within +-0.15; ask for more cases in the "
+        "study file, and run it into another folder",
     ]
-    assert "what drives overshoot" in str(study)
+    assert "main influences on overshoot" in str(study)
     with undrawn():
         study.write(out)
     names = {path.name for path in out.iterdir()}
@@ -128,6 +128,6 @@ def test_a_simulated_study_has_the_effects_of_its_closed_form(axis):
     assert {*sizes} == {"mu_star", "sigma"}
     cases = study.cases.assign(overshoot=study.cases["overshoot"].where(study.cases["case"] != 3))
     lacking = replace(study, findings=Findings(plan, cases, study.nominal.kpis))
-    (section,) = [each for each in lacking.document().sections() if "drives" in each.title]
+    (section,) = [each for each in lacking.document().sections() if "influences" in each.title]
     (block,) = section.blocks  # the sentence in place of the table
     assert block.texts == ["no indices of overshoot: not defined in 1 of 48 cases"]

@@ -155,7 +155,7 @@ def test_an_experiment_needs_no_bench_file(tmp_path):
         ),
         (
             '[vary]\n"motor.R_m" = "+-5 %"\n[requirements]\novershoot = "15 % with 90 %"',
-            ["overshoot = '15 %' cannot be read"],
+            ["overshoot = '15 %' is not valid"],
         ),
         ('[vary]\n"motor.R_m" = "+-5 %"\n[[correlation]]\nvalue = 0.5', ["of is missing"]),
         (

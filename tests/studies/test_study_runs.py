@@ -145,7 +145,7 @@ def test_a_folder_of_another_study_is_refused(study, tmp_path):
         assert "varied motor.R_m: normal, mean" in str(refused.value)
         assert "quantiles" not in str(refused.value)
     path.unlink()
-    with pytest.raises(FileError, match="is gone"):
+    with pytest.raises(FileError, match="no longer exists"):
         bywire.resume_study(out)
     with pytest.raises(FileError, match="does not contain a study"):
         bywire.study_report(tmp_path)
@@ -242,7 +242,7 @@ def test_time_is_a_budget(study, tmp_path):
     path = study(VARY + '[design]\ntime = "1 us"\n')
     first = bywire.run_study(path, tmp_path / "out", cases=128, workers=1)
     assert (len(first.cases), first.status) == (64, "unfinished")
-    assert "its file gives it 1e-06 s at a time" in first.warnings[-1]
+    assert "the study file limits each call to 1e-06 s" in first.warnings[-1]
     assert bywire.resume_study(tmp_path / "out", workers=1).status == "passed"
     with pytest.raises(ParameterError, match="budget of 'worst-case' is its 'cases'"):
         read_study(study(VARY + "[design]\nkind = 'worst-case'\ntime = '1 s'\n"))

@@ -87,14 +87,16 @@ def test_what_drives_missed_requirements_comes_first(study):
     outcomes = {each.demand.figure: each.outcome for each in findings.judgments}
     assert outcomes == {"dead_time": "met", "rise_time": "undecided", "overshoot": "missed"}
     titles = [each.title.split(",")[0] for each in influence_tables(findings)]
-    assert titles == [f"what drives {name}" for name in ("overshoot", "rise_time", "dead_time")]
+    assert titles == [
+        f"main influences on {name}" for name in ("overshoot", "rise_time", "dead_time")
+    ]
 
 
 def test_a_table_of_drivers_says_how_many_it_leaves_out(found):
     findings = found("rise_time", np.linspace(0.05, 0.07, CASES), "<= 60 ms with 90 %")
     (table,) = influence_tables(findings)
     assert len(table.table.rows) == 5
-    said = "What drives rise_time, the 5 strongest, and 2 more in report.json."
+    said = "Main influences on rise_time, the 5 strongest; 2 more are in report.json."
     assert table.caption == said
 
 
@@ -103,7 +105,8 @@ def test_captions_say_who_is_drawn_and_who_misses(found):
     every = captions(found("rise_time", values, "<= 60 ms with 90 %"))
     assert "crosses miss the limit" in every["scatter-rise_time"]
     assert every["parallel"].endswith(
-        "Drawn are 300 of 500 cases that meet all requirements and 300 of 500 cases that miss one."
+        "The figure shows 300 of 500 cases that meet all requirements "
+        "and 300 of 500 cases that miss one."
     )
     none = captions(found("rise_time", values, "<= 80 ms with 90 %"))
     assert "crosses" not in none["scatter-rise_time"]
@@ -112,13 +115,13 @@ def test_captions_say_who_is_drawn_and_who_misses(found):
     assert "all that have it meet the limit" in lacking["scatter-rise_time"]
     at_edge = "Triangles at the upper edge: cases without it (500), which miss the limit."
     assert lacking["scatter-rise_time"].endswith(at_edge)
-    assert lacking["parallel"].endswith("does not have a figure, its line goes to 'none'.")
+    assert lacking["parallel"].endswith("If a case lacks a figure, its line goes to 'none'.")
 
 
 def test_no_more_points_are_left_out_than_are_said(found):
     values = np.linspace(0.05, 0.07, 9000)
     said = captions(found("rise_time", values, "<= 69.5 ms with 90 %"))["scatter-rise_time"]
-    assert "Drawn are 4000 of 8775 cases that meet the limit and all that miss it (225)." in said
+    assert "shows 4000 of 8775 cases that meet the limit and all that miss it (225)." in said
 
 
 def test_a_surrogate_has_the_unit_of_its_figure(found):
@@ -138,7 +141,7 @@ def test_histograms_of_designs_that_go_to_the_ends_count_no_frequencies(found):
     findings = found("rise_time", np.linspace(0.05, 0.07, CASES), "<= 60 ms")
     assert "90 % of them" in captions(findings)["histograms"]
     ends = replace(findings, plan=replace(findings.plan, design="corners"))
-    said = "heights count the cases of corners, and are no frequencies"
+    said = "heights count the cases of corners, and are not probabilities"
     assert said in captions(ends)["histograms"]
 
 

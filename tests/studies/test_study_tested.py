@@ -34,13 +34,13 @@ def test_a_study_says_which_bench_with_which_faults_and_changes_was_tested(study
     document = found.document()
     assert "to 30 bar" in document.summary
     assert "with the fault pressure.stuck-at-last;" in document.summary
-    (tested,) = (each for each in document.page if each.title == "What was tested")
+    (tested,) = (each for each in document.page if each.title == "Tested bench")
     source, faults, changes, options = tested.blocks
     assert isinstance(source, Paragraph)
     assert isinstance(faults, Listing)
     assert isinstance(changes, TableBlock)
     assert isinstance(options, Details)
-    said = "Bench: bench.toml, of which the study sets options.p_to = 30 bar, motor.L_m = +20%."
+    said = "Bench: bench.toml; the study sets options.p_to = 30 bar, motor.L_m = +20%."
     assert source.text == said
     assert list(faults.texts) == [SENTENCE]
     changed = {row[0].text: row[1].text for row in changes.table.rows}

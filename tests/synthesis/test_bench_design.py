@@ -204,7 +204,7 @@ def test_a_verdict_says_where_it_was_computed() -> None:
         return verdict_text(wanted, tried), lines
 
     text, lines = verdict(small)
-    assert text == ("requirements: 1 met on the nonlinear bench, 2 met on the linear model alone")
+    assert text == ("requirements: 1 met on the nonlinear bench, 2 met only on the linear model")
     assert [line.partition(":")[0] for line in lines] == [
         "on the bench",
         "on the linear model",
@@ -214,6 +214,6 @@ def test_a_verdict_says_where_it_was_computed() -> None:
     assert lines[1].startswith("on the bench and the linear model (1 of 2 sines show it): phase")
     text, _ = verdict(small, missed="gain_margin >= 2")
     assert text == (
-        "requirements: 1 met on the nonlinear bench, 1 of 2 not met on the linear model alone"
+        "requirements: 1 met on the nonlinear bench, 1 of 2 not met only on the linear model"
     )
-    assert verdict()[0] == "requirements met on the linear model alone"
+    assert verdict()[0] == "requirements met only on the linear model"

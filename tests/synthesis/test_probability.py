@@ -76,7 +76,7 @@ def test_gains_hold_as_probably_as_is_wanted(study, monkeypatch):
     missed = replace(found, probability=replace(beyond, drawn=replace(told.drawn, lacking=3)))
     assert not missed.holds
     assert missed.document().remarks == ["all requirements with 90 %: missed"]
-    assert "3 more that were drawn" in str(missed)
+    assert "3 more models drawn" in str(missed)
     assert beyond.outcome == "missed"
 
 
@@ -88,7 +88,7 @@ def test_gains_hold_as_probably_as_is_wanted(study, monkeypatch):
         (STUDY, {"drawn": 0}, "1 to 1000"),
         (STUDY, {"vary": "", "probability": "99 %"}, "needs drawn models"),
         (STUDY, {"probability": "120 %"}, "between 0 and 100 %"),
-        (STUDY, {"schedule": True}, "not chosen for drawn models"),
+        (STUDY, {"schedule": True}, "either schedule or vary"),
     ],
 )
 def test_what_does_not_fit_is_refused(study, text, given, message):

@@ -1,4 +1,4 @@
-"""Nonlinear and linear response of a loop, cause by cause: what makes it nonlinear."""
+"""Differences between nonlinear and linear response of a loop, by cause."""
 
 from __future__ import annotations
 
@@ -34,33 +34,33 @@ if TYPE_CHECKING:
 
 
 LABELS = {NOTHING: "nothing, small amplitude", LIMITS: "limits", EVERYTHING: "everything"}
-"""what a reader calls what is left on"""
+"""labels of the active causes"""
 STEP = "step (computed)"
-"""what a reader calls the error of the simulation's step"""
+"""label of the numerical error from the simulation's step"""
 LEGEND = (
-    "Nonlinear response minus the exact linear one, by the causes that are switched on. All rows "
-    "but the first have the large amplitude, at which limits of currents, voltages and rates also "
-    "act. -: the output sticks or does not settle. Largest: the cause without a number, else the "
-    "cause that changes the response most, limits alone, others by what they add to the limits. "
-    "Step: linear model of the simulation's midpoint rule minus the exact one."
+    "Nonlinear response minus the exact linear one, by the active causes. All rows except the "
+    "first use the large amplitude, at which limits of currents, voltages and rates also act. -: "
+    "the output sticks or does not settle. Largest: the cause without a number, otherwise the "
+    "cause with the largest effect; limits count by themselves, others by what they add to the "
+    "limits. Step: linear model of the simulation's midpoint rule minus the exact one."
 )
-"""how to read the table"""
+"""legend of the table"""
 
 
 @dataclass(frozen=True)
 class LoopAgreement(Answer):
-    """How far the nonlinear response of a loop is from its exact linear one, by what is left on.
+    """Difference of a loop's nonlinear response from its exact linear one, by active cause.
 
     Parameters
     ----------
     case
         The loop, its parameters and its operating point.
     differences
-        Nonlinear less linear, by cause and frequency.
+        Nonlinear minus linear response, by cause and frequency.
     small, large
-        Amplitudes [``unit``]: everything off is measured with the small one, causes with the large.
+        Amplitudes [``unit``]: the small one without causes, the large one with each cause.
     unit
-        SI unit of the shaken input.
+        SI unit of the excited input.
     """
 
     case: LoopCase
@@ -71,12 +71,12 @@ class LoopAgreement(Answer):
 
     @property
     def notes(self) -> list[str]:
-        """On which side of corners the linear model is."""
+        """Side of corners of the linear model."""
         return corner_notes([self.case.loop.closed(self.case.par, self.case.value).corners])
 
     @property
     def holds(self) -> bool:
-        """Whether both responses agree with everything off."""
+        """Whether both responses agree without any cause."""
         return self.differences.holds
 
     def document(self) -> Document:
@@ -88,8 +88,8 @@ class LoopAgreement(Answer):
         sizes = f"small amplitude {small}, large amplitude {large}"
         figure = FigureBlock(
             self._draw,
-            "Size of the differences from the exact linear response; of single causes, what they "
-            "add to the limits. Smaller ones than shown lie at the lower edge.",
+            "Size of the differences from the exact linear response; for single causes, what they "
+            "add to the limits. Values below the range are at the lower edge.",
             f"{case.loop.name}-agreement",
         )
         head = f"closed loop {case.loop.name} of {case.name} at {case.point}"
@@ -155,7 +155,7 @@ def compared_responses(
     amplitudes: tuple[float, float],
     progress: Progress | None,
 ) -> LoopAgreement:
-    """Return how far both responses of a loop are from each other, cause by cause.
+    """Return the difference between both responses of a loop, by cause.
 
     Parameters
     ----------
@@ -169,7 +169,7 @@ def compared_responses(
     Raises
     ------
     ParameterError
-        When the loop is unstable, or its output does not answer to the set point.
+        If the loop is unstable, or its output does not respond to the set point.
     """
     gain, closed = case.loop.gain_and_closed(case.par, case.value)
     require_stable(closed)
@@ -188,19 +188,19 @@ def compared_responses(
 
 
 def two_amplitudes(case: LoopCase, text: str) -> tuple[float, float]:
-    """Return the small and the large amplitude [SI]; the loop's own where none are given.
+    """Return the small and the large amplitude [SI], by default those of the loop.
 
     Raises
     ------
     InputError
-        When these are not two, the small one first.
+        If these are not two, the small one first.
     """
     if not text:
         return case.loop.amplitudes[0], case.loop.amplitudes[-1]
     sizes = spread(text, case.input_unit, "amplitudes")
     if len(sizes) != 2 or not sizes[0] < sizes[1]:
         raise ParameterError(
-            f"{option('amplitudes')} {text}: give two, the small one first: bywire measures the "
+            f"{option('amplitudes')} {text}: give two, the small one first; bywire measures the "
             "loop without nonlinear causes at the small one, and each cause at the large one",
             name=option("amplitudes"),
             value=text,
@@ -209,18 +209,18 @@ def two_amplitudes(case: LoopCase, text: str) -> tuple[float, float]:
 
 
 def verdict(compared: Agreement) -> str:
-    """Return whether the responses agree with everything off, as a text with the limits."""
+    """Return whether the responses agree without any cause, as a text with the limits."""
     state = "agree" if compared.holds else "DO NOT agree"
     gain = max(map(abs, compared.gain[NOTHING].tolist()))
     phase = max(map(abs, compared.phase[NOTHING].tolist()))
     return (
         f"with everything off both responses {state}: largest differences {gain:.2g} dB and "
-        f"{phase:.2g}° (at most {GAIN:g} dB and {PHASE:g}°)"
+        f"{phase:.2g}° (limits {GAIN:g} dB and {PHASE:g}°)"
     )
 
 
 def agreement_table(compared: Agreement) -> Table:
-    """Return the differences, a row for what is left on, and the largest cause by frequency."""
+    """Return the differences, a row for each active cause, and the largest cause by frequency."""
     heading = ["left on", *(amount(float(f), "Hz", 3) for f in compared.frequencies)]
     rows = [
         [LABELS.get(cause, cause), *map(_cell, compared.gain[cause], compared.phase[cause])]

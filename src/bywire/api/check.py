@@ -1,4 +1,4 @@
-"""A brake, or a part of one, put to the test of every contract."""
+"""Test of a brake, or of a part of one, against every contract."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ _HEADINGS = ("subject", "contract", "outcome", "what was found")
 
 @dataclass(frozen=True)
 class Check(Answer):
-    """What was found of what was asked for.
+    """Findings of a check.
 
     Parameters
     ----------
     subject
-        What was checked: a brake, a model, an element, a parameter set, or everything.
+        Subject of the check: a brake, a model, an element, a parameter set, or everything.
     findings
-        One per part of it and contract.
+        One finding per part and contract.
     """
 
     subject: str
@@ -35,31 +35,31 @@ class Check(Answer):
 
     @property
     def holds(self) -> bool:
-        """Whether nothing is broken."""
+        """Whether no contract is broken."""
         return not self.broken
 
     @property
     def broken(self) -> tuple[Finding, ...]:
-        """What does not hold."""
+        """Findings of broken contracts."""
         return self._with("broken")
 
     @property
     def not_checked(self) -> tuple[Finding, ...]:
-        """What could not be put to the test; each says why."""
+        """Contracts that could not be checked, each with the reason."""
         return self._with("not checked")
 
     def _with(self, outcome: str) -> tuple[Finding, ...]:
         return tuple(f for f in self.findings if f.outcome == outcome)
 
     def document(self) -> Document:
-        """Return what holds and what does not, with figure, limit and the line to look at."""
+        """Return contracts that pass or fail, with figure, limit and the source line."""
         kept = len(self._with("holds"))
         counts = [f"{kept} of {len(self.findings)} contracts hold"]
         counts += [f"{len(self.broken)} do not"] if self.broken else []
         counts += [f"{len(self.not_checked)} could not be checked"] if self.not_checked else []
         summary = f"{self.subject}: {', '.join(counts)}"
         if not self.findings:
-            summary = f"{self.subject} declares nothing to check: docs/modeling.md says what it may"
+            summary = f"{self.subject} declares nothing to check: see docs/modeling.md"
         shown = [f for f in self.findings if f.figure is not None and "(" in f.subject]
         brief: list[str | Flat] = [TableBlock(_figures(shown)), ""] if shown else []
         if self.not_checked:
@@ -70,10 +70,10 @@ class Check(Answer):
             brief += [Listing(texts, "not checked, because"), ""]
         return Document(
             f"Check of {self.subject}",
-            "Every contract that elements, parameter sets and models have to keep.",
+            "All contracts of elements, parameter sets and models.",
             sections=[
-                Section("What does not hold", [TableBlock(_table(self.broken))]),
-                Section("What could not be checked", [TableBlock(_table(self.not_checked))]),
+                Section("Broken contracts", [TableBlock(_table(self.broken))]),
+                Section("Not checked", [TableBlock(_table(self.not_checked))]),
                 Section("All contracts", [TableBlock(_table(self.findings))]),
             ],
             brief=brief,
@@ -81,7 +81,7 @@ class Check(Answer):
             banner=Banner(summary, "good" if self.holds else "bad"),
             record="check.json",
             remarks=[
-                f"does not hold: {f.subject}: {f.contract}: {f.text}; look at {f.place}"
+                f"broken contract: {f.subject}: {f.contract}: {f.text}; see {f.place}"
                 for f in self.broken
             ],
         )
@@ -109,7 +109,7 @@ class Check(Answer):
 
 
 def _figures(findings: list[Finding]) -> Table:
-    """Return what was measured, one line each."""
+    """Return the measured figures, one per line."""
     rows = [
         (
             Cell(clean(f.subject)),

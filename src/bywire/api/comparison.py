@@ -1,4 +1,4 @@
-"""Benches beside each other: what differs of settings and key figures, verdicts, curves."""
+"""Comparison of runs: differing settings and key figures, verdicts, curves."""
 
 from __future__ import annotations
 
@@ -63,13 +63,13 @@ _BENCH = {
     "step": "simulation.step",
     "seed": "simulation.seed",
 }
-"""attributes of a recording that bench files set, by what they call them"""
+"""attributes of a recording that bench files set, with their names there"""
 _PROGRAM = ("bywire_version", "engine")
 
 
 @dataclass(frozen=True)
 class Setting:
-    """What a bench was set to: a value in an SI unit, or a choice."""
+    """A setting of a bench: a value in an SI unit, or a choice."""
 
     value: Any
     unit: str = "1"
@@ -77,22 +77,22 @@ class Setting:
 
 @dataclass(frozen=True)
 class ComparedRun:
-    """A bench that was run.
+    """A run bench.
 
     Parameters
     ----------
     label
-        What the comparison calls it.
+        Its name in the comparison.
     source
-        Where it comes from: a folder, a bench file, an experiment.
+        Its origin: a folder, a bench file, an experiment.
     recordings
         One dataset per run of the experiment, by label.
     kpis, verdicts
-        Key figures, and the requirements beside them.
+        Key figures, and verdicts on requirements.
     warnings
-        What its run warned of.
+        Warnings of its run.
     changes
-        What of it was changed.
+        Changes from the cited values.
     """
 
     label: str
@@ -105,29 +105,29 @@ class ComparedRun:
 
     @cached_property
     def attributes(self) -> Mapping[str, Any]:
-        """What the first recording says of how it was made, as plain numbers and texts."""
-        said = next(iter(self.recordings.values())).attrs
-        return {key: v.item() if isinstance(v, np.generic) else v for key, v in said.items()}
+        """Attributes of the first recording, as plain numbers and texts."""
+        attributes = next(iter(self.recordings.values())).attrs
+        return {key: v.item() if isinstance(v, np.generic) else v for key, v in attributes.items()}
 
     @property
     def model(self) -> str:
-        """Name of the assembly that was tested."""
+        """Name of the tested assembly."""
         return str(self.attributes.get("model", ""))
 
     @cached_property
     def definition(self) -> Experiment | None:
-        """The experiment; None where this installation does not know it."""
-        said = self.attributes
+        """The experiment; None if this installation does not have it."""
+        attributes = self.attributes
         name, cited, model = (
-            str(said.get(k, "")) for k in ("experiment", "parameter_set", "model")
+            str(attributes.get(k, "")) for k in ("experiment", "parameter_set", "model")
         )
         with contextlib.suppress(InputError):
-            return experiment_of(name, cited, model, flattened(_object(said, "options")))
+            return experiment_of(name, cited, model, flattened(_object(attributes, "options")))
         return None
 
     @cached_property
     def options(self) -> Any:
-        """The options of the experiment; None where they cannot be read."""
+        """The options of the experiment; None if they cannot be read."""
         if self.definition is None:
             return None
         with contextlib.suppress(InputError):
@@ -136,18 +136,18 @@ class ComparedRun:
 
     @cached_property
     def settings(self) -> dict[str, Setting]:
-        """Everything that was set, by the names that ``--set`` takes."""
-        said = self.attributes
+        """All settings, by the names that ``--set`` takes."""
+        attributes = self.attributes
         settings = {
-            name: Setting(said[key], "s" if key == "step" else "1")
+            name: Setting(attributes[key], "s" if key == "step" else "1")
             for key, name in _BENCH.items()
-            if key in said
+            if key in attributes
         }
         options = None if self.definition is None else self.definition.options
-        settings |= dict(_settings(_object(said, "options"), options, OPTION))
+        settings |= dict(_settings(_object(attributes, "options"), options, OPTION))
         settings |= dict(self._stimuli())
-        settings |= dict(_settings(_object(said, "parameters"), self._parameter_class))
-        return settings | {key: Setting(said[key]) for key in _PROGRAM if key in said}
+        settings |= dict(_settings(_object(attributes, "parameters"), self._parameter_class))
+        return settings | {key: Setting(attributes[key]) for key in _PROGRAM if key in attributes}
 
     @property
     def has_units(self) -> bool:
@@ -161,7 +161,7 @@ class ComparedRun:
         return None if cited is None else cited.parameter_class
 
     def _stimuli(self) -> Iterator[tuple[str, Setting]]:
-        """Yield what ``[stimulus]`` and its further sections were set to."""
+        """Yield the settings of ``[stimulus]`` and its subsections."""
         sections = _object(self.attributes, "stimulus")
         further = {name: each for name, each in sections.items() if isinstance(each, Mapping)}
         plain = {name: each for name, each in sections.items() if name not in further}
@@ -179,7 +179,7 @@ class ComparedRun:
 
 
 def ran(result: Result, label: str, source: str) -> ComparedRun:
-    """Return a bench that was run just now."""
+    """Return a bench run by this call."""
     warned = tuple(result.warnings)
     return ComparedRun(
         label,
@@ -193,12 +193,12 @@ def ran(result: Result, label: str, source: str) -> ComparedRun:
 
 
 def kept(folder: Path) -> ComparedRun:
-    """Return what a result folder holds.
+    """Return the run in a result folder.
 
     Raises
     ------
     FileError
-        As `read_result`.
+        See `read_result`.
     """
     result = read_result(folder)
     name = folder.resolve().name
@@ -225,15 +225,15 @@ def _tupled(values: Mapping[str, Any]) -> dict[str, Any]:
     return {name: tuple(v) if isinstance(v, list) else v for name, v in flat.items()}
 
 
-def _object(said: Mapping[str, Any], key: str) -> dict[str, Any]:
-    """Return an attribute that holds a JSON object; an empty one where there is none."""
+def _object(attributes: Mapping[str, Any], key: str) -> dict[str, Any]:
+    """Return an attribute that contains a JSON object, or an empty object."""
     with contextlib.suppress(ValueError):
-        content = json.loads(str(said.get(key, "{}")))
+        content = json.loads(str(attributes.get(key, "{}")))
         return content if isinstance(content, dict) else {}
     return {}
 
 
-# --- Benches beside each other: what differs of settings and key figures, verdicts, curves
+# --- Settings, key figures and verdicts side by side
 
 _LONGEST = 48  # characters of a value in a table
 
@@ -245,11 +245,11 @@ class Compared:
     Parameters
     ----------
     name, unit
-        What it is called, and its SI unit or ``"%"``.
+        Its name, and its SI unit or ``"%"``.
     values
-        Its value in each run; None where a run has no such thing, NaN where it is not defined.
+        Its value in each run; None if a run does not have it, NaN if it is not defined.
     errors
-        How far each value of a key figure may be off by the step, NaN where that was not estimated.
+        Numerical error of each value of a key figure, NaN if it was not estimated.
     """
 
     name: str
@@ -259,19 +259,19 @@ class Compared:
 
     @property
     def differs(self) -> bool:
-        """Whether not all runs have the same value; what is not defined equals itself."""
+        """Whether not all runs have the same value; undefined values count as equal."""
         first, *others = (_comparable(value) for value in self.values)
         return any(value != first for value in others)
 
     @property
     def is_distinct(self) -> bool:
-        """Whether a key figure differs by more than its errors; they count as independent."""
+        """Whether a key figure differs by more than its errors, taken as independent."""
         values = [math.nan if value is None else value for value in self.values]
         return are_distinct(values, self.errors)
 
 
 def _compared_settings(runs: Sequence[ComparedRun], *, shared_only: bool) -> tuple[Compared, ...]:
-    """Return everything that was set, or what all runs have of it."""
+    """Return all settings, or only those that all runs have."""
     names = list(dict.fromkeys(name for each in runs for name in each.settings))
     if shared_only:
         names = [name for name in names if all(name in each.settings for each in runs)]
@@ -284,7 +284,7 @@ def _compared_settings(runs: Sequence[ComparedRun], *, shared_only: bool) -> tup
 
 
 def _compared_figures(runs: Sequence[ComparedRun]) -> tuple[Compared, ...]:
-    """Return every key figure that some run has; those of another unit stay apart."""
+    """Return the key figures of all runs; figures with different units are separate."""
     keys = dict.fromkeys((kpi.name, kpi.unit) for each in runs for kpi in each.kpis)
     each_run = [{(k.name, k.unit): (k.value, k.bound) for k in each.kpis} for each in runs]
     rows = []
@@ -295,7 +295,7 @@ def _compared_figures(runs: Sequence[ComparedRun]) -> tuple[Compared, ...]:
 
 
 def _settings_table(labels: Sequence[str], rows: Sequence[Compared]) -> Table:
-    """Return settings of all runs, a column each."""
+    """Return settings with one column per run."""
     return Table(
         (Column("setting"), *(Column(label, numeric=True) for label in labels)),
         tuple(
@@ -306,7 +306,7 @@ def _settings_table(labels: Sequence[str], rows: Sequence[Compared]) -> Table:
 
 
 def _kpi_table(labels: Sequence[str], rows: Sequence[Compared]) -> Table:
-    """Return key figures of all runs, a column each, and their change; of many, the spread."""
+    """Return key figures with one column per run, and their change, or spread for many runs."""
     change = "change" if len(labels) == 2 else "spread"
     return Table(
         (
@@ -329,7 +329,7 @@ def _kpi_table(labels: Sequence[str], rows: Sequence[Compared]) -> Table:
 
 
 def _verdict_table(runs: Sequence[ComparedRun]) -> Table:
-    """Return the requirements of all runs, one row each, with what every run makes of it."""
+    """Return the requirements, one per row, with the verdict of every run."""
     each_run = [{(v.kpi, v.limit): v for v in each.verdicts} for each in runs]
     keys = dict.fromkeys(key for verdicts in each_run for key in verdicts)
     rows = []
@@ -349,7 +349,7 @@ def _verdict_table(runs: Sequence[ComparedRun]) -> Table:
 
 
 def _change(row: Compared) -> Cell:
-    """Return how far two values are apart, or several at most; or that they need not be."""
+    """Return the difference of two values, or the spread of several, if it is distinct."""
     known = [value for value in row.values if value is not None and math.isfinite(value)]
     if len(known) < len(row.values):
         return Cell("-")
@@ -376,7 +376,7 @@ def _value(setting: Setting | None) -> Any:
 
 
 def _comparable(value: Any) -> Any:
-    """Return what compares equal where two values are the same; NaN does not by itself."""
+    """Return a value that compares equal to itself, even for NaN."""
     return "NaN" if isinstance(value, float) and math.isnan(value) else value
 
 
@@ -387,14 +387,14 @@ _FEW = 2  # differing settings that a legend names
 
 @dataclass(frozen=True)
 class Comparison(Answer):
-    """Benches beside each other.
+    """Comparison of runs.
 
     Parameters
     ----------
     runs
-        What is compared.
+        The runs.
     is_full
-        Whether what is the same is shown as well.
+        Whether to also show equal settings and key figures.
     """
 
     runs: tuple[ComparedRun, ...]
@@ -402,25 +402,25 @@ class Comparison(Answer):
 
     @cached_property
     def settings(self) -> tuple[Compared, ...]:
-        """Everything that was set; of different brakes, what all of them have."""
+        """All settings; for different brakes, those that all of them have."""
         return _compared_settings(self.runs, shared_only=self._mixed)
 
     @cached_property
     def figures(self) -> tuple[Compared, ...]:
-        """Every key figure that some run has; those of one name but another unit stay apart."""
+        """Key figures of all runs; figures of one name with different units are separate."""
         return _compared_figures(self.runs)
 
     @property
     def warnings(self) -> list[str]:
-        """What makes the comparison weaker than it looks, and what the runs warned of."""
-        said = [f"{each.label}: {text}" for each in self.runs for text in each.warnings]
+        """Limitations of the comparison, and warnings of the runs."""
+        texts = [f"{each.label}: {text}" for each in self.runs for text in each.warnings]
         if self._mixed:
             names = ", ".join(f"{each.label} is a {each.model}" for each in self.runs)
-            said.append(
-                f"different brakes are compared ({names}): only parameters and signals that they "
-                "share are shown"
+            texts.append(
+                f"the runs are of different brakes ({names}): bywire compares only the parameters "
+                "and signals that they share"
             )
-        said += self._spans()
+        texts += self._spans()
         grouped = self._groups
         left_out = [
             f"{each.label}: {label}"
@@ -429,18 +429,17 @@ class Comparison(Answer):
             if not any(each.recordings[label] is r for g in grouped.values() for r in g)
         ]
         if left_out:
-            said.append(f"not drawn, for lack of a counterpart over time: {', '.join(left_out)}")
-        said += [
-            f"{each.label}: its parameter set is not known here, so its values stand without "
-            f"units; {'--system PATH' if is_command_line() else 'bywire.load_system'} loads a "
-            "brake of your own"
+            texts.append(f"not drawn, because no other run has them: {', '.join(left_out)}")
+        texts += [
+            f"{each.label}: its parameter set is unknown here, so its values have no units; load "
+            f"your brake with {'--system PATH' if is_command_line() else 'bywire.load_system'}"
             for each in self.runs
             if not each.has_units
         ]
-        return said
+        return texts
 
     def document(self) -> Document:
-        """Return what differs, key figures, verdicts and curves."""
+        """Return differences, key figures, verdicts and curves."""
         settings, figures = self._tables()
         verdicts = [TableBlock(_verdict_table(self.runs), title="Requirements:")]
         verdicts = verdicts if any(each.verdicts for each in self.runs) else []
@@ -449,9 +448,9 @@ class Comparison(Answer):
         changes = [Listing(changed, "Also changed:")] if changed else []
         return Document(
             "Comparison of " + ", ".join(each.label for each in self.runs),
-            f"{len(self.runs)} runs; values in the order in which they were given",
+            f"{len(self.runs)} runs; values in the order of the command",
             sections=lambda: [
-                Section("What differs", [Listing(sources), *settings, *changes]),
+                Section("Differing settings", [Listing(sources), *settings, *changes]),
                 *([Section("Requirements", verdicts)] if verdicts else []),
                 Section("Curves", self._curves()),
                 *([Section("Differences", apart)] if (apart := self._differences()) else []),
@@ -463,16 +462,16 @@ class Comparison(Answer):
         )
 
     def _changed(self) -> list[str]:
-        """Return what of the runs was changed and is no setting that differs between them."""
+        """Return the changes of the runs, without settings that differ between them."""
         differing = {each.name for each in self.settings if each.differs}
-        said: dict[str, list[str]] = {}
+        runs_by_text: dict[str, list[str]] = {}
         for each in self.runs:
             for text in change_texts([c for c in each.changes if c.name not in differing]):
-                said.setdefault(text, []).append(each.label)
+                runs_by_text.setdefault(text, []).append(each.label)
         every = len(self.runs)
         return [
             text if len(labels) == every else f"{', '.join(labels)}: {text}"
-            for text, labels in said.items()
+            for text, labels in runs_by_text.items()
         ]
 
     @property
@@ -481,7 +480,7 @@ class Comparison(Answer):
 
     @cached_property
     def _groups(self) -> dict[str, tuple[xr.Dataset, ...]]:
-        """The recordings over time that belong together: by label, or each run's only one."""
+        """Corresponding recordings over time: by label, or each run's only one."""
         over_time = [
             {label: r for label, r in each.recordings.items() if r.sizes.get("time", 0) > 1}
             for each in self.runs
@@ -493,7 +492,7 @@ class Comparison(Answer):
 
     @cached_property
     def labels(self) -> tuple[str, ...]:
-        """What the legend calls each run: its label, and what of it differs where that is short."""
+        """Legend entries: each run's label, and its differing settings if these are few."""
         if self._mixed:
             return tuple(each.label for each in self.runs)
         differing = [s for s in self.settings if s.differs and s.name not in _NOT_NAMED]
@@ -517,10 +516,10 @@ class Comparison(Answer):
         }
         if len(set(spans.values())) < 2:
             return []
-        said = ", ".join(f"{label} {low} to {high}" for label, (low, high) in spans.items())
+        times = ", ".join(f"{label} {low} to {high}" for label, (low, high) in spans.items())
         return [
-            f"the runs cover different times ({said}): each curve ends where its run does, and "
-            "key figures judge each its own"
+            f"the runs cover different times ({times}): each curve ends with its run, and key "
+            "figures cover only their run's time"
         ]
 
     def _tables(self) -> tuple[list[Flat], list[Flat]]:
@@ -551,15 +550,15 @@ class Comparison(Answer):
         return [
             FigureBlock(
                 partial(_drawn, dict(zip(self.labels, group, strict=True)), self._step()),
-                f"All runs{f', {label}' if label else ''}: signals that they share.",
+                f"Signals that all runs share{f', {label}' if label else ''}.",
                 f"overlay-{label}" if label else "overlay",
             )
             for label, group in self._groups.items()
             if can_overlay(group)
-        ] or [Paragraph("The runs share no signal over time: there are no curves to compare.")]
+        ] or [Paragraph("The runs share no signal over time, so there are no curves to compare.")]
 
     def _differences(self) -> list[Block]:
-        """Return what each run differs from the first by, over time, where that can be drawn."""
+        """Return figures of each run's difference from the first over time, where possible."""
         from bywire.report.time_traces import difference_figure
 
         first, *_ = self.runs
@@ -569,13 +568,13 @@ class Comparison(Answer):
             figure = difference_figure(dict(zip(labels, group, strict=True)))
             if figure is not None:
                 of = f", {label}" if label else ""
-                caption = f"What the other runs differ from {first.label} by{of}."
+                caption = f"Differences of the other runs from {first.label}{of}."
                 name = f"difference-{label}" if label else "difference"
                 blocks.append(FigureBlock(figure, caption, name))
         return blocks
 
     def _step(self) -> tuple[str, StepLimits] | None:
-        """Return signal and limits of the step that all runs are judged by, if they share it."""
+        """Return signal and limits of the step that judges all runs, if they share it."""
         from bywire.report.step_response import step_limits
 
         steps = [
@@ -630,7 +629,7 @@ def _drawn(recordings: Mapping[str, xr.Dataset], step: tuple[str, StepLimits] | 
     return overlaid_panels(recordings, step=step)
 
 
-# --- What is compared: result folders as they lie, all else run now
+# --- Runs to compare: result folders are read, all others are run
 
 Comparable = Bench | Result | str | Path
 Run = TypeVar("Run", bound=Comparable)
@@ -645,7 +644,7 @@ def compared(
 ) -> Comparison:
     """Return a comparison of runs; see `bywire.compare`."""
     require_comparable(runs, overrides)
-    # Folders first: what they lack is said before anything is computed.
+    # Folders first, so that an incomplete one fails before the computation.
     read = {k: kept(Path(str(each))) for k, each in enumerate(runs) if _is_folder(each)}
     shown = [
         read.get(k) or _resolved(each, overrides, progress, estimate_error)
@@ -655,7 +654,7 @@ def compared(
 
 
 def require_comparable(runs: Sequence[Run], overrides: Mapping[str, str]) -> list[Run]:
-    """Return those of some runs that are to be run yet, which changes have an effect on.
+    """Return the runs that are still to be computed, which changes can affect.
 
     Raises
     ------
@@ -673,19 +672,19 @@ def require_comparable(runs: Sequence[Run], overrides: Mapping[str, str]) -> lis
     benches = [each for each in runs if not _was_run(each)]
     if overrides and not benches:
         raise ParameterError(
-            f"{', '.join(overrides)} would have no effect: the compared runs are already computed",
+            f"{', '.join(overrides)} would have no effect, because all runs are already computed",
             name=", ".join(overrides),
         )
     return benches
 
 
 def _was_run(source: Comparable) -> bool:
-    """Return whether something was run before."""
+    """Return whether a source is already computed."""
     return isinstance(source, Result) or _is_folder(source)
 
 
 def _is_folder(source: Comparable) -> bool:
-    """Return whether something is to be read as a result folder."""
+    """Return whether a source is a result folder."""
     if not isinstance(source, str | Path):
         return False
     path = Path(source)
@@ -700,7 +699,7 @@ def _resolved(
     progress: Progress | None,
     estimate_error: bool,
 ) -> ComparedRun:
-    """Return what a bench gives, run now unless it was."""
+    """Return a computed bench, run now unless it already was."""
     if isinstance(source, Result):
         result, text = source, "given"
     else:
@@ -722,7 +721,7 @@ def _reported(progress: Progress, name: str, label: str, share: float) -> None:
 
 
 def _told_apart(runs: Sequence[ComparedRun]) -> list[ComparedRun]:
-    """Return runs whose labels differ: by their sources, and else by their numbers."""
+    """Return runs with unique labels: their names, otherwise sources, otherwise numbers."""
     labels = [clean(each.label) for each in runs]
     if len(set(labels)) < len(runs):
         labels = [clean(each.source) for each in runs]

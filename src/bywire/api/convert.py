@@ -1,4 +1,4 @@
-"""A measurement file in another format, on one time axis where a rate is given."""
+"""Conversion of a measurement file to another format, also to one time axis."""
 
 from __future__ import annotations
 
@@ -20,25 +20,25 @@ if TYPE_CHECKING:
     from bywire.data.channel_quality import AlignedChannel, AlignmentReport, Stretch
 
 _LISTED = 20
-"""stretches of a kind that the JSON object lists for a channel; it counts all of them"""
+"""longest list of stretches per kind and channel in the JSON object, which counts all of them"""
 
-_ROUNDING = 1e-9  # steps: the jitter of numbers, not of a clock
+_ROUNDING = 1e-9  # steps; smaller jitter is rounding, not the clock's
 
 
 @dataclass(frozen=True)
 class Conversion(Answer):
-    """A measurement as it was written.
+    """A converted measurement.
 
     Parameters
     ----------
     source, target
-        Files that were read and written.
+        The files read and written.
     recording
         Its signals, SI.
     alignment
-        How they were brought to one time axis; None where they were left on their own.
+        Resampling to one time axis; None if the signals keep their own.
     remarks
-        What the user should know of how the file was read.
+        Notes from reading the file.
     """
 
     source: Path
@@ -49,11 +49,11 @@ class Conversion(Answer):
 
     @property
     def notes(self) -> list[str]:
-        """What is left out, counts as missing, or was guessed when the file was read."""
+        """Notes on omitted, missing or guessed content of the file."""
         return list(self.remarks)
 
     def document(self) -> Document:
-        """Return the signals, and what was found while they were aligned."""
+        """Return the signals, and the findings of the alignment."""
         report = self.alignment
         table = TableBlock(self._signal_table() if report is None else _channel_table(report))
         head, foot = ([], []) if report is None else _around(report)
@@ -122,12 +122,12 @@ def aligned(
     exclude: Sequence[str] | None,
     max_gap: str,
 ) -> tuple[xr.Dataset, AlignmentReport]:
-    """Return the signals on one time axis, and what was done to them; see `bywire.convert`.
+    """Return the signals on one time axis, with a report; see `bywire.convert`.
 
     Raises
     ------
     ParameterError
-        For a rate that is none.
+        For an invalid rate.
     """
     from bywire.data.alignment import resample
 
@@ -159,7 +159,7 @@ def _channel(channel: AlignedChannel) -> dict[str, Any]:
 
 
 def _stretches(stretches: tuple[Stretch, ...]) -> dict[str, Any]:
-    """Return count, total length, and the longest of some stretches in the order of time."""
+    """Return count, total length, and the longest stretches in the order of time."""
     longest = sorted(stretches, key=lambda stretch: -stretch.length)[:_LISTED]
     return {
         "count": len(stretches),
@@ -172,15 +172,15 @@ def _stretches(stretches: tuple[Stretch, ...]) -> dict[str, Any]:
 
 
 def _around(report: AlignmentReport) -> tuple[list[str], list[str]]:
-    """Return what stands above and below the table of an alignment."""
+    """Return the lines above and below the table of an alignment."""
     head = (
         f"{report.samples} samples every {units.shown(report.interval, 's')} from "
         f"{units.shown(report.start, 's')} to {units.shown(report.stop, 's')}, method "
         f"{report.method}; excluded: {', '.join(report.exclude) or 'nothing'}"
     )
     folded = (
-        f"faster than the axis: {', '.join(report.folded)}; what they hold above half its rate "
-        f"folds into slow content, unless {option('method', 'average')}"
+        f"sampled faster than the time axis: {', '.join(report.folded)}; content above half the "
+        f"axis's rate aliases to low frequencies, unless {option('method', 'average')}"
     )
     return [head], [folded] if report.folded else []
 

@@ -1,4 +1,4 @@
-"""All about a name: a method, an experiment, a signal; and everything that mentions a word."""
+"""Descriptions of names (methods, experiments, signals), and search for words."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _WORD = re.compile(r"[^\W\d_]{2,}|\w+")
 
 
 class Mention(NamedTuple):
-    """Something with a name, and what is declared of it."""
+    """Something with a name, and its declared meaning."""
 
     kind: str
     name: str
@@ -34,28 +34,28 @@ class Mention(NamedTuple):
 
 @dataclass(frozen=True)
 class Mentioned(Answer):
-    """What mentions some words that are no name.
+    """Results of a search for words.
 
     Parameters
     ----------
     words
-        What was asked for.
+        The searched words.
     mentions
-        What mentions them, what is called so first.
+        Things that mention the words, first those with the words in their name.
     """
 
     words: str
     mentions: tuple[Mention, ...]
 
     def document(self) -> Document:
-        """Return kind, name and meaning of each; on a terminal of as many as a screen holds."""
+        """Return kind, name and meaning of each; on a terminal as many as fit on a screen."""
         rows = [(mention.kind, mention.name, mention.meaning) for mention in self.mentions]
         more = len(rows) - _SHOWN
         table, start = (
             text_table(("kind", "name", "meaning"), each) for each in (rows, rows[:_SHOWN])
         )
-        left = [f"and {more} more: ask with more words"] if more > 0 else []
-        head = f"nothing is called {quoted(self.words)}; it is mentioned by"
+        left = [f"and {more} more: add words to narrow the search"] if more > 0 else []
+        head = f"nothing has the name {quoted(self.words)}; these mention it"
         return Document(
             self.words,
             head,
@@ -73,10 +73,10 @@ class Mentioned(Answer):
 
 
 def mentions(words: str) -> list[Mention]:
-    """Return everything that mentions all of some words, what is called so first.
+    """Return everything that mentions all of some words, first those with them in the name.
 
-    A word is found at the beginning of a declared one, in names, meanings (docstrings, labels,
-    summaries) and, as a whole, units.
+    A word matches the beginning of a declared word in names and meanings (docstrings, labels,
+    summaries). Units must match completely.
     """
     asked = [word.lower() for word in _WORD.findall(words)]
     known = dict.fromkeys(_known()) if asked else {}
@@ -87,7 +87,7 @@ def mentions(words: str) -> list[Mention]:
 
 
 def _nearest_words(name: str) -> Sequence[str]:
-    """Return the declared words that are nearest to one that nothing mentions."""
+    """Return the declared words closest to an unknown one."""
     words = {word for mention in _known() for word in _WORD.findall(mention.meaning)}
     return get_close_matches(name, [word for word in words if len(word) > 3], n=2, cutoff=0.75)
 
@@ -102,7 +102,7 @@ def _begins(text: str, word: str) -> bool:
 
 
 def _known() -> Iterator[Mention]:
-    """Yield everything that has a name; groups of parameters first, which say what is where."""
+    """Yield everything that has a name, groups of parameters first for orientation."""
     assemblies = dict.fromkeys(each.assembly for each in PARAMETER_SETS.all().values())
     classes = [PARAMETER_SETS.find(main_set(name)).parameter_class for name in assemblies]
     for cls in classes:
@@ -132,18 +132,18 @@ def _groups(cls: type[ParameterSet], prefix: str = "") -> Iterator[Mention]:
 # --- All about a name
 
 _LINES = ("parts", "assembly", "system", "at", "unit", "range", "experiment", "records", "source")
-"""keys of an object that are lines of it, before what there is for an assembly"""
-_LONGEST = 200  # characters that are looked for
+"""keys of an object shown as lines, before those of an assembly"""
+_LONGEST = 200  # characters of a search
 _TABLES = ("drives", "signals", "found in", "values", "estimates", "kpis")
 
 
 def described(name: str) -> list[Object]:
-    """Return an object for everything that has a name: a method, an experiment, both.
+    """Return an object for each thing with a name, for instance a method and an experiment.
 
     Raises
     ------
     UnknownNameError
-        With the nearest known names.
+        If there is none, with the closest matches.
     """
     objects: list[Object] = [
         {"kind": kind.title, "name": name, **kind.describe(things[name])}
@@ -158,7 +158,7 @@ def described(name: str) -> list[Object]:
 
 @dataclass(frozen=True)
 class Description(Answer):
-    """Everything of a name, as plain data: an object for each kind of thing that has it."""
+    """Description of a name as plain data, with an object for each kind of thing."""
 
     name: str
     objects: tuple[Object, ...]
@@ -183,9 +183,9 @@ class Description(Answer):
 
 @checked
 def describe(name: str) -> Description | Mentioned:
-    """Return all about something of the list, a parameter, a group of them, or a signal.
+    """Return all about a listed thing, a parameter, a group of parameters, or a signal.
 
-    Of words that are no name, everything whose declared meaning mentions them.
+    For other words, return everything whose declared meaning mentions them.
 
     Parameters
     ----------
@@ -197,16 +197,16 @@ def describe(name: str) -> Description | Mentioned:
     Returns
     -------
     Description or Mentioned
-        What there is of that name, or what mentions the words.
+        Description of the name, or things that mention the words.
 
     Raises
     ------
     UnknownNameError
-        With the nearest known names.
+        If nothing mentions the words, with the closest matches.
     """
     if len(name) > _LONGEST:
         raise UnknownNameError(
-            f"{quoted(name)} is too long: give a name or a few words, of at most {_LONGEST} "
+            f"{quoted(name)} is too long: give a name or a few words with at most {_LONGEST} "
             "characters",
             name="name",
             value=quoted(name),
@@ -222,7 +222,7 @@ def describe(name: str) -> Description | Mentioned:
 
 
 def _blocks(thing: Object) -> list[str | Flat]:
-    """Return an object as lines and tables, apart by empty lines."""
+    """Return an object as lines and tables, separated by empty lines."""
     there = [kind.topic.replace("_", " ") for kind in thing_kinds() if kind.has_assembly]
     lines = [f"{thing['kind']} {thing['name']}: {thing['summary']}"]
     lines += [
@@ -251,7 +251,7 @@ def _blocks(thing: Object) -> list[str | Flat]:
 
 
 def _option_table(rows: Sequence[Mapping[str, Any]], heading: str) -> Table:
-    """Return these rows as a table whose values stand under a heading."""
+    """Return options as a table, with a heading for their values."""
     columns = ["name", "value", "range", "meaning"]
     if all(row["value"] is None for row in rows):
         columns.remove("value")

@@ -1,4 +1,4 @@
-"""Gains of a loop, or a gain schedule, from requirements, also for drawn models."""
+"""Design of a loop's gains, or of a gain schedule, from requirements, also for drawn models."""
 
 from __future__ import annotations
 
@@ -68,26 +68,26 @@ if TYPE_CHECKING:
 
     from bywire.report.loop_curves import DesignCurve
 
-_JUDGES = 512  # further ones, that judge the gains
+_JUDGES = 512  # further models, which judge the gains
 _MOST = 1000
 
 
 @dataclass(frozen=True)
 class DrawnModels:
-    """Models as a study draws its cases.
+    """Models drawn as a study draws its cases.
 
     Parameters
     ----------
     study
         The study's name.
     cases
-        Models that gains are chosen for.
+        Models for which the gains are chosen.
     lacking
-        How many of those that were drawn for it do not exist.
+        Number of models drawn for the gains that do not exist.
     judges
-        Further models, which judge the gains; None for one that does not exist.
+        Further models, which judge the gains; None for a model that does not exist.
     confidence
-        Of intervals.
+        Confidence level of intervals.
     """
 
     study: str
@@ -99,7 +99,7 @@ class DrawnModels:
 
 @dataclass(frozen=True)
 class Probability:
-    """How probably gains meet their requirements, on the linear models.
+    """Probability that gains meet their requirements, on linear models.
 
     Parameters
     ----------
@@ -108,9 +108,9 @@ class Probability:
     requirements
         The requirements.
     judged
-        How many of the judging models meet each.
+        Number of judging models that meet each.
     wanted
-        Probability that is wanted of all requirements together; None for none.
+        Required probability of all requirements together, or None.
     """
 
     drawn: DrawnModels
@@ -120,12 +120,12 @@ class Probability:
 
     @property
     def together(self) -> Share:
-        """Probability with which all requirements are met, and its interval."""
+        """Probability to meet all requirements, with its interval."""
         return self._share(self.judged.all_met)
 
     @property
     def outcome(self) -> Outcome | None:
-        """Whether they are met as probably as wanted; None where nothing is."""
+        """Whether the required probability is reached; None if there is none."""
         if self.wanted is None:
             return None
         return judged(self.together, self.together, self.wanted)
@@ -135,7 +135,7 @@ class Probability:
 
     def parts(self) -> Sequence[Part]:
         """Return a table and sentences."""
-        told = f"{100.0 * self.drawn.confidence:g} % interval"
+        interval = f"{100.0 * self.drawn.confidence:g} % interval"
         rows: list[tuple[str | Cell, ...]] = [
             (str(wanted), *self._words(self._share(count)), figure_cell(wanted.figure, worst))
             for wanted, count, worst in zip(
@@ -147,20 +147,20 @@ class Probability:
         lines: list[Part] = [
             f"gains chosen for {len(self.drawn.cases)} models drawn from study "
             f"{self.drawn.study!r}, judged by {self.judged.models} others",
-            text_table(["of other models", "met by", "probability", told, "worst"], rows),
+            text_table(["of other models", "met by", "probability", interval, "worst"], rows),
         ]
         if self.judged.unstable:
             lines.append(
-                f"{self.judged.unstable} of them are unstable, or do not exist: they "
-                "count as missing every requirement"
+                f"{self.judged.unstable} of them are unstable or do not exist; they count as "
+                "missing every requirement"
             )
         if self.drawn.lacking:
-            lines.append(f"{self.drawn.lacking} more that were drawn for the gains do not exist")
+            lines.append(f"{self.drawn.lacking} more models drawn for the gains do not exist")
         return [*lines, self.verdict] if self.wanted is not None else lines
 
     @property
     def verdict(self) -> str:
-        """Whether all requirements are met as probably as wanted, in words."""
+        """Verdict on the required probability, as a sentence."""
         wanted = "" if self.wanted is None else f" with {100.0 * self.wanted:.10g} %"
         return f"all requirements{wanted}: {self.outcome or 'no probability is required'}"
 
@@ -203,22 +203,21 @@ class Probability:
 def _drawn_models(case: LoopCase, file: str | Path, count: int) -> DrawnModels:
     """Return models of a loop whose parameters vary as in a study file.
 
-    What the study says of cases, requirements and its bench's experiment does not count.
+    Only the study's varied parameters count, not its cases, requirements or experiment.
 
     Parameters
     ----------
     case
         The loop, its parameters and operating point.
     file
-        Study file; shares in it are of what its own bench has.
+        Study file; shares in it refer to the values of its bench.
     count
-        Models that gains are chosen for.
+        Number of models for which the gains are chosen.
 
     Raises
     ------
     InputError
-        For a study file that does not fit the loop, a count that is not valid, and models of
-        which none exists.
+        For a study file that does not fit the loop, an invalid count, and if no model exists.
     """
     if not 1 <= count <= _MOST:
         raise not_valid("drawn", f"{count}", f"1 to {_MOST} models")
@@ -239,12 +238,12 @@ def _drawn_models(case: LoopCase, file: str | Path, count: int) -> DrawnModels:
 
 
 def _probability(text: str) -> float | None:
-    """Return the probability that is wanted; None for an empty text.
+    """Return the required probability; None for an empty text.
 
     Raises
     ------
     ParameterError
-        For what is no probability between 0 and 1.
+        If the text is not a probability between 0 and 1.
     """
     if not text:
         return None
@@ -264,7 +263,7 @@ def _require_fitting(case: LoopCase, plan: StudyPlan, file: str | Path) -> None:
     for name in (name for v in plan.varied for name in (v.name, *v.together)):
         if name.startswith(OPTION):
             raise ParameterError(
-                f"{file}: {name} is an option of the experiment, which the loop does not have: "
+                f"{file}: {name} is an option of the experiment, but the loop does not have it: "
                 "leave it out",
                 name=name,
             )
@@ -291,20 +290,20 @@ def requirements_of(file: str | Path | None, texts: Sequence[str]) -> tuple[Limi
 def _left_to_choose(
     loop: str, spans: Spans, changes: Mapping[str, Any]
 ) -> dict[str, tuple[float, float]]:
-    """Return what may be chosen: what the user has set stays.
+    """Return the gains to choose, without those that the user has set.
 
     Raises
     ------
     ParameterError
-        When nothing is left.
+        If no gain is left.
     """
     if not spans:
         raise ParameterError(f"loop {loop!r} has no gains to design", name="loop", value=loop)
     left = {name: span for name, span in spans.items() if name not in changes}
     if not left:
         raise ParameterError(
-            f"{option('overrides')} fixes all of {', '.join(spans)}: leave out those that bywire "
-            "should choose",
+            f"{option('overrides')} fixes all gains ({', '.join(spans)}): leave out those that "
+            "bywire should choose",
             name=option("overrides"),
             value=", ".join(spans),
         )
@@ -314,10 +313,10 @@ def _left_to_choose(
 def _for_ecu(
     case: LoopCase, changes: Mapping[str, Any], free: bool
 ) -> tuple[LoopCase, dict[str, Any], Spans]:
-    """Return a case, its changes, and the spans that an ECU can run, but for what the user has set.
+    """Return a case, its changes, and the spans of gains that an ECU can realize.
 
-    What they leave one value has it in the case, and among the changes as a text with its unit.
-    With ``free``, nothing is kept.
+    Parameters that the user has set have no span. A parameter whose span is a single value gets it
+    in the case, and in the changes as a text with its unit. With ``free``, there are no limits.
     """
     if free:
         return case, dict(changes), {}
@@ -329,12 +328,12 @@ def _for_ecu(
 
 
 def _narrowed(spans: Spans, limits: Spans) -> Spans:
-    """Return spans with the limits in their place where there are any."""
+    """Return spans, replaced by the limits where these exist."""
     return {name: limits.get(name, span) for name, span in spans.items()}
 
 
 def _tunables_of(case: LoopCase) -> Spans:
-    """Return the loop's tunables; with its schedule on, those of the operating point's region."""
+    """Return the loop's tunables; with an active schedule, those of the region."""
     schedule = case.loop.schedule
     if schedule is None or not schedule.is_on(case.par):
         return case.loop.tunables
@@ -342,7 +341,7 @@ def _tunables_of(case: LoopCase) -> Spans:
 
 
 def _trial_of(case: LoopCase, changes: Mapping[str, Any], amplitudes: str) -> Trial:
-    """Return what the design is tried on; ``amplitudes`` are those of the sines, with units."""
+    """Return the trial of the design on the bench; ``amplitudes`` are the sines', with units."""
     loop = case.loop
     sizes = spread(amplitudes, case.input_unit, "amplitudes") if amplitudes else loop.amplitudes[1:]
     bench = Bench(loop.proof, case.name, changes) if loop.proof else None
@@ -374,25 +373,25 @@ def _from_file(path: Path | None) -> list[str]:
 
 # --- The answer
 
-_STEPS, _SETTLED = 5.0, 1.2  # what is drawn of a step: periods of the bandwidth, settling times
+_STEPS, _SETTLED = 5.0, 1.2  # drawn length of a step: periods of the bandwidth, settling times
 
 
 @dataclass(frozen=True)
 class DesignAnswer(Answer):
-    """What designs of gains and of gain schedules have in common.
+    """Common part of designs of gains and of gain schedules.
 
     Parameters
     ----------
     case
         The loop, its parameters before the design, and its operating point.
     overrides
-        Parameters that were set beforehand.
+        Parameters that the user set.
     requirements
-        What was required.
+        The requirements.
     limits
-        Spans [SI] that were kept to so that an ECU can run the gains; none of ``free_derivative``.
+        Spans [SI] within which an ECU can realize the gains; empty with ``free_derivative``.
     tried
-        The design on the nonlinear bench; None where that was left out, or nothing is feasible.
+        The design on the nonlinear bench; None if it was skipped or nothing is feasible.
     """
 
     case: LoopCase
@@ -409,7 +408,7 @@ class DesignAnswer(Answer):
     @property
     @abstractmethod
     def points(self) -> str:
-        """The operating points in words."""
+        """The operating points as text."""
 
     @abstractmethod
     def parts(self) -> Sequence[Part]:
@@ -421,7 +420,7 @@ class DesignAnswer(Answer):
 
     @property
     def gains(self) -> Mapping[str, float]:
-        """The gains [SI] by dotted name: those of the bench where it retuned them."""
+        """The gains [SI] by dotted name, retuned on the bench if it was tried."""
         return self.linear.gains if self.tried is None else self.tried.final.gains
 
     @property
@@ -432,18 +431,18 @@ class DesignAnswer(Answer):
 
     @property
     def notes(self) -> list[str]:
-        """On which side of corners the linear models are."""
+        """Side of corners of the linear models."""
         loop, par = self.case.loop, self.case.par.replace(self.gains)
         return corner_notes([loop.closed(par, self.case.value).corners])
 
     @property
     def partial(self) -> str:
-        """What an interrupted design still shows."""
-        return "what is shown is the best until then"
+        """Meaning of an interrupted design's results."""
+        return "the result is the best so far"
 
     @property
     def holds(self) -> bool:
-        """Whether the requirements are met, on the bench too where that was tried."""
+        """Whether the requirements are met, also on the bench if it was tried."""
         return self.linear.status == "met" and (self.tried is None or self.tried.met)
 
     def document(self) -> Document:
@@ -461,7 +460,7 @@ class DesignAnswer(Answer):
                 Section("Requirements", [required]),
                 Section("Result", design_parts.as_blocks(parts)),
                 Section("Figures", self._figures()),
-                self.case.subject.provenance("Parameters as they were before the design."),
+                self.case.subject.provenance("Parameters before the design."),
             ],
             brief=design_parts.brief_blocks(parts),
             data={**self.data(), "kept_for_the_ecu": {k: list(v) for k, v in self.limits.items()}},
@@ -473,17 +472,20 @@ class DesignAnswer(Answer):
 
     def _remarks(self) -> list[str]:
         if self.status == "infeasible":
-            return ["no gains meet the requirements together: see what excludes what"]
+            return [
+                "no gains meet all requirements together: the lines above give the best achievable "
+                "values"
+            ]
         if self.tried is not None and not self.tried.met:
             final = self.tried.final
             missed = [text for text, slack in final.slacks.items() if slack < 0.0]
             texts = ", ".join(f"{text} ({judged_on(final, text)})" for text in missed)
-            return [f"the linear design meets all requirements, the tried gains do not: {texts}"]
+            return [f"the linear design meets all requirements, but not on the bench: {texts}"]
         return []
 
     @staticmethod
     def _missed_floors(tried: Verification) -> list[Limit]:
-        """Return what was to be kept and is not: the verdict counts it."""
+        """Return the enforced figures that the gains miss, which the verdict counts."""
         return [each for each in tried.kept if tried.final.slacks[str(each)] < 0.0]
 
     def _write_bench(self, path: Path) -> Path:
@@ -515,11 +517,9 @@ class DesignAnswer(Answer):
             return [Paragraph(f"{NO_LOOP}.")]
         limits = {(each.figure, each.is_upper): each.bound for each in self.requirements}
         captions = {
-            "loop-gain": "Loop gain of the nominal linear model; phase margins as the spans in "
-            "which they are read.",
+            "loop-gain": "Loop gain of the nominal linear model; spans show the phase margins.",
             "sensitivity": "Sensitivity S = 1/(1 + L) and complementary sensitivity T = L/(1 + L), "
-            "with the limits that are usually asked for (Skogestad and Postlethwaite, section "
-            "2.4.3).",
+            "with the usual limits (Skogestad and Postlethwaite, section 2.4.3).",
             "step": "Unit step of the nominal linear model, at the sampling instants.",
         }
         return [
@@ -548,7 +548,7 @@ class LoopDesign(DesignAnswer):
     designed
         The linear design.
     probability
-        How probably its requirements are met over drawn models; None where none were drawn.
+        Probability to meet the requirements over drawn models; None without drawn models.
     """
 
     designed: Design
@@ -556,7 +556,7 @@ class LoopDesign(DesignAnswer):
 
     @property
     def holds(self) -> bool:
-        """Whether the requirements are met, on the bench too, and as probably as is wanted."""
+        """Whether the requirements are met, also on the bench, and as probably as required."""
         is_probable = self.probability is None or self.probability.outcome in (None, "met")
         return super().holds and is_probable
 
@@ -572,7 +572,7 @@ class LoopDesign(DesignAnswer):
 
     @property
     def points(self) -> str:
-        """The operating point in words."""
+        """The operating point as text."""
         return shown(self.case.value, self.case.loop.at.unit)
 
     def parts(self) -> Sequence[Part]:
@@ -588,7 +588,7 @@ class LoopDesign(DesignAnswer):
 
 @dataclass(frozen=True)
 class LoopScheduleDesign(DesignAnswer):
-    """Gains of a loop by region; ``retuned`` is the loop across the regions with the bench's."""
+    """Gains of a loop by region; ``retuned`` is the loop across regions with the bench's gains."""
 
     designed: ScheduleDesign
     retuned: tuple[Across, ...]
@@ -600,7 +600,7 @@ class LoopScheduleDesign(DesignAnswer):
 
     @property
     def points(self) -> str:
-        """The operating points in words."""
+        """The operating points as text."""
         unit = self.case.loop.at.unit
         return ", ".join(shown(v, unit) for values in self.designed.points.values() for v in values)
 
@@ -647,8 +647,8 @@ def designed_at_point(
 ) -> LoopDesign:
     """Return gains of a loop at its operating point, over ranges, and for drawn models.
 
-    ``wanted``: the requirements; ``amplitudes``: None without the nonlinear bench; all else as of
-    `bywire.design`.
+    ``wanted``: the requirements; ``amplitudes``: None without the nonlinear bench; for the others
+    see `bywire.design`.
     """
     least = _probability(probability)
     if least is not None and not vary:
@@ -692,8 +692,8 @@ def designed_by_region(
 ) -> LoopScheduleDesign:
     """Return gains by region of the operating point.
 
-    ``wanted``: the requirements; ``amplitudes``: None without the nonlinear bench; all else as of
-    `bywire.design`.
+    ``wanted``: the requirements; ``amplitudes``: None without the nonlinear bench; for the others
+    see `bywire.design`.
     """
     schedule = scheduled(LOOPS.find(name))
     overrides = {**overrides, **schedule.changes}

@@ -1,4 +1,4 @@
-"""A design, a gain schedule and their verification, in words and as JSON objects."""
+"""Texts, tables and JSON objects of designs, gain schedules and their verification."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _PAIRS = 6
 def verification_parts(
     case: LoopCase, nominal: Mapping[str, float], tried: Verification
 ) -> list[Part]:
-    """Return tables and sentences on the linear design, and on the retuned gains, on the bench.
+    """Return tables and sentences on the linear design and the retuned gains on the bench.
 
     ``nominal`` are the figures of the linear design's nominal model.
     """
@@ -56,25 +56,25 @@ def verification_parts(
     labels = tried.final.corners
     if labels:
         worst = f" (worst of {tried.corners} corners)" if len(labels) < tried.corners else ""
-        parts.append(f"tried on the bench: at the nominal point, and at {'; '.join(labels)}{worst}")
+        parts.append(f"tried on the bench at the nominal point and at {'; '.join(labels)}{worst}")
     kept = {str(requirement) for requirement in tried.kept}
     for text, slack in tried.final.slacks.items():
         verdict = "met" if slack >= 0.0 else "NOT met"
         room = 100.0 * tried.final.room(text)
-        also = "also kept, " if text in kept else ""
+        also = "also enforced, " if text in kept else ""
         where = judged_on(tried.final, text)
         parts.append(f"{also}{where}: {text} {verdict} ({room:+.1f} % of the limit)")
     conflict = tried.conflict()
     if conflict is not None:
         first, other, edge = conflict
-        middle = sorted(sorted(edge, key=min)[-_PAIRS:])  # where both are nearly met
+        middle = sorted(sorted(edge, key=min)[-_PAIRS:])  # where both are almost met
         pairs = "; ".join(f"{100 * a:+.1f} % and {100 * b:+.1f} %" for a, b in middle)
-        parts.append(f"edge between {first} and {other}, as distance from the limits: {pairs}")
+        parts.append(f"tradeoff of {first} and {other}, as margins to the limits: {pairs}")
     return parts
 
 
 def judged_on(candidate: Candidate, text: str) -> str:
-    """Return where a requirement was judged, in words."""
+    """Return where a requirement was judged, as text."""
     shown, possible = candidate.shown[text]
     if not shown:
         return "on the linear model"
@@ -84,11 +84,11 @@ def judged_on(candidate: Candidate, text: str) -> str:
 
 
 def verdict_text(requirements: Sequence[Limit], tried: Verification) -> str:
-    """Return whether requirements are met, and which part of them the bench shows."""
+    """Return the verdict on requirements, on the bench and on the linear model."""
     final = tried.final
     on_bench = [str(each) for each in requirements if final.shown[str(each)][0]]
     linear = [str(each) for each in requirements if not final.shown[str(each)][0]]
-    parts = ((on_bench, "on the nonlinear bench"), (linear, "on the linear model alone"))
+    parts = ((on_bench, "on the nonlinear bench"), (linear, "only on the linear model"))
     texts = []
     for names, where in parts:
         missed = sum(final.slacks[name] < 0.0 for name in names)
@@ -117,7 +117,7 @@ def _figure_text(name: str, value: float) -> str:
 def _figure_rows(
     case: LoopCase, where: str, columns: list[BenchFigures | None]
 ) -> list[list[str | Cell]]:
-    """Return rows of one trial: what the sines and the step show, a column for each design."""
+    """Return rows of one trial: figures of the sines and the step, a column for each design."""
 
     def cell(figures: BenchFigures | None, k: int, name: str) -> Cell:
         if figures is None or not figures.small:
@@ -162,7 +162,7 @@ def _reasons(case: LoopCase, tries: Sequence[BenchFigures]) -> list[Part]:
             why = "the output does not move"
         else:
             side = "above" if math.isinf(size.crossover) else "below"
-            why = f"the loop gain stays {side} 1 at all frequencies that were measured"
+            why = f"the loop gain stays {side} 1 at all measured frequencies"
         sine = amount(size.amplitude, case.input_unit, 3)
         names = "phase_margin is" if math.isinf(size.crossover) else "phase_margin, crossover are"
         texts.append(f"sine of {sine}: {names} not defined: {why}")
@@ -170,7 +170,7 @@ def _reasons(case: LoopCase, tries: Sequence[BenchFigures]) -> list[Part]:
 
 
 def _verification_object(case: LoopCase, tried: Verification) -> dict[str, Any]:
-    """Return the same as plain data."""
+    """Return the verification as plain data."""
     conflict = tried.conflict()
     return {
         "met": tried.met,
@@ -275,7 +275,7 @@ def as_parts(
     design: Design,
     tried: Verification | None,
 ) -> list[Part]:
-    """Return what a person wants to know, in tables and sentences."""
+    """Return tables and sentences of a design."""
     at = case.loop.at
     point = f"{at.name} = {amount(case.value, at.unit)}"
     parts: list[Part] = [
@@ -317,15 +317,15 @@ def as_parts(
 
 
 def _kept_lines(design: Design) -> list[str]:
-    """Return what is kept besides the requirements, a sentence or none."""
+    """Return a sentence on figures enforced in addition to the requirements, or none."""
     if not design.kept:
         return []
     texts = ", ".join(str(requirement) for requirement in design.kept)
-    return [f"also kept: {texts} (require another limit of the same figure to change it)"]
+    return [f"also enforced: {texts} (to change a limit, require another one)"]
 
 
 def _unsound_lines(design: Design) -> list[str]:
-    """Return which models have no figures, and why, a sentence for each reason."""
+    """Return a sentence for each reason why models have no figures."""
     states = dict.fromkeys(design.unsound.values())
     return [
         f"{state}, at {', '.join(k for k, why in design.unsound.items() if why == state)}"
@@ -334,7 +334,7 @@ def _unsound_lines(design: Design) -> list[str]:
 
 
 def limit_lines(case: LoopCase, limits: Mapping[str, tuple[float, float]]) -> list[str]:
-    """Return what was kept so that an ECU can run the gains, a sentence or none."""
+    """Return a sentence on the limits that an ECU needs, or none."""
     if not limits:
         return []
     texts = [
@@ -343,7 +343,7 @@ def limit_lines(case: LoopCase, limits: Mapping[str, tuple[float, float]]) -> li
         else f"{name} >= {_gain_text(case, name, low)}"
         for name, (low, high) in limits.items()
     ]
-    return [f"kept for an ECU: {', '.join(texts)} ({option('free_derivative')} does not)"]
+    return [f"limited for an ECU: {', '.join(texts)} ({option('free_derivative')} removes this)"]
 
 
 def _unit_of(case: LoopCase, name: str) -> str:
@@ -357,7 +357,7 @@ def _gain_text(case: LoopCase, name: str, value: float) -> str:
 
 
 def brief_blocks(parts: Sequence[Part]) -> list[str | Block]:
-    """Return parts as a terminal shows them: of loop figures, those that have a limit."""
+    """Return parts for a terminal, with only those loop figures that have a limit."""
     blocks: list[str | Block] = []
     for part in parts:
         if isinstance(part, str):
@@ -454,10 +454,10 @@ def schedule_as_parts(
     tried: Verification | None,
     retuned: Sequence[Across],
 ) -> list[Part]:
-    """Return what a person wants to know, in tables and sentences.
+    """Return tables and sentences of a gain schedule.
 
-    ``retuned`` is the loop across the regions with the gains of the bench; empty where these are
-    the linear design's.
+    ``retuned`` is the loop across the regions with the gains of the bench; empty if these are the
+    linear design's.
     """
     at, leaves = case.loop.at, case.par.leaves()
     borders = " and ".join(
@@ -485,7 +485,7 @@ def schedule_as_parts(
         ]
     for title, across in (("linear design", design.across), ("retuned gains", retuned)):
         if across:
-            parts.append(f"{title}, gains frozen, linear model, room as a share of the limit:")
+            parts.append(f"{title}, frozen gains, linear model, margin as a share of the limit:")
             parts += _frozen(case, across)
     if tried is not None:
         parts += verification_parts(case, design.nominal, tried)

@@ -30,12 +30,12 @@ if TYPE_CHECKING:
 
 @contextmanager
 def export_folder(out: str | Path) -> Iterator[Path]:
-    """Yield the folder of an export; what was made of it is removed where nothing is written.
+    """Yield the folder of an export; new folders are removed if nothing is written.
 
     Raises
     ------
     FileError
-        When it cannot be made, or files in it cannot be written.
+        If the folder cannot be created, or its files cannot be written.
     """
     folder = Path(out).expanduser()
     try:
@@ -55,7 +55,7 @@ GOALS: Mapping[tuple[str, str], Mapping[str, int]] = {
     ("Cortex-M4F", "single"): {"rom": 2048, "ram": 128, "stack": 128, "instructions": 400},
     ("Cortex-M4F", "double"): {"instructions": 10_000},
 }
-"""what a tick of an ECU should take at most, by processor and precision: bytes, instructions"""
+"""limits of an ECU's tick, by processor and precision: bytes, instructions"""
 _HEADINGS = {
     "rom": "ROM [B]",
     "ram": "RAM [B]",
@@ -66,18 +66,18 @@ _HEADINGS = {
 
 @dataclass(frozen=True)
 class ControllerCheck:
-    """How an exported ECU did.
+    """Check of an exported ECU.
 
     Parameters
     ----------
     trials
-        One for every processor and precision that was tried, this machine first.
+        One for every tried processor and precision, this machine first.
     vectors
         Test vectors of all tasks.
     skipped
-        What was not tried, why, and what to install.
+        Skipped trials, with the reason and what to install.
     inexact
-        Precisions in which functions of the C library are called whose last digit is free.
+        Precisions that call functions of the C library whose last digit may differ.
     """
 
     trials: tuple[Trial, ...]
@@ -86,13 +86,13 @@ class ControllerCheck:
     inexact: tuple[str, ...] = ()
 
     def is_identical(self, trial: Trial) -> bool:
-        """Return whether a processor gave what the first one gave, in every bit."""
+        """Return whether a processor's results equal the first one's in every bit."""
         first = next(each for each in self.trials if each.precision == trial.precision)
         return trial.bits == first.bits
 
     @property
     def holds(self) -> bool:
-        """Whether values are Python's, bits the same but for free digits, and contracts kept."""
+        """Whether values equal Python's, bits agree where they must, and contracts are kept."""
         return all(
             each.differing == each.breaches == 0
             and (self.is_identical(each) or each.precision in self.inexact)
@@ -100,7 +100,7 @@ class ControllerCheck:
         )
 
     def table(self) -> TableBlock:
-        """Return a row for every trial."""
+        """Return a table with one row per trial."""
         figures = (Column(each, True) for each in _HEADINGS.values())
         columns = [
             Column("processor"),
@@ -113,14 +113,14 @@ class ControllerCheck:
         rows = tuple(self._row(each) for each in self.trials)
         caption = (
             f"{self.vectors} vectors: values that differ from Python's, breaches of the contract "
-            "in README.txt, bits beside those of the first row; instructions and stack of the task "
-            "that takes most, calls included."
+            "in README.txt, bits compared with the first row. Instructions and stack are those of "
+            "the most expensive task, with calls."
         )
         return TableBlock(Table(tuple(columns), rows), caption)
 
     def _row(self, trial: Trial) -> tuple[Cell, ...]:
         identical = self.is_identical(trial)
-        same = Cell("the same" if identical else "others", "good" if identical else "bad")
+        same = Cell("the same" if identical else "different", "good" if identical else "bad")
         figures, goals = figures_of(trial), GOALS.get((trial.target, trial.precision), {})
         cells = [_measured(figures.get(name), goals.get(name)) for name in _HEADINGS]
         counts = [
@@ -152,7 +152,7 @@ class ControllerCheck:
 
 
 def figures_of(trial: Trial) -> dict[str, int]:
-    """Return the figures of a trial that goals are about; none on the host."""
+    """Return the figures of a trial that have limits; none on the host."""
     if trial.rom is None or trial.ram is None or not trial.tasks:
         return {}
     return {
@@ -173,19 +173,19 @@ def _measured(value: int | None, goal: int | None) -> Cell:
 
 
 def check_controller(case: Case, cited: Mapping[str, Cited], count: int) -> ControllerCheck:
-    """Compile the ECU of a case in both precisions, and run it wherever the tools are there.
+    """Compile the ECU of a case in both precisions, and run it wherever tools are installed.
 
     Parameters
     ----------
     cited
         Values of the parameter set with their provenance.
     count
-        Test vectors of each task.
+        Test vectors per task.
 
     Raises
     ------
     CompilerError
-        When nothing can be compiled, or a compiler fails.
+        If nothing can be compiled, or a compiler fails.
     """
     from bywire.export.controller.c_text import PRECISIONS
     from bywire.export.controller.files import files
@@ -201,12 +201,14 @@ def check_controller(case: Case, cited: Mapping[str, Cited], count: int) -> Cont
     compiler, missing = find_compiler(), missing_tools()
     if compiler is None and missing:
         raise CompilerError(
-            f"nothing can be checked: there is no C compiler, and {missing}; "
-            "the extra bywire[compiler] brings one"
+            f"nothing can be checked: there is no C compiler, and {missing}; to get a compiler, "
+            "install the extra bywire[compiler]"
         )
     skipped = [f"Cortex-M3, M4F and M7 were skipped: {missing}"] if missing else []
     if compiler is None:
-        skipped.append("this machine was skipped: there is no C compiler (extra bywire[compiler])")
+        skipped.append(
+            "this machine was skipped: there is no C compiler; install the extra bywire[compiler]"
+        )
     trials: list[Trial] = []
     inexact, tried = [], 0
     for precision in PRECISIONS:
@@ -236,22 +238,22 @@ def check_controller(case: Case, cited: Mapping[str, Cited], count: int) -> Cont
 
 @dataclass(frozen=True)
 class ControllerExport(Answer):
-    """An ECU that was written as C.
+    """An ECU exported as C.
 
     Parameters
     ----------
     folder
-        Where it stands.
+        Its folder.
     files
         Names of its files.
     program
-        What was translated.
+        The translated program.
     vectors
-        Test vectors of each task.
+        Test vectors per task.
     bench
-        Whose ECU it is.
+        Bench of the ECU.
     check
-        How it did on processors; None where that was not asked for.
+        Check on processors; None if it was not requested.
     """
 
     folder: Path
@@ -263,16 +265,16 @@ class ControllerExport(Answer):
 
     @property
     def holds(self) -> bool:
-        """Whether all processors gave what Python gives; so, too, where none was asked."""
+        """Whether all checked processors agree with Python."""
         return self.check is None or self.check.holds
 
     @property
     def notes(self) -> list[str]:
-        """What was skipped of a check, and how to install what it wants."""
+        """Skipped parts of the check, and what to install for them."""
         return [] if self.check is None else list(self.check.skipped)
 
     def document(self) -> Document:
-        """Return what was written, and how it is tried."""
+        """Return the written files, and how to test them."""
         tasks = ", ".join(f"{s.task.name} ({s.task.period:.9g} s)" for s in self.program.steps)
         what = Paragraph(
             f"{self.program.name}_ecu.c: {len(self.program.functions)} functions, "
@@ -320,29 +322,29 @@ _KINDS: dict[Causality, str] = {
     "local": "others",
 }
 _NO_START = (
-    "the start at rest of this experiment is not known for other parameters: with changed "
-    "parameters the unit begins where the exported ones rest, and settles"
+    "this experiment's rest state is unknown for other parameters: with changed parameters the "
+    "unit starts at the exported rest state, and settles"
 )
 _EXCHANGED = (
-    "a solver integrates its states and meets its events; between them contacts and frictions keep "
-    "their modes"
+    "the client's solver integrates the states and locates the events; between events, contacts "
+    "and frictions keep their modes"
 )
 
 
 @dataclass(frozen=True)
 class ExportedFmu(Answer):
-    """An FMU that was written.
+    """An exported FMU.
 
     Parameters
     ----------
     path
         Its file.
     unit
-        What it holds: run, variables, sources.
+        Its contents: run, variables, sources.
     targets
-        Systems that it has binaries for.
+        Platforms of its binaries.
     compilers
-        What made each of them.
+        Compiler of each binary.
     """
 
     path: Path
@@ -352,11 +354,11 @@ class ExportedFmu(Answer):
 
     @property
     def notes(self) -> list[str]:
-        """What else to know of it."""
+        """Note on its start."""
         return [] if self.unit.begins_anywhere else [_NO_START]
 
     def document(self) -> Document:
-        """Return what was written, and how it steps."""
+        """Return its contents, and its steps."""
         unit = self.unit
         schedule = unit.made.schedule
         table = TableBlock(self._table())
@@ -373,7 +375,7 @@ class ExportedFmu(Answer):
         return Document(
             f"FMU {unit.identifier}",
             written,
-            sections=[Section("What it holds", [table, steps])],
+            sections=[Section("Contents", [table, steps])],
             brief=[table, steps, written],
             data=self._data(),
             is_paged=False,
@@ -421,14 +423,14 @@ def _some(names: list[str], most: int = 6) -> str:
 
 @dataclass(frozen=True)
 class ExportedWasm(Answer):
-    """A module that was written.
+    """An exported module.
 
     Parameters
     ----------
     files
         Module, description (JSON), loader and types.
     made
-        The run that it is of.
+        The run that it computes.
     size
         Bytes of the module.
     """
@@ -438,7 +440,7 @@ class ExportedWasm(Answer):
     size: int
 
     def document(self) -> Document:
-        """Return what was written."""
+        """Return the written files."""
         run = f"{self.made.bench.experiment}, run {self.made.case.label!r}"
         listing = Listing([str(path) for path in self.files], f"{run}: {self.size / 1e3:.1f} kB")
         return Document(
@@ -459,12 +461,12 @@ class ExportedWasm(Answer):
         }
 
 
-# --- A page that anybody can open
+# --- A page that anyone can open
 
 
 @dataclass(frozen=True)
 class BenchPage(Answer):
-    """A page that was written.
+    """An exported page.
 
     Parameters
     ----------
@@ -473,7 +475,7 @@ class BenchPage(Answer):
     made
         The run that it computes.
     size, compressed
-        Bytes of the file, and of what a server sends of it (gzip).
+        Bytes of the file, uncompressed and compressed (gzip).
     """
 
     file: Path
@@ -482,7 +484,7 @@ class BenchPage(Answer):
     compressed: int
 
     def document(self) -> Document:
-        """Return what was written."""
+        """Return the written files."""
         run = f"{self.made.bench.experiment}, run {self.made.case.label!r}"
         sizes = f"{self.size / 1e3:.0f} kB, {self.compressed / 1e3:.0f} kB compressed"
         listing = Listing([str(self.file)], f"{run}: {sizes}")

@@ -58,7 +58,7 @@ if TYPE_CHECKING:
 def response_warnings(
     response: xr.Dataset, variants: Sequence[Variant], unit: str, tolerance: float
 ) -> list[str]:
-    """Return what left the brake's range, what stuck, and what never repeated.
+    """Return warnings on exceeded ranges, sticking outputs, and aperiodic windows.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def response_warnings(
     unit
         SI unit of the amplitudes.
     tolerance
-        Share within which a window had to repeat the one before.
+        Relative tolerance within which successive windows must agree.
     """
     texts = []
     empty = [variant for variant in variants if not variant.has_loop]
@@ -81,7 +81,7 @@ def response_warnings(
         label = f"amplitude {amount(float(size), unit, 3)}"
         reasons = (leaving(case.loop, case.par, case.value, float(size)) for case in variants)
         if reason := next(filter(None, reasons), ""):
-            texts.append(f"{label}: it asks for set points out of the brake's range: {reason}")
+            texts.append(f"{label}: set points leave the brake's range: {reason}")
         still, restless = np.isnan(row["gain"].values), row["settled"].values == 0
         if still.any():
             texts.append(f"{label}: the output sticks at {_cases(response, still)}: no gain")
@@ -90,15 +90,15 @@ def response_warnings(
             scatter = float(np.nanmax(row["scatter"].values[shaken]))
             cases = _cases(response, shaken)
             texts.append(
-                f"{label}: no window repeats the one before within {100 * tolerance:g} % at "
-                f"{cases} (a limit cycle, a drift, or the encoder's resolution): "
-                "shown are means of the last windows; their root mean square distance from the "
-                f"mean is up to {amount(100 * scatter, 'percent', 2)}"
+                f"{label}: successive windows do not agree within {100 * tolerance:g} % at "
+                f"{cases} (a limit cycle, a drift, or the encoder's resolution). Results are means "
+                "of the last windows; their root mean square deviation from the mean is up to "
+                f"{amount(100 * scatter, 'percent', 2)}"
             )
     if response.attrs.get("unestimated"):
         texts.append(
-            "how far the response is off by the step is not known: it cannot be measured in half "
-            f"steps ({response.attrs['unestimated']})"
+            "the numerical error of the response is unknown: it cannot be measured in half steps "
+            f"({response.attrs['unestimated']})"
         )
     if response["unsettled_substeps"].values.any():
         texts.append("some substeps hit the cap of the contact iteration: take a smaller step")
@@ -106,19 +106,19 @@ def response_warnings(
 
 
 def purity(response: xr.Dataset) -> str:
-    """Return the least coherence by amplitude, as what the excitation makes of it.
+    """Return a line on the least coherence by amplitude, in terms of the excitation.
 
     Parameters
     ----------
     response
-        Response to sines or, then averaged over windows, to all frequencies at once.
+        Response to sines, or to all frequencies together, averaged over windows.
     """
     lowest = response["coherence"].min(dim="frequency").values[0]
     shares = ", ".join("-" if np.isnan(share) else f"{share:.3f}" for share in lowest)
     if response.attrs["excitation"] == "sine":
         return (
-            f"least share of the output's power at the sine: {shares} (harmonics, dither and "
-            "ripple are the rest)"
+            f"least share of the output's power at the sine's frequency: {shares} (the rest is "
+            "harmonics, dither and ripple)"
         )
     return f"lowest coherence of set point and output: {shares}"
 
@@ -134,7 +134,7 @@ def _cases(response: xr.Dataset, which: NDArray[np.bool_]) -> str:
 
 @dataclass(frozen=True)
 class FrequencyResponse(Answer):
-    """The measured response of a closed loop, beside the exact linear one.
+    """The measured response of a closed loop, and the exact linear one.
 
     Parameters
     ----------
@@ -146,15 +146,15 @@ class FrequencyResponse(Answer):
     linear
         The linear response of the first variant, complex, shape (frequencies,).
     variants
-        The cases of the range; a single one without.
+        The cases of the range; a single one without a range.
     range
-        Name and SI unit of what varies; an empty name without a range.
+        Name and SI unit of the varied quantity; an empty name without a range.
     unit
         SI unit of the amplitudes.
     note
-        What was set so that the loop can be shaken for as long as it takes; empty for nothing.
+        Settings that allow long excitation of the loop; may be empty.
     tolerance
-        Share within which a window had to repeat the one before.
+        Relative tolerance within which successive windows must agree.
     """
 
     case: LoopCase
@@ -168,13 +168,13 @@ class FrequencyResponse(Answer):
 
     @property
     def notes(self) -> list[str]:
-        """On which side of corners the linear models are."""
+        """Side of corners of the linear models."""
         models = (case.loop.closed(case.par, case.value) for case in self.variants)
         return corner_notes(model.corners for model in models)
 
     @property
     def warnings(self) -> list[str]:
-        """What left the brake's range, what stuck, and what never repeated."""
+        """Warnings on exceeded ranges, sticking outputs, and aperiodic windows."""
         return response_warnings(self.data, self.variants, self.unit, self.tolerance)
 
     def document(self) -> Document:
@@ -187,7 +187,7 @@ class FrequencyResponse(Answer):
         listing: list[Block] = [Listing(heed)] if heed else []
         bode = FigureBlock(
             self._bode,
-            "Closed loop: the exact linear response without friction, and the nonlinear ones.",
+            "Closed loop: exact linear response without friction, and nonlinear responses.",
             f"{loop.name}-frequency-response",
         )
         found = ". ".join(filter(None, [purity(response), largest(response)]))
@@ -228,12 +228,12 @@ class FrequencyResponse(Answer):
         ]
 
     def _bandwidths(self) -> list[Block]:
-        """Return what a page says of bandwidths."""
+        """Return the blocks on bandwidths."""
         note = f"{_NOTE[0].upper()}{_NOTE[1:]}.{self._first(' Of the first case: ', '.')}"
         blocks: list[Block] = [TableBlock(_figures_table(self.data, self.unit), note)]
         if not self.range[0]:
             return blocks
-        caption = "Bandwidth over the range; rings: worst cases. All else shows the first case."
+        caption = "Bandwidth over the range; rings: worst cases. Other figures show the first case."
         over = TableBlock(
             _over_table(self.data, self.variants, self.range, self.unit), "Bandwidth by amplitude."
         )
@@ -241,7 +241,7 @@ class FrequencyResponse(Answer):
         return [*blocks, FigureBlock(self._over_range, caption, name), over]
 
     def _first(self, before: str, after: str = "") -> str:
-        """Return which case of a range is shown where only one is; empty without a range."""
+        """Return a text on the first case of a range; empty without a range."""
         if not self.range[0]:
             return ""
         label = amount(self.variants[0].label, self.range[1])
@@ -306,7 +306,7 @@ def _cell(gain: float, phase: float) -> str:
     if not math.isfinite(gain):
         return "sticks"
     if gain == 0.0:
-        return "no answer"
+        return "no response"
     decibel = round(20.0 * math.log10(gain), 2) + 0.0  # no negative zero
     return f"{decibel:.2f} dB {phase:.1f}°"
 
@@ -325,23 +325,23 @@ def measured_response(
     *,
     estimate_error: bool,
 ) -> FrequencyResponse:
-    """Return the response of a loop, with its error from the step where that is asked for.
+    """Return the response of a loop, with its numerical error if requested.
 
     Parameters
     ----------
     case, overrides
-        The loop at its operating point, and what the user changed.
+        The loop at its operating point, and the user's changes.
     frequencies, amplitudes
-        Of the input [Hz, SI].
+        Frequencies and amplitudes of the input [Hz, SI].
     over
-        Name, unit and values of the range for bandwidths; an empty name without one.
+        Name, unit and values of the range for bandwidths; an empty name without a range.
     excitation, progress, estimate_error
-        As of `bywire.frequency_response`.
+        See `bywire.frequency_response`.
 
     Raises
     ------
     ParameterError
-        When the linear loop is unstable.
+        If the linear loop is unstable.
     """
     base, note = _sustained(case, overrides)
     variants = _variants(base, over)
@@ -374,9 +374,9 @@ def measured_response(
 
 
 def _sustained(case: LoopCase, changes: Mapping[str, Any]) -> tuple[Variant, str]:
-    """Return the loop such that it can be shaken for as long as it takes, and what that changed.
+    """Return the loop with settings for long excitation, and a note on these changes.
 
-    What the user set stays.
+    The user's settings stay.
     """
     loop = case.loop
     par = case.par.replace({k: v for k, v in loop.sustained.items() if k not in changes})
@@ -387,18 +387,17 @@ def _sustained(case: LoopCase, changes: Mapping[str, Any]) -> tuple[Variant, str
         for name, value in after.items()
         if value != before[name]
     ]
-    note = f"set for sines that last: {', '.join(texts)}; {option('overrides')} keeps another "
-    note += "value"
+    note = f"set to allow long excitation: {', '.join(texts)}; override with {option('overrides')}"
     return Variant(loop, par, case.value), note if texts else ""
 
 
 def _variants(base: Variant, over: tuple[str, str, list[float]]) -> list[Variant]:
-    """Return the cases of a range, or the one without.
+    """Return the cases of a range, or the single case without a range.
 
     Raises
     ------
     ParameterError
-        When the linear loop is unstable in one of them.
+        If the linear loop is unstable in one of them.
     """
     name, unit, values = over
     if not name:
@@ -420,7 +419,7 @@ def _with_step_errors(
     excitation: str,
     progress: Progress,
 ) -> xr.Dataset:
-    """Return a response with its errors from the step, or with why these are not known."""
+    """Return a response with its numerical errors, or with the reason why they are unknown."""
     share = OTHER_STEPS[0]
     try:
         finer = _measured(variants, sweep, excitation, progress, share)
@@ -437,9 +436,9 @@ def _measured(
     progress: Progress,
     share: float = 1.0,
 ) -> xr.Dataset:
-    """Return the response of all cases, each around its own operating point.
+    """Return the response of all cases, each around its operating point.
 
-    ``share``: of the loop's step, in which they run.
+    ``share``: step of the runs, as a share of the loop's step.
     """
     runs = [variant.point.run() for variant in variants]
     points = [replace(run, step=share * run.step) for run in runs]
@@ -453,8 +452,8 @@ def _measured(
 # --- Bandwidths by amplitude, of one case or over a range, as tables and as JSON
 
 _NOTE = (
-    "bandwidth: -3 dB; crossover and margins of the loop gain's describing function; shares "
-    "of the time: the largest of all frequencies"
+    "bandwidth: -3 dB; crossover and margins: from the describing function of the loop gain; "
+    "shares of the time: largest over all frequencies"
 )
 
 
@@ -462,13 +461,13 @@ _WIDTHS = ("bandwidth", "crossover", "phase_margin", "gain_margin", "lower_gain_
 
 
 def shares(response: xr.Dataset) -> dict[str, str]:
-    """Return the shares of the time that a response tells, with the titles of their columns."""
+    """Return the shares of time in a response, with the headings of their columns."""
     names = [str(name) for name in response if str(name).startswith("share_")]
     return {name: _title(name.removeprefix("share_")) for name in names}
 
 
 def _title(flag: str) -> str:
-    """Return a mode's title; ``sat_`` names a limit."""
+    """Return the heading of a mode; ``sat_`` denotes a limit."""
     if flag.startswith("sat_"):
         return f"at {flag.removeprefix('sat_').replace('_', ' ')} limit"
     return flag.replace("_", " ")
@@ -532,9 +531,9 @@ def _over_table(
     variants
         Cases of the range.
     range_
-        Name and unit of what is varied.
+        Name and unit of the varied quantity.
     unit
-        Of the amplitudes.
+        SI unit of the amplitudes.
     """
     sizes = [amount(float(size), unit, 3) for size in response["amplitude"].values]
     rows = [
@@ -612,7 +611,7 @@ def _step_error(case: xr.Dataset, name: str) -> float:
 
 
 def _bounded(case: xr.Dataset, name: str) -> dict[str, float | None]:
-    """Return a frequency, or null with the bound that is known."""
+    """Return a frequency, or null with its known bound."""
     value, f = float(case[name]), case["frequency"].values
     if math.isinf(value):
         return {name: None, f"{name}_above": float(f[-1])}

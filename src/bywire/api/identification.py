@@ -1,4 +1,4 @@
-"""Parameters with their confidence, from measurements, by a named method or one of any bench."""
+"""Identification of parameters with their confidence, by a brake's method or a general one."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ if TYPE_CHECKING:
     from bywire.identification.method import Method
 
 Source = str | Path | xr.Dataset
-"""a measurement: a file, or what `bywire.read_measurement` gives"""
+"""a measurement: a file, or a result of `bywire.read_measurement`"""
 
 
 @dataclass(frozen=True)
@@ -65,12 +65,12 @@ class ChosenMethod:
     Parameters
     ----------
     method, options
-        What is done, and how.
+        The method and its options.
     name, par
-        Parameter set and values from which the search begins; empty and None for a method of any
+        Parameter set and values at which the search begins; empty and None for a method of any
         assembly.
     changes
-        What of the parameter set was changed, by dotted name, SI.
+        Changes of the parameter set by dotted name, SI.
     """
 
     method: Method
@@ -81,7 +81,7 @@ class ChosenMethod:
 
     @property
     def subject(self) -> Subject | None:
-        """What a report says of the method's brake; None for a method of any assembly."""
+        """The method's brake for reports; None for a method of any assembly."""
         method = self.method
         if method.bench is not None:
             return Subject.of_bench(
@@ -95,7 +95,7 @@ class ChosenMethod:
 
     @property
     def changed(self) -> tuple[Change, ...]:
-        """What the user changed of the bench or parameter set, and of the method's options."""
+        """The user's changes of the bench or parameter set, and of the method's options."""
         return self._option_changes if self.subject is None else self.subject.changes
 
     @property
@@ -116,26 +116,25 @@ def choose(
     time: str = "",
     progress: Progress = silent,
 ) -> ChosenMethod:
-    """Return the method of a name with what it needs.
+    """Return a method by name, with its parameters and options.
 
     Parameters
     ----------
     name
         Method of ``bywire list``.
     parameters, overrides, options
-        Parameter set, and what of it and of the method's options is changed.
+        Parameter set, and changes of it and of the method's options.
     question
-        For methods of any bench.
+        Inputs of methods of any bench.
     measurements, mapping, time
-        What is identified, what the columns of its files mean, and which one holds the instants;
-        none for simulated ones.
+        Measurements, the meaning of their columns, and their time column; none for simulated ones.
     progress
         Called with a label and the finished share.
 
     Raises
     ------
     InputError
-        When something does not fit.
+        If an argument is invalid.
     """
     bench_method = BENCH_METHODS.all().get(name)
     if bench_method is None:
@@ -156,7 +155,7 @@ def choose(
     idle = [key for key in options if key.split(".")[0] in method.simulated]
     if measurements and idle:
         raise ParameterError(
-            f"option {idle[0]} of {name} only shapes simulated experiments: leave it out for "
+            f"option {idle[0]} of {name} affects only simulated experiments: omit it for "
             "measurement files",
             name=idle[0],
         )
@@ -165,19 +164,19 @@ def choose(
 
 
 def _require_columns_alone(method: Method, question: Question) -> None:
-    """Refuse what methods of any bench take, but columns of the method's signals.
+    """Reject inputs of general methods, except columns of the method's signals.
 
     Raises
     ------
     InputError
-        For anything else that is asked, and signals that the method does not take.
+        For any other input, and signals that the method does not take.
     """
     noisy = any(question.noise.values())
     beyond = [name for name in question.given if name not in ("inputs", "outputs")]
     if beyond or noisy:
         raise ParameterError(
             f"{option(beyond[0] if beyond else 'outputs')}{'' if beyond else ' with a noise'} is "
-            f"for methods of any bench "
+            f"only for methods of any bench "
             f"({', '.join(BENCH_METHODS.all())}): leave it out for {method.name}",
             name=option(beyond[0] if beyond else "outputs"),
         )
@@ -193,16 +192,16 @@ def _columns_of(method: Method, question: Question, time: str) -> NamedColumns:
     Parameters
     ----------
     method
-        What takes the signals.
+        Method that takes the signals.
     question
-        Columns of outputs, and of what drives the model.
+        Columns of outputs and inputs.
     time
-        Column of the instants.
+        Time column.
 
     Raises
     ------
     ParameterError
-        When one name means two columns.
+        If one name means two columns.
     """
     outputs = question.columns
     units = {**method.optional, **method.signals}
@@ -238,7 +237,7 @@ def _with_parameters(
 
 
 def _options(method: Method, values: Mapping[str, Any]) -> ParameterSet:
-    """Return a method's options with some of them changed."""
+    """Return a method's options with changes."""
     try:
         given = parsed(method.options, values, f"option of {method.name}")
         return method.defaults.replace(given)
@@ -247,28 +246,29 @@ def _options(method: Method, values: Mapping[str, Any]) -> ParameterSet:
 
 
 def _require_not_fitted(holdout: Source, measurements: Sequence[Source]) -> None:
-    """Refuse a held-out measurement that is fitted too, or none beside it: it proves nothing."""
+    """Reject a held-out measurement that is also fitted, or without a fitted one."""
     if not measurements:
         raise ParameterError(
-            f"{option('holdout')} is for measurement files: leave it out", name=option("holdout")
+            f"{option('holdout')} is only for measurement files: leave it out",
+            name=option("holdout"),
         )
     for fitted in measurements:
         if isinstance(holdout, xr.Dataset) or isinstance(fitted, xr.Dataset):
             if isinstance(fitted, xr.Dataset) and fitted is holdout:
                 raise ParameterError(
-                    f"{option('holdout')} is also fitted: hold out a record that is not",
+                    f"{option('holdout')} is also fitted: choose a record that is not fitted",
                     name=option("holdout"),
                 )
             continue
         try:
             equal = filecmp.cmp(fitted, holdout, shallow=False)
-        except OSError:  # reading says what is wrong with it
+        except OSError:  # reading the file will report the error
             continue
         if equal:
             same = "is" if Path(fitted).samefile(holdout) else "has the same content as"
             raise ParameterError(
-                f"{option('holdout')} {holdout} {same} {fitted}, which is fitted: hold out a "
-                "record that is not",
+                f"{option('holdout')} {holdout} {same} {fitted}, which is fitted: choose a record "
+                "that is not fitted",
                 name=option("holdout"),
                 value=str(holdout),
             )
@@ -282,7 +282,7 @@ def _on_bench(
     time: str,
     progress: Progress,
 ) -> Method:
-    """Return a method of any bench for the one that is asked about."""
+    """Return a general method for the bench of the question."""
     if question.bench is None:
         raise ParameterError(
             f"{method.name} needs {option('bench')}: a bench file (TOML), or an experiment of "
@@ -311,7 +311,7 @@ def _on_bench(
 _STARTS = "starts.jsonl"
 """file of the output folder that keeps finished starts"""
 
-_FAR = 30.0  # times: beyond, a unit is the first suspect
+_FAR = 30.0  # factor above which a wrong unit is the first suspect
 
 
 def identified(
@@ -327,7 +327,7 @@ def identified(
     seed: int,
     progress: Progress,
 ) -> Identification:
-    """Return what a method finds in measurements, or in a simulated one; see `bywire.identify`."""
+    """Identify measurements, or a simulated one, by a method; see `bywire.identify`."""
     method = chosen.method
     named = _columns_of(method, question, time)
     _require_one_source(chosen, sources, synthetic, mapping, time)
@@ -367,15 +367,15 @@ def identified(
 
 
 def _far_off(estimates: Mapping[str, float], before: Mapping[str, float]) -> list[str]:
-    """Return a note for every parameter that is far from what it was, as by a wrong unit."""
+    """Return a note on every parameter far from its earlier value, as with a wrong unit."""
     notes = []
     for name, value in estimates.items():
         known = before.get(name, 0.0)
         ratio = abs(value / known) if known else 1.0
         if ratio > _FAR or ratio * _FAR < 1.0:
             notes.append(
-                f"{name} is {ratio:.3g} times what it was before: are the units of the "
-                "measurement right (the map's 'unit')?"
+                f"{name} is {ratio:.3g} times its earlier value: are the units of the measurement "
+                "right (the map's 'unit')?"
             )
     return notes
 
@@ -387,12 +387,12 @@ def _require_one_source(
     mapping: str | Path | None,
     time: str,
 ) -> None:
-    """Refuse both a measured and a simulated experiment, and neither; and what fits neither.
+    """Require either a measured or a simulated experiment, with matching arguments.
 
     Raises
     ------
     ParameterError
-        With what is missing, or to be left out.
+        With the missing or excess argument.
     """
     method = chosen.method
     study = f"{option('study') if is_command_line() else 'bywire.trust, with count'} COUNT"
@@ -410,7 +410,7 @@ def _require_one_source(
     for name, given in {"mapping": mapping is not None, "time": bool(time)}.items():
         if given and not sources:
             raise ParameterError(
-                f"{option(name)} is for measurement files: leave it out", name=option(name)
+                f"{option(name)} is only for measurement files: leave it out", name=option(name)
             )
 
 
@@ -422,7 +422,7 @@ def _data_of(
     synthetic: int | None,
     progress: Progress,
 ) -> tuple[Measured, str]:
-    """Return the measurement, and what it is in one line."""
+    """Return the measurement, and one line on its source."""
     method = chosen.method
     if synthetic is None:
         read = measured(
@@ -444,7 +444,7 @@ def _data_of(
 
 
 def _start_of(chosen: ChosenMethod, synthetic: int | None) -> ParameterSet | None:
-    """Return the parameters from which the search begins: off those that were put in."""
+    """Return the parameters at which the search begins, displaced for a simulated measurement."""
     if synthetic is None or chosen.par is None:
         return chosen.par
     return displaced(chosen.par, chosen.method.unknowns, Effort().spread, synthetic)
@@ -453,12 +453,12 @@ def _start_of(chosen: ChosenMethod, synthetic: int | None) -> ParameterSet | Non
 def _search(
     chosen: ChosenMethod, start: ParameterSet | None, data: xr.Dataset, effort: Effort
 ) -> Identified:
-    """Return what the method finds; an interrupted search says where its starts are kept.
+    """Run the method; an interrupted search names the file of its finished starts.
 
     Raises
     ------
     KeyboardInterrupt
-        When interrupted.
+        If interrupted.
     """
     require_signals(data, chosen.method.signals)
     try:
@@ -467,19 +467,19 @@ def _search(
         if effort.store is None or not effort.store.exists():
             raise
         raise KeyboardInterrupt(
-            f"finished starts are in {effort.store}: the same command goes on from there"
+            f"finished starts are in {effort.store}: repeat the command to continue"
         ) from None
 
 
 def _begun_at(
     chosen: ChosenMethod, start: ParameterSet | None, identified: Identified
 ) -> dict[str, float]:
-    """Return the values from which the search began, by label."""
+    """Return the values at which the search began, by label."""
     if start is None:
         return {}
     if chosen.method.bench is None:
         return start.leaves()
-    # A range that leaves out the bench's own value begins elsewhere.
+    # If the range excludes the bench's value, the search begins elsewhere.
     return start.leaves() | {
         u.label: u.start for e in identified.estimates.values() for u in e.all_unknowns
     }
@@ -502,15 +502,15 @@ def parameter_file(
     Parameters
     ----------
     experiment
-        Experiment that the file runs; another one of the same assembly where it wants more than
+        Experiment that the file runs; another one of the same assembly if it needs more than
         parameters.
     parameters
-        Name of the parameter set that the changes are made to.
+        Name of the changed parameter set.
     par
         Parameters of that set, for units.
     changes
-        Dotted name -> value, SI, or choice. What has no effect in the experiment is left
-        out, and a comment says so.
+        Dotted name -> value, SI, or choice. Changes without effect in the experiment become
+        comments.
     comment
         First line.
     """
@@ -520,7 +520,7 @@ def parameter_file(
         for other in _alternatives(parameters):
             accepted, left, trouble = _accepted(other, parameters, changes)
             if not trouble:
-                notes.append(f"experiment {experiment!r} wants more than this file says: {problem}")
+                notes.append(f"experiment {experiment!r} needs more than this file has: {problem}")
                 experiment, wanted, left_out = other, accepted, left
                 break
     lines = [f"# {line}" for line in notes]
@@ -536,7 +536,7 @@ def parameter_file(
 def _accepted(
     experiment: str, parameters: str, changes: Mapping[str, Any]
 ) -> tuple[dict[str, Any], list[str], str]:
-    """Return the changes that take effect, the others' names, and why none of it runs."""
+    """Return effective changes, names of the others, and the reason why the bench is invalid."""
     wanted: dict[str, Any] = dict(changes)
     left_out: list[str] = []
     while True:
@@ -553,7 +553,7 @@ def _accepted(
 
 
 def _alternatives(parameters: str) -> list[str]:
-    """Return the experiments of a parameter set's assembly that bring all they need."""
+    """Return the experiments of a parameter set's assembly that need no stimulus."""
     assembly = PARAMETER_SETS.find(parameters).assembly
     return [
         experiment.name
@@ -579,24 +579,24 @@ def _nodes(value: Any) -> tuple[float, ...]:
     return (float(value),)
 
 
-# --- What an earlier identification or study left in the folder of ``--out``
+# --- Earlier identifications and studies in the folder of ``--out``
 
 _ESTIMATE = "estimate.json"
-"""file of the output folder that says which method wrote it, and what else it wrote"""
+"""file of the output folder with its method and its further files"""
 
 STUDY = "study.json"
-"""file of the output folder that says which method a study tried, and what came of it"""
+"""file of the output folder with a study's method and results"""
 
 _OURS = (".html", ".nc", ".png", ".toml")
 
 
 def require_own(out: Path, method: str) -> None:
-    """Refuse a folder that holds a result or a study of another method.
+    """Reject a folder with a result or a study of another method.
 
     Raises
     ------
     FileError
-        When it does, or what it holds cannot be read.
+        If there is one, or the files cannot be read.
     """
     for path, what in ((out / _ESTIMATE, "result"), (out / STUDY, "study")):
         earlier = _read(path)
@@ -616,31 +616,31 @@ def remove_study(out: Path) -> None:
     Raises
     ------
     FileError
-        When it cannot be removed.
+        If it cannot be removed.
     """
     _unlink(out / STUDY)
 
 
 def _remove(out: Path, keep: Sequence[Path]) -> None:
-    """Remove the files of an earlier result, so that none stands beside the new one.
+    """Remove the files of an earlier result, so that they do not mix with the new one.
 
     Parameters
     ----------
     out
         Folder.
     keep
-        Files that stay: what is just being identified.
+        Files to keep: the current measurements.
 
     Raises
     ------
     FileError
-        When one cannot be removed.
+        If a file cannot be removed.
     """
     earlier = _read(out / _ESTIMATE)
     if earlier is None:
         return
     kept = {path.resolve() for path in keep}
-    # Names alone, within the folder: it may have moved since. The list itself goes last.
+    # Only names within the folder, which may have moved. The list itself is removed last.
     names = [Path(str(text)).name for text in earlier.get("files", [])]
     written = [out / name for name in names if Path(name).suffix in _OURS]
     for path in (*written, out / _ESTIMATE):
@@ -654,13 +654,13 @@ def _unlink(path: Path) -> None:
             path.unlink()
     except OSError as error:
         raise FileError(
-            f"cannot remove {path} of an earlier result: {error.strerror}; name another folder "
+            f"cannot remove {path} from an earlier result: {error.strerror}; name another folder "
             f"with {option('folder')}"
         ) from None
 
 
 def _read(path: Path) -> dict[str, Any] | None:
-    """Return an earlier result, None where there is none."""
+    """Return an earlier result, or None."""
     if not path.exists():
         return None
     try:
@@ -681,28 +681,28 @@ def _read(path: Path) -> dict[str, Any] | None:
 
 @dataclass(frozen=True)
 class Identification(Answer):
-    """An identification with all that went into it.
+    """An identification with its inputs.
 
     Parameters
     ----------
     chosen
         The method with its parameters and options.
     identified
-        What it found.
+        Result of the method.
     data
         The measurement, over ``time`` [s].
     source
         The measurement in one line.
     start
-        Values from which the search began, by the estimates' labels, SI.
+        Values at which the search began, by the estimates' labels, SI.
     put_in
-        What a simulated measurement is made of, likewise; empty for a measured one.
+        True values of a simulated measurement, by the same labels; empty for a measured one.
     data_notes
-        What was done to the measurement, and what of it is doubtful.
+        Notes on the processing of the measurement, and on doubtful data.
     is_simulated
-        Whether the measurement is simulated, and kept beside the result.
+        Whether the measurement is simulated, and written with the result.
     files
-        Measurement files: they stay when an earlier result is tidied away.
+        Measurement files, which stay if an earlier result is removed.
     """
 
     chosen: ChosenMethod
@@ -717,17 +717,17 @@ class Identification(Answer):
 
     @property
     def parameters(self) -> dict[str, float]:
-        """Identified parameters by dotted name, SI: what a bench takes as overrides."""
+        """Identified parameters by dotted name, SI, as overrides of a bench."""
         return dict(self.identified.parameters)
 
     @property
     def estimates(self) -> dict[str, Estimate]:
-        """Estimates with their covariance, by what they are of."""
+        """Estimates with their covariance, by subject."""
         return dict(self.identified.estimates)
 
     @property
     def notes(self) -> list[str]:
-        """What was done to the measurement, and what of it is doubtful."""
+        """Notes on the processing of the measurement, and on doubtful data."""
         return list(self.data_notes)
 
     @property
@@ -746,15 +746,15 @@ class Identification(Answer):
         return not self.failures
 
     def bench_file(self) -> str:
-        """Return the text of a bench file with the parameters; failed checks stand at its top.
+        """Return the text of a bench file with the parameters, headed by failed checks.
 
-        Empty where there are no parameters of an assembly, or none that are fit for use.
+        It is empty without usable parameters of an assembly.
         """
         method, par = self.chosen.method, self.chosen.par
         if par is None or not self.identified.parameters:
             return ""
         lines = [
-            f"CHECK FAILED, do not use it as it is: {c.name} = {c.value:.4g} "
+            f"CHECK FAILED, do not use this file: {c.name} = {c.value:.4g} "
             f"(limit {'>=' if c.at_least else '<='} {c.limit:g}): {c.note}"
             for c in self.identified.checks
             if not c.holds
@@ -762,7 +762,7 @@ class Identification(Answer):
         lines.append(f"identified by {method.name} from {self.source}")
         for estimate in self.identified.estimates.values():
             lines += [f"not told by the data: {k.unknown.label}" for k in estimate.kept]
-            lines += [f"lies at its bound: {label}" for label in estimate.at_bounds()]
+            lines += [f"at its bound: {label}" for label in estimate.at_bounds()]
         comment = "\n".join([*lines, *([method.bench_note] if method.bench_note else [])])
         if method.bench is not None:
             from bywire.bench.bench_file import bench_text
@@ -772,7 +772,7 @@ class Identification(Answer):
         return parameter_file(method.experiment, self.chosen.name, par, changes, comment)
 
     def document(self) -> Document:
-        """Return parameters, checks, curves, residuals, correlations, and how it was made."""
+        """Return parameters, checks, curves, residuals, correlations, and settings."""
         method, subject = self.chosen.method, self.chosen.subject
         head = f"{method.name}, {self.source}: {method.summary}"
         return Document(
@@ -818,7 +818,7 @@ class Identification(Answer):
         if self.identified.figures:
             yield TableBlock(figure_table(self.identified), "Further results.")
         if self.identified.checks:
-            yield TableBlock(check_table(self.identified.checks), "Whether to believe it.")
+            yield TableBlock(check_table(self.identified.checks), "Checks.")
         if self.identified.notes:
             yield Listing(self.identified.notes)
 
@@ -837,14 +837,14 @@ class Identification(Answer):
         blocks: list[Block] = [
             FigureBlock(
                 partial(correlation_matrix, estimate),
-                f"{name}: correlations of the estimates. Near 1 or -1 the data tells a "
+                f"{name}: correlations of the estimates. Near 1 or -1, the data determine a "
                 "combination of the two rather than either.",
                 key,
             )
             for key, name, estimate in self._keyed("correlation")
             if len(estimate.unknowns) > 1
         ]
-        return blocks or [Paragraph("One unknown alone has no correlations.")]
+        return blocks or [Paragraph("A single unknown has no correlations.")]
 
     def _keyed(self, kind: str) -> Iterator[tuple[str, str, Estimate]]:
         """Yield file name of a figure, capitalized name of an estimate, and the estimate."""
@@ -859,7 +859,7 @@ class Identification(Answer):
         chosen = Details("Options of the method", [TableBlock(parameter_table(rows))])
         if subject is None:
             changed = changes_block(self.chosen.changed, "", method.name)
-            return Section("How it was made", [Paragraph(method.summary), changed, chosen])
+            return Section("Settings", [Paragraph(method.summary), changed, chosen])
         section = subject.provenance(f"Method {method.name}: {method.summary}.")
         return Section(section.title, [*section.blocks, chosen])
 
@@ -867,7 +867,7 @@ class Identification(Answer):
         failed = [check.name for check in self.identified.checks if not check.holds]
         untold = [k.unknown.label for e in self.identified.estimates.values() for k in e.kept]
         if failed:
-            return Banner(f"Do not use it as it is: {', '.join(failed)} failed.", "bad")
+            return Banner(f"Do not use this result: {', '.join(failed)} failed.", "bad")
         if untold:
             return Banner(f"All checks hold; not told by the data: {', '.join(untold)}.", "none")
         return Banner("All checks hold.", "good")
@@ -905,7 +905,7 @@ class Identification(Answer):
         }
 
     def _of_estimates(self, values: Mapping[str, float]) -> dict[str, float]:
-        """Return those values that an estimate, or an unknown that is not told, stands beside."""
+        """Return the values of all unknowns, estimated or not."""
         labels = [u.label for e in self.identified.estimates.values() for u in e.all_unknowns]
         return {label: values[label] for label in labels if label in values}
 
@@ -921,18 +921,18 @@ class Identification(Answer):
         return write_measurement(self.data, path, overwrite=True)
 
     def _file_notes(self) -> list[str]:
-        """Return what the user should know of the bench file, or why there is none."""
+        """Return a note on the bench file, or why there is none."""
         method = self.chosen.method
         if self.identified.parameters and self.chosen.par is not None:
             return [f"parameters.toml: {method.bench_note}"] if method.bench_note else []
         asked = self.chosen.par is not None and method.unknowns
         reason = (
-            "no estimate is fit for use"
+            "no estimate is usable"
             if asked
-            else f"{method.name} gives no parameters of an assembly; take its figures from "
+            else f"{method.name} gives no parameters of an assembly; its figures are in "
             "estimate.json"
         )
-        return [f"no parameters.toml is written: {reason}"]
+        return [f"bywire writes no parameters.toml: {reason}"]
 
     def _prepare(self, folder: Path) -> None:
         require_own(folder, self.chosen.method.name)
@@ -941,10 +941,10 @@ class Identification(Answer):
 
 def _residual_caption(name: str, estimate: Estimate) -> str:
     follows = (
-        "Neighbors go together: what the model misses lasts longer than a sample, and the "
-        "intervals allow for that"
+        "Neighboring residuals are correlated: the model's errors last longer than a sample, and "
+        "the intervals account for that"
         if estimate.colored
-        else "Neighbors are independent, as noise is"
+        else "Neighboring residuals are independent, like noise"
     )
     return (
         f"{name}: residuals of {estimate.residuals.size} measured values, root mean square "

@@ -1,4 +1,4 @@
-"""How long a brake lasts: its slow states over thousands of stops, and what ends its life."""
+"""Life of a brake: slow states over thousands of stops, and the end of life."""
 
 from __future__ import annotations
 
@@ -36,20 +36,20 @@ from bywire.report.tables import KpiRow, Table, amount_cell, kpi_table, paramete
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_MOST = 100_000  # stops that are run one by one
+_MOST = 100_000  # largest number of stops to run one by one
 _PROJECTION = ("stops", "seed", "share", "tolerance", "longest")
 
 
 @dataclass(frozen=True, repr=False)
 class LifeResult(Answer):
-    """How long a brake lasts.
+    """Projected life of a brake.
 
     Parameters
     ----------
     projection
-        Slow states and what is left of the limits over stops, SI.
+        Slow states and margins to the limits over stops, SI.
     checked
-        Slow states of stops run one by one, shape (stops + 1,) each; empty where none were.
+        Slow states of stops run one by one, shape (stops + 1,) each; may be empty.
     """
 
     projection: Projection
@@ -57,18 +57,18 @@ class LifeResult(Answer):
 
     @property
     def warnings(self) -> list[str]:
-        """What the runs warned of: alike but for numbers, the first one stands for all."""
+        """Warnings of the runs; of those that differ only in numbers, the first."""
         kinds: dict[str, list[str]] = {}
         for text in self.projection.warnings:
             kinds.setdefault(re.sub(r"-?\d[\d.e+-]*", "#", text), []).append(text)
         return [
-            texts[0] + (f" (and {len(texts) - 1} alike)" if len(texts) > 1 else "")
+            texts[0] + (f" (and {len(texts) - 1} similar)" if len(texts) > 1 else "")
             for texts in kinds.values()
         ]
 
     @property
     def data(self) -> xr.Dataset:
-        """Slow states and what is left of the limits after each stop, dimension ``stop``, SI."""
+        """Slow states and margins to the limits after each stop, dimension ``stop``, SI."""
         life, made = self.projection.plan.life, self.projection
         told = {**life.states, **{f"left_{name}": each for name, each in life.limits.items()}}
         values = {**made.states, **{f"left_{name}": each for name, each in made.left.items()}}
@@ -81,9 +81,9 @@ class LifeResult(Answer):
         )
 
     def deviation(self, name: str) -> float:
-        """Return by how much the projected change of a state differs from stops one by one.
+        """Return the relative error of a state's projected change, against stops one by one.
 
-        A share of that change; NaN where none were run, or where it does not change.
+        NaN if no stops were run one by one, or the state does not change.
         """
         if not self.checked:
             return math.nan
@@ -93,7 +93,7 @@ class LifeResult(Answer):
         return made / change - 1.0 if change else math.nan
 
     def document(self) -> Document:
-        """Return how long it lasts, what ends it, slow states, and how it was stepped."""
+        """Return the stops until the end of life, its cause, slow states, and settings."""
         plan = self.projection.plan
         subject = Subject.of_bench(
             plan.bench,
@@ -136,7 +136,7 @@ class LifeResult(Answer):
     def _outcome(self) -> str:
         made = self.projection
         if not made.ended_by:
-            return f"no end within {made.stops} stops"
+            return f"no end of life within {made.stops} stops"
         half = math.ceil(made.error)
         about = f" +- {half}" if half else ""
         return f"{made.stops}{about} stops: {made.plan.life.limits[made.ended_by].label} is used up"
@@ -144,17 +144,19 @@ class LifeResult(Answer):
     def _rows(self) -> list[KpiRow]:
         made, life = self.projection, self.projection.plan.life
         runs = sum(len(which) for _, which in made.plan.known)
-        end = "ended by: " + life.limits[made.ended_by].label if made.ended_by else "no limit met"
+        end = (
+            "ended by: " + life.limits[made.ended_by].label if made.ended_by else "no limit reached"
+        )
         rows = [
             KpiRow("stops", float(made.stops), "1", f"Stops until the end of life; {end}."),
             KpiRow(
                 "interval",
                 made.error,
                 "1",
-                f"Half the width of its {100 * CONFIDENCE:g} % interval, by the sample of "
+                f"Half width of its {100 * CONFIDENCE:g} % interval, from the sample of "
                 f"{made.plan.count} stop{'s' * (made.plan.count > 1)}.",
             ),
-            KpiRow("runs", float(runs), "1", "Stops that were simulated for it."),
+            KpiRow("runs", float(runs), "1", "Simulated stops."),
         ]
         for name, each in life.states.items():
             if not math.isnan(share := self.deviation(name)):
@@ -193,7 +195,7 @@ class LifeResult(Answer):
     def _population(self) -> list[str]:
         plan = self.projection.plan
         if not plan.varied:
-            return ["all stops are alike"]
+            return ["all stops are identical"]
         return [f"{each.name}: {each.distribution.text}" for each in plan.varied]
 
     def _drawn(self) -> Figure:
@@ -237,13 +239,13 @@ class LifeResult(Answer):
 
 
 _CAPTION = (
-    "Slow states over stops, with dots where stops were simulated, and what is left of the limits: "
-    "life ends where the first one is zero."
+    "Slow states over stops, with dots at simulated stops, and margins to the limits. Life ends "
+    "where the first margin reaches zero."
 )
 
 
 def _wear_changes(plan: LifePlan) -> tuple[Change, ...]:
-    """Return what a life file sets of wear, of the conditions of stops, and of the projection."""
+    """Return a life file's settings of wear, of the conditions of stops, and of the projection."""
     life, wear = plan.life, plan.life.defaults()
     origins = {name: ", ".join(filter(None, (c.kind, c.where))) for name, c in life.values.items()}
     of = f"the life {life.name}"
@@ -261,12 +263,12 @@ def _wear_changes(plan: LifePlan) -> tuple[Change, ...]:
 
 
 def require_checkable(check: int, plan: LifePlan) -> None:
-    """Refuse a number of stops, to be run one by one, that says nothing of a life.
+    """Reject a number of stops one by one that cannot check the projection.
 
     Raises
     ------
     ParameterError
-        When it is none, too large, or below the stops that stand for the population.
+        If it is invalid, too large, or below the number that represents the population.
     """
     whole_number("check", check, 0, _MOST)
     if 0 < check < plan.count:

@@ -1,4 +1,4 @@
-"""What is said of linear models: JSON objects, poles, and lines on reductions, loci, dither."""
+"""Texts and JSON objects of linear models: poles, reductions, root loci, dither."""
 
 from __future__ import annotations
 
@@ -29,17 +29,15 @@ _SAME = 1e-9  # of half the sampling frequency
 
 
 def rate_table(model: LinearModel) -> Table:
-    """Return the poles as a table: rate, frequency, damping ratio; of pairs one.
+    """Return the poles as a table: rate, frequency, damping ratio; one row per pair.
 
-    A negative real pole of a sampled model swings at half the sampling frequency, and is marked:
-    it is a single one, of no damping ratio.
-
-    ``model``: poles of what does not move are left out, see `left_out`.
+    A negative real pole of a sampled model oscillates at half the sampling frequency. It is marked,
+    because it is single and has no damping ratio. Poles at zero are omitted, see `left_out`.
     """
     rows = []
     for s in rates(model):
         size = abs(s)
-        if s.imag < -1e-9 or size < STILL:  # the other of a pair; what does not move
+        if s.imag < -1e-9 or size < STILL:  # the other pole of a pair; poles at zero
             continue
         values = (s.real, s.imag, size / 2.0 / np.pi, -s.real / size)
         units = ("1/s", "rad/s", "Hz", "1")
@@ -56,27 +54,27 @@ def rate_table(model: LinearModel) -> Table:
 
 
 def left_out(model: LinearModel) -> list[str]:
-    """Return a line on the poles that `rate_table` does not show; none where it shows all."""
+    """Return a line on the poles that `rate_table` omits, if there are any."""
     speeds = rates(model)
     still, dead = int(np.sum(np.abs(speeds) < STILL)), len(model.states) - len(speeds)
     parts = []
     if still:
-        parts.append(f"{still} at 0 (not driven, or not brought back)")
+        parts.append(f"{still} at 0 (not driven, or without restoring force)")
     if dead:
-        parts.append(f"{dead} over within a sample")
+        parts.append(f"{dead} that decay within a sample")
     return [f"other poles: {', '.join(parts)}"] if parts else []
 
 
-# --- Words and JSON
+# --- Texts and JSON
 
 
 def poles_block(model: LinearModel, caption: str = "") -> list[Flat]:
-    """Return the table of a model's poles, and what it leaves out."""
+    """Return the table of a model's poles, and a line on those omitted."""
     return [TableBlock(rate_table(model), caption), *map(Paragraph, left_out(model))]
 
 
 def json_file(name: str, content: Mapping[str, Any]) -> Attachment:
-    """Return a file that holds a JSON object."""
+    """Return a file with a JSON object."""
     return Attachment(name, partial(_write_json, content))
 
 
@@ -134,23 +132,23 @@ def pairs(values: Any) -> list[list[float]]:
 
 
 def reduced(model: LinearModel, text: str, band: float | None = None) -> Reduced:
-    """Return the reduced model that a text asks for.
+    """Return the reduced model that a text requests.
 
     Parameters
     ----------
     model
         Full model.
     text
-        An order, ``"4"``, or a band, ``"150 Hz"``: as few states as 1 % of error allows there.
+        An order, ``"4"``, or a band, ``"150 Hz"``, in which the error must be at most 1 %.
     band
-        Frequency [Hz] up to which the error of an order is told; the model's own where None.
+        Frequency [Hz] up to which the error of an order is estimated; by default the model's.
 
     Raises
     ------
     ParameterError
-        When it is neither, or out of range.
+        If the text is neither, or out of range.
     UnitError
-        When the band has a wrong unit.
+        If the band has a wrong unit.
     """
     if _is_number(text):
         order = read_count(text)
@@ -187,14 +185,14 @@ def reduced_object(reduced: Reduced) -> dict[str, Any]:
 
 
 def corner_notes(corners: Iterable[Sequence[str]]) -> list[str]:
-    """Return on which side of corners linear models are, each once; nothing where on none."""
+    """Return a note on each corner's side of linear models, without repetitions."""
     texts = dict.fromkeys(text for each in corners for text in each)
     return [f"the operating point lies on a corner: the linear model is {each}" for each in texts]
 
 
 def reduced_line(reduced: Reduced) -> str:
     """Return order and error of a reduced model as a line."""
-    kept = f", {reduced.kept} of them kept as they are not stable" if reduced.kept else ""
+    kept = f", of which {reduced.kept} unstable ones are kept" if reduced.kept else ""
     return f"reduced to {len(reduced.model.states)} states{kept}; {error_line(reduced.error)}"
 
 
@@ -218,7 +216,7 @@ def error_line(error: ReductionError) -> str:
         f"largest error up to {error.high:.4g} Hz: {_percent(error.relative)} "
         f"({error.gain:.2g} dB, {error.phase:.2g} degrees), at {error.at:.3g} Hz"
         + (f" in {error.channel[0]} by {error.channel[1]}" if error.channel[0] else "")
-        + ("" if math.isnan(error.poles) else f"; its poles there {_percent(error.poles)} off")
+        + ("" if math.isnan(error.poles) else f"; error of its poles there {_percent(error.poles)}")
     )
 
 
@@ -227,7 +225,7 @@ def _percent(share: float) -> str:
 
 
 def locus_object(locus: Locus) -> dict[str, Any]:
-    """Return values, poles by value [real, imaginary], and where stability changes."""
+    """Return values, poles by value [real, imaginary], and borders of stability."""
     return {
         "over": locus.name,
         "unit": locus.unit,
@@ -243,7 +241,7 @@ def locus_object(locus: Locus) -> dict[str, Any]:
 
 
 def locus_lines(locus: Locus) -> list[str]:
-    """Return where over its range a loop is stable, a text each."""
+    """Return a text on each border of stability over the range."""
     from bywire.report.poles import border_text
 
     if not locus.borders:
@@ -253,7 +251,7 @@ def locus_lines(locus: Locus) -> list[str]:
 
 
 def dithered_object(model: PeriodicModel) -> dict[str, Any]:
-    """Return the JSON object of the averaged map, and the motion that it is about."""
+    """Return the JSON object of the averaged map and its periodic motion."""
     linear = model.averaged
     shown = state_space(linear)
     names = ("period", "A", "B", "C", "D", "states", "inputs", "outputs", "poles")
@@ -270,14 +268,14 @@ def dithered_object(model: PeriodicModel) -> dict[str, Any]:
 
 
 def dithered_line(model: PeriodicModel) -> str:
-    """Return the motion that the model is about as a line."""
+    """Return a line on the periodic motion about which the model is linearized."""
     linear = model.averaged
     unit = signals_of(model.run.model.Output)[model.output].unit
     stable = "stable" if linear.is_stable else "UNSTABLE"
     return (
-        f"with friction and dither, averaged over {linear.period * 1e3:g} ms: {stable}; "
-        f"{model.output} = {amount(model.mean, unit)} in the mean, "
-        f"{amount(model.ripple, unit)} of ripple, stuck {100 * model.orbit.stuck:.3g} % of the "
+        f"with friction and dither, averaged over {linear.period * 1e3:g} ms: {stable}; mean of "
+        f"{model.output} {amount(model.mean, unit)}, ripple "
+        f"{amount(model.ripple, unit)}, stuck {100 * model.orbit.stuck:.3g} % of the "
         f"time, steady gain {model.steady_gain:.4g}"
     )
 
@@ -288,14 +286,14 @@ def small_sines(model: PeriodicModel, band: tuple[float, float]) -> Array:
 
 
 def small_gains_line(model: PeriodicModel, band: tuple[float, float], error: float) -> str:
-    """Return the gain to small sines at five frequencies of a band [Hz] as a line.
+    """Return a line on the gain to small sines at five frequencies of a band [Hz].
 
-    ``error``: the largest of these gains from the step, as a share.
+    ``error``: the largest numerical error of these gains, as a share.
     """
     frequencies = small_sines(model, band)
-    known = f"{100 * error:.1g} %" if math.isfinite(error) else "unknown, no motion repeats there"
+    known = f"{100 * error:.1g} %" if math.isfinite(error) else "unknown, no periodic motion"
     gains = ", ".join(
         f"{abs(h):.3g} at {f:.3g} Hz"
         for f, h in zip(frequencies, model.response(frequencies), strict=True)
     )
-    return f"gain to small sines: {gains} (error from the step, by half steps: {known})"
+    return f"gain to small sines: {gains} (numerical error, from half steps: {known})"

@@ -52,7 +52,7 @@ _MADE = "Exact linear model of the plant, sources in place of its controllers."
 
 @dataclass(frozen=True)
 class PlantCase:
-    """A plant with the parameters and the operating point that a user asked for.
+    """A plant with the requested parameters and operating point.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ class PlantCase:
     name, par
         Name of the parameter set, and the values in use.
     point
-        Where it is linearized, and what friction does there.
+        Operating point, and the state of friction there.
     """
 
     plant: Plant
@@ -71,7 +71,7 @@ class PlantCase:
 
     @property
     def point_text(self) -> str:
-        """The operating point and what friction does there."""
+        """The operating point and the state of friction there."""
         point = self.point
         moving = f" at {point.speed:g} rad/s" if point.speed else ""
         value = amount(point.value, point.quantity.unit)
@@ -79,7 +79,7 @@ class PlantCase:
 
     @property
     def subject(self) -> Subject:
-        """What a report says of plant and operating point."""
+        """Plant and operating point for reports."""
         plant = self.plant
         return Subject(plant.name, plant.summary, self.name, self.par, self.point_text)
 
@@ -93,9 +93,9 @@ class LinearizedPlant(Answer):
     case
         The plant, its parameters and its operating point.
     model
-        From its inputs to its outputs; ``model.state_space()`` is python-control's.
+        Model from its inputs to its outputs; ``model.state_space()`` is python-control's.
     reduced
-        The model with fewer states; None where none was asked for.
+        The reduced model; None if it was not requested.
     """
 
     case: PlantCase
@@ -104,23 +104,23 @@ class LinearizedPlant(Answer):
 
     @property
     def notes(self) -> list[str]:
-        """On which side of corners the model is."""
+        """Side of corners of the model."""
         return texts.corner_notes([self.model.corners])
 
     @cached_property
     def exact(self) -> LinearModel | None:
-        """The model that this one simplifies; None where it is exact."""
+        """The exact model of a simplified one; None if the model is exact."""
         return self.case.plant.exact(self.case.par, self.case.point)
 
     @cached_property
     def error(self) -> ReductionError | None:
-        """How far it is from the exact model; None where it is exact."""
+        """Error against the exact model; None if the model is exact."""
         if self.exact is None:
             return None
         return reduction_error(self.exact, self.model, self.case.plant.band)
 
     def document(self) -> Document:
-        """Return poles and responses, beside those of the exact and the reduced model."""
+        """Return poles and responses, with those of the exact and the reduced model."""
         case, model = self.case, self.model
         head = (
             f"plant {case.plant.name} of {case.name} at {case.point_text}: {len(model.states)} "
@@ -142,12 +142,12 @@ class LinearizedPlant(Answer):
         return [texts.reduced_line(self.reduced), *texts.poles_block(self.reduced.model)]
 
     def _notes(self) -> list[str]:
-        """Return what friction makes of the model, or how far it is from the whole plant."""
+        """Return a note on stuck friction, or on the error against the full plant."""
         if not self.model.effective():
-            return ["nothing that the inputs reach moves an output: what friction holds, rests"]
+            return ["the inputs move no output, because friction holds the plant at rest"]
         if self.error is None:
             return []
-        return [f"against the whole plant: {texts.error_line(self.error)}"]
+        return [f"against the full plant: {texts.error_line(self.error)}"]
 
     def _sections(self) -> list[Section]:
         case, notes = self.case, self._notes()
@@ -198,7 +198,7 @@ class PlantLocus(Answer):
     locus: Locus
 
     def document(self) -> Document:
-        """Return where the plant turns unstable, and its root locus."""
+        """Return borders of stability, and the root locus."""
         case, point = self.case, self.case.point
         name = case.plant.name
         listing = Listing(texts.locus_lines(self.locus))
@@ -262,18 +262,18 @@ def _plant_case(
     parameters
         Parameter set; empty for the main one of the plant's brake.
     at
-        Operating point; its unit says what it is. Empty for the plant's own.
+        Operating point; its unit selects the quantity. Empty for the plant's nominal one.
     overrides
         Parameters by dotted name, with units.
     friction, speed
-        What dry friction does, and how fast the motors turn; empty: removed, at rest.
+        State of dry friction, and speed of the motors; empty: removed, at rest.
     side
-        As of `loop_case`.
+        See `loop_case`.
 
     Raises
     ------
     InputError
-        For names that are unknown, values out of range, and sets of another brake.
+        For unknown names, values out of range, and parameter sets of another brake.
     """
     read_sides(side)
     plant = replace(PLANTS.find(name), side=side)
@@ -314,9 +314,8 @@ def _friction(friction: str, speed: str) -> tuple[Friction, float]:
         )
     if kind != "sliding" and omega != 0.0:
         raise ParameterError(
-            f"{option('speed')} {speed}: only sliding friction depends on it: add "
-            f"{option('friction', 'sliding')}, or "
-            "leave it out",
+            f"{option('speed')} {speed}: only sliding friction depends on the speed: add "
+            f"{option('friction', 'sliding')}, or leave {option('speed')} out",
             name=option("speed"),
             value=speed,
         )
@@ -331,10 +330,10 @@ def _draw_locus(locus: Locus) -> Figure:
 
 # --- Closed loops
 
-_LOWEST = 1e-2  # lower end of what is searched for the bandwidth, Hz
+_LOWEST = 1e-2  # lower end of the search for the bandwidth, Hz
 _NYQUIST = 0.998  # of half the sampling frequency
 _POINTS = 600
-_DEPTH = 80.0  # of the closed loop's gain that is shown, dB
+_DEPTH = 80.0  # shown range of the closed loop's gain, dB
 
 
 @dataclass(frozen=True)
@@ -346,16 +345,16 @@ class LinearizedLoop(Answer):
     case
         The loop, its parameters and its operating point.
     model
-        From its input to its output, as it is sampled; ``model.state_space()`` is python-control's.
+        Sampled model from input to output; ``model.state_space()`` is python-control's.
     locus
-        Its poles over a range; None where none was asked for.
+        Its poles over a range; None if they were not requested.
     reduced
-        The model with fewer states; None where none was asked for.
+        The reduced model; None if it was not requested.
     dithered
-        The loop about its motion under dither; None where it was not asked for.
+        The loop about its motion under dither; None if it was not requested.
     dithered_error
-        Largest error of its gains to small sines from the step, as a share; infinite where the
-        motion does not repeat itself in half steps.
+        Largest numerical error of its gains to small sines, as a share; infinite if the motion is
+        not periodic in half steps.
     """
 
     case: LoopCase
@@ -367,12 +366,12 @@ class LinearizedLoop(Answer):
 
     @property
     def notes(self) -> list[str]:
-        """On which side of corners the model is."""
+        """Side of corners of the model."""
         return texts.corner_notes([self.model.corners])
 
     @cached_property
     def state(self) -> str:
-        """``"stable"``, ``"unstable"``, or that there is no loop."""
+        """``"stable"``, ``"unstable"``, or a text that there is no loop."""
         gain, closed = self.case.loop.gain_and_closed(self.case.par, self.case.value)
         if not LoopFigures(gain, closed).has_loop:
             return NO_LOOP
@@ -396,7 +395,7 @@ class LinearizedLoop(Answer):
                 Section("Figures", self._figures()),
                 self.case.subject.provenance(
                     f"Exact linear model, sampled with {model.period * 1e3:g} ms: plant, filters "
-                    "and controllers, dry friction left out."
+                    "and controllers, without dry friction."
                 ),
             ],
             brief=[head, *poles, *over, *self._brief_reduced(), *self._brief_dithered()],
@@ -434,8 +433,8 @@ class LinearizedLoop(Answer):
             FigureBlock(
                 partial(_poles, model, width),
                 "Poles of the closed loop as rates; rays of equal damping ratio, circles of equal "
-                "frequency, the unstable half shaded, f_s the sampling frequency. Pairs are shown "
-                "by one of them.",
+                "frequency; shaded: the unstable half; f_s: the sampling frequency. Of a pair, one "
+                "pole is shown.",
                 f"{name}-poles",
             ),
             FigureBlock(
@@ -528,18 +527,18 @@ def linearized(
 ) -> LinearizedLoop | LinearizedPlant | PlantLocus:
     """Return the linear model of a loop or of a plant, or the poles of a plant over a range.
 
-    ``locus``, ``reduce``, ``dither``: as of `bywire.linearize`.
+    ``locus``, ``reduce``, ``dither``: see `bywire.linearize`.
     """
     if isinstance(case, LoopCase):
         return _linearized_loop(case, locus, reduce, dither)
     if dither:
         raise ParameterError(
-            f"{option('dither', True)} is for loops: leave it out, or name a loop",
+            f"{option('dither', True)} is only for loops: leave it out, or name a loop",
             name=option("dither", True),
         )
     if locus and reduce:
         raise ParameterError(
-            f"{option('reduce')} and {option('locus')} exclude each other: give only one of them",
+            f"give either {option('reduce')} or {option('locus')}, not both",
             name=option("reduce"),
         )
     return _plant_locus(case, locus) if locus else _linearized_plant(case, reduce)
@@ -567,17 +566,17 @@ def linear_case(
     speed: str,
     side: str = "",
 ) -> LoopCase | PlantCase:
-    """Return the loop or the plant that is linearized, with its parameters and operating point.
+    """Return the loop or the plant to linearize, with its parameters and operating point.
 
     Parameters
     ----------
     name, parameters, at, overrides, friction, speed, side
-        As of `bywire.linearize`.
+        See `bywire.linearize`.
 
     Raises
     ------
     InputError
-        As `bywire.linearize`.
+        See `bywire.linearize`.
     """
     if name in PLANTS.all():
         return _plant_case(name, parameters, at, overrides, friction, speed, side)
@@ -586,7 +585,7 @@ def linear_case(
     for argument, text in (("friction", friction), ("speed", speed)):
         if text:
             raise ParameterError(
-                f"{option(argument)} is for plants ({', '.join(PLANTS.all())}): controllers are "
+                f"{option(argument)} is only for plants ({', '.join(PLANTS.all())}): loops are "
                 "linearized without dry friction; leave it out",
                 name=option(argument),
                 value=text,
@@ -595,12 +594,12 @@ def linear_case(
 
 
 def locus_range(case: LoopCase | PlantCase, range_: str) -> tuple[str, str, list[float]]:
-    """Return name, unit and values of the range over which poles are followed.
+    """Return name, unit and values of the range of a root locus.
 
     Raises
     ------
     InputError
-        For what is no range.
+        For an invalid range.
     """
     quantity = case.point.quantity if isinstance(case, PlantCase) else case.loop.at
     return range_of(range_, quantity, case.par, "locus")
@@ -623,7 +622,7 @@ def _dithered(case: LoopCase) -> PeriodicModel:
 
 
 def _gain_error(case: LoopCase, model: PeriodicModel) -> float:
-    """Return how far gains to small sines are off by the step, as a share: half steps beside it."""
+    """Return the numerical error of gains to small sines, as a share, from half steps."""
     share, frequencies = OTHER_STEPS[0], texts.small_sines(model, case.loop.band)
     try:
         finer = dithered_loop(case.loop, case.par, case.value, share * model.run.step)

@@ -1,4 +1,4 @@
-"""What the use cases of loops have in common: loop, parameters, operating point, ranges."""
+"""Common inputs of the use cases of loops: loop, parameters, operating point, ranges."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _MOST = 10_000
 
 @dataclass(frozen=True)
 class LoopCase:
-    """A loop with the parameters and the operating point that a user asked for.
+    """A loop with the requested parameters and operating point.
 
     Parameters
     ----------
@@ -53,17 +53,17 @@ class LoopCase:
 
     @property
     def input_unit(self) -> str:
-        """SI unit of the input that is shaken."""
+        """SI unit of the excited input."""
         model = self.loop.point(self.par, self.value).model
         return signals_of(model.Stimulus)[self.loop.inputs[0]].unit
 
     def frequencies(self, text: str, points: int) -> list[float]:
-        """Return the frequencies [Hz] that a text names; so many over the loop's band by default.
+        """Return the frequencies [Hz] of a text; by default ``points`` over the loop's band.
 
         Raises
         ------
         InputError
-            As `spread`.
+            See `spread`.
         """
         if text:
             return spread(text, "Hz", "frequencies", logarithmic=True)
@@ -71,14 +71,14 @@ class LoopCase:
 
     @property
     def subject(self) -> Subject:
-        """What a report says of loop and operating point."""
+        """Loop and operating point for reports."""
         from bywire.report.subject import Subject
 
         return Subject(self.loop.name, self.loop.summary, self.name, self.par, self.point)
 
     @property
     def heading(self) -> dict[str, Any]:
-        """The fields with which every JSON object of a loop begins."""
+        """The first fields of every JSON object of a loop."""
         return {
             "loop": self.loop.name,
             "parameters": self.name,
@@ -102,16 +102,16 @@ def loop_case(
     parameters
         Parameter set; empty for the main one of the loop's brake.
     at
-        Operating point with its unit; empty for the loop's own.
+        Operating point with its unit; empty for the loop's nominal one.
     changes
         Parameters by dotted name, with units.
     side
-        Side on which linear models are taken at a corner, see `read_sides`.
+        Side of linear models at a corner, see `read_sides`.
 
     Raises
     ------
     InputError
-        For names that are unknown, values out of range, and sets of another brake.
+        For unknown names, values out of range, and parameter sets of another brake.
     """
     read_sides(side)
     loop = replace(LOOPS.find(name), side=side)
@@ -126,9 +126,9 @@ def spread(text: str, unit: str, name: str, *, logarithmic: bool = False) -> lis
     Raises
     ------
     ParameterError
-        When it is neither.
+        If the text is neither.
     UnitError
-        When a value has no unit or a wrong one.
+        If a value has no unit or a wrong one.
     """
     parts = [part.strip() for part in text.split(":")]
     if len(parts) == 1:
@@ -152,7 +152,7 @@ def spread(text: str, unit: str, name: str, *, logarithmic: bool = False) -> lis
         )
     if low == high:
         raise ParameterError(
-            f"{name} = {quoted(text)}: the range is a single value: write it alone, "
+            f"{name} = {quoted(text)}: the range is a single value: write only "
             f"{name}={quoted(parts[0])[1:-1]}",
             name=name,
             value=quoted(text),
@@ -180,7 +180,7 @@ def range_of(
     Raises
     ------
     InputError
-        As `spread`, and for a name that is neither a parameter nor the operating quantity.
+        See `spread`; also for a name that is neither a parameter nor the operating quantity.
     """
     name, equals, values = (part.strip() for part in text.partition("="))
     if not equals:

@@ -1,4 +1,4 @@
-"""Margins and bandwidth of a loop as it is sampled, at a point or over a range."""
+"""Margins and bandwidth of a sampled loop, at a point or over a range."""
 
 from __future__ import annotations
 
@@ -41,19 +41,18 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 LEGEND = (
-    "Linear loop as it is sampled, dry friction left out. Gain margins: factors by which the loop "
-    "gain may grow, and to which it may fall; delay margin: dead time that may be added; disk "
-    "margin: 2 is the best, 0 none; S, T: sensitivity and complementary sensitivity. An unstable "
-    "loop has no margins, nor has a loop without gain."
+    "Linear sampled loop without dry friction. Gain margins: factors by which the loop gain may "
+    "grow, and to which it may fall. Delay margin: additional dead time the loop tolerates. Disk "
+    "margin: 2 is the best, 0 none. S, T: sensitivity and complementary sensitivity. An unstable "
+    "loop has no margins, nor does a loop without gain."
 )
-"""what the headings mean"""
+"""meaning of the headings"""
 _CAPTIONS = {
-    "loop-gain": "Loop gain as it is sampled; phase and gain margins as the spans in which they "
-    "are read.",
-    "nyquist": "Nyquist plot near -1; the shaded disk is what the disk margin keeps free.",
-    "nichols": "Nichols chart with contours of |T|; shaded, what the disk margin keeps free.",
+    "loop-gain": "Loop gain of the sampled loop; spans show the phase and gain margins.",
+    "nyquist": "Nyquist plot near -1; the disk margin keeps the shaded disk free.",
+    "nichols": "Nichols chart with contours of |T|; the disk margin keeps the shaded area free.",
     "sensitivity": "Sensitivity S = 1/(1 + L) and complementary sensitivity T = L/(1 + L), with "
-    "the limits that are usually asked for (Skogestad and Postlethwaite, section 2.4.3).",
+    "the usual limits (Skogestad and Postlethwaite, section 2.4.3).",
 }
 
 
@@ -66,10 +65,9 @@ class Margins(Answer):
     case
         The loop, its parameters and its operating point.
     margins
-        One for each value of the range; a single one without a range.
+        Margins for each value of the range; a single entry without a range.
     name, unit, values
-        Parameter that was varied, or the operating quantity, its SI unit and its values; empty
-        without a range.
+        Varied parameter or operating quantity, its SI unit and its values; empty without a range.
     """
 
     case: LoopCase
@@ -80,7 +78,7 @@ class Margins(Answer):
 
     @property
     def notes(self) -> list[str]:
-        """On which side of corners the linear models are."""
+        """Side of corners of the linear models."""
         return corner_notes(margins.corners for margins in self.margins)
 
     @cached_property
@@ -100,7 +98,7 @@ class Margins(Answer):
         table = TableBlock(margins_table(self.margins, self.name, self.unit, self.values))
         texts = worst_texts(self.margins, self.name, self.unit, self.values) if self.name else []
         worst_of = [Listing(texts, "Worst of each:")] if self.name else []
-        ranged = " Emphasized: the least disk margin, or what is unstable. Dashed: unstable loops."
+        ranged = " Emphasized: the least disk margin, or unstable loops. Dashed: unstable loops."
         is_drawn = any(margins.has_loop for margins in self.margins)
         figures: list[Block] = [] if is_drawn else [Paragraph(f"{NO_LOOP}.")]
         figures += [
@@ -179,7 +177,7 @@ def margins_over(
 
 
 def _margins_at(case: LoopCase, point: tuple[ParameterSet, float], label: str) -> LoopMargins:
-    """Return the margins at one value of a range; an error says at which."""
+    """Return the margins at one value of a range; an error names the value."""
     try:
         return margins_of(figures_at(case.loop, *point))
     except CornerError as error:
@@ -189,14 +187,14 @@ def _margins_at(case: LoopCase, point: tuple[ParameterSet, float], label: str) -
 def margins_table(
     margins_at: Sequence[LoopMargins], name: str = "", unit: str = "1", values: Sequence[float] = ()
 ) -> Table:
-    """Return the table, with the values of the parameter that is varied in the first column.
+    """Return the table, with the values of the varied parameter in the first column.
 
     Parameters
     ----------
     margins_at
-        Margins, one row each.
+        Margins, one per row.
     name, unit, values
-        Parameter, its SI unit and its values; empty where nothing is varied.
+        Varied parameter, its SI unit and its values; empty without a range.
     """
     heading = [*(figure.heading for figure in MARGINS.values()), "stable"]
     rows = [
@@ -221,7 +219,7 @@ def _state_cell(margins: LoopMargins) -> Cell:
 def worst_texts(
     margins_at: Sequence[LoopMargins], name: str, unit: str, values: Sequence[float]
 ) -> list[str]:
-    """Return where there is no stable loop, and the worst of each margin where there is one."""
+    """Return the values without a stable loop, and the worst of each margin elsewhere."""
     pairs = list(zip(values, margins_at, strict=True))
     kept = [(margins, value) for value, margins in pairs if margins.is_sound]
     texts = []

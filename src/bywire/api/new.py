@@ -26,16 +26,16 @@ _LONGEST = 40
 
 @dataclass(frozen=True)
 class NewBrake(Answer):
-    """A package that was written.
+    """A new brake's package.
 
     Parameters
     ----------
     name
-        Of the brake.
+        Name of the brake.
     folder
         Its project: ``pyproject.toml``, ``README.md``, ``src`` and ``tests``.
     package
-        What ``--system`` takes.
+        Path of the package, for ``--system``.
     """
 
     name: str
@@ -43,7 +43,7 @@ class NewBrake(Answer):
     package: Path
 
     def document(self) -> Document:
-        """Return what was written, and what to do next."""
+        """Return the written files, and the next steps."""
         files = sorted(str(p.relative_to(self.folder)) for p in self.folder.rglob("*.py"))
         steps = [
             f"bywire check --system {self.package}",
@@ -52,12 +52,12 @@ class NewBrake(Answer):
             f"pip install -e {self.folder}    # then every command finds it without --system",
             f"pytest {self.folder / 'tests'}    # with pytest installed",
         ]
-        written = Paragraph(f"{self.name} stands in {self.folder}; its README says what is where")
+        written = Paragraph(f"{self.name} is in {self.folder}; its README describes the files")
         following = Listing(steps, "Next:")
         return Document(
             f"The brake {self.name}",
-            "A package that passes bywire check, to be changed step by step.",
-            sections=[Section("What was written", [written, Listing(files), following])],
+            "A package that passes bywire check; change it step by step.",
+            sections=[Section("Files", [written, Listing(files), following])],
             brief=[written, following],
             data=self._data(steps),
         )
@@ -72,14 +72,14 @@ class NewBrake(Answer):
 
 
 def write_package(name: str, folder: Path) -> Path:
-    """Write a package that passes ``bywire check``, whole or not at all.
+    """Write a package that passes ``bywire check``, completely or not at all.
 
     Parameters
     ----------
     name
-        Of the brake, in small letters, digits and single dashes: ``my-brake``.
+        Name of the brake: lowercase letters, digits and single dashes, such as ``my-brake``.
     folder
-        Where its folder is made.
+        Parent of its folder.
 
     Returns
     -------
@@ -89,9 +89,9 @@ def write_package(name: str, folder: Path) -> Path:
     Raises
     ------
     ParameterError
-        When the name is none that Python and bywire can take.
+        If the name is not valid for Python or bywire.
     FileError
-        When there is such a folder already, or it cannot be written.
+        If the folder already exists, or is not writable.
     """
     package = module_name(name)
     target = folder / name
@@ -124,7 +124,7 @@ def module_name(name: str) -> str:
     Raises
     ------
     ParameterError
-        When it cannot be one, with the reason.
+        If the name is not valid, with the reason.
 
     Examples
     --------
@@ -134,17 +134,17 @@ def module_name(name: str) -> str:
     package = name.replace("-", "_")
     reason = ""
     if not _ALLOWED.fullmatch(name):
-        reason = "a name has small letters and digits, single dashes between, and a letter first"
+        reason = "a name must start with a letter and have lowercase letters, digits, single dashes"
     elif len(name) > _LONGEST:
         reason = f"a name has at most {_LONGEST} characters"
     elif keyword.iskeyword(package) or keyword.issoftkeyword(package):
-        reason = f"{package} is a word of Python"
+        reason = f"{package} is a Python keyword"
     elif package in sys.stdlib_module_names:
-        reason = f"Python has a module {package} of its own"
+        reason = f"Python has a standard module {package}"
     elif package.replace("_", "-") in brakes():
-        reason = f"there is a brake {package.replace('_', '-')} already"
+        reason = f"the brake {package.replace('_', '-')} already exists"
     elif (spec := find_spec(package)) is not None and spec.origin is not None:
-        reason = f"a module {package} is installed already"
+        reason = f"a module {package} is already installed"
     if reason:
         raise ParameterError(
             f"{quoted(name)} cannot be the name of a new brake: {reason}; choose one such as "
@@ -166,7 +166,7 @@ def _files(package: str) -> Iterator[tuple[Path, str]]:
 
 
 def _renamed(source: Path, package: str) -> str:
-    """Return the text of a file of the template under the new names."""
+    """Return the text of a template file with the new names."""
     text = source.read_text(encoding="utf-8").replace(PACKAGE, package)
     text = text.replace("Starter", "".join(part.capitalize() for part in package.split("_")))
     return text.replace("starter", package.replace("_", "-"))

@@ -1,4 +1,4 @@
-"""What there is: assemblies, parameter sets, experiments, loops, studies, methods, key figures."""
+"""Index of names: assemblies, parameter sets, experiments, loops, studies, methods, figures."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from bywire.report.tables import Table, text_table
 _WIDTH = 80  # characters of a line of the index
 _NAME = 21  # columns of a topic
 _HINT = (
-    "'bywire list TOPIC' opens one of these. 'bywire list NAME' shows all about a\n"
-    "name, a parameter (motor.R_m), a group (motor) or a signal (p_mc); of other\n"
-    "words, such as battery, what mentions them."
+    "'bywire list TOPIC' lists the names of a topic. 'bywire list NAME' shows all\n"
+    "about a name, a parameter (motor.R_m), a group (motor) or a signal (p_mc).\n"
+    "'bywire list WORD' finds other words, such as battery."
 )
 
 
@@ -33,12 +33,12 @@ class Overview(Answer):
     Parameters
     ----------
     things
-        Kind of thing -> name -> summary; a list of names where there is no summary, and the names
-        of the key figures of every experiment.
+        Kind of thing -> name -> summary; a list of names without summaries, and the names of the
+        key figures of every experiment.
     topic
-        The kind that is shown; all where empty.
+        The kind to show; all if empty.
     doubts
-        What is declared for something that does not exist.
+        Declarations for something that does not exist.
     """
 
     things: Mapping[str, Any]
@@ -47,7 +47,7 @@ class Overview(Answer):
 
     @property
     def warnings(self) -> list[str]:
-        """What is declared for something that does not exist."""
+        """Declarations for something that does not exist."""
         return [*self.doubts]
 
     def document(self) -> Document:
@@ -56,7 +56,7 @@ class Overview(Answer):
         tables = {key.replace("_", " "): _table(content) for key, content in shown.items()}
         brief = next(iter(tables.items())) if self.topic else None
         return Document(
-            "What there is",
+            "Index",
             _HINT.replace("\n", " "),
             sections=[Section(title, [TableBlock(table)]) for title, table in tables.items()],
             brief=[brief[0], TableBlock(brief[1])] if brief else [self._index()],
@@ -65,7 +65,7 @@ class Overview(Answer):
         )
 
     def _index(self) -> str:
-        """Return a line for each kind, and what to do next: a screen of 80 by 24."""
+        """Return one line per kind, and a hint, for a screen of 80 by 24."""
         heads = {
             f"{key.replace('_', ' '):<{_NAME}}{len(content):>3}  ": content
             for key, content in self.things.items()
@@ -76,15 +76,15 @@ class Overview(Answer):
 
 @answering
 def overview(topic: str = "") -> Overview:
-    """Return everything that has a name, from an index that is made anew when a file changes.
+    """Return everything that has a name, from an index that is rebuilt when a file changes.
 
-    Making it loads every brake and all that it brings; the index is kept in the folder of compiled
-    kernels, so that a listing need not.
+    Building the index loads every brake with all its parts. It is cached in the folder of compiled
+    kernels, so that a listing does not load them.
 
     Parameters
     ----------
     topic
-        The kind of things that is shown, for instance ``"experiments"``; all where empty.
+        The kind of things to show, for instance ``"experiments"``; all if empty.
 
     Returns
     -------
@@ -94,7 +94,7 @@ def overview(topic: str = "") -> Overview:
     Raises
     ------
     UnknownNameError
-        With the nearest topics.
+        If the topic is unknown, with the closest matches.
     """
     things, doubts = _things()
     chosen = _plain(topic)
@@ -113,7 +113,7 @@ def _plain(topic: str) -> str:
 
 
 def _things() -> tuple[Mapping[str, Any], list[str]]:
-    """Return what there is, and what is doubtful of it."""
+    """Return all names by kind, and doubtful declarations."""
     from bywire.simulation.compiler import keep_text, usable_folder
 
     names = hashlib.sha256(" ".join(brakes()).encode()).hexdigest()[:8]
@@ -125,7 +125,7 @@ def _things() -> tuple[Mapping[str, Any], list[str]]:
         if kept["state"] == state:
             return kept["things"], kept["doubts"]
     except (FileError, OSError, ValueError, KeyError, TypeError):
-        pass  # none yet, not ours, or no room for any
+        pass  # no index yet, an invalid one, or no space for one
     from bywire.api.things import all_things, doubts
 
     things, texts = all_things(), doubts()
@@ -135,7 +135,7 @@ def _things() -> tuple[Mapping[str, Any], list[str]]:
 
 
 def _first(names: Iterable[str], width: int) -> str:
-    """Return as many names as a line has room for."""
+    """Return as many names as fit in a line."""
     text = ", ".join(names)
     return text if len(text) <= width else text[: width - 4].rpartition(", ")[0] + " ..."
 

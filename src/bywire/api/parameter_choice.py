@@ -1,4 +1,4 @@
-"""The parameters that a user asked for, of the brake that is looked at."""
+"""The parameters that the user requested, for the brake of a use case."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ def set_for(subject: str, assembly: str, name: str) -> CitedSet:
     Parameters
     ----------
     subject, assembly, name
-        As of `parameters_for`.
+        See `parameters_for`.
 
     Raises
     ------
     InputError
-        For names that are unknown, and sets of another brake.
+        For unknown names, and parameter sets of another brake.
     """
     cited = PARAMETER_SETS.find(name or main_set(assembly))
     if cited.assembly != assembly:
@@ -39,14 +39,14 @@ def set_for(subject: str, assembly: str, name: str) -> CitedSet:
 def parameters_for(
     subject: str, assembly: str, name: str, changes: Mapping[str, Any]
 ) -> tuple[str, ParameterSet]:
-    """Return name and values of a parameter set, changed.
+    """Return name and values of a parameter set, with changes.
 
     Parameters
     ----------
     subject
-        What is looked at, for instance ``"loop 'moment'"``.
+        Subject of the use case, for instance ``"loop 'moment'"``.
     assembly
-        The brake that it belongs to.
+        The brake to which it belongs.
     name
         Parameter set; empty for the main one of that brake.
     changes
@@ -55,7 +55,7 @@ def parameters_for(
     Raises
     ------
     InputError
-        For names that are unknown, values out of range, and sets of another brake.
+        For unknown names, values out of range, and parameter sets of another brake.
     """
     cited = set_for(subject, assembly, name)
     base = cited.parameters()

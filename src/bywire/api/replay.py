@@ -1,4 +1,4 @@
-"""A measured demand drives a bench's model, and what it gives is laid beside the measurement."""
+"""Replay: a measured demand drives a bench's model, compared with the measured response."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ _SHOWN = ("nrmse", "vaf", "max_error", "bias", "lag")
 
 @dataclass(frozen=True)
 class Replay(Answer):
-    """A measurement beside what the model makes of the same demand.
+    """A measured response and the model's response to the same demand.
 
     Parameters
     ----------
@@ -59,11 +59,11 @@ class Replay(Answer):
     replayed
         Inputs, and each output measured and modeled.
     fits
-        Figures of every signal and stretch, with the tolerances.
+        Figures of every signal and segment, with the tolerances.
     tracks
-        Drifting parameters, tracked.
+        Tracked drifting parameters.
     data_notes
-        What was done to the measurement.
+        Notes on the processing of the measurement.
     """
 
     bench: Bench
@@ -80,7 +80,7 @@ class Replay(Answer):
 
     @property
     def notes(self) -> list[str]:
-        """What was done to the measurement, what is assumed, and why figures are not defined."""
+        """Notes on the measurement, assumptions, and undefined figures."""
         return [*self.data_notes, *self.replayed.notes, *undefined(self.fits)]
 
     @property
@@ -94,7 +94,7 @@ class Replay(Answer):
         return xr.Dataset({**signals, **{str(n): v for n, v in self.replayed.inputs.items()}})
 
     def document(self) -> Document:
-        """Return how well it fits, stretch by stretch, with figures and tracked parameters."""
+        """Return the fit by segment, with figures and tracked parameters."""
         bench, inputs = self.bench, ", ".join(map(str, self.replayed.inputs.data_vars))
         subject = Subject.of_bench(bench)
         table = TableBlock(_fit_table(self.fits))
@@ -104,7 +104,7 @@ class Replay(Answer):
             f"Replay of {self.source}",
             subject.line,
             sections=lambda: [
-                Section("How well it fits", [table, Listing(definitions)]),
+                Section("Fit", [table, Listing(definitions)]),
                 Section("Measured and simulated", self._figures()),
                 *([Section("Tracked parameters", self._track_figures())] if self.tracks else []),
                 subject.provenance(
@@ -171,10 +171,10 @@ class Replay(Answer):
             return None
         outcomes = [v.outcome for fit in self.fits for v in fit.verdicts]
         counted = ((outcomes.count(word), word) for word in ("missed", "undecided"))
-        said = " and ".join(f"{count} {word}" for count, word in counted if count)
-        if not said:
+        open_ = " and ".join(f"{count} {word}" for count, word in counted if count)
+        if not open_:
             return Banner("All tolerances are met.", "good")
-        return Banner(f"Of {len(outcomes)} tolerances, {said}.", "bad")
+        return Banner(f"Of {len(outcomes)} tolerances, {open_}.", "bad")
 
     def _data(self) -> dict[str, Any]:
         return {
@@ -222,7 +222,7 @@ class Replay(Answer):
 
 
 def _fit_table(fits: Sequence[SegmentFit]) -> Table:
-    """Return the figures of every signal and stretch, with the tolerances that are missed."""
+    """Return the figures of every signal and segment, with missed tolerances."""
     rows = []
     for fit in fits:
         by_name = {k.name: k for k in fit.kpis}
@@ -234,10 +234,10 @@ def _fit_table(fits: Sequence[SegmentFit]) -> Table:
             ]
             for word in ("missed", "undecided")
         }
-        said = "; ".join(f"{word}: {', '.join(each)}" for word, each in failed.items() if each)
+        text = "; ".join(f"{word}: {', '.join(each)}" for word, each in failed.items() if each)
         verdict = Cell("-")
         if fit.verdicts:
-            verdict = Cell(said, "bad") if said else Cell("ok", "good")
+            verdict = Cell(text, "bad") if text else Cell("ok", "good")
         rows.append(
             (
                 Cell(clean(fit.segment.name)),
@@ -277,23 +277,23 @@ _SILENT = {"kind": "step", "start": "0", "end": "0", "t_step": "0"}
 def columns_of_bench(
     inputs: Mapping[str, str], columns: Mapping[str, str], time: str, units: Mapping[str, str]
 ) -> NamedColumns:
-    """Return the columns that are named for a bench's inputs and outputs.
+    """Return the named columns of a bench's inputs and outputs.
 
-    An input keeps the name that it was given; an output is called as the model calls it.
+    An input keeps the name of its column; an output gets the model's name.
 
     Parameters
     ----------
     inputs, columns
-        Column of each stimulus, and of each output whose column is named.
+        Column of each stimulus, and of each output with a named column.
     time
-        Column of the instants.
+        Time column.
     units
-        SI unit of every signal that matters, by name.
+        SI unit of every needed signal, by name.
 
     Raises
     ------
     ParameterError
-        When one name means two columns.
+        If one name means two columns.
     """
     driving = {column: stimulus for stimulus, column in inputs.items()}
     for name, column in columns.items():
@@ -316,19 +316,19 @@ def units_of(model: Model, inputs: Mapping[str, str], outputs: Iterable[str]) ->
 
 
 def driven_bench(bench: Bench | str | Path, changes: Mapping[str, Any]) -> Bench:
-    """Return a bench; one that wants a stimulus gets none of its own, for it is measured.
+    """Return a bench; a missing stimulus becomes zero, because the measurement replaces it.
 
     Parameters
     ----------
     bench
         A `Bench`, the path of a bench file, or an experiment's name.
     changes
-        As ``--set`` takes them.
+        Changes as ``--set`` takes them.
 
     Raises
     ------
     InputError
-        When it cannot be read, or something does not fit.
+        If the bench cannot be read, or a change is invalid.
     """
     if isinstance(bench, Bench):
         return bench.with_overrides(changes) if changes else bench
@@ -344,7 +344,7 @@ def driven_bench(bench: Bench | str | Path, changes: Mapping[str, Any]) -> Bench
 def stretches_of(
     wanted: str | Path, inputs: xr.Dataset, limits: Mapping[str, str]
 ) -> list[Segment]:
-    """Return the stretches that are judged: those of a file, what is found, or the whole record."""
+    """Return the segments to judge: those of a file, those detected, or the whole record."""
     if not wanted:
         return whole_record(inputs["time"].values, limits)
     if wanted == "auto":

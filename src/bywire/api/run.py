@@ -51,30 +51,28 @@ if TYPE_CHECKING:
 
 
 def require_scene(bench: Bench, over: str = "") -> None:
-    """Refuse benches whose runs cannot be played.
+    """Reject benches without an animation.
 
     Raises
     ------
     ParameterError
-        When the bench's assembly declares no animation, or a range of values is run.
+        If the bench's assembly declares no animation, or a range of values is run.
     """
     assembly, known = bench.definition.assembly, SCENES.all()
     if assembly not in known:
         raise ParameterError(
             f"{bench.experiment}: runs of {assembly} have no animation, only those of "
-            f"{' and '.join(known)}: leave animate out, or declare a SceneKind in a module "
+            f"{' and '.join(known)}: omit animate, or declare a SceneKind in a module "
             "'animations' of the brake",
             name="animate",
             valid=", ".join(known),
         )
     if over:
-        raise ParameterError(
-            "an animation shows single runs: leave out animate or over", name="animate"
-        )
+        raise ParameterError("an animation shows single runs: omit animate or over", name="animate")
 
 
 def _playable(result: Result) -> list[str]:
-    """Return the labels of the runs that an animation can show."""
+    """Return the labels of runs that an animation can show."""
     place = SCENES.find(result.bench.definition.assembly).place
     return [label for label, run in result.recordings.items() if place in run]
 
@@ -100,8 +98,8 @@ def animations(result: Result) -> list[Attachment]:
 
 
 _SAID = (
-    "Where a tyre slides it marks the road; where its wheel stands the mark is black. Arrows are "
-    "braking forces, as long as a meter where they are as large as the weight."
+    "Sliding tires mark the road; marks of locked wheels are black. Arrows are braking forces; an "
+    "arrow of 1 m equals the weight."
 )
 
 
@@ -109,14 +107,14 @@ _SAID = (
 
 _SCATTERED = (
     'Errors "up to" belong to figures that do not converge: over double, single and half steps, '
-    "their differences do not shrink as the scheme's order 2 demands. Their errors are not known: "
-    "what is given bounds 95 % of such errors, by the scatter of the figure over all steps."
+    "their differences do not shrink as the scheme's order 2 requires. Their errors are unknown. "
+    "The value is a bound for 95 % of such errors, from the scatter of the figure over all steps."
 )
 
 
 @dataclass(frozen=True)
 class BenchResult(Result, Answer):
-    """What a bench gave, with recordings as xarray and key figures with their verdicts.
+    """Result of a bench, with recordings as xarray and key figures with their verdicts.
 
     ``animated``: whether its folder gets a page that plays each run.
     """
@@ -125,17 +123,17 @@ class BenchResult(Result, Answer):
 
     @property
     def holds(self) -> bool:
-        """Whether every requirement is met, and none too closely to tell."""
+        """Whether every requirement is met, and none is undecided."""
         return self.status not in ("failed", "undecided")
 
     @property
     def warnings(self) -> list[str]:
-        """What the user should know of the bench and of its runs."""
+        """Warnings on the bench and its runs."""
         return [*self.bench.outdated, *super().warnings]
 
     @property
     def rows(self) -> list[KpiRow]:
-        """The key figures beside their requirements."""
+        """The key figures with their requirements."""
         verdicts, stated = {v.kpi: v for v in self.verdicts}, stated_figures(self.bench)
         return [
             KpiRow(
@@ -154,7 +152,7 @@ class BenchResult(Result, Answer):
         ]
 
     def ledgers(self) -> dict[str, Ledger]:
-        """Return the books of every run from time zero on, further ones apart, by label."""
+        """Return the energy balances of every run from time zero on, by label."""
         ledgers = {}
         for label, recording in self.recordings.items():
             if "E_stored" not in recording or recording["E_stored"].dims != ("time",):
@@ -168,7 +166,7 @@ class BenchResult(Result, Answer):
         return ledgers
 
     def document(self) -> Document:
-        """Return verdict and changes, figures, key figures, energy, and how it was made."""
+        """Return verdict, changes, figures, key figures, energy, and settings."""
         bench = self.bench
         table = TableBlock(kpi_table(self.rows))
         said = [*remarks(self), *self._unplayed()]
@@ -214,7 +212,7 @@ class BenchResult(Result, Answer):
         return [Listing(texts, "Not defined:")] if texts else []
 
     def _scatter(self) -> list[Paragraph]:
-        """Return what the errors of figures that do not converge are; nothing without any."""
+        """Return an explanation of figures that do not converge, if there are any."""
         if all(kpi.converges for kpi in self.kpis):
             return []
         return [Paragraph(_SCATTERED)]
@@ -225,10 +223,10 @@ class BenchResult(Result, Answer):
         return animations(self)
 
     def _unplayed(self) -> list[str]:
-        """Return what to say where an animation was wanted and nothing recorded has one."""
+        """Return a remark if an animation was requested and no recording allows one."""
         if not self.animated or self._animations():
             return []
-        return ["no animation: no recording of this experiment holds where the vehicle is"]
+        return ["no animation: no recording of this experiment contains the vehicle's position"]
 
     def _figures(self) -> list[FigureBlock]:
         if self.status == "interrupted":
@@ -239,7 +237,7 @@ class BenchResult(Result, Answer):
         return [FigureBlock(each.figure, each.caption, each.name) for each in shown]
 
     def _step_errors(self) -> dict[str, dict[str, dict[str, Any]]]:
-        """Return the error from the step of every signal, by run and name."""
+        """Return the numerical error of every signal, by run and name."""
         return {
             label: {
                 str(name): {
@@ -255,7 +253,7 @@ class BenchResult(Result, Answer):
 
     def _banner(self) -> Banner:
         if not self.verdicts:
-            return Banner("done, no requirement is stated")
+            return Banner("done, no requirements")
         met = sum(v.met for v in self.verdicts)
         text = f"{met} of {len(self.verdicts)} requirements met"
         if open_ := sum(not v.is_decided for v in self.verdicts):
@@ -285,7 +283,7 @@ class BenchResult(Result, Answer):
 def run_once(
     bench: Bench, progress: Progress | None, engine: str, estimate_error: bool, animated: bool
 ) -> BenchResult:
-    """Return what a bench gives; see `bywire.run`."""
+    """Return the result of a bench; see `bywire.run`."""
     result = running.run(bench, progress, engine, estimate_error)
     return BenchResult(
         **{each.name: getattr(result, each.name) for each in fields(result)}, animated=animated
@@ -293,12 +291,12 @@ def run_once(
 
 
 def bench_of(bench: Bench | str | Path, overrides: Mapping[str, str]) -> Bench:
-    """Return a bench, a bench file's or an experiment's, changed as ``--set`` takes it.
+    """Return the bench of a file or an experiment, with changes as ``--set`` takes them.
 
     Raises
     ------
     InputError
-        When it cannot be read, or a change does not fit.
+        If the bench cannot be read, or a change is invalid.
     """
     if not isinstance(bench, Bench):
         return bench_file.read(bench, overrides)
@@ -311,7 +309,7 @@ def faulty(bench: Bench, faults: Sequence[str]) -> Bench:
     Raises
     ------
     InputError
-        For a text that says none.
+        If a text is not a valid fault.
     """
     if not faults:
         return bench
@@ -319,22 +317,21 @@ def faulty(bench: Bench, faults: Sequence[str]) -> Bench:
 
 
 def _remark(verdict: Verdict) -> str:
-    """Return what to say of a requirement that is not met, or not for certain."""
-    wanted = f", wanted {verdict.limit}"
+    """Return a remark on a requirement that is missed or undecided."""
+    limit = f", limit {verdict.limit}"
     if not verdict.is_decided and math.isfinite(verdict.error):
         written = measured_amount(verdict.value, verdict.unit, verdict.error)
         return (
-            f"requirement undecided: {verdict.kpi} is {written}, give or take "
-            f"{amount(verdict.error, verdict.unit, 2)} from the step{wanted}: take a smaller step"
+            f"requirement undecided: {verdict.kpi} is {written}, numerical error "
+            f"{amount(verdict.error, verdict.unit, 2)}{limit}: take a smaller step"
         )
     if not verdict.is_decided and not math.isinf(verdict.error):
-        return f"requirement undecided: {verdict.kpi} is not defined{wanted} ({verdict.note})"
+        return f"requirement undecided: {verdict.kpi} is not defined{limit} ({verdict.note})"
     if not verdict.is_decided:
         return (
-            f"requirement undecided: {verdict.kpi} is defined with one of the steps and half of "
-            f"it only{wanted}: take a smaller step"
+            f"requirement undecided: {verdict.kpi} is defined for only one of the step and half "
+            f"the step{limit}: take a smaller step"
         )
-    return (
-        f"requirement not met: {verdict.kpi} is {amount(verdict.value, verdict.unit)}{wanted}"
-        + (f" ({verdict.note})" if verdict.note else "")
+    return f"requirement not met: {verdict.kpi} is {amount(verdict.value, verdict.unit)}{limit}" + (
+        f" ({verdict.note})" if verdict.note else ""
     )

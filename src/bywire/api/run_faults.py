@@ -47,17 +47,17 @@ class Quantity(Generic[R]):
     Parameters
     ----------
     value
-        What it is of a row: what JSON holds.
+        Its value for a row, as in JSON.
     key
-        Its name in JSON; empty where that does not have it.
+        Its name in JSON; empty if JSON does not have it.
     heading
-        Of its column; empty where tables do not show it.
+        Heading of its column; empty if tables do not show it.
     unit
-        SI unit of a number, ``"1"`` of a pure one; empty of anything else.
+        SI unit of a number, ``"1"`` for a pure number; empty for anything else.
     text
-        How a row shows it; by default a number with its unit, or the text itself.
+        Its text in a row; by default a number with its unit, or the text itself.
     number
-        What frames hold where that is neither the value nor the text, in the same unit.
+        Number in frames if it is neither the value nor the text, in the same unit.
     """
 
     value: Callable[[R], Any]
@@ -115,16 +115,16 @@ _MOST = 12
 
 @dataclass(frozen=True, repr=False)
 class FaultCampaign(Answer):
-    """What a campaign of faults found.
+    """Results of a campaign of faults.
 
     Parameters
     ----------
     findings
-        Of every fault: what it does, when it is too much, when it is seen; times in s.
+        Effect, fault tolerant time and time to detection of every fault; times in s.
     folder
-        Where its outcomes lie; None where they are not kept.
+        Folder of its outcomes; None if they are not kept.
     nominal
-        The bench without faults, run; None for what is not read from a run.
+        Result of the bench without faults, or None.
     """
 
     findings: CampaignFindings
@@ -148,30 +148,30 @@ class FaultCampaign(Answer):
 
     @property
     def notes(self) -> list[str]:
-        """What the figures stand for."""
+        """Meaning of the figures."""
         plan, findings = self.findings.plan, self.findings
         alarms, cases = findings.false_alarms, findings.coverage_of_cases
         weight = "failure rates of [rates]" if findings.is_weighted else "unweighted"
-        said = [
+        notes = [
             f"thresholds were tuned on {plan.tuning} healthy runs, alarms and faults judged on "
-            f"{plan.healthy - plan.tuning} others: {alarms.count} of these alarm "
+            f"{plan.healthy - plan.tuning} others: {alarms.count} of these raise an alarm "
             f"({100 * alarms.low:.2g} to {100 * alarms.high:.2g} %)",
-            f"coverage is the share of dangerous runs in which a fault is seen before its fault "
-            f"tolerant time is over, that of its worst run ({weight}); of {cases.cases} runs "
-            f"{cases.count} are ({100 * cases.low:.3g} to {100 * cases.high:.3g} %)",
+            f"coverage is the share of dangerous runs that detect a fault within its fault "
+            f"tolerant time, that of its worst run ({weight}); this is true for {cases.count} of "
+            f"{cases.cases} runs ({100 * cases.low:.3g} to {100 * cases.high:.3g} %)",
         ]
         if not plan.varied:
-            said.append("nothing varies: thresholds of one healthy run say little, give [vary]")
+            notes.append("nothing varies, so thresholds come from a single healthy run: add [vary]")
         if plan.reaction is not None:
-            said.append(
+            notes.append(
                 f"the reaction, {plan.reaction.failing.name} {_milliseconds(plan.reaction.delay)} "
-                "after a fault is seen, is put in where the fault leaves it possible"
+                "after the detection of a fault, is simulated where the fault permits it"
             )
-            said.append(findings.benefit_of_reaction())
-        return said
+            notes.append(findings.benefit_of_reaction())
+        return notes
 
     def document(self) -> Document:
-        """Return the table of faults, coverage, and when each is too much and seen."""
+        """Return the table of faults, coverage, fault tolerant times and detection times."""
         plan, bench, findings = self.findings.plan, self.findings.plan.bench, self.findings
         subject = Subject.of_bench(bench, plan.name, varied=[each.name for each in plan.varied])
         table = TableBlock(self._table())
@@ -213,7 +213,7 @@ class FaultCampaign(Answer):
 
     @cached_property
     def _quantities(self) -> dict[str, Quantity[FaultFinding]]:
-        """What is said of a fault, by heading or key, in the order of the JSON object."""
+        """Quantities of a fault, by heading or key, in the order of the JSON object."""
         plan = self.findings.plan
         is_rated = any(criterion.severity for criterion in plan.criteria)
         every: list[Quantity[FaultFinding]] = [
@@ -259,7 +259,7 @@ class FaultCampaign(Answer):
         return record_table(self.findings.faults, columns)
 
     def _worst_first(self) -> Table:
-        """Return what a terminal shows of each fault, beginning with the most dangerous."""
+        """Return the table for a terminal, with the most dangerous faults first."""
         ranked = sorted(
             self.findings.faults,
             key=lambda f: (_RANK.index(f.kind), f.tolerance if f.dangerous else math.inf),
@@ -285,7 +285,7 @@ class FaultCampaign(Answer):
                 [
                     residual.name,
                     residual.summary,
-                    "never looked at" if limit <= NEVER else amount_cell(limit, residual.unit, 3),
+                    "never checked" if limit <= NEVER else amount_cell(limit, residual.unit, 3),
                     Cell(str(alarms), value=alarms, unit="1"),
                     Cell(f"{seen} of {dangerous}", value=seen, unit="1"),
                     Cell(_milliseconds(delay), value=delay, unit="s"),
@@ -330,14 +330,14 @@ class FaultCampaign(Answer):
         return [
             FigureBlock(
                 times,
-                "Dangerous faults: time from onset until a criterion is violated, "
-                "and until a residual sees it, of every run.",
+                "Dangerous faults: time from onset until a criterion is violated, and until a "
+                "residual detects the fault, for every run.",
                 "fault-times",
             ),
             FigureBlock(
                 curves,
-                "Median delay of detection in dangerous runs over healthy runs "
-                "that alarm, for multiples of each threshold; rings are those in use.",
+                "Median detection delay in dangerous runs over healthy runs with an alarm, for "
+                "multiples of each threshold. Rings: the thresholds in use.",
                 "alarm-curves",
             ),
         ]
@@ -414,7 +414,7 @@ def _with_reaction(each: FaultFinding) -> dict[str, Any] | None:
 
 
 def _reacted(each: FaultFinding) -> str:
-    """Return what is still violated where the fault is answered."""
+    """Return the criteria that are violated in spite of the reaction."""
     if not each.reacted:
         return "-"
     counts = {name: (int(np.sum(~np.isnan(t))), t.size) for name, t in each.reacted.items()}
@@ -430,7 +430,7 @@ def _at_threshold() -> int:
 
 
 def _range(low: Array, high: Array, unit: str) -> str:
-    """Return how far runs come off, least and largest of all."""
+    """Return the range of deviations over all runs."""
     scale, shown = display_factor(unit), display_unit(difference_unit(unit))
     text = f"{scale * low.min():.3g} to {scale * high.max():.3g}"
     return text if unit == "1" else f"{text} {shown}"
@@ -443,12 +443,12 @@ def _milliseconds(time: float) -> str:
 
 
 def _latest(times: Array) -> float:
-    """Return the latest time [s]; NaN where there is none."""
+    """Return the latest time [s]; NaN if there is none."""
     return float(np.nanmax(times, initial=-math.inf)) if not np.isnan(times).all() else math.nan
 
 
 def _worst(times: Array) -> str:
-    """Return the latest time, and in how many runs there is none."""
+    """Return the latest time, and the number of runs without one."""
     never = int(np.isnan(times).sum())
     if never == times.size:
         return "never"

@@ -1,4 +1,4 @@
-"""A bench over a range of one of its numbers: key figures by value, verdicts, overlaid curves."""
+"""A bench over a range of one number: key figures by value, verdicts, overlaid curves."""
 
 from __future__ import annotations
 
@@ -42,21 +42,21 @@ from bywire.report.wording import amount, clean, measured_amount
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_COLUMNS = 5  # key figures beside each other on a terminal
+_COLUMNS = 5  # key figures side by side on a terminal
 
 
 @dataclass(frozen=True)
 class BenchRange(Answer):
-    """What a bench gave for every value of a range.
+    """Results of a bench for every value of a range.
 
     Parameters
     ----------
     bench
-        The bench as it is without the range.
+        The bench without the range.
     name, unit, values
-        Parameter or ``options.NAME`` that was varied, its SI unit and its values.
+        Varied parameter or ``options.NAME``, its SI unit and its values.
     results
-        What each value gave, with recordings, key figures and verdicts.
+        Result of each value, with recordings, key figures and verdicts.
     """
 
     bench: Bench
@@ -72,20 +72,20 @@ class BenchRange(Answer):
 
     @property
     def warnings(self) -> list[str]:
-        """What the runs warned of, and at which values."""
-        said: dict[str, list[float]] = {}
+        """Warnings of the runs, with their values."""
+        warned: dict[str, list[float]] = {}
         for value, result in zip(self.values, self.results, strict=True):
             for text in (*result.bench.outdated, *result.warnings):
-                said.setdefault(text, []).append(value)
-        return [f"{text} ({self._at(values)})" for text, values in said.items()]
+                warned.setdefault(text, []).append(value)
+        return [f"{text} ({self._at(values)})" for text, values in warned.items()]
 
     def kpi(self, name: str) -> Array:
-        """Return a key figure of every value, shape (values,); NaN where it is not defined.
+        """Return a key figure for every value, shape (values,); NaN where it is not defined.
 
         Raises
         ------
         UnknownNameError
-            With the nearest known names.
+            If the name is unknown, with the closest matches.
         """
         return np.array([result.kpi(name).value for result in self.results])
 
@@ -154,12 +154,12 @@ class BenchRange(Answer):
         return f"at {self.name} = {where}"
 
     def _kpis(self) -> list[Kpi]:
-        """Return the key figures that any value has, as the first one that has it gives it."""
+        """Return the key figures of all values, each from the first value that has it."""
         return list({kpi.name: kpi for r in reversed(self.results) for kpi in r.kpis}.values())
 
     @cached_property
     def _distinct(self) -> dict[str, bool]:
-        """Whether each key figure differs anywhere by more than its error from the step."""
+        """Whether each key figure differs anywhere by more than its numerical error."""
         by_name: dict[str, list[Kpi]] = {}
         for result in self.results:
             for kpi in result.kpis:
@@ -170,7 +170,7 @@ class BenchRange(Answer):
         }
 
     def _indistinct(self) -> list[str]:
-        """Return a sentence on figures whose changes may be the step's; none where none is."""
+        """Return a sentence on figures whose changes may be numerical errors, or none."""
         names = [
             kpi.name
             for kpi in self._kpis()
@@ -178,10 +178,10 @@ class BenchRange(Answer):
         ]
         if not names:
             return []
-        return [f"not distinct over {self.name}, by their error from the step: {', '.join(names)}"]
+        return [f"not distinct over {self.name} within their numerical error: {', '.join(names)}"]
 
     def _table(self, kpis: Sequence[Kpi]) -> Table:
-        """Return some key figures, one row for each value; a missed limit is marked."""
+        """Return some key figures, one row per value, with missed limits marked."""
         limits = self.bench.requirements
         heads = [Column(f"{k.name} {limits.get(k.name, '')}".strip(), numeric=True) for k in kpis]
         rows = [
@@ -215,7 +215,7 @@ class BenchRange(Answer):
                 yield "met", f"{head}: met {self._at([value for value, _ in pairs])}"
 
     def _worst(self, pairs: Sequence[tuple[float, Verdict]]) -> str:
-        """Return at which values a requirement has an outcome, and the worst figure of these."""
+        """Return the values with an outcome of a requirement, and the worst figure there."""
         where = self._at([value for value, _ in pairs])
         known = [(value, each) for value, each in pairs if math.isfinite(each.value)]
         if not known:
@@ -238,10 +238,10 @@ class BenchRange(Answer):
         from bywire.report.time_traces import can_overlay
 
         captions = {
-            "curves": "The values on top of each other, in the color that the scale shows.",
-            "kpis": "Key figures over the value, with their error from the step where it is seen; "
-            "dotted, the limit; crosses miss it. What is the "
-            "same for all values, or nowhere defined, is left out.",
+            "curves": "Curves of all values, colored by the scale.",
+            "kpis": "Key figures over the value, with their numerical error where it is visible. "
+            "Dotted: the limit; crosses miss it. Figures that are constant or undefined are "
+            "omitted.",
         }
         blocks: list[Block] = [
             FigureBlock(partial(kpi_curves, self), captions["kpis"], "key-figures")
@@ -295,17 +295,17 @@ class BenchRange(Answer):
 def run_over(
     bench: Bench, over: str, progress: Progress | None, engine: str, estimate_error: bool
 ) -> BenchRange:
-    """Return what a bench gives for every value of ``NAME=LOW:HIGH:COUNT``; see `bywire.run`.
+    """Return a bench's results for every value of ``NAME=LOW:HIGH:COUNT``; see `bywire.run`.
 
     Raises
     ------
     InputError
-        For what is no range, a name that is neither a number of the bench nor of its options,
-        and values that the bench refuses.
+        For an invalid range, a name that is not a number of the bench or of its options, and
+        values that the bench rejects.
     RunError
-        When a run fails.
+        If a run fails.
     KeyboardInterrupt
-        When interrupted.
+        If interrupted.
     """
     name, equals, text = (part.strip() for part in over.partition("="))
     if not equals:

@@ -1,4 +1,4 @@
-"""What a report says of a run or study: remarks, sections, and what was tested."""
+"""Parts of reports on runs and studies: remarks, sections, and the tested bench."""
 
 from __future__ import annotations
 
@@ -37,19 +37,20 @@ _MISSED = 0.05  # of the step's height
 
 
 def remarks(result: Result) -> list[str]:
-    """Return what a run did instead of what was asked.
+    """Return remarks on unexpected behavior of a run.
 
-    A run is remarkable that is stuck more than half of its time, at a limit more than a tenth of
-    it, or that ends off its set point by more than a twentieth of the step; what its model says is.
+    There is a remark on a run that sticks for more than half of its time, is at a limit for more
+    than a tenth, or misses its set point by more than a twentieth of the step. Faults and remarks
+    of the model are included.
     """
     faults = fault_texts(result.bench, result.recordings)
     return [*faults, *_shares(result), *_set_point(result), *_of_models(result)]
 
 
 def fault_texts(bench: Bench, recordings: Recordings | None = None) -> list[str]:
-    """Return each fault of a bench in a sentence: how much, when, what it is.
+    """Return a sentence on each fault of a bench: size, time, description.
 
-    ``recordings``: its runs, of which none may meet the fault; None where they are not looked at.
+    ``recordings``: its runs, to report a fault that none of them reaches; None to skip this.
     """
     texts = []
     for fault in bench.injections:
@@ -61,7 +62,7 @@ def fault_texts(bench: Bench, recordings: Recordings | None = None) -> list[str]
             for each in recordings.values()
             if "time" in each
         )
-        unmet = "" if is_met else "; no recorded row meets it"
+        unmet = "" if is_met else "; not active in any recorded sample"
         texts.append(
             f"fault {mode.name}{size}, from {amount(course.onset, 's')}{until}: "
             f"{mode.summary}{unmet}"
@@ -70,9 +71,9 @@ def fault_texts(bench: Bench, recordings: Recordings | None = None) -> list[str]
 
 
 def _of_models(result: Result) -> list[str]:
-    """Return what the models say of their runs; the same of several of them once.
+    """Return remarks of the models on their runs, without repetitions.
 
-    Not of recordings that hold other things than the model's signals.
+    Recordings without all signals of the model are skipped.
     """
     texts: dict[str, None] = {}
     models = ASSEMBLIES.beside(type(result.bench.par))
@@ -111,7 +112,7 @@ def _set_point(result: Result) -> list[str]:
     if not share > _MISSED:
         return []
     return [
-        f"misses its set point: {step.signal} ends {amount(error.value, error.unit)} off "
+        f"misses its set point: {step.signal} ends {amount(error.value, error.unit)} from "
         f"{amount(step.end, error.unit)}, {100 * share:.3g} % of the step"
     ]
 
@@ -119,17 +120,17 @@ def _set_point(result: Result) -> list[str]:
 # --- Sections
 
 _RECORDED = ("bywire_version", "parameter_hash", "step", "engine", "status", "seed")
-"""attributes of a recording that say how it was made"""
+"""attributes of a recording with the settings of its run"""
 
 
 def outcome(result: Result, rows: Sequence[KpiRow], notes: Sequence[Block]) -> Section:
-    """Return what was required, what was changed, and what else to know before looking on.
+    """Return requirements, changes and notes, the first section of a report.
 
-    ``rows``: key figures beside their requirements; ``notes``: warnings and remarks.
+    ``rows``: key figures with their requirements; ``notes``: warnings and remarks.
     """
     blocks: list[Block] = []
     if judged := [row for row in rows if row.limit]:
-        blocks.append(TableBlock(kpi_table(judged), "What was required."))
+        blocks.append(TableBlock(kpi_table(judged), "Requirements"))
     return Section("Outcome", [*blocks, Subject.of_bench(result.bench).changes_block, *notes])
 
 
@@ -140,7 +141,7 @@ def _options_in_use(bench: Bench) -> Details:
 
 
 def source_says(result: Result) -> list[Block]:
-    """Return what a source states for the experiment, drawn in green in its figures."""
+    """Return the published values for the experiment, drawn in green in its figures."""
     levels = stated_for(result.bench)
     if not levels:
         return []
@@ -154,11 +155,11 @@ def source_says(result: Result) -> list[Block]:
         for each in levels
     ]
     table = text_table(("level", "signal", "stated", "where"), rows)
-    return [TableBlock(table, "What the source states for this experiment: green in the figures.")]
+    return [TableBlock(table, "Published values for this experiment, green in the figures.")]
 
 
 def energy(ledgers: Mapping[str, Ledger]) -> list[Section]:
-    """Return the books of every run that keeps any, by label."""
+    """Return the energy balances of all runs that have one, by label."""
     blocks: list[Block] = []
     for label, books in ledgers.items():
         blocks += [Paragraph(f"{label}, from time zero on:"), TableBlock(energy_table(books))]
@@ -166,8 +167,8 @@ def energy(ledgers: Mapping[str, Ledger]) -> list[Section]:
 
 
 def schematic_section(bench: Bench) -> list[Section]:
-    """Return the brake as parts and wires, where its model is made of such."""
-    case = next(iter(replace(bench, faults=()).cases()), None)  # without what bends its signals
+    """Return the brake as parts and wires, if its model is made of them."""
+    case = next(iter(replace(bench, faults=()).cases()), None)  # without faults of signals
     model, par = (
         (ASSEMBLIES.find(bench.system)(), bench.par) if case is None else (case.model, case.par)
     )
@@ -180,14 +181,14 @@ def how_it_was_made(
 ) -> Section:
     """Return source, program and all values.
 
-    ``errors``: of every recorded signal from the step, by run and name.
+    ``errors``: numerical error of every recorded signal, by run and name.
     """
     bench, cited = result.bench, PARAMETER_SETS.find(result.bench.parameters)
     attrs = next(iter(result.recordings.values())).attrs if result.recordings else {}
     kept = "; ".join(f"{key} {attrs[key]}" for key in _RECORDED if key in attrs)
     parameters = parameter_table(parameter_rows(bench.par, cited.values))
     return Section(
-        "How it was made",
+        "Settings",
         [
             Paragraph(f"Source of the parameters: {cited.source}."),
             Paragraph(f"{kept}."),
@@ -199,7 +200,7 @@ def how_it_was_made(
 
 
 def energy_table(books: Ledger) -> Table:
-    """Return a ledger as a table: place, energy, share of what was turned over."""
+    """Return an energy balance as a table: place, energy, share of the supplied energy."""
     total = books.turnover
 
     def row(side: str, label: str, energy: float) -> tuple[str | Cell, ...]:
@@ -214,7 +215,7 @@ def energy_table(books: Ledger) -> Table:
 
 
 def _signal_errors(errors: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> list[Details]:
-    """Return how far each recorded signal is off, where that was estimated."""
+    """Return the numerical error of each recorded signal, if it was estimated."""
     rows = [
         (label, name, amount_cell(error["rms"], unit, 2), amount_cell(error["max"], unit, 2))
         for label, signals in errors.items()
@@ -224,14 +225,14 @@ def _signal_errors(errors: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> lis
     if not rows:
         return []
     table = text_table(["run", "signal", "rms", "largest"], rows)
-    return [Details("Error of recorded signals from the step", [TableBlock(table)])]
+    return [Details("Numerical error of recorded signals", [TableBlock(table)])]
 
 
-# --- What a study tests
+# --- The tested bench of a study
 
 
 def tested_line(plan: StudyPlan) -> str:
-    """Return what the bench of a study does in one line, with the faults that it has."""
+    """Return one line on the bench of a study, with its faults."""
     line = plan.bench.summary([each.name for each in plan.varied])
     names = [fault.mode.name for fault in plan.bench.injections]
     if not names:
@@ -240,7 +241,7 @@ def tested_line(plan: StudyPlan) -> str:
 
 
 def tested_brief(nominal: Result, plan: StudyPlan) -> list[Block]:
-    """Return for a terminal the faults, if there are any, and what varies."""
+    """Return faults and varied quantities for a terminal."""
     names = ", ".join(each.name for each in plan.varied)
     faults = fault_texts(nominal.bench, nominal.recordings)
     listed = Listing([*faults, *([f"varied: {names}"] if names else [])])
@@ -248,34 +249,34 @@ def tested_brief(nominal: Result, plan: StudyPlan) -> list[Block]:
 
 
 def varied_texts(varied: Sequence[Varied]) -> list[str]:
-    """Return a sentence on each quantity that takes several values."""
+    """Return a sentence on each varied quantity."""
     return [clean(f"{each.name} varies: {each.distribution.text}") for each in varied]
 
 
 def tested_section(nominal: Result, source: StudiedBench | None, subject: Subject) -> Section:
-    """Return where the bench comes from, its faults, what it changes, and its options.
+    """Return the bench's origin, faults, changes and options.
 
     Parameters
     ----------
     nominal
-        The bench itself, run.
+        Result of the nominal bench.
     source
-        Where it comes from; None where that is not known.
+        Origin of the bench; None if unknown.
     subject
-        The bench with what was changed of it.
+        The bench with its changes.
     """
     faults = fault_texts(nominal.bench, nominal.recordings)
     blocks: list[Block] = [Paragraph(f"{_source_text(source)}.")] if source is not None else []
     blocks += [Listing(faults)] if faults else []
     blocks += [subject.changes_block, _options_in_use(nominal.bench)]
-    return Section("What was tested", blocks)
+    return Section("Tested bench", blocks)
 
 
 def tested_data(bench: Bench, source: StudiedBench | None) -> dict[str, Any]:
     """Return the bench for JSON.
 
-    Values are SI numbers, those of changes and of what the study sets texts with units; the end of
-    a fault that stays is None.
+    Values are SI numbers; changes and settings of the study are texts with units. The end of a
+    permanent fault is None.
     """
     return {
         "file": None if source is None else source.bench,
@@ -302,8 +303,6 @@ def tested_data(bench: Bench, source: StudiedBench | None) -> dict[str, Any]:
 
 
 def _source_text(source: StudiedBench) -> str:
-    """Return which bench the study file names, and what the study sets of it."""
+    """Return the bench that the study file names, and the study's settings of it."""
     changes = ", ".join(f"{name} = {value}" for name, value in source.changes.items())
-    return clean(
-        f"Bench: {source.bench}" + (f", of which the study sets {changes}" if changes else "")
-    )
+    return clean(f"Bench: {source.bench}" + (f"; the study sets {changes}" if changes else ""))

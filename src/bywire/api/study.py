@@ -1,4 +1,4 @@
-"""Designs of a brake compared at equal demands: the best, what limits it, at what price."""
+"""Sizing study: designs of a brake compared at equal demands, the best and its limits."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class StudyResult(Answer):
-    """What a study found.
+    """Results of a sizing study.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ class StudyResult(Answer):
 
     @property
     def warnings(self) -> list[str]:
-        """What the user should know of the designs."""
+        """Warnings on the designs."""
         return list(self.findings.warnings)
 
     def document(self) -> Document:
@@ -86,7 +86,7 @@ class StudyResult(Answer):
         options = TableBlock(parameter_table(parameter_rows(self.options)))
         chosen = Details("Options of the study", [options])
         brief_limits: list[str | Flat] = (
-            ["what limits the best design", limits, ""] if findings.limits else []
+            ["limits of the best design", limits, ""] if findings.limits else []
         )
         brief_tables: list[str | Flat] = [
             each for table in tables for each in (table.caption.rstrip("."), table, "")
@@ -96,7 +96,7 @@ class StudyResult(Answer):
             subject.line,
             sections=lambda: [
                 Section("Key figures", [*(warned if findings.warnings else []), kpis]),
-                *([Section("What limits the best design", [limits])] if findings.limits else []),
+                *([Section("Limits of the best design", [limits])] if findings.limits else []),
                 *([Section("Maps", maps)] if maps else []),
                 *([Section("Tables", tables)] if tables else []),
                 Section("Assumptions", [Listing(findings.assumptions), chosen]),
@@ -167,7 +167,7 @@ def asked_study(name: str, parameters: str, overrides: Mapping[str, Any]) -> Ask
     Raises
     ------
     InputError
-        As `bywire.study`.
+        See `bywire.study`.
     """
     definition = STUDIES.find(name)
     cited = set_for(f"study {definition.name!r}", definition.assembly, parameters)

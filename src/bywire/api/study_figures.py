@@ -1,4 +1,4 @@
-"""The figures of a study, in the order in which its report shows them."""
+"""The figures of a study, in the order of its report."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ if TYPE_CHECKING:
     from bywire.report.study.cases import CaseAxis
     from bywire.report.study.probabilities import Curve
 
-_DRIVERS = 3  # quantities that a key figure is drawn over
+_DRIVERS = 3  # quantities on the axes of a key figure's scatter plots
 _AXES = 9  # of parallel coordinates
 
 
 def scatters(findings: Findings) -> list[Block]:
-    """Return the scatter of each requirement's key figure over what drives it most."""
+    """Return the scatter of each requirement's key figure over its main influences."""
     return [
         _scatter_block(findings, judgment)
         for judgment in findings.judgments
@@ -49,37 +49,38 @@ def _scatter_block(findings: Findings, judgment: Judgment) -> Block:
         if cases.all_met
         else f"{every} miss the limit"
     )
-    said = [
-        f"{name.replace('_', ' ')} over what drives it most; {crosses}.",
+    sentences = [
+        f"{name.replace('_', ' ')} over its main influences; {crosses}.",
         cases.caption("meet the limit", "miss it"),
         f"Triangles at the upper edge: cases without it ({lacking}), which miss the limit."
         if lacking
         else "",
-        "Cases gather where failures are: shares of them are no probabilities."
+        "Cases concentrate near failures, so shares of them are not probabilities."
         if findings.rare
         else "",
     ]
-    return FigureBlock(
-        partial(_scatter, findings, name, cases), " ".join(filter(None, said)), f"scatter-{name}"
-    )
+    caption = " ".join(filter(None, sentences))
+    return FigureBlock(partial(_scatter, findings, name, cases), caption, f"scatter-{name}")
 
 
 def parallel(findings: Findings) -> Block:
-    """Return every case as a line over what varies and what is required."""
+    """Return every case as a line over varied quantities and required figures."""
     met = np.all([j.met for j in findings.judgments], axis=0)
     cases = drawn_cases(met, LINES, LINES)
     thinned = cases.caption("meet all requirements", "miss one")
-    said = (
+    outcome = (
         "all meet all requirements"
         if not cases.all_missed
-        else "in front, those that miss a requirement"
+        else "cases that miss a requirement are in front"
         if cases.all_met
         else "all miss a requirement"
     )
-    text = f"Cases as lines; {said}. {thinned}" if thinned else f"Every case as a line; {said}."
+    text = (
+        f"Cases as lines; {outcome}. {thinned}" if thinned else f"Every case as a line; {outcome}."
+    )
     drawn = _required(findings)
     if not all(np.isfinite(findings.figure(name)).all() for name in drawn):
-        text += " Where a case does not have a figure, its line goes to 'none'."
+        text += " If a case lacks a figure, its line goes to 'none'."
     if absent := [j.demand.figure for j in findings.judgments if j.demand.figure not in drawn]:
         text += f" No case has {', '.join(absent)}."
     return FigureBlock(partial(_parallel, findings, cases), text, "parallel")
@@ -126,7 +127,7 @@ def _parallel(findings: Findings, cases: DrawnCases) -> Figure:
 
 
 def _bound_of(findings: Findings, name: str) -> float | None:
-    """Return the limit of a key figure in its unit; None where nothing is required of it."""
+    """Return the limit of a key figure in its unit; None without a requirement."""
     return next((each.bound for each in findings.plan.demands if each.figure == name), None)
 
 
@@ -139,34 +140,34 @@ _Recordings = Callable[[], Mapping[str, Mapping[str, "xr.Dataset"]]]
 
 
 def load_drawing() -> None:
-    """Load what draws the figures of a study and writes its report, ahead of its findings."""
+    """Import the modules for a study's figures and report, ahead of its findings."""
     from bywire.data import netcdf  # noqa: F401
     from bywire.report import page, time_traces  # noqa: F401
 
 
 def study_figures(findings: Findings, recordings: _Recordings) -> list[Block]:
-    """Return the figures of a study; none where no case has a result.
+    """Return the figures of a study; none if no case has a result.
 
     Parameters
     ----------
     findings
-        What was found.
+        The study's cases, judged.
     recordings
-        Returns the recordings of the bench itself and of worst cases, by run and by what they are.
+        Returns the recordings of the bench itself and of worst cases, by run and label.
     """
     if not findings.spreads:
         return []
     if findings.rare:
         return [*_rare_figures(findings), *scatters(findings), *_overlays(findings, recordings)]
     band = (
-        "; the shaded band holds 90 % of them."
+        "; the shaded band contains 90 % of them."
         if findings.plan.is_sampled
-        else f"; heights count the cases of {findings.plan.design}, and are no frequencies."
+        else f"; heights count the cases of {findings.plan.design}, and are not probabilities."
     )
     blocks: list[Block] = [
         FigureBlock(
             partial(_histograms, findings),
-            f"Spread of the key figures over the cases{band} Dashed, the bench itself; dotted, "
+            f"Spread of the key figures over the cases{band} Dashed: the bench itself; dotted: "
             "the limit.",
             "histograms",
             is_long=True,
@@ -177,8 +178,9 @@ def study_figures(findings: Findings, recordings: _Recordings) -> list[Block]:
         blocks.append(
             FigureBlock(
                 partial(_influences, findings),
-                f"What drives the key figures: {'partial ' * bool(findings.plan.correlations)}rank "
-                "correlations with their intervals. Pale: not distinct from none."
+                f"Influences on the key figures: "
+                f"{'partial ' * bool(findings.plan.correlations)}rank "
+                "correlations with their intervals. Pale: not distinct from zero."
                 f"{_on_choices(findings)}"
                 f"{strongest(map(findings.influences, figures))}",
                 "influences",
@@ -188,21 +190,21 @@ def study_figures(findings: Findings, recordings: _Recordings) -> list[Block]:
         blocks.append(
             FigureBlock(
                 partial(_tornado, findings, effects),
-                "How far each quantity alone moves the key figures from what the bench itself "
-                f"gives; marks are its levels, dotted the limit."
+                "Effect of each quantity alone on the key figures, from the bench itself. Marks: "
+                "its levels; dotted: the limit."
                 f"{_on_gray(findings)}{_on_edge(effects)}{strongest(effects.values())}",
                 "tornado",
             )
         )
     if findings.plan.sensitivity is not None:
         blocks += _sensitivity_figures(findings)
-    # Trajectories stand on a few levels: their points would be stripes.
+    # Trajectories use only a few levels: their points would form stripes.
     blocks += scatters(findings) if findings.plan.design != "morris" else []
     if findings.judgments and findings.plan.is_sampled:
         blocks.append(
             FigureBlock(
                 partial(_convergence, findings),
-                "Probability that a requirement is met, over the number of cases; dotted, the "
+                "Probability to meet a requirement, over the number of cases; dotted: the "
                 f"required one.{_on_others(findings)}",
                 "convergence",
             )
@@ -213,13 +215,13 @@ def study_figures(findings: Findings, recordings: _Recordings) -> list[Block]:
 
 
 def _on_gray(findings: Findings) -> str:
-    return " Gray: a choice, by name where it goes farthest." if _has_choices(findings) else ""
+    return " Gray: a choice, with the names of its extremes." if _has_choices(findings) else ""
 
 
 def _on_edge(effects: Mapping[str, Sequence[Effect]]) -> str:
     if not any(effect.lacking for each in effects.values() for effect in each):
         return ""
-    return " A triangle: the figure is not defined at some of its levels."
+    return " Triangle: the figure is not defined at some of its levels."
 
 
 def _has_choices(findings: Findings) -> bool:
@@ -229,7 +231,7 @@ def _has_choices(findings: Findings) -> bool:
 def _on_choices(findings: Findings) -> str:
     if not _has_choices(findings):
         return ""
-    return " A choice has no order: its correlation ratio stands among their sizes, unsigned."
+    return " A choice has no order; its bar is the correlation ratio, without a sign."
 
 
 def _histograms(findings: Findings) -> Figure:
@@ -277,7 +279,7 @@ def _convergence(findings: Findings) -> Figure:
 
 
 def _converging(findings: Findings) -> list[Judgment]:
-    """Return requirements, those that want a probability and are not met before others."""
+    """Return requirements, first those with a probability that are not met."""
     return sorted(
         findings.judgments, key=lambda j: (j.demand.probability is None, j.outcome == "met")
     )
@@ -309,13 +311,13 @@ def _overlaid(each: Mapping[str, xr.Dataset]) -> Figure:
 
 
 def _alike_once(each: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
-    """Return recordings by label, those that are the same under one: a case may be worst twice."""
+    """Return recordings by label, with equal ones merged: a case may be worst twice."""
     once: dict[str, xr.Dataset] = {}
     for label, recording in each.items():
         same = next((known for known, other in once.items() if other.equals(recording)), None)
         if same is None:
             once[label] = recording
-        else:  # in its place: colors are given in order
+        else:  # keep its position: colors are assigned in order
             once = {f"{k}, {label}" if k == same else k: other for k, other in once.items()}
     return once
 
@@ -324,22 +326,22 @@ def _alike_once(each: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
 
 _POINTS = 200  # of a curve
 _CAPTIONS = {
-    "sobol-indices": "Shares of the variance of each key figure that a quantity makes, alone and "
-    "with all others, with their intervals. Pale: not distinct from none.",
+    "sobol-indices": "Share of each quantity in the variance of each key figure, alone and with "
+    "all others, with intervals. Pale: not distinct from zero.",
     "morris": "Mean size (with its interval) and standard deviation of the elementary effects of "
-    "each quantity. Pale: not distinct from none.",
+    "each quantity. Pale: not distinct from zero.",
 }
 
 
 def _rare_figures(findings: Findings) -> list[FigureBlock]:
-    """Return the figure of probabilities over the limit; none where nothing was found."""
+    """Return the figure of probabilities over the limit, if there are any."""
     if not any(each.failure.span for each in findings.rare):
         return []
     return [
         FigureBlock(
             partial(_curves, findings),
-            "Probability that a key figure comes worse than a value, with its interval. Dotted, "
-            "the limit and the probability that is admitted.",
+            "Probability that a key figure is worse than a value, with its interval. Dotted: the "
+            "limit and the permitted probability.",
             "exceedance",
         )
     ]
@@ -372,7 +374,7 @@ def _curve(each: RareFailure) -> Curve:
 
 
 def _sensitivity_figures(findings: Findings) -> list[FigureBlock]:
-    """Return the figure of all indices; none where there are none."""
+    """Return the figure of all indices, if there are any."""
     drivers = [findings.sensitivity(name).drivers for name in shown_figures(findings)]
     if not any(drivers):
         return []

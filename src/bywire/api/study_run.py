@@ -1,6 +1,6 @@
-"""A study of many cases: computed or kept, judged, and shown with its worst cases.
+"""A study of many cases: its results, verdicts and worst cases.
 
-In a study of rare failures, the most probable failing one.
+A study of rare failures has its most probable failing cases instead.
 """
 
 from __future__ import annotations
@@ -83,9 +83,9 @@ class ShownCases:
     Parameters
     ----------
     findings
-        What was found.
+        The study's cases, judged.
     nominal
-        The bench itself.
+        Result of the nominal bench.
     """
 
     findings: Findings
@@ -93,17 +93,17 @@ class ShownCases:
 
     @property
     def kind(self) -> str:
-        """What each is called, in names of files too."""
+        """Word for each case, also in file names."""
         return "failing" if self.findings.rare else "worst"
 
     @property
     def title(self) -> str:
-        """What they are called together."""
+        """Heading of the cases."""
         return "Most probable failing cases" if self.findings.rare else "Worst cases"
 
     @cached_property
     def benches(self) -> Mapping[str, Bench]:
-        """What runs each that has a result, by its key figure."""
+        """Bench of each case that has a result, by its key figure."""
         return {
             j.demand.figure: self._bench(j, row)
             for j in self.findings.judgments
@@ -112,11 +112,11 @@ class ShownCases:
 
     @cached_property
     def results(self) -> Mapping[str, Result]:
-        """Each one, run again, by its key figure."""
+        """Result of each case, run again, by its key figure."""
         return {kpi: running.run(bench) for kpi, bench in self.benches.items()}
 
     def texts(self) -> list[str]:
-        """Return each case in words."""
+        """Return a text on each case."""
         return [
             self._text(each, each.worst)
             for each in self.findings.judgments
@@ -126,7 +126,7 @@ class ShownCases:
     def _text(self, judgment: Judgment, row: int) -> str:
         kpi = judgment.demand.figure
         if row in self.findings.failures:
-            return f"{kpi}: case {self.named(row)}, which has no result"
+            return f"{kpi}: case {self.named(row)} has no result"
         if not math.isfinite(self.findings.figure(kpi)[row]):
             (why,) = [each.note for each in self.results[kpi].kpis if each.name == kpi]
             return (
@@ -181,9 +181,9 @@ class ShownCases:
         return replace(made, name=f"{self.kind} {judgment.demand.figure}")
 
     def _doubt(self, judgment: Judgment, row: int) -> str:
-        """Return that a case is too close to the limit to be told from one that meets it."""
+        """Return a remark on a case that is too close to the limit to be decided."""
         is_close = self.findings.is_close(judgment.demand)[row]
-        return " (closer to the limit than its error)" if is_close else ""
+        return " (closer to the limit than its numerical error)" if is_close else ""
 
     def _figure(self, name: str, row: int) -> str:
         return figure_text(self.findings, name, float(self.findings.figure(name)[row]))
@@ -235,7 +235,7 @@ def findings_data(findings: Findings) -> dict[str, Any]:
 
 
 def _judgment_data(findings: Findings, judgment: Judgment) -> dict[str, Any]:
-    """Return a requirement; of cases that were not drawn, without a probability."""
+    """Return a requirement; without a probability if the cases are not random."""
     demand, share = judgment.demand, judgment.share
     probability = {"probability": share.value, "low": share.low, "high": share.high}
     rare = {}
@@ -255,7 +255,7 @@ def _judgment_data(findings: Findings, judgment: Judgment) -> dict[str, Any]:
 
 
 def _spread_data(spread: Spread) -> dict[str, Any]:
-    """Return mean and quantiles of drawn cases."""
+    """Return mean and quantiles of random cases."""
     return {
         "mean": spread.mean,
         "sd": spread.sd,
@@ -268,29 +268,29 @@ def _spread_data(spread: Spread) -> dict[str, Any]:
 
 # --- Warnings and notes
 
-_REASONS = 10  # that are named
-_WIDE = 0.15  # reach of an interval of shares of the variance to either side, that tells little
+_REASONS = 10  # largest number of listed reasons
+_WIDE = 0.15  # half width above which an interval of a share of the variance is too wide
 
 
 def warned(findings: Findings, of_the_bench: list[str]) -> list[str]:
-    """Return what runs warn of, what is undecided of rare failures, and cases without a result."""
+    """Return warnings of runs, undecided rare failures, and cases without a result."""
     count = len(findings.cases)
-    said = [f"{text} ({cases} of {count} cases)" for text, cases in findings.warnings.items()]
-    said += of_the_bench if not said else []
+    texts = [f"{text} ({cases} of {count} cases)" for text, cases in findings.warnings.items()]
+    texts += of_the_bench if not texts else []
     if failed := findings.failures:
-        said.append(
+        texts.append(
             f"{len(failed)} of {count} cases have no result; they count as missing every "
             "requirement"
         )
     if findings.spreads:
-        said += _undefined(findings)
+        texts += _undefined(findings)
     elif count and not failed:
-        said.append("no key figure is defined in any case: look at the bench alone, bywire run")
-    return said + (state_texts(findings) if findings.rare and count else [])
+        texts.append("no key figure is defined in any case: check the bench with bywire run")
+    return texts + (state_texts(findings) if findings.rare and count else [])
 
 
 def _undefined(findings: Findings) -> list[str]:
-    """Return which figures of requirements are not defined in cases that ran."""
+    """Return the figures of requirements that are not defined in some cases."""
     cases: dict[int, list[str]] = {}
     for each in findings.judgments:
         undefined = int(np.count_nonzero(~np.isfinite(findings.figure(each.demand.figure))))
@@ -298,16 +298,16 @@ def _undefined(findings: Findings) -> list[str]:
             cases.setdefault(lacking, []).append(each.demand.figure)
     return [
         f"{', '.join(names)}: not defined in {number} of {len(findings.cases)} cases, which count "
-        "as missing what is required"
+        "as missing the requirement"
         for number, names in cases.items()
     ]
 
 
 def unfinished(plan: StudyPlan, cases: int, resume: str) -> str:
-    """Return what is still to be computed, and by which command."""
+    """Return a text on missing cases, with the command that computes them."""
     if plan.sought is not None:
-        return f"not all cases that it asks for are computed yet: {resume}"
-    limit = f" (its file gives it {shown(plan.time, 's')} at a time)"
+        return f"not all cases are computed yet: {resume}"
+    limit = f" (the study file limits each call to {shown(plan.time, 's')})"
     return (
         f"{plan.total - cases} of {plan.total} cases are not computed yet"
         f"{limit if math.isfinite(plan.time) else ''}: {resume}"
@@ -315,7 +315,7 @@ def unfinished(plan: StudyPlan, cases: int, resume: str) -> str:
 
 
 def noted(findings: Findings, damaged: int) -> list[str]:
-    """Return what was rounded or repaired, and what intervals stand for."""
+    """Return notes on rounding and repair, and on the meaning of intervals."""
     repaired = ""
     if damaged:
         files = "1 damaged chunk is" if damaged == 1 else f"{damaged} damaged chunks are"
@@ -329,7 +329,7 @@ def noted(findings: Findings, damaged: int) -> list[str]:
 
 
 def _failure_texts(findings: Findings, named: Callable[[int], str]) -> list[str]:
-    """Return why cases have no result, each reason once, with the first case that has it.
+    """Return each reason why cases have no result, with the first such case.
 
     Parameters
     ----------
@@ -342,14 +342,14 @@ def _failure_texts(findings: Findings, named: Callable[[int], str]) -> list[str]
         count = f"{len(rows)} cases, " if len(rows) > 1 else ""
         texts.append(f"{text} ({count}case {named(rows[0])})")
     rest = len(reasons) - len(texts)
-    return texts + ([f"and {rest} reasons more"] if rest else [])
+    return texts + ([f"and {rest} more reasons"] if rest else [])
 
 
 def _rounding(plan: StudyPlan) -> list[str]:
     if plan.total == plan.cases or not (plan.is_sampled or plan.sensitivity is not None):
         return []
     what = "whole groups" if plan.sensitivity is not None else f"whole chunks of {CHUNK}"
-    return [f"{plan.total} cases in place of {plan.cases}: they come in {what}"]
+    return [f"{plan.total} cases in place of {plan.cases}, because cases come in {what}"]
 
 
 def _on_choices(plan: StudyPlan) -> list[str]:
@@ -357,8 +357,8 @@ def _on_choices(plan: StudyPlan) -> list[str]:
     if not choices or not plan.is_sampled:
         return []
     return [
-        f"{', '.join(choices)}: a choice has no rank correlation: its correlation ratio ranks it "
-        "among the quantities, without a sign or an interval; 'sobol-indices' tells its share of "
+        f"{', '.join(choices)}: a choice has no rank correlation. Its correlation ratio ranks it "
+        "among the quantities, without a sign or an interval; 'sobol-indices' gives its share of "
         "the variance"
     ]
 
@@ -371,20 +371,18 @@ def _on_intervals(findings: Findings) -> list[str]:
         return rare_notes(findings)
     if plan.sensitivity is not None:
         return [
-            f"{plan.design}: cases share values, so that shares of them are no probabilities",
+            f"{plan.design}: cases share values, so shares of them are not probabilities",
             *((missing_indices(findings) + _wide_shares(findings)) if len(findings.cases) else []),
         ]
     if not plan.is_sampled:
-        return [f"{plan.design}: what may happen, and not how often"]
+        return [f"{plan.design}: possible outcomes, without their probability"]
     if plan.design == "monte-carlo":
         return []
-    return [
-        f"{plan.design}: intervals are those of independent cases, which scatter more as a rule"
-    ]
+    return [f"{plan.design}: intervals are those of independent cases, which usually scatter more"]
 
 
 def _wide_shares(findings: Findings) -> list[str]:
-    """Return which key figures have shares of the variance that are hardly known."""
+    """Return the key figures whose shares of the variance have wide intervals."""
     design = findings.plan.sensitivity
     assert design is not None
     wide = [
@@ -398,8 +396,8 @@ def _wide_shares(findings: Findings) -> list[str]:
     if not wide:
         return []
     return [
-        f"{', '.join(wide)}: {design.base} groups do not tell shares within +-{_WIDE:g}; "
-        "name more cases in the study file, and run it into another folder"
+        f"{', '.join(wide)}: {design.base} groups do not determine shares within +-{_WIDE:g}; "
+        "ask for more cases in the study file, and run it into another folder"
     ]
 
 
@@ -411,23 +409,23 @@ _DRIVERS = 3  # rows of each without --verbose
 
 @dataclass(frozen=True, repr=False)
 class StudyRun(Answer):
-    """What a study found; as far as it is computed.
+    """Results of a study so far.
 
     Parameters
     ----------
     plan
         The study.
     folder
-        Where its chunks lie.
+        Folder of its chunks.
     findings
         Its cases, judged.
     nominal
-        The bench itself.
+        Result of the nominal bench.
     status
-        ``passed``, ``failed`` or ``undecided`` by the requirements, ``done`` where there are none,
-        ``failed``, too, where no case has a key figure, and ``unfinished`` where cases are missing.
+        ``passed``, ``failed`` or ``undecided`` by the requirements, ``done`` without requirements.
+        Also ``failed`` if no case has a key figure, and ``unfinished`` if cases are missing.
     damaged
-        Chunks whose files could not be read, and that were computed again.
+        Chunks with unreadable files, which were computed again.
     """
 
     plan: StudyPlan
@@ -443,7 +441,7 @@ class StudyRun(Answer):
 
     @property
     def cases(self) -> pd.DataFrame:
-        """Every case: what varied [SI], key figures, why there is none, what the run warned of.
+        """All cases: varied quantities [SI], key figures, reasons for none, and warnings.
 
         ``.attrs["units"]`` has the unit of each column.
         """
@@ -470,47 +468,46 @@ class StudyRun(Answer):
 
     @property
     def holds(self) -> bool:
-        """Whether all cases are computed and every requirement is met as it is wanted."""
+        """Whether all cases are computed and every requirement is met."""
         return self.status in ("done", "passed")
 
     @property
     def warnings(self) -> list[str]:
-        """What the runs warned of, cases without a result, and what is still to be computed."""
+        """Warnings of the runs, cases without a result, and missing cases."""
         return list(self._warnings)
 
     @cached_property
     def _warnings(self) -> list[str]:
-        """The warnings, for which all cases are gone through once."""
-        said = [*self.nominal.bench.outdated, *warned(self.findings, self.nominal.warnings)]
+        """The warnings, cached because they need a pass over all cases."""
+        texts = [*self.nominal.bench.outdated, *warned(self.findings, self.nominal.warnings)]
         if self.status == "unfinished":
             resume = StudyStore(self.folder).resume_command
-            said.append(unfinished(self.plan, len(self.cases), resume))
-        return said
+            texts.append(unfinished(self.plan, len(self.cases), resume))
+        return texts
 
     @property
     def notes(self) -> list[str]:
-        """What was rounded or repaired, what intervals stand for, what nothing is said of."""
+        """Notes on rounding and repair, and on the meaning of intervals."""
         return noted(self.findings, self.damaged)
 
     def worst(self, kpi: str) -> Bench:
-        """Return the bench of the case that comes worst of all by a requirement.
+        """Return the bench of the worst case for a requirement.
 
-        Of a rare failure, that of the most probable failing case.
+        For a rare failure, return that of the most probable failing case.
 
         Raises
         ------
         UnknownNameError
-            When nothing is required of the key figure.
+            If the key figure has no requirement.
         ParameterError
-            When no case has it, or all have the same.
+            If no case has a result, or all are equal.
         """
         required = [each.demand.figure for each in self.findings.judgments]
         if kpi not in required:
             raise unknown_name("key figure of a requirement", str(kpi), required)
         if kpi not in self._shown.benches:
             raise ParameterError(
-                f"there is no {self._shown.kind} case of {kpi}: none has a result, or all are "
-                "equal",
+                f"{kpi} has no {self._shown.kind} case: no case has a result, or all are equal",
                 name=kpi,
             )
         return self._shown.benches[kpi]
@@ -519,7 +516,7 @@ class StudyRun(Answer):
         return f"<StudyRun {self.plan.name}: {len(self.cases)} cases, {self.status}>"
 
     def document(self) -> Document:
-        """Return verdicts, the spread of key figures, what drives them, worst cases, figures."""
+        """Return verdicts, the spread of key figures, influences, worst cases, figures."""
         plan, findings = self.plan, self.findings
         if not len(self.cases):
             return self._empty()
@@ -554,7 +551,7 @@ class StudyRun(Answer):
                 *([Section("Notes", [Listing(remarks)])] if remarks else []),
                 *([Section("Key figures", figures)] if figures else []),
                 *(
-                    [Section("What drives them", [*drivers, *unexplained])]
+                    [Section("Main influences", [*drivers, *unexplained])]
                     if drivers or unexplained
                     else []
                 ),
@@ -565,7 +562,7 @@ class StudyRun(Answer):
                 ),
                 *([Section(self._shown.title, [Listing(texts)])] if judged and texts else []),
                 *([Section("Cases without a result", [Listing(missing)])] if missing else []),
-                Section("What varies", [TableBlock(varied_table(plan)), *correlated(plan)]),
+                Section("Varied quantities", [TableBlock(varied_table(plan)), *correlated(plan)]),
                 subject.provenance(f"Chunks of the study: {self.folder}.", has_changes=False),
             ],
             brief=spaced(
@@ -575,7 +572,7 @@ class StudyRun(Answer):
                     *figures,
                     *[replace(each, most=_DRIVERS) for each in drivers[:_BRIEF]],
                     *(unexplained if findings.plan.sensitivity is None else []),
-                    *([f"and {more} more such tables in the report"] if more > 0 else []),
+                    *([f"{more} more such tables are in the report"] if more > 0 else []),
                     *([Listing(missing, "Cases without a result")] if missing else []),
                 ]
             ),
@@ -637,10 +634,10 @@ def completed(
     cluster: str,
     progress: Progress | None,
 ) -> StudyRun:
-    """Return a study with all of its cases, those that were missing computed."""
+    """Return a study with all of its cases, after computing those that were missing."""
 
     def ready() -> None:
-        if is_command_line():  # its report is drawn next; a program may want no figure
+        if is_command_line():  # the report needs it next; a program may not
             load_drawing()
             field_notes(type(plan.bench.par))
 
@@ -663,7 +660,7 @@ def completed(
 
 
 def kept_study(folder: str | Path) -> StudyRun:
-    """Return what `study_report` does, without warning of anything: for what is made of it."""
+    """Return the results of a study's folder, as `study_report` but without warnings."""
     store = StudyStore(Path(folder))
     plan, _ = kept_plan(store)
     store.require(plan)
@@ -671,30 +668,30 @@ def kept_study(folder: str | Path) -> StudyRun:
 
 
 def kept_plan(store: StudyStore) -> tuple[StudyPlan, Origin]:
-    """Return the study of a folder, with as many cases as were asked for, and its origin."""
-    said = store.record()
-    origin = Origin(Path(said["source"]), said["set"])
+    """Return the study of a folder, with its requested number of cases, and its origin."""
+    record = store.record()
+    origin = Origin(Path(record["source"]), record["set"])
     if not origin.file.is_file():
         raise FileError(
-            f"the study file {origin.file} of {store.folder} no longer exists: run the study from "
-            f"its new place, bywire study run FILE --out {store.folder}",
+            f"the study file {origin.file} of {store.folder} no longer exists: if you moved it, "
+            f"type bywire study run FILE --out {store.folder}",
             name=str(origin.file),
         )
     try:
         plan = read_study(origin.file, origin.overrides)
     except InputError as error:
-        unloaded = [path for path in said["systems"] if path not in loaded_files()]
+        unloaded = [path for path in record["systems"] if path not in loaded_files()]
         if not unloaded:
             raise
         raise error.reworded(
             f"{error}; the study was run with {' '.join(map(_loaded_by, unloaded))}"
         ) from None
     is_listed = plan.design in SPANNED
-    return (plan if is_listed else replace(plan, cases=int(said["cases"]))), origin
+    return (plan if is_listed else replace(plan, cases=int(record["cases"]))), origin
 
 
 def with_engine(engine: str, plan: StudyPlan) -> StudyPlan:
-    """Return the plan computed by an engine; its cases are the same by whichever."""
+    """Return the plan with an engine; the cases do not depend on the engine."""
     return plan if engine == "auto" else replace(plan, bench=replace(plan.bench, engine=engine))
 
 
@@ -716,5 +713,5 @@ def _run_of(plan: StudyPlan, store: StudyStore, nominal: Result) -> StudyRun:
 
 
 def _loaded_by(path: str) -> str:
-    """Return how a reader loads a brake from a file."""
+    """Return the text with which a user loads a brake from a file."""
     return f"--system {path}" if is_command_line() else f'bywire.load_system("{path}")'

@@ -1,4 +1,4 @@
-"""Surrogates of a study's key figures: what they tell of values in between, and how far off."""
+"""Surrogates of a study's key figures: estimates between cases, and their errors."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from bywire.report.tables import Cell, Column, Table
 from bywire.report.wording import amount, clean
 from bywire.studies.surrogate import Surrogate
 
-_POOR = 0.5  # share of the variance below which a surrogate is no use
+_POOR = 0.5  # explained share of the variance below which a surrogate is useless
 
 
 @dataclass(frozen=True)
@@ -25,13 +25,13 @@ class StudySurrogates(Answer):
     Parameters
     ----------
     study
-        The study that they are made of.
+        The study from which they are fitted.
     surrogates
-        By key figure; each is called with values of what varies [SI].
+        Surrogates by key figure, functions of the varied quantities [SI].
     at
-        Values that were asked for [SI]; empty where none were.
+        Values at which to estimate [SI]; may be empty.
     refused
-        Key figures that have none, and why.
+        Key figures without a surrogate, with the reason.
     """
 
     study: StudyRun
@@ -41,10 +41,10 @@ class StudySurrogates(Answer):
 
     @property
     def warnings(self) -> list[str]:
-        """Surrogates that tell little, and the study's own warnings."""
+        """Warnings on poor surrogates, and the study's warnings."""
         poor = [
-            f"the surrogate of {each.kpi} tells {100.0 * each.explained:.0f} % of the variance of "
-            "cases it has not seen: the rest is noise, or no polynomial"
+            f"the surrogate of {each.kpi} explains {100.0 * each.explained:.0f} % of the variance "
+            "of cases outside its fit; the rest is noise, or not a polynomial"
             for each in self.surrogates.values()
             if each.explained < _POOR
         ]
@@ -53,11 +53,11 @@ class StudySurrogates(Answer):
 
     @property
     def notes(self) -> list[str]:
-        """What quantities are taken for that were not given, where the bench alone does not say."""
+        """Notes on values of quantities that the user did not give."""
         varied, first = self.study.plan.varied, next(iter(self.surrogates.values()))
         moved = [
-            f"no case has {v.name} = {amount(v.nominal, v.unit)} as the bench has it: the nearest, "
-            f"{amount(first.nominal[v.name], v.unit)}, is taken; choose another by {option('at')}"
+            f"no case has the bench's {v.name} = {amount(v.nominal, v.unit)}: bywire takes the "
+            f"nearest, {amount(first.nominal[v.name], v.unit)}; choose another with {option('at')}"
             for v in varied
             if self.at and v.name not in self.at and first.nominal[v.name] != v.nominal
         ]
@@ -67,12 +67,12 @@ class StudySurrogates(Answer):
             if (pair[0] in self.at) != (pair[1] in self.at)
         ]
         return moved + [
-            f"{' and '.join(pair)} are correlated, and one of them stays as in the bench: give both"
+            f"{' and '.join(pair)} are correlated, but you changed only one of them: give both"
             for pair in pairs
         ]
 
     def document(self) -> Document:
-        """Return how good the surrogates are, and what they say of the values asked for."""
+        """Return the accuracy of the surrogates, and their estimates."""
         plan = self.study.plan
         table = TableBlock(self._table())
         return Document(
@@ -80,7 +80,7 @@ class StudySurrogates(Answer):
             f"polynomials of {len(plan.varied)} quantities, from {len(self.study.cases)} cases",
             sections=[
                 Section("Key figures", [table]),
-                Section("What varies", [TableBlock(varied_table(plan))]),
+                Section("Varied quantities", [TableBlock(varied_table(plan))]),
             ],
             brief=spaced([table]),
             data=self._data(),

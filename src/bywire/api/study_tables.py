@@ -1,4 +1,4 @@
-"""Tables and notes of a study: requirements, key figures, what varies, and what drives them."""
+"""Tables and notes of a study: requirements, key figures, varied quantities, influences."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ from bywire.studies.statistics import FailureProbability, Influence, Interval, O
 if TYPE_CHECKING:
     pass
 
-_URGENCY = ("missed", "undecided", "met")  # outcomes, in the order in which they matter
-_SHOWN = 5  # quantities that drive a key figure
+_URGENCY = ("missed", "undecided", "met")  # outcomes, the most urgent first
+_SHOWN = 5  # listed influences on a key figure
 
 
 def demand_table(findings: Findings) -> Table:
-    """Return the requirements: how often they are met, how probable that is, and the verdict."""
+    """Return the requirements: cases that meet them, probability, and verdict."""
     confidence = f"{100.0 * findings.plan.confidence:g} %"
     is_sampled = findings.plan.is_sampled
-    is_search = findings.plan.design == WORST  # how many of its cases it went through says nothing
+    is_search = findings.plan.design == WORST  # its share of cases means nothing
     counted = "worst found" if is_search else "cases that meet it"
     columns = [Column("requirement"), Column(counted, numeric=True)]
     columns += [Column("probability", numeric=True), Column(f"{confidence} interval")] * is_sampled
@@ -60,7 +60,7 @@ def demand_table(findings: Findings) -> Table:
 
 
 def _worst(findings: Findings, judgment: Judgment) -> Cell:
-    """Return the worst figure that was found; of cases that are all equal, theirs."""
+    """Return the worst figure, or the common one if all cases are equal."""
     kpi = judgment.demand.figure
     figures = findings.figure(kpi)
     known = np.flatnonzero(np.isfinite(figures))
@@ -82,18 +82,18 @@ def _figure_cell(
 def figure_text(
     findings: Findings, name: str, value: float, digits: int = 4, *, is_difference: bool = False
 ) -> str:
-    """Return a value of a key figure in the unit of the figure's cases, that of its axes too.
+    """Return a value of a key figure in the unit of its cases and axes.
 
     Parameters
     ----------
     name
         The figure.
     value
-        The value, or a difference of two, in the figure's SI unit; NaN where it is not defined.
+        The value, or a difference of two, in the figure's SI unit; NaN if it is not defined.
     digits
         Significant digits.
     is_difference
-        Whether it is one: of temperatures they are in K.
+        Whether the value is a difference; those of temperatures are in K.
     """
     unit = findings.units[name]
     return amount(
@@ -102,13 +102,13 @@ def figure_text(
 
 
 def strongest(drivers: Iterable[Sequence[object]]) -> str:
-    """Return how many of the quantities that drive each figure have bars; empty where all have."""
+    """Return a sentence on the number of bars; empty if all quantities have one."""
     count = max(map(len, drivers), default=0)
-    return f" Shown are the {BARS} strongest of {count} quantities." if count > BARS else ""
+    return f" Only the {BARS} strongest of {count} quantities are shown." if count > BARS else ""
 
 
 def percent(value: float, of: Share) -> str:
-    """Return a probability in the digits that its interval leaves.
+    """Return a probability with as many digits as its interval justifies.
 
     Examples
     --------
@@ -123,16 +123,16 @@ def percent(value: float, of: Share) -> str:
 
 
 def spread_blocks(findings: Findings) -> list[TableBlock | Listing]:
-    """Return the table of key figures, and which ones no case has; nothing where there are none."""
+    """Return the table of key figures, and the figures that no case has."""
     if not findings.spreads:
         return []
     absent = [name for name in findings.units if name not in {s.name for s in findings.spreads}]
-    said = [Listing([f"not defined in any case: {', '.join(absent)}"])] if absent else []
-    return [TableBlock(spread_table(findings)), *said]
+    undefined = [Listing([f"not defined in any case: {', '.join(absent)}"])] if absent else []
+    return [TableBlock(spread_table(findings)), *undefined]
 
 
 def spread_table(findings: Findings) -> Table:
-    """Return the key figures: the bench itself, percentiles of drawn cases, and ends."""
+    """Return the key figures: nominal values, percentiles of random cases, and extremes."""
     is_sampled = findings.plan.is_sampled
     heads = ["the bench itself", *["5 %", "median", "95 %"] * is_sampled, "least", "largest"]
     rows = []
@@ -147,7 +147,7 @@ def spread_table(findings: Findings) -> Table:
 
 
 def varied_table(plan: StudyPlan) -> Table:
-    """Return what varies, and how."""
+    """Return the varied quantities with their distributions."""
     return text_table(
         ["quantity", "in the bench", "distribution", "together with it"],
         [
@@ -163,7 +163,7 @@ def varied_table(plan: StudyPlan) -> Table:
 
 
 def correlated(plan: StudyPlan) -> list[Listing]:
-    """Return which quantities go together, where any do."""
+    """Return the correlated quantities, if there are any."""
     texts = [
         f"{first} and {second}: correlation {value:.3g} of their normal scores"
         for (first, second), value in plan.correlations.items()
@@ -172,7 +172,7 @@ def correlated(plan: StudyPlan) -> list[Listing]:
 
 
 def influence_tables(findings: Findings) -> list[TableBlock]:
-    """Return what drives each key figure of a requirement; of all where nothing is required."""
+    """Return the influences on each key figure of a requirement, or on all."""
     if not findings.plan.is_sampled:
         return []
     each = {name: findings.influences(name) for name in shown_figures(findings)}
@@ -180,8 +180,8 @@ def influence_tables(findings: Findings) -> list[TableBlock]:
     return [
         TableBlock(
             _influence_table(found, is_partial),
-            f"What drives {name}{_more(found)}.",
-            title=f"what drives {name}{_more(found)}",
+            f"Main influences on {name}{_more(found)}.",
+            title=f"main influences on {name}{_more(found)}",
         )
         for name, found in each.items()
         if found
@@ -189,19 +189,19 @@ def influence_tables(findings: Findings) -> list[TableBlock]:
 
 
 def effect_tables(findings: Findings) -> list[TableBlock]:
-    """Return what each quantity alone does to key figures of requirements, or to all."""
+    """Return the effect of each quantity alone on key figures of requirements, or on all."""
     return [
         TableBlock(
             _effect_table(findings, name, found),
-            f"What each quantity alone does to {name}.",
-            title=f"what moves {name}",
+            f"Effect of each quantity alone on {name}.",
+            title=f"effects on {name}",
         )
         for name, found in moving_effects(findings).items()
     ]
 
 
 def moving_effects(findings: Findings) -> dict[str, Sequence[Effect]]:
-    """Return the effects on each of the key figures that matter, those that nothing moves apart."""
+    """Return the effects on each relevant key figure that changes."""
     each = {name: findings.effects(name) for name in shown_figures(findings)}
     return {name: found for name, found in each.items() if any(e.swing or e.lacking for e in found)}
 
@@ -224,9 +224,9 @@ def _effect_table(findings: Findings, name: str, effects: Sequence[Effect]) -> T
 
 
 def shown_figures(findings: Findings) -> list[str]:
-    """Return the key figures that matter: those that something is required of, else all.
+    """Return the relevant key figures: those with a requirement, otherwise all.
 
-    Those of requirements that are missed come first, then those that are undecided.
+    Figures of missed requirements are first, then those of undecided ones.
     """
     known = [each.name for each in findings.spreads]
     judgments = findings.judgments if known else ()
@@ -240,9 +240,9 @@ def shown_figures(findings: Findings) -> list[str]:
 
 
 def unmoved(findings: Findings) -> list[str]:
-    """Return in a sentence which of the key figures that matter are the same in every case.
+    """Return a sentence on relevant key figures that are the same in every case.
 
-    Of designs for indices, which say so themselves, and of rare failures, nothing.
+    Designs for indices report this themselves; for rare failures there is none.
     """
     if not (findings.plan.is_sampled or findings.plan.design == ONE):
         return []
@@ -250,17 +250,17 @@ def unmoved(findings: Findings) -> list[str]:
     same = [
         each.name for each in findings.spreads if each.name in shown and each.least == each.largest
     ]
-    return [f"nothing moves {', '.join(same)}: the same in every case"] if same else []
+    return [f"the same in every case: {', '.join(same)}"] if same else []
 
 
 def _more(influences: Sequence[object]) -> str:
-    """Return how many quantities a table leaves out, and where they are."""
+    """Return the number of quantities that a table omits, and their place."""
     rest = len(influences) - _SHOWN
-    return f", the {_SHOWN} strongest, and {rest} more in report.json" if rest > 0 else ""
+    return f", the {_SHOWN} strongest; {rest} more are in report.json" if rest > 0 else ""
 
 
 def _influence_table(influences: Sequence[Influence | ChoiceInfluence], is_partial: bool) -> Table:
-    """Return rank correlations; where choices are among them, their ratios in a column beside."""
+    """Return rank correlations, and in another column the correlation ratios of choices."""
     heads = [f"{'partial ' * is_partial}rank correlation", "interval"]
     has_choices = any(isinstance(i, ChoiceInfluence) for i in influences)
     if has_choices:
@@ -278,14 +278,14 @@ def _influence_table(influences: Sequence[Influence | ChoiceInfluence], is_parti
     return text_table(["quantity", *heads, "drives it"], rows)
 
 
-# --- Rare failures and sensitivities: how probable, where, what drives them
+# --- Rare failures and sensitivities
 
-_VALUES = 3  # single values of a quantity that are shown
-_SEEN = 0.005  # share of failing cases from which on one is
+_VALUES = 3  # largest number of discrete values of a quantity to show
+_SEEN = 0.005  # least share of failing cases to show a value
 
 
 def failure_table(findings: Findings) -> Table:
-    """Return the requirements: how probable failure is, by how many cases, and the verdict."""
+    """Return the requirements: probability of failure, number of cases, and verdict."""
     confidence = f"{100.0 * findings.plan.confidence:g} %"
     heads = ["probability of failure", f"{confidence} interval", "variation", "cases", "admitted"]
     rows = []
@@ -313,7 +313,7 @@ def failure_table(findings: Findings) -> Table:
 
 
 def importance_tables(findings: Findings) -> list[TableBlock]:
-    """Return where the failures of each requirement lie, by quantity."""
+    """Return the location of each requirement's failures, by quantity."""
     return [
         TableBlock(
             _importance_table(findings, each),
@@ -352,7 +352,7 @@ def rare_data(failure: FailureProbability, findings: RareFailure) -> dict[str, A
 
 
 def state_texts(findings: Findings) -> list[str]:
-    """Return of each requirement without an estimate why there is none, and what to do."""
+    """Return a text on each requirement without an estimate: the reason and the next step."""
     outcomes = {each.demand: each.outcome for each in findings.judgments}
     return [
         f"{each.demand.figure}: {text}"
@@ -362,24 +362,24 @@ def state_texts(findings: Findings) -> list[str]:
 
 
 def rare_notes(findings: Findings) -> list[str]:
-    """Return what was rounded, what is not judged, and what intervals stand for."""
+    """Return notes on rounding, on requirements without a verdict, and on intervals."""
     plan = findings.plan
     design = plan.sought
     assert design is not None
     notes = []
     if design.kind == SUBSET and design.level != design.asked:
         notes.append(
-            f"{design.level} cases in each level in place of {design.asked}: they come in "
+            f"{design.level} cases per level in place of {design.asked}, because cases come in "
             "whole chunks"
         )
     if unjudged := [str(each) for each in plan.demands if each not in plan.judged_demands]:
         notes.append(
-            f"not judged, because it requires no probability: {'; '.join(unjudged)}; cases that "
-            "search for failures do not represent all cases"
+            f"no verdict without a required probability: {'; '.join(unjudged)}; cases that search "
+            "for failures do not represent all cases"
         )
     notes += [
-        f"{each.demand.figure}: failure is less probable than a thousandth of what is admitted: it "
-        "was followed no further"
+        f"{each.demand.figure}: failure is less probable than a thousandth of the limit, so the "
+        "search stopped"
         for each in findings.rare
         if each.failure.state == "negligible"
     ]
@@ -390,11 +390,11 @@ def rare_notes(findings: Findings) -> list[str]:
                 if design.kind == SUBSET
                 else "extend the study"
             )
-            notes.append(f"{each.demand.figure}: the interval holds what is admitted: {more}")
+            notes.append(f"{each.demand.figure}: the interval contains the limit: {more}")
     if design.kind == IMPORTANCE:
         notes.append(
-            "importance-sampling: failures far from the design point may be missed; "
-            "'subset-simulation' looks for them everywhere"
+            "importance-sampling may miss failures far from the design point; 'subset-simulation' "
+            "searches everywhere"
         )
     return notes
 
@@ -402,8 +402,8 @@ def rare_notes(findings: Findings) -> list[str]:
 def _state_text(each: RareFailure, plan: StudyPlan, outcome: Outcome) -> str:
     failure = each.failure
     if failure.state == "budget spent":
-        so_far = f"it is no more probable than {failure.estimate.high:.2g}"
-        seen = f"failing cases seen, too few for an estimate: {failure.failed}; "
+        so_far = f"the probability is at most {failure.estimate.high:.2g}"
+        seen = f"{failure.failed} failing cases, too few for an estimate; "
         so_far = seen * bool(failure.failed) + so_far
         where = (
             "before the last level"
@@ -414,9 +414,9 @@ def _state_text(each: RareFailure, plan: StudyPlan, outcome: Outcome) -> str:
             ": extend the study" if outcome == "undecided" else ""
         )
     if failure.state == "level":
-        return "too many cases have the same figure to tell worse ones: take 'monte-carlo'"
+        return "too many cases have the same figure to rank them: use 'monte-carlo'"
     if failure.state == "no design point":
-        return f"no design point was found, for {failure.why}: take 'subset-simulation'"
+        return f"no design point was found, because {failure.why}: use 'subset-simulation'"
     return ""
 
 
@@ -456,7 +456,7 @@ def _importance_table(findings: Findings, each: RareFailure) -> Table:
 
 
 def _place(importance: Importance, failure: RareFailure, unit: str) -> str:
-    """Return where failures lie in a quantity: its value, or how many have each single value."""
+    """Return the location of failures in a quantity: its value, or shares of discrete values."""
     if importance.quantity not in failure.point:
         return "-"
     if not importance.shares:
@@ -471,18 +471,18 @@ def _shown(value: float | str, unit: str) -> str:
 
 
 def search_notes(findings: Findings) -> list[str]:
-    """Return what a search for worst cases stands for, and where it did not come to its end."""
+    """Return notes on the meaning of a search for worst cases, and on unfinished searches."""
     plan = findings.plan
     spent = [
         demand.figure
         for demand, each in zip(plan.judged_demands, findings.searches, strict=False)
         if each.state == "budget spent"
     ]
-    notes = [f"{plan.design}: a search proves nothing: a worse case may be where it did not look"]
+    notes = [f"{plan.design}: a search is no proof; there may be worse cases that it did not find"]
     if spent:
         notes.append(
-            f"{', '.join(spent)}: the budget of {plan.cases} cases is spent before the search came "
-            "to its end: extend the study"
+            f"{', '.join(spent)}: the budget of {plan.cases} cases was spent before the search "
+            "ended: extend the study"
         )
     return notes
 
@@ -491,10 +491,12 @@ def search_notes(findings: Findings) -> list[str]:
 
 
 def sensitivity_tables(findings: Findings) -> list[TableBlock]:
-    """Return the indices of each key figure of a requirement; of all where nothing is required."""
+    """Return the indices of each key figure of a requirement, or of all."""
     return [
         TableBlock(
-            _table(findings, name, found), f"What drives {name}.", title=f"what drives {name}"
+            _table(findings, name, found),
+            f"Main influences on {name}.",
+            title=f"main influences on {name}",
         )
         for name in shown_figures(findings)
         if (found := findings.sensitivity(name).drivers)
@@ -502,7 +504,7 @@ def sensitivity_tables(findings: Findings) -> list[TableBlock]:
 
 
 def drivers_data(findings: Findings, name: str) -> dict[str, Any]:
-    """Return what drives a key figure for JSON: influences, effects, or indices.
+    """Return the influences, effects, or indices of a key figure for JSON.
 
     Figures and effects are in the unit of the figure, values of quantities in SI.
     """
@@ -537,9 +539,9 @@ def _effect_data(effect: Effect) -> dict[str, Any]:
 
 
 def missing_indices(findings: Findings) -> list[str]:
-    """Return in a sentence which key figures have no indices, and why; nothing where all have.
+    """Return a sentence on key figures without indices, with the reasons.
 
-    Nothing, too, of designs that are not made for indices.
+    Designs that do not compute indices have no such sentence.
     """
     if findings.plan.sensitivity is None:
         return []
@@ -547,8 +549,8 @@ def missing_indices(findings: Findings) -> list[str]:
     for name in shown_figures(findings):
         if reason := findings.sensitivity(name).missing:
             reasons.setdefault(reason, []).append(name)
-    said = [f"of {', '.join(names)}: {reason}" for reason, names in reasons.items()]
-    return [f"no indices {'; '.join(said)}"] if said else []
+    texts = [f"of {', '.join(names)}: {reason}" for reason, names in reasons.items()]
+    return [f"no indices {'; '.join(texts)}"] if texts else []
 
 
 def _table(

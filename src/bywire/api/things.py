@@ -1,4 +1,4 @@
-"""Kinds of things that have a name: what there is of each, in a line, and all about one."""
+"""Kinds of named things: their names, summaries and descriptions."""
 
 from __future__ import annotations
 
@@ -46,24 +46,24 @@ def _with_assembly(thing: Any) -> str:
 
 
 class ThingKind(NamedTuple):
-    """A kind of things that have a name.
+    """A kind of named things.
 
     Parameters
     ----------
     title
-        What one of them is called.
+        Word for one of them.
     things
         All of them by name.
     describe
-        Everything about one as plain data, with a ``summary``; None where its line is all.
+        Function that describes one as plain data, with a ``summary``; None if the line suffices.
     topic
-        The part of the index that lists them; empty where they are too many to be listed.
+        Topic of the index that lists them; empty if there are too many to list.
     line
-        One of them in the index.
+        Function that returns a thing's line in the index.
     listed
-        Those that the index lists; by default all.
+        Things that the index lists; by default all.
     meaning
-        The text in which words are looked for; None where that is not done.
+        Function that returns the searched text; None if they are not searched.
     has_assembly
         Whether each belongs to an assembly, whose description names it.
     """
@@ -181,9 +181,9 @@ def thing_kinds() -> tuple[ThingKind, ...]:
 
 
 def all_things() -> dict[str, Any]:
-    """Return topic -> name -> line, as plain data; brakes that were loaded by path first.
+    """Return topic -> name -> line, as plain data; things of brakes loaded by path first.
 
-    Assemblies have no lines. The names of the key figures of every experiment stand at the end.
+    Assemblies have no lines. The names of the key figures of every experiment are at the end.
     """
     topics: dict[str, Any] = {}
     for kind in thing_kinds():
@@ -212,7 +212,7 @@ def doubts() -> list[str]:
 
 
 def _in_order(kind: Kind[Any]) -> Mapping[str, Any]:
-    """Return all things of a kind, those of brakes that were loaded by path first."""
+    """Return all things of a kind, those of brakes loaded by path first."""
     files = loaded_files()
     loaded = [brake for brake in brakes().values() if brake.file in files]
     first = {name: thing for brake in loaded for name, thing in kind.of(brake.module).items()}
@@ -226,7 +226,7 @@ def _brakes() -> Mapping[str, Any]:
 
 
 def _assemblies_with_numbers() -> Mapping[str, Any]:
-    """Return the assemblies that have a parameter set, and all of a brake without any such."""
+    """Return the assemblies with a parameter set, and all of a brake that has no such assembly."""
     known = ASSEMBLIES.all()
     named = {cited.assembly for cited in PARAMETER_SETS.all().values()}
     names = named & known.keys()
@@ -271,7 +271,7 @@ def _fault(places: list[tuple[str, Mode]]) -> dict[str, Any]:
     return {
         "summary": places[0][1].summary,
         "found in": rows,
-        "see": f'put in by [[faults]] of a bench file, or --fault "{name}'
+        "see": f'injected by [[faults]] in a bench file, or --fault "{name}'
         + ("=VALUE" if places[0][1].unit else "")
         + '@ONSET"',
     }
@@ -290,8 +290,8 @@ def _campaign(campaign: DeclaredCampaign) -> Object:
         "summary": campaign.summary,
         "experiment": campaign.content["bench"],
         "signals": criteria,
-        "see": f"run by 'bywire faults {campaign.name}'; its faults, criteria and residuals are "
-        "listed in the answer",
+        "see": f"run it with 'bywire faults {campaign.name}', which lists its faults, criteria and "
+        "residuals",
     }
 
 
@@ -335,7 +335,7 @@ def _parameter(name: str) -> Object:
         "unit": merged["unit"],
         "range": merged["range"],
         "values": values,
-        "see": f"changed with --set {name}=VALUE",
+        "see": f"change it with --set {name}=VALUE",
     }
 
 
@@ -365,7 +365,7 @@ def _group(name: str) -> Object:
 
 
 def group_meaning(cls: type[ParameterSet]) -> str:
-    """Return what a group of parameters is of: an element's module says it, else the class."""
+    """Return the meaning of a parameter group, from its element's module or from its class."""
     about = inspect.getdoc(cls) or ""
     if cls.__name__ == "Parameters":
         about = getattr(inspect.getmodule(cls), "__doc__", None) or about
@@ -388,9 +388,9 @@ def _option_rows(
     cls
         The class.
     values
-        What is taken unless something else is given; None where the class alone says so.
+        Default values; None to take those of the class.
     simulated
-        First parts of the names of those that only shape simulated experiments.
+        First parts of the names of options that affect only simulated experiments.
     """
     leaves, notes = leaf_fields(cls), field_notes(cls)
     known: Mapping[str, Any] = _given_by(cls) if values is None else values.flat()
@@ -414,13 +414,13 @@ def _option_rows(
 
 
 def _given_by(cls: type[ParameterSet]) -> Mapping[str, Any]:
-    """Return what a class takes where nothing is given, by name."""
+    """Return the default values of a class by name."""
     fields = cls.model_fields.items()
     return {name: info.default for name, info in fields if not info.is_required()}
 
 
 _PLACES = {"input": "the input", "output": "the output", "level": "the signal"}
-"""units of levels that belong to no signal yet: of generic experiments, and of stimuli"""
+"""units of levels without a signal yet, in generic experiments and stimuli"""
 
 
 def _range(leaf: Leaf) -> str:
@@ -434,7 +434,7 @@ def _range(leaf: Leaf) -> str:
 
 
 def _choices(cls: type[ParameterSet], name: str) -> str:
-    """Return what a choice may be."""
+    """Return the valid values of a choice."""
     *groups, last = name.split(".")
     for group in groups:
         cls = cls.model_fields[group].annotation  # type: ignore[assignment]
@@ -466,7 +466,7 @@ def _parameter_set(cited: CitedSet) -> Object:
 
 
 def signals() -> Mapping[str, Sequence[Object]]:
-    """Return every signal of a system by name: in which systems, with unit, meaning and place."""
+    """Return every signal by name, with its systems, units, meanings and places."""
     places: dict[str, list[Object]] = {}
     for system, model in ASSEMBLIES.all().items():
         for name, signal, where in merged_signals(places_of(model).items()):
@@ -486,7 +486,7 @@ def _signal(rows: Sequence[Object]) -> Object:
 
 
 def _system(model: type[Any]) -> Object:
-    """Return an assembly, or a rig, with its signals and what there is for it."""
+    """Return an assembly, or a rig, with its signals and the things that belong to it."""
     rows = [
         {
             "signal": name,
@@ -513,20 +513,20 @@ def _system(model: type[Any]) -> Object:
 
 
 def system_summary(model: type[Any]) -> str:
-    """Return what a model is in a line."""
-    # The class says what it is for; what it is stands at the head of its file.
+    """Return one line on a model."""
+    # The docstring of the class gives its purpose; that of its file describes the model.
     about = inspect.getmodule(model).__doc__ or ""
     return " ".join(about.strip().partition("\n\n")[0].split()).rstrip(".")
 
 
 def _drive(experiment: Experiment) -> Object:
-    """Return which signals an experiment drives, of which systems."""
+    """Return the signals that an experiment drives, with their systems."""
     if experiment.driven_unit is not None:
         unit = display_unit(experiment.driven_unit(experiment.defaults))
         row = {
             "signal": "[stimulus]",
             "unit": unit,
-            "meaning": "what this section of the bench file gives",
+            "meaning": "stimulus from this section of the bench file",
             "system": experiment.assembly,
         }
         return {"drives": [row], "see": _recorded([experiment.assembly])}
@@ -541,9 +541,9 @@ def _drive(experiment: Experiment) -> Object:
 
 
 def _recorded(ran: Sequence[str]) -> str:
-    """Return where the signals of what ran are shown."""
+    """Return the commands that list the recorded signals."""
     commands = " and ".join(f"'bywire list {name}'" for name in ran)
-    return f"{commands}: the signals that a recording holds" if ran else ""
+    return f"{commands}: the signals in a recording" if ran else ""
 
 
 def _driven(case: Case) -> list[tuple[str, str, str]]:
@@ -579,8 +579,8 @@ def _generic_experiment(experiment: GenericExperiment) -> Object:
         "assembly": "any",
         "options": rows,
         "changed_with": "--set options.NAME=VALUE",
-        "see": "'bywire list' with the name of an assembly shows its stimuli and what it records; "
-        f"levels are multiples of what is nominal for the signal of option {_named(experiment)}",
+        "see": "'bywire list' with the name of an assembly shows its stimuli and recorded signals; "
+        f"levels are multiples of the nominal value of the signal in option {_named(experiment)}",
     }
 
 
@@ -614,7 +614,7 @@ def _kpi(kpi: Any) -> Object:
 
 
 def _loop(loop: Loop) -> Object:
-    """Return a loop with its inputs, output, states, and where it is cut and looked at."""
+    """Return a loop with its inputs, output, states, cut and operating point."""
     par = loop.smooth(PARAMETER_SETS.find(main_set(loop.assembly)).parameters())
     model = loop.point(par, loop.at.default).model
     known = {name: (s.unit, s.label) for name, s, _ in merged_signals(places_of(model).items())}
@@ -647,7 +647,7 @@ def _loop(loop: Loop) -> Object:
 def _plant(plant: Plant) -> Object:
     """Return a plant with its inputs, outputs and states."""
     par = PARAMETER_SETS.find(main_set(plant.assembly)).parameters()
-    with taking(ABOVE):  # names of signals are those of any side
+    with taking(ABOVE):  # the names of signals do not depend on the side
         model = plant.model(par, plant.usual)
     places = places_of(ASSEMBLIES.all()[plant.assembly]).items()
     meaning = {name: signal.label for name, signal, _ in merged_signals(places)}
@@ -671,7 +671,7 @@ def _element(element: Element) -> Object:
         "summary": element.summary,
         "source": element.module.__file__ or element.name,
         "parts": ", ".join(parts),
-        "see": f"'bywire check {element.name}' puts it to the test",
+        "see": f"'bywire check {element.name}' tests it",
     }
 
 
@@ -705,14 +705,14 @@ def _bench_method(method: BenchMethod) -> Object:
         "records": "one or several",
         "options": _option_rows(method.options, method.defaults, method.simulated),
         "changed_with": "--option NAME=VALUE",
-        "see": "'bywire list' with the name of the bench's assembly shows what --input (stimulus), "
-        "--output (recording) and --estimate-start (state) take, with a parameter's what --unknown "
-        "takes",
+        "see": "'bywire list' with the name of the bench's assembly shows names for --input "
+        "(stimulus), --output (recording) and --estimate-start (state), with the name of a "
+        "parameter set names for --unknown",
     }
 
 
 def _estimates(method: Method) -> list[Object]:
-    """Return the names that a method finds, parameters of the assembly first."""
+    """Return the names that a method estimates, parameters of the assembly first."""
     rows = []
     if method.assembly and method.unknowns:
         cls = PARAMETER_SETS.find(main_set(method.assembly)).parameter_class

@@ -1,4 +1,4 @@
-"""Whether a method gives back what is put into many simulated experiments."""
+"""Trust study: whether a method recovers known values from many simulated experiments."""
 
 from __future__ import annotations
 
@@ -28,19 +28,19 @@ STORE = "experiments.jsonl"
 
 _NONE: Mapping[str, Any] = MappingProxyType({})
 _NOTHING = Question()
-_MOST = 5  # experiments without a result that are named one by one
+_MOST = 5  # largest number of listed experiments without a result
 
 
 @dataclass(frozen=True)
 class TrustStudy(Answer):
-    """What many simulated experiments say of a method.
+    """Results of a method on many simulated experiments.
 
     Parameters
     ----------
     chosen
         The method with its parameters and options.
     trust
-        Every experiment's outcome, and how well each unknown comes back.
+        Every experiment's outcome, and the recovery of each unknown.
     """
 
     chosen: ChosenMethod
@@ -48,31 +48,33 @@ class TrustStudy(Answer):
 
     @property
     def holds(self) -> bool:
-        """Whether every unknown comes back, from every experiment."""
+        """Whether the method recovers every unknown, from every experiment."""
         return self.trust.holds
 
     @cached_property
     def troubles(self) -> list[str]:
-        """What did not come back: experiments, unknowns that were not told, failed checks."""
+        """Failed experiments, unknowns that were not determined, failed checks."""
         outcomes, failed = self.trust.outcomes, self.trust.failed
-        texts = [f"seed {o.seed} gave nothing: {o.error}" for o in failed[:_MOST]]
+        texts = [f"seed {o.seed} gave no result: {o.error}" for o in failed[:_MOST]]
         if len(failed) > _MOST:
             texts.append(f"and {len(failed) - _MOST} more")
         kept = Counter(label for o in outcomes for label in o.kept)
         checks = Counter(name for o in outcomes for name in o.failed_checks)
-        texts += [f"{label} was not told in {n} of {len(outcomes)}" for label, n in kept.items()]
+        texts += [
+            f"{label} was not determined in {n} of {len(outcomes)}" for label, n in kept.items()
+        ]
         texts += [f"check {name} failed in {n} of {len(outcomes)}" for name, n in checks.items()]
         return texts
 
     def document(self) -> Document:
-        """Return how well each unknown comes back, and what did not."""
+        """Return the recovery of each unknown, and the failures."""
         method, trust = self.chosen.method, self.trust
         count = len(trust.outcomes)
         blocks = list(self._blocks())
         return Document(
             f"Trust in {method.name}",
             f"{count} simulated experiments, each with its own noise",
-            sections=[Section("What comes back", blocks)],
+            sections=[Section("Recovery", blocks)],
             brief=[
                 f"{method.name}: {count} simulated experiments, each with its own noise",
                 *blocks,
@@ -119,20 +121,20 @@ def trust(
     processes: int | None = None,
     progress: Progress | None = None,
 ) -> TrustStudy:
-    """Identify many simulated experiments, each with its own noise and from a start that is off.
+    """Identify many simulated experiments, each with its own noise and a perturbed start.
 
     Parameters
     ----------
     method, parameters, overrides, question, options
-        As of `bywire.identify`.
+        See `bywire.identify`.
     count
         Number of experiments.
     starts, seed
         Starts of each search, and the first experiment's seed; the others follow it.
     folder
-        Where the result will be written: a folder with the result of another method is refused, an
-        earlier study is removed, and finished experiments are kept there, so that an interrupted
-        study goes on.
+        Folder of the result. A folder with the result of another method is rejected, an earlier
+        study is removed. Finished experiments stay there, so that an interrupted study can
+        continue.
     processes
         Experiments at a time; all cores by default.
     progress
@@ -141,14 +143,14 @@ def trust(
     Returns
     -------
     TrustStudy
-        How far what was put in comes back: errors and intervals of each parameter, in SI units.
+        Recovery of the known values: errors and intervals of each parameter, in SI units.
 
     Raises
     ------
     InputError
-        When something that is asked for does not fit.
+        If an argument is invalid.
     KeyboardInterrupt
-        When interrupted.
+        If interrupted.
     """
     shown = silent if progress is None else progress
     chosen = choose(method, parameters, overrides, options, question, progress=shown)
@@ -172,6 +174,6 @@ def trust(
         if store is None or not store.exists():
             raise
         raise KeyboardInterrupt(
-            f"finished experiments are in {store}: the same command goes on"
+            f"finished experiments are in {store}: repeat the command to continue"
         ) from None
     return TrustStudy(chosen, recovered)

@@ -23,8 +23,8 @@ from bywire.simulation.run import Run, Trajectory, simulate
 from bywire.simulation.tapped import rests
 
 LANES = 64
-"""runs that are computed side by side at most, so that their recordings stay small"""
-_MOST = 250e6  # numbers that are held at once: 2 GB
+"""largest number of runs in one batch, so that their recordings stay small"""
+_MOST = 250e6  # largest number of values in memory: 2 GB
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Traces:
     Parameters
     ----------
     time
-        Of the rows [s], shape (rows,).
+        Times of the rows [s], shape (rows,).
     signals
         By name, shape (cases, rows) each.
     doubts
@@ -89,13 +89,13 @@ def faulty_traces(
     Parameters
     ----------
     failing
-        What fails.
+        Injected fault.
     onsets
-        When, in each run [s].
+        Onset in each run [s].
     samples
-        Whose scatter each run has.
+        Healthy runs whose scatter and noise are used.
     reactions
-        When the reaction of the campaign takes effect in each run [s]; None for none.
+        Time of the campaign's reaction in each run [s]; None for none.
     """
     cases = []
     for k, (onset, sample) in enumerate(zip(onsets, samples, strict=True)):
@@ -161,14 +161,14 @@ class Healthy:
     Parameters
     ----------
     traces
-        Of all healthy runs.
+        Signals of all healthy runs.
     thresholds
-        Of every residual, tuned on the first half.
+        Threshold of every residual, tuned on the first half.
     alarms
-        Runs of the other half in which each residual exceeds its threshold times `FACTORS`,
-        by name, shape (factors,).
+        Number of runs in the other half in which each residual exceeds its threshold times
+        `FACTORS`, by name, shape (factors,).
     any_alarm
-        Runs of the other half in which any of them does.
+        The same number for any residual.
     """
 
     traces: Traces
@@ -207,7 +207,7 @@ def _scaled(limit: float, factor: float) -> float:
 def judge_fault(plan: CampaignPlan, failing: Failing, healthy: Healthy) -> Outcome:
     """Return the outcomes of all runs with a fault, as plain numbers."""
     onsets = np.array(plan.onsets_of(failing))
-    # By its name: another fault in the catalog must not change whose scatter this one has.
+    # By its name, so that other faults in the catalog do not change its scatter.
     first = crc32(failing.name.encode())
     samples = [plan.sample_of(first + k) for k in range(onsets.size)]
     traces = faulty_traces(plan, failing, onsets.tolist(), samples)
@@ -241,7 +241,7 @@ def _reached(
 def _extremes(
     plan: CampaignPlan, traces: Traces, beside: Traces, onsets: Array
 ) -> dict[str, list[Any]]:
-    """Return how far every judged signal comes off its healthy run: least, largest, at the end."""
+    """Return every judged signal's deviation from its healthy run: least, largest, at the end."""
     later = traces.time >= onsets[:, None] - 1e-9
     extremes = {}
     for name in dict.fromkeys(c.signal for c in plan.criteria):
@@ -290,7 +290,7 @@ def _with_reaction(
 
 
 def _is_the_same(plan: CampaignPlan, failing: Failing) -> bool:
-    """Return whether fault and reaction change the same: nothing is left to be done then."""
+    """Return whether fault and reaction change the same value: then no reaction is possible."""
     assert plan.reaction is not None
     par = plan.case(0).par
     return touch_alike(failing, plan.reaction.failing, par) or (
@@ -299,14 +299,14 @@ def _is_the_same(plan: CampaignPlan, failing: Failing) -> bool:
 
 
 def _earliest(columns: Sequence[Array], count: int) -> Array:
-    """Return the least of several times in each case; NaN where there is none."""
+    """Return the earliest of several times in each case; NaN if there is none."""
     times = np.array([np.full(count, np.nan), *columns])
     missing = np.isnan(times).all(axis=0)
     return np.where(missing, np.nan, np.nanmin(np.where(np.isnan(times), np.inf, times), axis=0))
 
 
 def _plain(values: Array) -> list[Any]:
-    """Return numbers for a file of JSON, null for what is not defined."""
+    """Return numbers for a JSON file, null for undefined ones."""
     if values.ndim > 1:
         return [_plain(row) for row in values]
     return [None if math.isnan(value) else value for value in values.tolist()]

@@ -58,10 +58,9 @@ class Criterion:
     signal
         Recorded signal that is judged.
     sense, level
-        On which side of what it must not be [SI]: a level, that far from the healthy run, or below
-        a share of it.
+        Forbidden side [SI]: of a level, of a distance from the healthy run, or of a share of it.
     lasting
-        For how long without a break [s].
+        Duration without a break [s].
     severity
         Severity class from the user, for instance ``"S3"``.
     """
@@ -86,7 +85,7 @@ class Criterion:
         return np.asarray(self.level * healthy - values)
 
     def reached(self, values: Array, healthy: Array, time: Array, onset: Array) -> Array:
-        """Return when it has lasted as long as it must not [s], NaN where never; shape (cases,)."""
+        """Return when the violation has lasted long enough [s], NaN for never; shape (cases,)."""
         dt = float(time[1] - time[0])
         rows = round(min(self.lasting, dt * time.size) / dt) + 1
         lasted = least_of_the_last(self.excess(values, healthy), rows)
@@ -102,14 +101,14 @@ def criteria_of(
     Parameters
     ----------
     sections
-        What its file says.
+        Sections of the file.
     signals
-        What the model records.
+        Signals recorded by the model.
 
     Raises
     ------
     InputError
-        When one of them does not fit.
+        When one of them is not valid.
     """
     criteria = tuple(_criterion(each, signals) for each in sections)
     names = [criterion.name for criterion in criteria]
@@ -149,11 +148,11 @@ class Failing:
     Parameters
     ----------
     mode, value
-        What fails, and how much [SI].
+        Failure mode, and its value [SI].
     is_present
-        Whether it is there before the run starts; times then count from zero.
+        Whether it is present before the run starts; times then count from zero.
     latent
-        Another fault that was there before, unseen; None for none.
+        Another, undetected fault that is present before; None for none.
     """
 
     mode: Mode
@@ -169,7 +168,7 @@ class Failing:
         return f"{name} after {self.latent.name}" if self.latent is not None else name
 
     def at(self, onset: float, seed: int) -> list[Injection]:
-        """Return the fault from an onset [s] on, or all along, and the latent one beside it."""
+        """Return the fault from an onset [s] on, or from the start, with the latent one."""
         start = 0.0 if self.mode.falsified == "drift" else _LONG_AGO  # a drift grows from then on
         begin = start if self.is_present else onset
         fault = Injection(self.mode, self.value, AT_ZERO.replace({"onset": begin}), seed)
@@ -183,9 +182,9 @@ class Reaction:
     Parameters
     ----------
     failing
-        Mode that is taken.
+        Mode of the reaction.
     delay
-        From detection to its effect [s].
+        Delay from detection to its effect [s].
     """
 
     failing: Failing
@@ -203,19 +202,20 @@ class CampaignPlan:
     bench
         The maneuver.
     faults
-        Faults, one at a time.
+        Faults, injected one at a time.
     onsets
-        When [s].
+        Times of the onset [s].
     criteria, residuals
         Criteria, and residuals that detect faults.
     varied, correlations
-        What scatters from run to run; pairs of names -> correlation of their normal scores.
+        Quantities that scatter from run to run; pairs of names -> correlation of their normal
+        scores.
     healthy
-        Healthy runs: on one half thresholds are tuned, on the other all is judged.
+        Number of healthy runs: one half tunes thresholds, the other half judges them.
     false_alarms
         Share of healthy runs in which a residual may exceed its threshold.
     seed
-        Of what scatters, and of noise.
+        Seed of scatter and noise.
     rates
         Failure rates by fault, or by its place.
     reaction
@@ -243,15 +243,15 @@ class CampaignPlan:
 
     @property
     def total(self) -> int:
-        """Runs with a fault."""
+        """Number of runs with a fault."""
         return len(self.faults) * len(self.onsets)
 
     def onsets_of(self, failing: Failing) -> tuple[float, ...]:
-        """Return from when on the times of a fault count [s]."""
+        """Return the time from which the times of a fault count [s]."""
         return (0.0,) * len(self.onsets) if failing.is_present else self.onsets
 
     def sample_of(self, number: int) -> int:
-        """Return whose scatter a run with a fault has: healthy runs that no threshold has seen."""
+        """Return healthy runs whose scatter a fault's runs use: not those for thresholds."""
         return self.tuning + number % (self.healthy - self.tuning)
 
     @cached_property
@@ -287,7 +287,7 @@ class CampaignPlan:
         return self.case(0).par.choices()
 
     def is_apart(self, failing: Failing) -> bool:
-        """Return whether a fault needs a model of its own: laws change, or a drive comes late."""
+        """Return whether a fault needs a separate model: laws change, or a drive is delayed."""
         if failing.latent is not None and self.is_apart(failing.latent):
             return True
         mode = failing.mode
@@ -308,29 +308,29 @@ class CampaignPlan:
 
     @cached_property
     def signals(self) -> tuple[str, ...]:
-        """Recorded signals that criteria and residuals look at."""
+        """Recorded signals that criteria and residuals use."""
         wanted = [criterion.signal for criterion in self.criteria]
         wanted += [name for residual in self.residuals for name in residual.signals]
         return tuple(dict.fromkeys(wanted))
 
     def rate(self, failing: Failing) -> float:
-        """Return the failure rate of a fault; that of its place, or 1, unless it has its own."""
+        """Return the failure rate of a fault; by default that of its place, or 1."""
         mode = failing.mode
         return self.rates.get(mode.name, self.rates.get(mode.place, 1.0))
 
     @property
     def _functions(self) -> list[Any]:
-        """What its faults change, and what its residuals compute."""
+        """Taps of its faults, and signals of its residuals."""
         return [*(each.mode.changes for each in self.faults), *self.residuals]
 
     @cached_property
     def digest(self) -> str:
-        """What tells a campaign from another."""
+        """What distinguishes the campaign from any other."""
         return digest_of(self.identity)
 
     @cached_property
     def identity(self) -> Mapping[str, Any]:
-        """All that the figures of its runs depend on."""
+        """Everything that the figures of its runs depend on."""
         bench, reaction = self.bench, self.reaction
         return as_json(
             {
@@ -360,11 +360,11 @@ class CampaignPlan:
 
 
 def evenly(first: float, spread: float, count: int) -> tuple[float, ...]:
-    """Return onsets evenly over a span [s], the end left out: of a period, it is its beginning."""
+    """Return onsets evenly over a span [s], without its end: the span may be a period."""
     return tuple(float(f"{first + k * spread / count:.12g}") for k in range(count))
 
 
 def touch_alike(first: Failing, second: Failing, par: ParameterSet) -> bool:
-    """Return whether two faults change the same: not both can be there then."""
+    """Return whether two faults change the same value: then they cannot both be present."""
     one, other = (touched(each.mode, each.value, par) for each in (first, second))
     return bool(one & other)

@@ -16,33 +16,33 @@ from bywire.core.typing import Array
 
 
 def least_of_the_last(values: Array, rows: int) -> Array:
-    """Return the least of the last rows, the present one among them, along the last axis."""
+    """Return the least of the last rows, including the present one, along the last axis."""
     size = max(min(rows, values.shape[-1]), 1)
     return np.asarray(minimum_filter1d(values, size, axis=-1, origin=(size - 1) // 2))
 
 
 def largest_of_the_last(values: Array, rows: int) -> Array:
-    """Return the largest of the last rows, the present one among them, along the last axis."""
+    """Return the largest of the last rows, including the present one, along the last axis."""
     return -least_of_the_last(-values, rows)
 
 
 def mean_of_the_last(values: Array, rows: int) -> Array:
-    """Return the mean of the last rows, the present one among them, along the last axis."""
+    """Return the mean of the last rows, including the present one, along the last axis."""
     size = max(min(rows, values.shape[-1]), 1)
     return np.asarray(uniform_filter1d(values, size, axis=-1, origin=(size - 1) // 2))
 
 
 def first_time(holds: Array, time: Array, since: Array) -> Array:
-    """Return the first time [s] at or after another at which a condition holds; else NaN.
+    """Return the first time [s] at or after another at which a condition is true; else NaN.
 
     Parameters
     ----------
     holds
-        Whether it does, shape (cases, rows).
+        Condition, shape (cases, rows).
     time
-        Of the rows [s].
+        Times of the rows [s].
     since
-        Of each case [s], shape (cases,).
+        Start of each case [s], shape (cases,).
     """
     counted = (holds > 0) & (time >= since[:, None] - 1e-9)
     there = counted.any(axis=1)
@@ -52,7 +52,7 @@ def first_time(holds: Array, time: Array, since: Array) -> Array:
 # --- Residuals
 
 NEVER = -1e9
-"""of a residual where it is not looked at; one that never is in healthy runs judges nothing"""
+"""value of a residual while it is inactive; one that is always inactive has no threshold"""
 
 
 @dataclass(frozen=True)
@@ -70,13 +70,13 @@ class Residual:
     unit
         SI unit.
     signals
-        Recorded signals that it takes: such as the controller knows.
+        Recorded signals that it uses, which the controller must know.
     compute
         ``compute(signals, par, dt)``: its magnitude in every row, shape (cases, rows), `NEVER`
-        where it is not looked at; ``signals`` by name, of that shape; ``par`` what the controller
-        believes; ``dt`` time between rows [s].
+        while it is inactive; ``signals`` by name, of that shape; ``par``: the controller's
+        parameters; ``dt``: time between rows [s].
     hold
-        Time for which it has to exceed its threshold without a break [s].
+        Time above the threshold without a break until detection [s].
     """
 
     name: str
@@ -89,11 +89,11 @@ class Residual:
 
     @property
     def assemblies(self) -> tuple[str, ...]:
-        """Names of the assemblies that have it."""
+        """Names of the assemblies with this residual."""
         return (self.assembly,) if isinstance(self.assembly, str) else self.assembly
 
     def lasted(self, signals: Mapping[str, Array], par: Any, time: Array) -> Array:
-        """Return the value that it has exceeded for its hold time, shape (cases, rows)."""
+        """Return the value exceeded throughout the hold time, shape (cases, rows)."""
         dt = float(time[1] - time[0])
         return least_of_the_last(self.compute(signals, par, dt), round(self.hold / dt) + 1)
 
@@ -105,7 +105,7 @@ RESIDUALS = Kind("residual", ("residuals",), instances(Residual), declared="a Re
 def residuals_of(model: Any) -> dict[str, Residual]:
     """Return the residuals of a model, and those of the assemblies within it.
 
-    These are named by the path of the parameters there, and take what was recorded under a prefix.
+    These are named by the path of the parameters there, and use signals recorded under a prefix.
     """
     every = RESIDUALS.of(ASSEMBLIES.owner(model.name)).values()
     mine = (each for each in every if model.name in each.assemblies)
@@ -137,7 +137,7 @@ def _within(
 
 
 def missed_ticks(task: str, assembly: str, period: float) -> Residual:
-    """Return the watchdog of a task: ticks of the last five that it has missed.
+    """Return the watchdog of a task: number of missed ticks among the last five.
 
     It takes a signal ``missed_TASK`` that counts 1 where a tick is missed.
     """
@@ -152,14 +152,15 @@ def missed_ticks(task: str, assembly: str, period: float) -> Residual:
 
 
 def threshold(largest: Array, share: float) -> float:
-    """Return the threshold that a share of healthy runs exceeds at most.
+    """Return the threshold that at most a share of healthy runs exceeds.
 
     Parameters
     ----------
     largest
-        Of each healthy run, shape (cases,).
+        Largest value of each healthy run, shape (cases,).
     share
-        Of false alarms that is admitted; where it is less than one run, none of them exceeds it.
+        Admissible share of false alarms; if it is less than one run, none of them exceeds the
+        threshold.
     """
     ordered = np.sort(largest)
     admitted = int(np.floor(share * ordered.size))
@@ -167,13 +168,13 @@ def threshold(largest: Array, share: float) -> float:
 
 
 def detected(lasted: Array, limit: float, time: Array, since: Array) -> Array:
-    """Return when a residual exceeds its threshold first [s]; NaN where never; shape (cases,).
+    """Return when a residual first exceeds its threshold [s]; NaN for never; shape (cases,).
 
-    One that healthy runs have never looked at has no threshold, and sees nothing.
+    A residual that was always inactive in healthy runs has no threshold, and detects nothing.
     """
     if limit <= NEVER:
         return np.full(len(lasted), np.nan)
-    margin = 1e-9 * max(abs(limit), 1e-12)  # rounding is no failure
+    margin = 1e-9 * max(abs(limit), 1e-12)  # for rounding errors
     return first_time(np.where(lasted > limit + margin, 1.0, 0.0), time, since)
 
 

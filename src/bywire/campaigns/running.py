@@ -1,4 +1,4 @@
-"""A campaign, run: judged fault by fault, kept in a folder, with the coverage of its residuals."""
+"""Execution of a campaign: each fault judged and stored, with the coverage of residuals."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from bywire.studies.statistics import Share, share
 
 CONFIDENCE = 0.95
 _AT = FACTORS.index(1.0)
-_SAME = 1e-9  # s, between two times of rows
+_SAME = 1e-9  # s, tolerance of times of rows
 Class = Literal["covered", "too late", "undetected", "harmless, seen", "latent"]
 
 
@@ -36,17 +36,17 @@ class FaultFinding:
     failing
         The fault.
     reached
-        Time from onset until each criterion is violated [s], by name; NaN where it is not.
+        Time from onset until each criterion is violated [s], by name; NaN if it is not.
     detected
-        Time from onset until each residual sees it [s], by name; shape (factors, cases).
+        Time from onset until each residual detects it [s], by name; shape (factors, cases).
     extremes
-        By signal: how far it comes off the healthy run, least, largest and at the end.
+        By signal: deviation from the healthy run, least, largest and at the end.
     reacted
-        What is reached with the reaction, by criterion, of the runs in which it could be taken.
+        Times of violation with the reaction, by criterion, for the runs in which it was possible.
     answered
-        Which runs these are.
+        Indices of these runs.
     delay
-        From detection until the reaction takes effect [s]; 0 where there is none.
+        Delay from detection to the reaction [s]; 0 without reaction.
     doubts
         Warnings of the solver in these runs.
     """
@@ -83,7 +83,7 @@ class FaultFinding:
 
     @property
     def tolerance(self) -> float:
-        """Fault tolerant time: that of its worst run [s]; NaN where nothing is violated."""
+        """Fault tolerant time: that of its worst run [s]; NaN without violation."""
         return float(np.nanmin(self.violated)) if self.dangerous else math.nan
 
     @property
@@ -102,7 +102,7 @@ class FaultFinding:
 
     @cached_property
     def only_with_reaction(self) -> dict[str, int]:
-        """Number of runs that violate each criterion because of the reaction alone."""
+        """Number of runs that violate each criterion only because of the reaction."""
         counts = {
             name: int(np.sum(np.isnan(self._unanswered(name)) & ~np.isnan(times)))
             for name, times in self.reacted.items()
@@ -111,7 +111,7 @@ class FaultFinding:
 
     @cached_property
     def sooner_with_reaction(self) -> dict[str, int]:
-        """Number of runs that violate each criterion in any case, and sooner with the reaction."""
+        """Number of runs that violate each criterion anyway, but sooner with the reaction."""
         counts = {
             name: int(np.sum(times < self._unanswered(name) - _SAME))
             for name, times in self.reacted.items()
@@ -129,14 +129,14 @@ class FaultFinding:
 
     @property
     def is_relieved(self) -> bool:
-        """Whether the reaction keeps every dangerous run from violating anything."""
+        """Whether the reaction prevents every violation in dangerous runs."""
         dangerous = set(np.flatnonzero(~np.isnan(self.violated)).tolist())
         if not dangerous or not dangerous <= set(self.answered):
             return False
         return all(np.isnan(times).all() for times in self.reacted.values())
 
     def _unanswered(self, criterion: str) -> Array:
-        """Return when the runs that are answered violate a criterion without the reaction [s]."""
+        """Return when runs with a reaction would violate a criterion without it [s]."""
         return np.asarray(self.reached[criterion])[list(self.answered)]
 
     @property
@@ -156,7 +156,7 @@ class FaultFinding:
 
     @property
     def kind(self) -> Class:
-        """Class of the fault, by its worst run."""
+        """Class of the fault, from its worst run."""
         if self.dangerous:
             if self.in_time == self.dangerous:
                 return "covered"
@@ -165,7 +165,7 @@ class FaultFinding:
         return "latent" if np.isnan(self.seen).any() else "harmless, seen"
 
     def severity(self, plan: CampaignPlan) -> str:
-        """Return the worst class of the criteria that are violated, in alphabetical order."""
+        """Return the worst severity of the violated criteria, by alphabetical order."""
         return max((c.severity for c in plan.criteria if c.name in self.criteria), default="")
 
 
@@ -191,19 +191,19 @@ class CampaignFindings:
 
     @property
     def coverage_of_cases(self) -> Share:
-        """The same of plain runs, with its interval."""
+        """The share of runs, with its interval."""
         seen = sum(each.in_time for each in self.faults)
         return share(seen, sum(each.dangerous for each in self.faults), CONFIDENCE)
 
     @property
     def false_alarms(self) -> Share:
-        """Healthy runs, unseen by thresholds, in which any residual exceeds its own."""
+        """Healthy runs outside the tuning in which any residual exceeds its threshold."""
         plan = self.plan
         return share(self.healthy.any_alarm, plan.healthy - plan.tuning, CONFIDENCE)
 
     @property
     def doubts(self) -> tuple[str, ...]:
-        """Warnings of the solver, with the number of faults in whose runs it gave them."""
+        """Warnings of the solver, with the number of faults in whose runs they occurred."""
         counts = Counter(text for each in self.faults for text in dict.fromkeys(each.doubts))
         return (
             *(f"healthy runs: {text}" for text in self.healthy.traces.doubts),
@@ -211,7 +211,7 @@ class CampaignFindings:
         )
 
     def kinds(self) -> Counter[Class]:
-        """Return how many faults are of each class."""
+        """Return the number of faults in each class."""
         return Counter(each.kind for each in self.faults)
 
     def harm_of_reaction(self) -> tuple[str, ...]:
@@ -243,7 +243,7 @@ class CampaignFindings:
         )
 
     def curve(self, residual: str) -> list[tuple[float, int, float, int]]:
-        """Return factor of the threshold, false alarms, median delay [s], runs in which it sees.
+        """Return factor of the threshold, false alarms, median delay [s], number of detected runs.
 
         Of the dangerous runs of all faults; one row for each of the factors.
         """
@@ -258,7 +258,7 @@ class CampaignFindings:
 
 
 def finding(plan: CampaignPlan, number: int, outcome: Mapping[str, Any]) -> FaultFinding:
-    """Return the finding of a fault's outcome, nulls as NaN; ``number``: its index in the plan."""
+    """Return the finding of a fault's outcome, null as NaN; ``number``: its index in the plan."""
     reacted = outcome.get("reacted", {}).get("reached", {})
     return FaultFinding(
         plan.faults[number],
@@ -273,7 +273,7 @@ def finding(plan: CampaignPlan, number: int, outcome: Mapping[str, Any]) -> Faul
 
 
 def _harm(groups: Mapping[str, Sequence[Mapping[str, int]]]) -> list[str]:
-    """Return which criteria suffer in how many faults of each group, where any does."""
+    """Return the affected criteria and the number of faults in each group, where there are any."""
     return [
         f"{', '.join(dict.fromkeys(name for counts in worse for name in counts))} in {len(worse)} "
         f"of {len(each)} {kind} faults"
@@ -319,7 +319,7 @@ class CampaignStore(PieceFolder):
         return f"name another folder with {option('out')}, or remove it"
 
     def kept(self, plan: CampaignPlan) -> dict[int, dict[str, Any]]:
-        """Return the outcomes of faults that are there, by number; a damaged one is not."""
+        """Return the stored outcomes of faults, by number, without damaged ones."""
         outcomes = {}
         for number in self.finished() & {*range(len(plan.faults))}:
             try:
@@ -330,12 +330,12 @@ class CampaignStore(PieceFolder):
         return outcomes
 
     def keep(self, number: int, outcome: dict[str, Any]) -> None:
-        """Keep the outcome of a fault.
+        """Store the outcome of a fault.
 
         Raises
         ------
         FileError
-            When it cannot be written.
+            When it is not writable.
         """
         text = json.dumps(outcome) + "\n"
         self.keep_file(number, lambda fresh: fresh.write_text(text, encoding="utf-8"))
@@ -352,14 +352,14 @@ def run_campaign(
     Parameters
     ----------
     plan, store
-        The campaign and its folder; None keeps nothing.
+        The campaign and its folder; None to store nothing.
     progress
         Called with the fault's name and the finished share, 0 to 1.
 
     Raises
     ------
     InputError
-        When a fault cannot be put in, or the folder is another campaign's.
+        When a fault cannot be injected, or the folder belongs to another campaign.
     RunError
         When a run fails.
     KeyboardInterrupt
@@ -369,7 +369,7 @@ def run_campaign(
         store.begin(plan, {"name": plan.name})
     progress("healthy runs", 0.0)
     healthy = judge_healthy(plan, healthy_traces(plan))
-    # A few lanes each: faults side by side use the cores better than the runs of one.
+    # A few lanes each: several faults in parallel use the cores better than the runs of one.
     outcomes = complete(
         range(len(plan.faults)),
         {} if store is None else store.kept(plan),

@@ -1,1 +1,1 @@
-"""Command line: argument parsing, messages, exit statuses; everything else lies below."""
+"""Command line: argument parsing, messages, exit statuses; lower layers do everything else."""

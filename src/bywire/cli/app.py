@@ -1,4 +1,4 @@
-"""The commands of ``bywire``: those of all use cases, and a few by hand."""
+"""The commands of ``bywire``: those of all use cases, and a few others."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ def list_command(
         str | None,
         typer.Argument(
             metavar="[TOPIC|NAME|WORD]",
-            help="A kind of things; or a name: its options, signals, units; or what it is about.",
+            help="A topic; or a name, to show its options, signals, units; or a word to search.",
             autocompletion=completion.names_of(),
         ),
     ] = None,
     json: JsonFlag = False,
 ) -> None:
-    """Show what there is: kinds of things, the names of one kind, or all about a name."""
+    """List topics, the names of a topic, or all about a name."""
     from bywire.api.overview import is_topic, overview
 
     if name is None or is_topic(name):
@@ -49,27 +49,27 @@ def list_command(
 def benchmark_command(
     parts: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[PART]...", help="What to measure, e.g. commands; else all."),
+        typer.Argument(metavar="[PART]...", help="What to measure, e.g. commands; by default all."),
     ] = None,
     json: JsonFlag = False,
 ) -> None:
-    """Measure speed against hand-written C and what users would pick instead."""
+    """Measure speed against hand-written C and other simulators."""
     show(lambda progress: _benchmarks().measure(progress, parts or ()), as_json=json)
 
 
 def _benchmarks() -> ModuleType:
-    """Load the benchmarks, which stand in a clone of the repository beside ``src``.
+    """Load the benchmarks, which are next to ``src`` in a clone of the repository.
 
     Raises
     ------
     InputError
-        Where bywire runs from anywhere else.
+        If bywire does not run from a clone.
     """
     clone = Path(__file__).parents[3]
     if not (clone / "benchmarks" / "suite.py").is_file():
         raise InputError(
-            "the benchmarks are only in a clone of bywire's repository: run python3 tasks.py demo "
-            "there, then .venv/bin/bywire benchmark"
+            "the benchmarks need a clone of bywire's repository: run python3 tasks.py demo there, "
+            "then .venv/bin/bywire benchmark"
         )
     sys.path.insert(0, str(clone))
     return import_module("benchmarks.suite")
@@ -90,24 +90,24 @@ def serve_command(
             help="Bench file, experiment or folder; the current folder by default.",
         ),
     ] = None,
-    port: Annotated[int, typer.Option(help="Port; 0 for any that is free.")] = PORT,
+    port: Annotated[int, typer.Option(help="Port; 0 for any free port.")] = PORT,
     folder: Annotated[
         Path | None,
         typer.Option(
-            help="What is served; by default the folder of the bench file.", show_default=False
+            help="Folder to serve; by default the folder of the bench file.", show_default=False
         ),
     ] = None,
 ) -> None:
-    """Show benches, results and studies in a browser of this machine, and compute what they ask."""
+    """Show and run benches and studies in a browser on this machine, with their results."""
     from bywire.server.serving import serve
 
     def say(link: str) -> None:
-        message("open this link in a browser of this machine; Ctrl-C ends the server")
+        message("open this link in a browser on this machine; Ctrl-C ends the server")
         result(link)
 
     try:
         serve(subject or "", port=port, folder=folder or "", say=say)
-    except KeyboardInterrupt:  # typer would exit without a word
+    except KeyboardInterrupt:  # typer would exit without a message
         interrupt_heard()
         message("interrupted")
         raise typer.Exit(INTERRUPTED) from None
@@ -138,27 +138,27 @@ margins, life, faults, design, convert, identify, replay, check, new,
 study run, study resume, study extend, study report, study status, study surrogate, study size,
 export controller, export fmu, export wasm
 """
-"""commands in the order of the help; others follow"""
+"""commands in the order of the help; any others follow"""
 _GROUPS: dict[str, dict[str, Any]] = {
     "study": {
         "cls": StudyGroup,
         "help": "Run a study of many cases (run FILE), or compare designs of a brake (NAME).",
     },
-    "export": {"help": "Write parts of a bench in the form that other tools take."},
+    "export": {"help": "Export parts of a bench for other tools."},
 }
-"""groups of commands, by the first of their words"""
+"""groups of commands, by their first word"""
 
 
 @cache
 def program() -> Any:
-    """Return the command line, called with its arguments: its options are read off once."""
+    """Return the command line as a callable of its arguments, built once."""
     found = typer.main.get_command(app())
     _keep_brackets(found)
     return found
 
 
 def app() -> typer.Typer:
-    """Return the commands as typer has them."""
+    """Return the commands as a typer application."""
     made = typer.Typer(
         name="bywire",
         help="A virtual test bench for brake-by-wire actuators.",
@@ -179,7 +179,7 @@ def app() -> typer.Typer:
 
 
 def _keep_brackets(command: Any) -> None:
-    """Have help show brackets, as in ``Pressure [bar]``, which Rich would take for markup."""
+    """Make help show brackets, as in ``Pressure [bar]``, which Rich would take for markup."""
     for option in command.params:
         if getattr(option, "help", None):
             option.help = option.help.replace("[", r"\[")
@@ -188,7 +188,7 @@ def _keep_brackets(command: Any) -> None:
 
 
 def _commands() -> Iterator[tuple[str, Callable[..., None]]]:
-    """Yield every command with the words behind ``bywire``."""
+    """Yield every command with the words after ``bywire``."""
     yield "list", list_command
     yield "serve", serve_command
     yield "benchmark", benchmark_command
@@ -205,8 +205,8 @@ def _root(
         typer.Option(
             "--system",
             metavar="PATH",
-            help="Load a brake of your own, a file or a package; its code is run. "
-            "Before or behind the command.",
+            help="Load your own brake, a file or a package; bywire executes its code. "
+            "Before or after the command.",
         ),
     ] = None,
 ) -> None:
@@ -218,7 +218,7 @@ def _root(
     if system:
         from bywire.core.brake import load_system
 
-        with redirect_stdout(sys.stderr):  # what its code prints is no result
+        with redirect_stdout(sys.stderr):  # output of its code is not a result
             for path in system:
                 load_system(path)
         if context.invoked_subcommand is None:

@@ -1,4 +1,4 @@
-"""What the shell completes with the tab key: names from the kept index, and files beside them."""
+"""Tab completion in the shell: names from the cached index, and files."""
 
 from __future__ import annotations
 
@@ -7,18 +7,18 @@ from glob import escape, iglob
 from os.path import isdir
 
 Completed = list[tuple[str, str]]
-"""words that a shell may put in, each with what it means"""
+"""words that a shell offers, each with its meaning"""
 
 
 def names_of(*kinds: str, ending: str = "") -> Callable[[str], Completed]:
-    """Return what completes names of some kinds of things, and files of an ending.
+    """Return a completer for names of some kinds of things, and for files of an ending.
 
     Parameters
     ----------
     kinds
         Kinds of things, for instance ``"experiments"``, see `bywire.overview`; all by default.
     ending
-        Of files, for instance ``".toml"``; none where empty.
+        Ending of files, for instance ``".toml"``; no files if empty.
     """
 
     def completed(incomplete: str) -> Completed:
@@ -42,7 +42,7 @@ def _texts(things: dict[str, str] | list[str]) -> dict[str, str]:
 
 
 def _files(incomplete: str, ending: str) -> Completed:
-    """Return folders, and files of an ending, whose paths begin so."""
+    """Return folders, and files of an ending, whose paths start with the incomplete one."""
     paths = sorted(iglob(f"{escape(incomplete)}*"))
     return [
         (f"{path}/" if isdir(path) else path, "")
@@ -52,14 +52,14 @@ def _files(incomplete: str, ending: str) -> Completed:
 
 
 def changeable(args: list[str], incomplete: str) -> Completed:
-    """Complete ``KEY=VALUE`` to the key: parameters and options of the bench that is named.
+    """Complete the key of ``KEY=VALUE``: parameters and options of the named bench.
 
-    Of what is no bench, a loop for instance, those of all parameter sets.
+    If the command names no bench but a loop, for instance, complete those of all parameter sets.
     """
     from bywire.core.errors import BywireError
 
     if "=" in incomplete:
-        return []  # values are the user's own
+        return []  # values are free text
     named = next((word for word in args if not word.startswith("-")), "")
     try:
         keys = _keys_of(named)
@@ -74,7 +74,7 @@ def varied(args: list[str], incomplete: str) -> Completed:
 
 
 def _keys_of(bench: str) -> dict[str, str]:
-    """Return parameters, and options, of a bench with what they are now."""
+    """Return parameters and options of a bench with their values."""
     from bywire.bench.bench_file import read
     from bywire.bench.changes import OPTION
 

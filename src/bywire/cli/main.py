@@ -1,6 +1,6 @@
 """The command ``bywire``.
 
-Light to load, so that Ctrl-C is heard from the start: what commands need comes with ``app``.
+It loads fast, so that Ctrl-C works from the start; ``app`` imports what commands need.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ from bywire.core.machine import address_space
 
 FAILED = 3
 GARBAGE = 50_000
-"""objects between two searches for garbage; Python's 700 make a short run a tenth longer"""
+"""objects between two garbage collections; Python's 700 make a short run a tenth longer"""
 
 
 def process() -> None:
-    """Be a process of the command line, which leaves without a tidying up of Python's.
+    """Run the process of the command line, and exit without Python's finalization.
 
-    Once all is written and said, that takes a sixth of a warm run, and a library's thread that
-    still runs after Ctrl-C may abort it. What was registered to be done at exit is done.
+    After all output, finalization would take a sixth of a warm run, and a library's thread that
+    still runs after Ctrl-C may abort it. Functions registered for the exit still run.
     """
     status: list[object] = []
 
@@ -42,7 +42,7 @@ def process() -> None:
             flush()
             os._exit(status[0] if isinstance(status[0], int) else 0)
 
-    atexit.register(leave)  # the first, and so the last that is called
+    atexit.register(leave)  # registered first, therefore called last
     leave_out_working_folder()
     leave_out_dask()
     silence_matplotlib()
@@ -56,11 +56,11 @@ def process() -> None:
 
 
 def main() -> None:
-    """Run the command line; errors meant for the user become one message and an exit status."""
+    """Run the command line; errors for the user become one message and an exit status."""
     from bywire.core.callers import command_line
     from bywire.core.sources import command
 
-    # All is written and said when Python tidies up: Ctrl-C then would end it by the signal.
+    # During finalization all output is written; Ctrl-C would then end the process by the signal.
     atexit.register(signal.signal, signal.SIGINT, signal.SIG_IGN)
     gc.set_threshold(GARBAGE, *gc.get_threshold()[1:])
     open_streams()
@@ -68,26 +68,26 @@ def main() -> None:
         with interrupts_noted() as was_interrupted, command(), command_line():
             status = _status(was_interrupted)
             flush()
-    except KeyboardInterrupt:  # before the first words, or while the last were said
+    except KeyboardInterrupt:  # before the first output, or during the last
         message("interrupted")
         status = INTERRUPTED
-    # In text that is executed, as where a named tuple is made, CPython notes a KeyboardInterrupt as
-    # unhandled, and ends ``python -m`` by the signal whatever becomes of it: another resets it.
+    # In executed text, as in creating a named tuple, CPython records a KeyboardInterrupt as
+    # unhandled and later ends ``python -m`` by the signal. Creating another tuple resets this.
     namedtuple("Reset", ())
     raise SystemExit(status)
 
 
 def _system_error(error: OSError) -> str:
-    """Return what the system refused, where, and what to do about it."""
+    """Return the operating system's error, its place, and what to do about it."""
     reason = error.strerror or str(error) or type(error).__name__
     place = f"{error.filename}: " if error.filename else ""
     if error.errno in (errno.ENOSPC, errno.EDQUOT):
-        return f"{place}{reason}: make room there, or name another place with --out or TMPDIR"
-    return f"{place}{reason}: check that it is there and that you may read and write it"
+        return f"{place}{reason}: make room there, or name another folder with --out or TMPDIR"
+    return f"{place}{reason}: check that it exists and that you may read and write it"
 
 
 def _foreign_line(error: Exception) -> str:
-    """Return an error with its line if it is one of a brake that is not ours; else nothing."""
+    """Return an error with its line if a user's brake raised it; otherwise an empty text."""
     from bywire.core.brake import foreign_line
 
     return foreign_line(error)
@@ -124,7 +124,7 @@ def systems_first(arguments: Sequence[str]) -> list[str]:
 
 
 def _status(was_interrupted: Callable[[], bool]) -> int | str | None:
-    """Return the exit status; after Ctrl-C 130, whatever libraries made of it."""
+    """Return the exit status; 130 after Ctrl-C, whatever libraries convert it to."""
     try:
         status = _warned()
     except BaseException as error:
@@ -142,17 +142,17 @@ _OURS = ("BrakeWarning", "MeasurementWarning")
 
 
 def _warned() -> int | str:
-    """Run the command; a brake's warnings are messages of ours."""
+    """Run the command; show a brake's warnings as messages."""
     with warnings.catch_warnings():
         show_otherwise = warnings.showwarning
 
         def show(text: Warning | str, category: type[Warning], *place: Any) -> None:
-            if category.__name__ in _OURS:  # their modules are loaded only where they are needed
+            if category.__name__ in _OURS:  # their modules load only when needed
                 message(f"warning: {text}")
             else:
                 show_otherwise(text, category, *place)
 
-        setattr(warnings, "showwarning", show)  # noqa: B010 - its type wants the very names
+        setattr(warnings, "showwarning", show)  # noqa: B010 - its type requires the exact names
         from bywire.cli.app import program
 
         try:
@@ -160,7 +160,7 @@ def _warned() -> int | str:
         except SystemExit as done:
             return done.code or 0
         except Exception as error:
-            # Typer's errors of usage; where they are declared differs between its versions.
+            # Typer's usage errors; their module differs between its versions.
             if not hasattr(error, "format_message"):
                 raise
             return _misused(error)
@@ -168,11 +168,11 @@ def _warned() -> int | str:
 
 
 def _misused(error: Any) -> int:
-    """Say in a line what is wrong with a command line, and return the exit status."""
+    """Print one line on what is wrong with a command line, and return the exit status."""
     text = error.format_message().strip().rstrip(".")
     if "\n" in text:
-        error.show()  # the help of a command that needs another word
-    elif text:  # that help may be printed already
+        error.show()  # the help of a command group
+    elif text:  # without a text, the help is already printed
         context = getattr(error, "ctx", None)
         command = context.command_path if context is not None else "bywire"
         name = f"{words}: " if (words := command.partition(" ")[2]) else ""
@@ -181,7 +181,7 @@ def _misused(error: Any) -> int:
 
 
 def _explained(error: BaseException) -> int:
-    """Say what went wrong, and return the exit status."""
+    """Print what went wrong, and return the exit status."""
     if isinstance(error, BywireError):
         message(f"error: {error}")
         return error.exit_status
@@ -191,7 +191,7 @@ def _explained(error: BaseException) -> int:
             f"the address space of this process is limited to {limit / 2**30:.3g} GiB (ulimit -v): "
             "raise that limit"
             if limit
-            else "free some, or ask for less at a time"
+            else "free some memory, or compute less at a time"
         )
         message(f"error: out of memory: {why}")
         return FAILED
@@ -202,7 +202,7 @@ def _explained(error: BaseException) -> int:
     if foreign:
         message(f"error: {foreign}")
         return ModelError.exit_status
-    # Python's own status for this, 1, would read as a requirement that is not met.
+    # Python's own status for this, 1, would mean that a requirement is not met.
     traceback.print_exception(error)
     message("error: this is a defect of bywire; please report it with the lines above")
     return FAILED

@@ -1,4 +1,4 @@
-"""What a command says: results on standard output, everything else on standard error."""
+"""Output of a command: results on standard output, everything else on standard error."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ INTERRUPTED = 130
 
 
 def open_streams() -> None:
-    """Make both streams usable: there, and able to show any text."""
-    # Without this, a message for a closed standard error would land among the results.
+    """Make both streams exist and able to show any text."""
+    # Otherwise, messages for a closed standard error would appear among the results.
     sys.stdout = sys.stdout or io.StringIO()
     sys.stderr = sys.stderr or io.StringIO()
     for stream in (sys.stdout, sys.stderr):
@@ -26,12 +26,12 @@ def open_streams() -> None:
 
 
 def result(text: str) -> None:
-    """Print on standard output at once; a reader that has left (``| head``) is no error.
+    """Print on standard output immediately; a closed pipe (``| head``) is not an error.
 
     Raises
     ------
     FileError
-        When standard output cannot take it, for instance on a full disk.
+        If writing fails, for instance on a full disk.
     """
     try:
         print(text, flush=True)
@@ -40,15 +40,15 @@ def result(text: str) -> None:
     except OSError as error:
         _abandon()
         raise FileError(
-            f"cannot write to standard output: {error.strerror}: make room there, or send it "
+            f"cannot write to standard output: {error.strerror}: make room there, or redirect it "
             "elsewhere"
         ) from None
 
 
 def message(text: str) -> None:
-    """Print a line for the user on standard error; control characters become harmless.
+    """Print a line for the user on standard error, with control characters escaped.
 
-    What is too long to be read is shortened in its middle: what to do stands at the end.
+    A long text is shortened in its middle, because the next step is at its end.
     """
     from bywire.report.wording import clean
 
@@ -57,7 +57,7 @@ def message(text: str) -> None:
 
 
 def flush() -> None:
-    """Flush standard output, as far as somebody still reads it."""
+    """Flush standard output if its reader is still there."""
     try:
         sys.stdout.flush()
     except OSError:
@@ -65,6 +65,6 @@ def flush() -> None:
 
 
 def _abandon() -> None:
-    """Let go of standard output, or what is left in its buffer fails once more at exit."""
+    """Redirect standard output to nowhere, so that its buffer does not fail again at exit."""
     with contextlib.suppress(OSError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

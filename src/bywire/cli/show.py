@@ -1,4 +1,4 @@
-"""What every command does with its answer: progress, messages, files, the exit status."""
+"""Output of every command's answer: progress, messages, files, the exit status."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ if TYPE_CHECKING:
 
 JsonFlag = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output.")]
 VerboseFlag = Annotated[
-    bool, typer.Option("--verbose", help="Show definitions, explanations and all rows too.")
+    bool, typer.Option("--verbose", help="Also show definitions, explanations and all rows.")
 ]
 
 
-# --- What every command does with its answer: progress, messages, files, the exit status
+# --- Progress
 
 _INTERVAL = 0.1  # s between two drawings of the bar
 
@@ -51,7 +51,7 @@ def progress_bar() -> Iterator[Progress]:
         TimeRemainingColumn(),
         console=console,
         transient=True,
-        auto_refresh=False,  # by a thread of its own: then nobody could copy this process
+        auto_refresh=False,  # its thread would prevent a fork of this process
     )
     tasks = {}
     with bar:
@@ -73,12 +73,12 @@ def progress_bar() -> Iterator[Progress]:
 
 
 def folder(text: str) -> Path:
-    """Return the path that ``--out`` names; nothing is no path, and never the current folder.
+    """Return the path that ``--out`` names; an empty text does not mean the current folder.
 
     Raises
     ------
     FileError
-        When it names nothing.
+        If the text is empty.
     """
     if not text.strip():
         raise FileError("--out '': name a folder; '.' is the current folder", name="--out")
@@ -86,20 +86,20 @@ def folder(text: str) -> Path:
 
 
 ANOTHER = "name another one with --out"
-"""what to do about a folder that cannot be written"""
+"""next step if a folder is not writable"""
 
 
 @contextmanager
 def output_folder(out: Path, advice: str = ANOTHER) -> Iterator[None]:
-    """Make the output folder, so that nothing is computed for one that cannot be written.
+    """Create the output folder before the computation, so that an unwritable one fails early.
 
-    What was made for it and is empty in the end is removed. ``advice``: what to do about one that
-    cannot be written.
+    Folders created here are removed if they stay empty. ``advice`` is the next step if the folder
+    is not writable.
 
     Raises
     ------
     FileError
-        When it cannot be made or written to.
+        If the folder cannot be created or is not writable.
     """
     with ExitStack() as made:
         try:
@@ -123,27 +123,27 @@ def show(
     advice: str = ANOTHER,
     verbose: bool = False,
 ) -> None:
-    """Compute an answer and show it; a full disk must not cost the numbers too.
+    """Compute an answer and show it; print the numbers even if the disk is full.
 
     Parameters
     ----------
     compute
         ``compute(progress)``: the use case.
     out
-        Folder for recordings, figures and the report; none is written without.
+        Folder for recordings, figures and the report; without it, no files are written.
     as_json
-        Whether one JSON object is printed.
+        Whether to print one JSON object.
     advice
-        What to do about a folder that cannot be written.
+        Next step if the folder is not writable.
     verbose
-        Whether a terminal also shows what it leaves out otherwise.
+        Whether a terminal also shows definitions, explanations and all rows.
 
     Raises
     ------
     BywireError
-        Whatever the use case raises; what a folder could not take, after the numbers are shown.
+        If the use case raises it; if files cannot be written, after the numbers are shown.
     typer.Exit
-        With status 1 where something required does not hold, and 130 after an interrupt.
+        With status 1 if a requirement is not met, and 130 after an interrupt.
     """
     from bywire.report.answer import (
         AnswerWarning,
@@ -168,7 +168,7 @@ def show(
                         files = write_document(document, out)
                     except BywireError as error:
                         trouble = error
-        except KeyboardInterrupt as stop:  # typer would exit without a word
+        except KeyboardInterrupt as stop:  # typer would exit without a message
             interrupt_heard()
             for text in (*stop.args, "interrupted"):
                 output.message(str(text))
@@ -191,7 +191,7 @@ def show(
         raise trouble
     interrupted = getattr(answer, "status", "") == "interrupted"
     if interrupted:
-        kept = f"; what was finished is in {out}" if out else ""
+        kept = f"; finished results are in {out}" if out else ""
         output.message(f"interrupted{answer.partial and f': {answer.partial}'}{kept}")
     elif out is not None:
         written = [f"written: {path}" for path in files]

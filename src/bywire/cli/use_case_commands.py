@@ -1,4 +1,4 @@
-"""Commands of use cases, made from their declarations."""
+"""Commands of use cases, generated from their declarations."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _REPEATED = ("changes", "lines", "names", "pairs")  # flags that may be given se
 
 
 def command_of(case: UseCase, command: Command) -> Callable[..., None]:
-    """Return a command of a use case as typer takes it."""
+    """Return a command of a use case as a function for typer."""
     arguments = [a for a in case.arguments if a.name not in command.without]
 
     def run(**given: Any) -> None:
@@ -55,7 +55,7 @@ def command_of(case: UseCase, command: Command) -> Callable[..., None]:
 
 
 def help_of(case: UseCase, command: Command) -> str:
-    """Return what a command does, with when it fails where it may."""
+    """Return a command's help, with the meaning of exit status 1 if it has one."""
     text = command.help or case.summary
     if not command.status_1:
         return text
@@ -67,7 +67,7 @@ def _parameter(name: str, kind: Any, default: Any) -> Parameter:
 
 
 def _typer(argument: Argument, command: Command) -> tuple[Any, Any]:
-    """Return type and default of an argument, as typer takes them."""
+    """Return type and default of an argument for typer."""
     ask, kind, default = argument.ask, argument.kind, argument.default
     if ask.is_folder:
         return _folder(ask, default)
@@ -84,13 +84,13 @@ def _typer(argument: Argument, command: Command) -> tuple[Any, Any]:
     taken = _taken(argument, is_required)
     if argument.is_positional:
         return Annotated[taken, typer.Argument(**more)], default
-    # Of a truth value that is set by default typer makes two flags, unless one is named.
+    # For a truth value with default True typer makes two flags, unless one is named.
     flags = [] if kind == "flag" and default is True else [argument.flag]
     return Annotated[taken, typer.Option(*flags, **more)], default
 
 
 def _taken(argument: Argument, is_required: bool) -> Any:
-    """Return the type to which typer converts what was typed."""
+    """Return the type to which typer converts the typed text."""
     if argument.kind == "lines" and argument.ask.is_listing:
         return str
     if argument.kind in _REPEATED:
@@ -121,7 +121,7 @@ def _completed(ask: Any) -> Callable[..., completion.Completed] | None:
 
 
 def _read(argument: Argument, value: Any) -> Any:
-    """Return what was typed, as the function takes it."""
+    """Convert a typed value to what the function takes."""
     if argument.kind in ("changes", "pairs"):
         return changes(value, argument.flag)
     if argument.kind == "names":
@@ -132,7 +132,7 @@ def _read(argument: Argument, value: Any) -> Any:
 
 
 def _listed(text: str, argument: Argument) -> Any:
-    """Return the parts between commas; those within brackets belong to a name, as ``ans(2,:)``."""
+    """Split at commas; those within brackets belong to a name, as in ``ans(2,:)``."""
     if text == "nothing" and argument.default is None:
         return []
     parts = [part.strip() for part in re.split(r",(?![^(\[]*[)\]])", text)]

@@ -1,1 +1,1 @@
-"""What leaves the bench: an ECU's C, functional mock-up units, WebAssembly."""
+"""Exports of a bench: an ECU's C code, functional mock-up units, WebAssembly."""

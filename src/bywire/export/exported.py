@@ -1,4 +1,4 @@
-"""The run of a bench that is exported, and its variables: what it takes and gives."""
+"""The exported run of a bench, and its variables: inputs and outputs."""
 
 from __future__ import annotations
 
@@ -45,11 +45,11 @@ class Exported:
     Parameters
     ----------
     bench
-        Whose parameters, step and seed are exported.
+        Bench whose parameters, step and seed are exported.
     number, case
-        Which of its runs.
+        Number of the run, and the run itself.
     run
-        The engine's description of it; its time begins with the settling.
+        The engine's description of the run; its time begins with the settling.
     """
 
     bench: Bench
@@ -74,7 +74,7 @@ class Exported:
 
     @property
     def layout(self) -> Layout:
-        """Where what stands in the state vector."""
+        """Layout of the state vector."""
         return layout_of(self.stages)
 
     @cached_property
@@ -84,7 +84,7 @@ class Exported:
 
     @property
     def demanded(self) -> list[float]:
-        """What drives the run at its start, without noise."""
+        """Stimulus at the start, without noise."""
         names = self.run.model.Stimulus._fields
         (row,) = self.run.stimulus(np.zeros(1))
         return [
@@ -100,7 +100,7 @@ class Exported:
 
 
 def cases_of(bench: Bench) -> tuple[Case, ...]:
-    """Return the runs of a bench, of which there is one at least.
+    """Return the runs of a bench, at least one.
 
     Raises
     ------
@@ -119,19 +119,19 @@ def cases_of(bench: Bench) -> tuple[Case, ...]:
 
 
 def exported(bench: Bench, label: str = "") -> Exported:
-    """Return the run of a bench that is exported.
+    """Return the exported run of a bench.
 
     Parameters
     ----------
     label
-        Which of its runs; may be left out where there is but one.
+        Label of the run; may be omitted if there is only one.
 
     Raises
     ------
     ParameterError
         When the bench makes no run, several without a choice, or one whose parameters change.
     UnknownNameError
-        When it has no run of that label.
+        When it has no run with that label.
     """
     cases = cases_of(bench)
     labels = [case.label for case in cases]
@@ -157,7 +157,7 @@ def exported(bench: Bench, label: str = "") -> Exported:
 
 # --- The state in which a run begins, for other parameters than the exported ones, also in C
 
-_AGREES = 1e-9  # of a value, that the same start may differ where it was computed otherwise
+_AGREES = 1e-9  # relative difference of equal starts, computed in different ways
 _NOT_SYMBOLIC = (BywireError, TypeError, ValueError, ArithmeticError, RuntimeError)
 
 HEADING = "void bw_start(const double *p, double *state)"
@@ -165,12 +165,12 @@ HEADING = "void bw_start(const double *p, double *state)"
 
 @dataclass(frozen=True)
 class Start:
-    """The state in which a run begins, over parameters.
+    """Initial state of a run as a function of the parameters.
 
     Parameters
     ----------
     graph, targets
-        Expressions, and the node of every place in the state vector that they set.
+        Expressions, and the node for every place in the state vector that they set.
     reads
         Parameters that they read, by index.
     """
@@ -181,7 +181,7 @@ class Start:
 
 
 def start_nodes(made: Exported) -> Start | None:
-    """Return the equations of the start; None where it is not known for other parameters."""
+    """Return the equations of the start; None if it is not known for other parameters."""
     function = _start(made)
     if function is None:
         return None
@@ -195,9 +195,9 @@ def start_nodes(made: Exported) -> Start | None:
 
 
 def start_source(made: Exported) -> tuple[str, frozenset[int]]:
-    """Return the C function that sets the state vector, and which parameters it reads.
+    """Return the C function that sets the state vector, and the parameters that it reads.
 
-    Empty text where the start is not known for other parameters: the exported one then stays.
+    Empty text if the start is not known for other parameters: then the exported one is used.
     """
     start = start_nodes(made)
     if start is None:
@@ -210,7 +210,7 @@ def start_source(made: Exported) -> tuple[str, frozenset[int]]:
 
 
 def _start(made: Exported) -> ca.Function | None:
-    """Return state and memory over parameters; None where these cannot be symbols."""
+    """Return state and memory as functions of parameters; None if these cannot be symbols."""
     start, par = made.case.start, made.run.par
     if start is None:
         return None
@@ -250,28 +250,28 @@ Causality = Literal["parameter", "input", "output", "local"]
 
 @dataclass(frozen=True)
 class Variable:
-    """A number that a client sets or gets.
+    """A number that a client sets or reads.
 
     Parameters
     ----------
     name
         Structured: ``motor.R_m``, ``caliper.p_table[1]``.
     causality
-        What it is for a client.
+        Its role for a client.
     place, index
-        Where the C code keeps it.
+        Its place in the C code.
     unit, label
-        SI unit, and what it means.
+        SI unit, and meaning.
     start
-        Value before anything is set; None of what is computed.
+        Initial value; None for computed variables.
     leaf
         Range of a parameter.
     is_tunable
-        Whether a parameter may change during the run: those that the ECU alone reads.
+        Whether a parameter may change during the run: only those of the ECU may.
     is_held
-        Whether it changes at ticks alone.
+        Whether it changes only at ticks.
     ends
-        Admissible range of an input whose signal declares one.
+        Valid range of an input whose signal declares one.
     """
 
     name: str
@@ -288,7 +288,7 @@ class Variable:
 
 
 def row_variable(made: Exported, k: int, place: Literal["row", "sampled"]) -> Variable:
-    """Return a recorded signal as it is now, or as the last tick left it."""
+    """Return a recorded signal: its current value, or that of the last tick."""
     name, signal = list(made.program.outputs.items())[k]
     if place == "row":
         return Variable(name, "output", place, k, signal.unit, signal.label)
@@ -297,7 +297,7 @@ def row_variable(made: Exported, k: int, place: Literal["row", "sampled"]) -> Va
 
 
 def state_variable(made: Exported, k: int, name: str, causality: Causality) -> Variable:
-    """Return a continuous state as a variable of a name."""
+    """Return a continuous state as a variable with a given name."""
     signal = list(signals_of(made.run.model.State).values())[k]
     at = made.layout.start["x"] + k
     start = made.vector[at] if causality == "input" else None
@@ -305,7 +305,7 @@ def state_variable(made: Exported, k: int, name: str, causality: Causality) -> V
 
 
 def memory_variable(made: Exported, k: int, causality: Causality) -> Variable:
-    """Return what the ECU holds as a variable."""
+    """Return an output of the ECU as a variable."""
     name, signal = list(signals_of(made.run.model.Memory).items())[k]
     at = made.layout.start["m"] + k
     start = made.vector[at] if causality == "input" else None
@@ -315,7 +315,7 @@ def memory_variable(made: Exported, k: int, causality: Causality) -> Variable:
 def parameter_variables(
     made: Exported, read: frozenset[int], tunable: frozenset[int]
 ) -> Iterator[Variable]:
-    """Yield the parameters that are read, of which some are tunable, by index."""
+    """Yield the parameters that are read, some of them tunable, by index."""
     fields = leaf_fields(type(made.run.par))
     notes = field_notes(type(made.run.par))
     for k, (name, value) in enumerate(made.run.par.leaves().items()):
@@ -340,9 +340,9 @@ def parameter_variables(
 
 
 def finite_range(leaf: Leaf) -> tuple[float | None, float | None]:
-    """Return the admissible ends of a parameter's range; None where it has no end.
+    """Return the valid ends of a parameter's range; None for an infinite end.
 
-    An end that does not belong to it becomes the next number within.
+    An open end becomes the next number within.
     """
     low = math.nextafter(leaf.low, math.inf) if leaf.low_open else leaf.low
     high = math.nextafter(leaf.high, -math.inf) if leaf.high_open else leaf.high
@@ -365,12 +365,12 @@ class Interface:
     Parameters
     ----------
     part
-        The whole brake, the plant (what the ECU holds are inputs), or the ECU (its readings of the
+        The whole brake, the plant (outputs of the ECU are inputs), or the ECU (its readings of the
         plant are inputs).
     variables
         In the order of their value references.
     kind
-        Whether it steps by itself, or a client's solver integrates it.
+        Whether it contains its own solver, or a client's solver integrates it.
     """
 
     part: Part
@@ -382,7 +382,7 @@ class Interface:
         return tuple(each for each in self.variables if each.causality == causality)
 
     def at(self, place: Place) -> dict[int, int]:
-        """Return the value references of what stands in a place, by index there."""
+        """Return the value references of the variables in a place, by index there."""
         return {v.index: k for k, v in enumerate(self.variables) if v.place == place}
 
 
@@ -422,7 +422,7 @@ def interface(made: Exported, part: Part, start_reads: frozenset[int] = frozense
 
 @dataclass(frozen=True)
 class _Reads:
-    """Indices of the leaves, by kind, that the passes read, the ticks, and each recorded signal."""
+    """Indices of the leaves, by kind, that the passes, the ticks and each recorded signal read."""
 
     plant: dict[str, frozenset[int]]
     ecu: dict[str, frozenset[int]]
@@ -446,7 +446,7 @@ class _Reads:
         )
 
     def shown(self, part: Part) -> list[int]:
-        """Return the recorded signals of a part: a plant's depend on what it is given alone."""
+        """Return the recorded signals of a part: those of a plant depend only on its inputs."""
         held = self.plant["m"]
         if part == "plant":
             return [k for k, each in enumerate(self.outputs) if each["m"] <= held]
@@ -469,7 +469,7 @@ class _Reads:
 
 
 def _changed(stages: Stages, roots: list[Node]) -> list[Node]:
-    """Return what a task computes: not what it leaves in the memory as it is."""
+    """Return the results of a task, without memory that it leaves unchanged."""
     return [node for k, node in enumerate(roots) if node != stages.graph.leaf("m", k)]
 
 
@@ -503,7 +503,7 @@ def _stimuli(made: Exported, reads: _Reads) -> Iterator[Variable]:
 
 
 def readings(made: Exported) -> dict[int, str]:
-    """Return the names of the states that ticks read; as recorded where that is the same."""
+    """Return the names of the states that ticks read; recorded names where they are equal."""
     outputs = list(made.program.outputs)
     memory = set(made.run.model.Memory._fields)
     names = {}
@@ -527,7 +527,7 @@ def tables(faces: Interface) -> Iterator[list[Numbered]]:
 
 
 def identifier_of(name: str) -> str:
-    """Return a name of C for a bench.
+    """Return a name in C for a bench.
 
     Examples
     --------

@@ -32,15 +32,15 @@ class LoopSource:
         The loop.
     entry, text
         Name and C text of ``void entry(const double *p, double t, double *out)``, which writes
-        what is not zero of the model at the operating point (t = 0), or beside it on either side
-        (t = 1, -1; see `bywire.analysis.linear.corners`): how clearly each contact is closed or
-        open [m], then row by row A (n, n) and B (n, nm) of the plant, and of each task the
-        memory's Jacobians by states (nm, n) and by memory (nm, nm). Of an analog loop, whose
-        sampled controllers hold, A is all.
+        the nonzero entries of the model at the operating point (t = 0), or beside it on either side
+        (t = 1, -1; see `bywire.analysis.linear.corners`): first the distance of each contact from
+        opening or closing [m], then row by row A (n, n) and B (n, nm) of the plant, and for each
+        task the memory's Jacobians by states (nm, n) and by memory (nm, nm). For an analog loop,
+        whose sampled controllers hold their outputs, A is all.
     states, memory
         Names, in the order of rows and columns; an analog loop has no memory.
     contacts
-        How many there are.
+        Number of contacts.
     every, frame
         Frames per tick of each task, and the length of a frame [s].
     """
@@ -56,7 +56,7 @@ class LoopSource:
 
     @property
     def size(self) -> int:
-        """Numbers that the function writes."""
+        """Number of values that the function writes."""
         n, m = len(self.states), len(self.memory)
         return self.contacts + (n + m) * (n + m * len(self.every))
 
@@ -64,7 +64,7 @@ class LoopSource:
 def loop_source(loop: Loop, par: ParameterSet) -> LoopSource | None:
     """Return a loop's linear model in C, at the loop's usual operating point.
 
-    None where the point or the structure cannot follow symbols.
+    None if the operating point or the structure cannot be computed with symbols.
     """
     names = par.leaves()
     p = SX.sym("p", len(names))
@@ -88,7 +88,7 @@ def loop_source(loop: Loop, par: ParameterSet) -> LoopSource | None:
 
 
 def _jacobians(loop: Loop, at: Point, moving: Point, t: Any) -> list[Any]:
-    """Return the rows of what the C writes, over symbolic parameters and the side t."""
+    """Return the rows of the C function, for symbolic parameters and the side t."""
     model, functions = at.model, smooth_functions(at.model, at.par)
     p = column([moving.par.value(name) for name in at.par.leaves()])
     x, m, u = (column(list(each)) for each in (moving.state, moving.memory, moving.stimulus))
@@ -125,7 +125,7 @@ def _jacobians(loop: Loop, at: Point, moving: Point, t: Any) -> list[Any]:
 
 
 def _in_c(entry: str, function: ca.Function) -> str:
-    """Return the C of a function of parameters; what is zero is not written."""
+    """Return the C of a function of parameters, without zeros."""
     graph = Graph()
     results = graph.add_function(
         function,

@@ -1,4 +1,4 @@
-"""C text of what a model gives the functions around its kernel: counts, tables, initial values."""
+"""C text of a model's data for the functions around its kernel: counts, tables, start values."""
 
 from __future__ import annotations
 
@@ -37,11 +37,11 @@ def model_header(
     Parameters
     ----------
     start
-        C function of the initial values, empty where there is none.
+        C function of the initial values, empty for none.
     token
-        What tells this model from others.
+        Unique identifier of the model.
     modes
-        Further counts, of a plant in model exchange.
+        Further counts, for a plant in model exchange.
     """
     schedule, n = made.schedule, made.program.sizes
     counts = {
@@ -130,7 +130,7 @@ def _ends(each: Variable) -> str:
 
 
 def text(value: str) -> str:
-    """Return a C string; what is not ASCII as octal bytes."""
+    """Return a C string; non-ASCII characters as octal bytes."""
     encoded = value.encode("utf-8")
     return (
         '"'
@@ -148,12 +148,12 @@ def comment(value: str) -> str:
 
 
 def number(value: float) -> str:
-    """Return a number that C reads as the very same double."""
+    """Return a number that C reads as exactly the same double."""
     if not math.isfinite(value):
         raise ValueError(f"{value} cannot be written in C")
     return json.dumps(float(value))
 
 
 def braced(values: Iterable[str]) -> str:
-    """Return an initializer; of nothing one that C takes."""
+    """Return an initializer; for an empty one, a form that is valid in C."""
     return f"{{{', '.join(values) or '0'}}}"

@@ -1,4 +1,4 @@
-"""What a use case returns: a result that shows itself in terminals, notebooks, files and tables."""
+"""Base of all results: shown in terminals, notebooks, files and tables from one document."""
 
 from __future__ import annotations
 
@@ -9,63 +9,65 @@ import os
 import sys
 from abc import ABC, abstractmethod
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from bywire.core.arguments import require_kinds
+from bywire.core.errors import unknown_name
 from bywire.report.document import Document, FigureBlock, TableBlock
 from bywire.report.result_folder import ResultFolder, result_folder
 from bywire.report.tables import Table
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.figure import Figure
 
 
 class AnswerWarning(UserWarning):
-    """What the user of a result should know before its figures are believed."""
+    """Warning about a result that the user should read before using its figures."""
 
 
 class Answer(ABC):
-    """A typed result with one document behind all that is shown of it."""
+    """A typed result with one document behind all of its representations."""
 
     @abstractmethod
     def document(self) -> Document:
-        """Return what the result has to say, written once."""
+        """Return the document of the result."""
 
     @property
     def warnings(self) -> list[str]:
-        """What the user should know before the figures are believed; none by default."""
+        """Warnings to read before using the figures; none by default."""
         return []
 
     @property
     def notes(self) -> list[str]:
-        """What was done to the data, and what else to know of the result; none by default."""
+        """Notes on the data processing and the result; none by default."""
         return []
 
     @property
     def failures(self) -> list[str]:
-        """Checks of the result itself that failed: it is not to be used as it is."""
+        """Failed checks of the result, which make it unusable; none by default."""
         return []
 
     @property
     def partial(self) -> str:
-        """What an interrupted result still shows; nothing to say by default."""
+        """Remaining content of an interrupted result; empty by default."""
         return ""
 
     @property
     def holds(self) -> bool:
-        """Whether all that was required, or checked, holds; commands exit with 1 where not."""
+        """Whether all requirements and checks are met; otherwise commands exit with 1."""
         return True
 
     def as_object(self) -> dict[str, Any]:
-        """Return the JSON object: what the command prints with ``--json``, but for the files."""
+        """Return the JSON object that the command prints with ``--json``, without the files."""
         shown: dict[str, Any] = finite(dict(self.document().facts))
         return shown
 
     def tables(self) -> dict[str, pd.DataFrame]:
         """Return the tables of the page as pandas frames, by caption or section.
 
-        Numbers are in the units that ``frame.attrs["units"]`` has by column; a column whose rows
-        differ in them is followed by one that says them.
+        Numbers are in the units of ``frame.attrs["units"]`` by column; a column with several units
+        is followed by a column of units.
         """
         frames: dict[str, pd.DataFrame] = {}
         for section in self.document().page:
@@ -75,15 +77,41 @@ class Answer(ABC):
                     frames.setdefault(name, frame_of(block.table))
         return frames
 
+    def plot(self, name: str = "") -> Figure:
+        """Return a figure of the report, which a notebook shows.
+
+        Parameters
+        ----------
+        name
+            Name of its file in the output folder, without the ending; the first one by default.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            The figure, to be changed or saved.
+
+        Raises
+        ------
+        UnknownNameError
+            When the report has no figure of that name, or none at all.
+        """
+        require_kinds(Answer.plot, (self, name), {})
+        drawn = [b for b in self.document().flat() if isinstance(b, FigureBlock) and b.name]
+        named = {block.name: block for block in drawn}
+        if name not in named and (name or not named):
+            raise unknown_name("figure", name, named)
+        figure: Any = (named[name] if name else drawn[0]).figure
+        return cast("Figure", figure)
+
     def write(self, folder: str | Path) -> list[Path]:
         """Write recordings, figures and one self-contained page; each file whole or not at all.
 
         Raises
         ------
         ParameterError
-            For what is no path.
+            For an invalid path.
         FileError
-            When the folder cannot be made or written to.
+            When the folder cannot be created or is not writable.
         """
         require_kinds(Answer.write, (self, folder), {})
         return write_document(self.document(), Path(folder))
@@ -131,7 +159,7 @@ def write_document(document: Document, folder: Path) -> list[Path]:
     FileError
         When a file cannot be written.
     KeyboardInterrupt
-        When interrupted, with what to do about what is missing.
+        When interrupted, with advice on the missing files.
     """
     if document.prepare is not None:
         document.prepare(folder)
@@ -152,7 +180,7 @@ def _written(document: Document, place: ResultFolder) -> list[str]:
         *([document.page_name] if document.is_paged else []),
         *([document.record] if document.record else []),
     ]
-    from bywire.report.drawing import drawn_side_by_side  # loads what starts processes
+    from bywire.report.drawing import drawn_side_by_side  # loads a module that starts processes
 
     with drawn_side_by_side(shown):
         for each in document.attachments:
@@ -190,16 +218,16 @@ def _record(document: Document, place: ResultFolder, names: list[str]) -> None:
 
 
 def with_files(document: Document, files: list[Path]) -> dict[str, Any]:
-    """Return the JSON object of a document with the files that were written, its own among them."""
+    """Return the JSON object of a document with the written files, its own among them."""
     shown: dict[str, Any] = finite(dict(document.facts))
     return {**shown, "files": [*shown.get("files", []), *map(str, files)]}
 
 
 def load_matplotlib() -> None:
-    """Load matplotlib as the user has set it up.
+    """Load matplotlib with the user's configuration.
 
-    A file ``matplotlibrc`` in the working folder does not count: it may have come with somebody
-    else's data, and may have figures set by another program (TeX).
+    A file ``matplotlibrc`` in the working folder is ignored: it may come with somebody else's data,
+    and may start another program to set figures (TeX).
     """
     is_set_here = os.path.exists("matplotlibrc")
     with contextlib.chdir(sys.prefix) if is_set_here else contextlib.nullcontext():
@@ -207,7 +235,7 @@ def load_matplotlib() -> None:
 
 
 def finite(value: Any) -> Any:
-    """Return plain data with null for what is infinite or not defined: JSON has no such numbers."""
+    """Return plain data with null for infinite or undefined numbers, which JSON does not have."""
     if isinstance(value, dict):
         return {key: finite(each) for key, each in value.items()}
     if isinstance(value, (list, tuple)):

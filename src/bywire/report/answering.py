@@ -1,4 +1,4 @@
-"""Public functions that return an answer: they check arguments and warn of what it warns of."""
+"""Public functions that return an answer: they check arguments and issue its warnings."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ Given = TypeVar("Given")
 
 
 def answering(function: Callable[Asked, Given]) -> Callable[Asked, Given]:
-    """Have a function warn of what its answer warns of, so that nothing coarse passes in silence.
+    """Issue the warnings of a function's answer, so that users cannot miss them.
 
-    Arguments of another kind than its signature says are refused before it begins. Commands take
-    warnings, notes and failures from the answer, and print each in its place.
+    Arguments of a type that does not match the signature are rejected before the call. Commands
+    take warnings, notes and failures from the answer, and print each in its place.
     """
 
     @wraps(function)

@@ -1,4 +1,4 @@
-"""Which figures show an experiment: the kinds that experiments name, made from their results."""
+"""Figures of an experiment: the kinds that experiments name, drawn from their results."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Shown:
-    """A figure with a name for its file and a caption."""
+    """A figure with a file name and a caption."""
 
     name: str
     figure: Figure
@@ -36,14 +36,14 @@ class Shown:
 
 @dataclass(frozen=True)
 class FigureKind:
-    """A kind of figure that experiments name.
+    """A kind of figure for experiments.
 
     Parameters
     ----------
     name
-        What experiments call it.
+        Name in experiments.
     draw
-        ``draw(result)``: the figures that show a result.
+        ``draw(result)``: the figures of a result.
     """
 
     name: str
@@ -51,7 +51,7 @@ class FigureKind:
 
 
 def bench_figures(result: Result) -> list[Shown]:
-    """Return the figures of a result, in the order in which its experiment names them."""
+    """Return the figures of a result, in the order of its experiment."""
     shown: list[Shown] = []
     for kind in result.bench.definition.figures:
         shown += FIGURES.find(kind).draw(result)
@@ -92,7 +92,7 @@ def _time_traces(result: Result) -> list[Shown]:
             f"time-traces-{label}" if len(result.recordings) > 1 else "time-traces",
             time_traces(recording, stated=stated_for(result.bench)),
             f"Time traces{f', {label}' if len(result.recordings) > 1 else ''}. Shaded: stuck; "
-            "faintly: again and again, with the share of the shaded time.",
+            "faintly: stuck repeatedly, with the share of the shaded time.",
         )
         for label, recording in result.recordings.items()
         if "time" in recording.dims
@@ -100,7 +100,7 @@ def _time_traces(result: Result) -> list[Shown]:
 
 
 def _overlaid_traces(result: Result) -> list[Shown]:
-    """Return a figure for all recordings that differ in the first part of their labels alone."""
+    """Return a figure for all recordings whose labels differ only in the first part."""
     groups: dict[str, dict[str, xr.Dataset]] = {}
     for label, recording in result.recordings.items():
         line, _, group = label.partition("-")
@@ -120,7 +120,7 @@ def _energy_balance(result: Result) -> list[Shown]:
     for label, recording in result.recordings.items():
         suffix = f"-{label}" if len(result.recordings) > 1 else ""
         after = recording.sel(time=slice(-1e-9, None))
-        caption = "Where the actuator's energy came from and where it went, from time zero on."
+        caption = "Energy balance of the actuator: sources and sinks, from time zero on."
         books = {"energy-balance": (actuator_ledger(after), caption)}
         for book, further in further_ledgers(after).items():
             books[f"energy-{book.replace(' ', '-')}"] = (further, f"The same {book}.")
@@ -183,4 +183,4 @@ GENERAL = (
 )
 
 FIGURES = Kind("figure", ("figures",), instances(FigureKind), "bywire.report.bench_figures")
-"""every kind of figure that experiments may name"""
+"""all kinds of figures for experiments"""

@@ -27,11 +27,11 @@ class Channel:
     name
         Variable of the recording.
     label
-        Its ``long_name``; the name itself where the recording has none.
+        Its ``long_name``, or the name if the recording has none.
     symbol
         Its SI unit.
     unit
-        The unit of ``values``, in which it is shown.
+        Display unit of ``values``.
     time
         Time axis [s], shape ``(n,)``.
     values
@@ -86,14 +86,14 @@ def channel(recording: xr.Dataset, name: str) -> Channel:
 IntArray = NDArray[np.intp]
 
 COLUMNS = 700
-"""pixel columns of a figure on a screen: finer detail than this is not visible"""
+"""pixel columns of a figure on a screen: finer detail is not visible"""
 
 
 def kept_samples(x: Array, y: Array, columns: int = COLUMNS) -> IntArray:
     """Return the positions of at most five samples per pixel column that draw the same line.
 
-    Of every column the first, the lowest, the highest and the last sample stay, so that a line
-    drawn through them covers the same pixels; a gap (NaN) stays a gap.
+    In every column the first, the lowest, the highest and the last sample stay, so that a line
+    through them covers the same pixels; a gap (NaN) stays a gap.
 
     ``x``: abscissa, not decreasing, shape ``(n,)``; ``y``: ordinate, shape ``(n,)``; ``columns``:
     pixel columns.
@@ -101,7 +101,7 @@ def kept_samples(x: Array, y: Array, columns: int = COLUMNS) -> IntArray:
     Returns
     -------
     ndarray
-        Positions of the samples that stay, ascending. Short lines stay whole.
+        Positions of the remaining samples, ascending. Short lines keep all samples.
 
     References
     ----------
@@ -130,7 +130,7 @@ def decimate(x: Array, y: Array, columns: int = COLUMNS) -> tuple[Array, Array]:
 def phases(
     time: Array, active: NDArray[np.bool_], columns: int = COLUMNS
 ) -> list[tuple[float, float]]:
-    """Return the time spans in which a mode is active, no finer than the eye can tell.
+    """Return the time spans in which a mode is active, at the resolution of the screen.
 
     Parameters
     ----------
@@ -139,13 +139,13 @@ def phases(
     active
         Whether the mode is active from this sample to the next, shape ``(n,)``.
     columns
-        Pixel columns. Where there are more spans than half of them, a column counts as active
-        when the mode is active for at least half of it.
+        Pixel columns. If there are more spans than half of them, a column counts as active when the
+        mode is active for at least half of it.
 
     Returns
     -------
     list
-        Start and end of every span [s], ascending, without overlap.
+        Start and end of every span [s], ascending and disjoint.
     """
     spans = _spans(time, active)
     if len(spans) <= columns // 2:
@@ -161,9 +161,9 @@ def phases(
 
 @dataclass(frozen=True)
 class Phase:
-    """A time over which a mode is active, or active now and again.
+    """A time span in which a mode is active, or active repeatedly.
 
-    ``start``, ``end``: times [s]; ``share``: of that time in which it is active, 1 where it lasts.
+    ``start``, ``end``: times [s]; ``share``: share of the time in which it is active, 1 if always.
     """
 
     start: float
@@ -174,14 +174,14 @@ class Phase:
 def lasting_phases(
     time: Array, active: NDArray[np.bool_], columns: int = COLUMNS, near: int = 16
 ) -> list[Phase]:
-    """Return the time spans in which a mode is active, those that follow closely as one.
+    """Return the time spans in which a mode is active, with close ones merged.
 
     Parameters
     ----------
     time, active, columns
         As in `phases`.
     near
-        Pixel columns between two spans that are too few to see them apart.
+        Distance of two spans in pixel columns below which they are merged.
     """
     spans = _spans(time, active)
     if not spans:

@@ -1,6 +1,6 @@
-"""A result, written once: the blocks that terminal, JSON, HTML page and files are made of.
+"""A result as a document: the blocks of terminal, JSON, HTML page and files.
 
-A `Document` loads no plotting: its figures are drawn when a page or a file wants them.
+A `Document` loads no plotting library: figures are drawn when a page or a file needs them.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Picture:
-    """A figure that was drawn elsewhere.
+    """A figure that another process has drawn.
 
     Parameters
     ----------
     png, svg
         Its files.
     axes
-        Where its axes lie; see `bywire.report.drawing.axes_of`.
+        Positions of its axes; see `bywire.report.drawing.axes_of`.
     """
 
     png: bytes
@@ -47,7 +47,7 @@ class Paragraph:
 
 @dataclass(frozen=True)
 class Listing:
-    """Plain texts, each with a bullet, below a line of their own if there is one."""
+    """Plain texts with bullets, below an optional line."""
 
     texts: Sequence[str]
     title: str = ""
@@ -60,14 +60,14 @@ class FigureBlock:
     Parameters
     ----------
     source
-        The figure, or what draws it.
+        The figure, or a function that draws it.
     caption
-        What it shows.
+        Description of the content.
     name
-        Its file in an output folder, without the ending; no file where it is empty.
+        File name in an output folder, without the ending; empty for no file.
     is_long
-        Whether it takes much longer to draw than most, as one of many panels does: where figures
-        are drawn side by side it is begun first.
+        Whether it takes much longer to draw than most, for instance because it has many panels.
+        When figures are drawn in parallel, it is started first.
     """
 
     source: Figure | Callable[[], Figure]
@@ -77,20 +77,20 @@ class FigureBlock:
 
     @cached_property
     def figure(self) -> Figure | Picture:
-        """The figure, made on first use, or what was drawn of it elsewhere."""
+        """The figure, made on first use, or drawn by another process."""
         return self.source() if callable(self.source) else self.source
 
 
 @dataclass(frozen=True)
 class Drawing:
-    """A drawing that takes the colors of the page it stands in, with its caption.
+    """A drawing in the colors of its page, with its caption.
 
     Parameters
     ----------
     source
-        What makes it: an SVG element as text, with its own description and all text escaped.
+        Function that makes it: an SVG element as text, with its own description and escaped texts.
     caption
-        What it shows.
+        Description of the content.
     """
 
     source: Callable[[], str]
@@ -104,9 +104,9 @@ class TableBlock:
     Parameters
     ----------
     title
-        Line above it on a terminal, which shows no captions; none where it is empty.
+        Line above it on a terminal, which shows no captions; empty for none.
     most
-        Rows that a terminal shows without ``--verbose``; 0 for all.
+        Largest number of rows on a terminal without ``--verbose``; 0 for all.
     """
 
     table: Table
@@ -117,9 +117,9 @@ class TableBlock:
 
 @dataclass(frozen=True)
 class Details:
-    """Blocks that a page folds until the reader opens them; a terminal shows them on request.
+    """Blocks that are folded on a page; a terminal shows them with ``--verbose``.
 
-    On a terminal that is ``--verbose``.
+    The reader of a page opens them.
     """
 
     title: str
@@ -132,7 +132,7 @@ Block = Flat | Details
 
 @dataclass(frozen=True)
 class Section:
-    """A heading and what stands under it."""
+    """A heading and its blocks."""
 
     title: str
     blocks: Sequence[Block]
@@ -140,7 +140,7 @@ class Section:
 
 @dataclass(frozen=True)
 class Banner:
-    """The outcome in one line at the top: ``good``, ``bad``, ``open`` or neither."""
+    """The result in one line at the top: ``good``, ``bad``, ``open`` or neither."""
 
     text: str
     verdict: Literal["good", "bad", "open", "none"] = "none"
@@ -148,17 +148,17 @@ class Banner:
 
 @dataclass(frozen=True)
 class Attachment:
-    """A file of data beside the page.
+    """A data file beside the page.
 
     Parameters
     ----------
     name
         File name in the output folder.
     write
-        ``write(path)``: writes it whole or not at all and returns the path.
+        ``write(path)``: writes the file whole or not at all and returns the path.
     after_record
-        Whether the document's record is written before it: values that must never lie without
-        what says whether to believe them.
+        Whether the document's record is written first, so that values never exist without the
+        record of their validity.
     """
 
     name: str
@@ -179,18 +179,18 @@ def recording_file(name: str, data: xr.Dataset) -> Attachment:
 
 @dataclass(frozen=True)
 class Change:
-    """A value that the user set, and that is not what it would be otherwise.
+    """A value that the user changed.
 
     Parameters
     ----------
     name
-        What ``--set`` calls it.
+        Name in the form of ``--set``.
     now, before
-        Both values as text with unit.
+        New and original value as text with unit.
     of
-        What it changes: the name of a parameter set, or whose defaults.
+        Name of the changed parameter set, or of the owner of the defaults.
     where
-        Where the value before comes from.
+        Source of the original value.
     """
 
     name: str
@@ -202,46 +202,45 @@ class Change:
 
 @dataclass(frozen=True)
 class Document:
-    """What a result has to say.
+    """Content of a result for all outputs.
 
     Parameters
     ----------
     title, summary
         Heading of the page, and one line below it.
     sections
-        The page; or what makes it, where that costs drawing.
+        Sections of the page; or a function that makes them, where that needs drawing.
     brief
-        What a terminal shows, a text or block each: mostly blocks that the page has as well. The
-        banner's text is its last line.
+        Texts and blocks for the terminal, mostly also on the page. The last line is the banner's
+        text.
     data
-        The JSON object, but for the files, or what makes it, where that costs statistics; NaN and
-        infinite numbers become null.
+        The JSON object without the files, or a function that makes it, where that needs statistics;
+        NaN and infinite numbers become null.
     banner
-        Outcome, above the contents of the page.
+        Verdict, above the contents of the page.
     attachments
-        Files of data.
+        Data files.
     record
-        File of the output folder that keeps the JSON object; none where it is empty.
+        File of the output folder for the JSON object; empty for none.
     heed
-        Lines for standard error before the result: what was set or left out.
+        Lines for standard error before the result, such as changed or omitted settings.
     remarks
-        Lines for standard error after the result, such as requirements that are not met.
+        Lines for standard error after the result, such as missed requirements.
     file_notes
-        What is to be known of the files of an output folder, or why there are none.
+        Notes on the files of an output folder, or on why there are none.
     prepare
-        ``prepare(folder)``: called before anything is written, to refuse a folder or to tidy it.
+        ``prepare(folder)``: called before writing, to reject a folder or to tidy it.
     is_paged
-        Whether an output folder gets a page and figures; not where an interrupt left too little.
+        Whether an output folder gets a page and figures; false if an interrupt left too little.
     page_name
-        File of the page.
+        File name of the page.
     has_files
-        Whether it may be written into a folder; its JSON object then lists the files.
+        Whether it can be written to a folder; its JSON object then lists the files.
     headline
-        What a reader must know first: the first words on a terminal and of the JSON object.
+        Most important message: the first words on a terminal and in the JSON object.
     changes
-        What the user changed, which a terminal shows first and the JSON object has by name; None
-        where nothing can be. Pages do not show it by themselves: a section holds it
-        (`bywire.report.subject`).
+        The user's changes, which a terminal shows first and the JSON object contains by name; None
+        where nothing can be changed. On pages a section shows them (`bywire.report.subject`).
     """
 
     title: str
@@ -283,12 +282,12 @@ class Document:
         }
 
     def flat(self) -> Iterator[Flat]:
-        """Yield the blocks of all sections, folded ones among them."""
+        """Yield the blocks of all sections, including folded ones."""
         return flat_blocks(block for section in self.page for block in section.blocks)
 
 
 def spaced(blocks: Iterable[str | Block]) -> list[str | Block]:
-    """Return blocks of a brief with an empty line between them."""
+    """Return the blocks of a brief separated by empty lines."""
     apart: list[str | Block] = []
     for block in blocks:
         apart += ["", block] if apart else [block]
@@ -296,7 +295,7 @@ def spaced(blocks: Iterable[str | Block]) -> list[str | Block]:
 
 
 def flat_blocks(blocks: Iterator[Block] | Sequence[Block]) -> Iterator[Flat]:
-    """Yield blocks, those of folded parts in their place."""
+    """Yield blocks, with those of folded parts in their place."""
     for block in blocks:
         if isinstance(block, Details):
             yield from block.blocks

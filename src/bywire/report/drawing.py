@@ -1,7 +1,7 @@
-"""Figures drawn as pixels and vector graphics: for files, for one HTML file, side by side.
+"""Figures as pixels and vector graphics: for files and for one HTML file, in parallel.
 
-To go through a figure's artists takes longer than either format, and to lay it out as long again:
-both formats share one layout, one pass, and what texts measure.
+Traversing a figure's artists takes longer than writing either format, and its layout takes as long
+again. So both formats share one layout, one traversal, and the sizes of texts.
 """
 
 from __future__ import annotations
@@ -43,9 +43,9 @@ if TYPE_CHECKING:
     from bywire.report.document import FigureBlock
 
 _COMPRESSION = 3
-"""zlib's next takes twice as long for a figure, to save 1 % of many points, 15 % of few lines"""
+"""zlib's next level takes twice as long, to save 1 % of many points, 15 % of few lines"""
 _FONTS = "'DejaVu Sans', 'Bitstream Vera Sans', Verdana, sans-serif"
-"""matplotlib's, and what is as wide where it is not installed"""
+"""matplotlib's font, and fonts of equal width where it is not installed"""
 _Pixels = np.ndarray[Any, np.dtype[np.uint8]]
 _ANONYMOUS = {"Date": None, "Creator": None, "Format": None, "Type": None}
 
@@ -53,8 +53,8 @@ _ANONYMOUS = {"Date": None, "Creator": None, "Format": None, "Type": None}
 def drawn(figure: Figure, dpi: float) -> tuple[bytes, bytes]:
     """Return a figure as PNG and as SVG file.
 
-    The first time, the layout of the figure is computed and then kept: computed again it would
-    move by fractions of a pixel, and the same figure would give other bytes.
+    The layout of the figure is computed once and kept: a second layout would move it by fractions
+    of a pixel, and the same figure would give other bytes.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ def drawn(figure: Figure, dpi: float) -> tuple[bytes, bytes]:
     canvas, resolution = figure.canvas, figure.dpi
     settings = mpl.rc_context({"svg.hashsalt": "bywire"})
     with settings, warnings.catch_warnings():
-        # A character that the font lacks is drawn as a box; that is no reason to fail.
+        # A character that is missing in the font is drawn as a box; that is not an error.
         warnings.filterwarnings("ignore", message="Glyph .* missing from")
         try:
             figure.dpi = dpi
@@ -76,12 +76,12 @@ def drawn(figure: Figure, dpi: float) -> tuple[bytes, bytes]:
         finally:
             figure.dpi = resolution
             figure.set_canvas(canvas)
-    figure.stale = False  # to set the resolution back changes nothing of what is drawn
+    figure.stale = False  # resetting the resolution does not change the drawing
     return _png(both.pixels[:, :, :3], dpi), both.vector.file(*figure.get_size_inches())
 
 
 def settle(figure: Figure) -> None:
-    """Compute the layout of a figure once and for all."""
+    """Compute the layout of a figure once."""
     engine = figure.get_layout_engine()
     if engine is not None:
         engine.execute(figure)
@@ -90,9 +90,9 @@ def settle(figure: Figure) -> None:
 
 
 class _Vector(RendererSVG):
-    """Vector graphics whose unit is a pixel, with texts as text.
+    """Vector graphics in pixels, with texts as text.
 
-    A text is stretched to the width for which it has room, should its font be another one.
+    A text is stretched to its intended width if another font is used.
     """
 
     def __init__(self, width: float, height: float, dpi: float) -> None:
@@ -163,7 +163,7 @@ class _Vector(RendererSVG):
         return style
 
     def file(self, width: float, height: float) -> bytes:
-        """Return the file of a figure of so many inches."""
+        """Return the file of a figure with a size in inches."""
         self.finalize()
         size = f'width="{72.0 * width:g}pt" height="{72.0 * height:g}pt" font-family="{_FONTS}"'
         text = re.sub(r' width="[^"]*" height="[^"]*"', f" {size}", self._text.getvalue(), count=1)
@@ -171,7 +171,7 @@ class _Vector(RendererSVG):
 
 
 class _Both(RendererBase):
-    """Draws everything twice, on pixels and as vector graphics; pixels say what has which size."""
+    """Renderer of pixels and vector graphics together; the pixels determine all sizes."""
 
     def __init__(self, agg: Any) -> None:
         super().__init__()
@@ -220,7 +220,7 @@ class _Both(RendererBase):
     def get_text_width_height_descent(
         self, s: str, prop: FontProperties, ismath: Any
     ) -> tuple[float, float, float]:
-        """Return the size of a text on pixels, measured when it is laid out and not again."""
+        """Return the size of a text in pixels, measured only once, for the layout."""
         key = s, hash(prop), ismath
         if key not in self._sizes:
             self._sizes[key] = self._agg.get_text_width_height_descent(s, prop, ismath)
@@ -237,11 +237,11 @@ class _Both(RendererBase):
         return draw
 
     def start_rasterizing(self) -> None:
-        """Begin what is an image in vector graphics too, as of the many colors of a scale."""
+        """Begin a part that is an image in vector graphics too, such as a color scale."""
         self._image = RendererAgg(self.width, self.height, self.dpi)
 
     def stop_rasterizing(self) -> None:
-        """End it, and draw the image."""
+        """End that part, and draw the image."""
         if self._image is None:
             return
         pixels = np.asarray(self._image.buffer_rgba())
@@ -256,7 +256,7 @@ class _Both(RendererBase):
 
 
 class _Canvas(FigureCanvasAgg):
-    """A canvas whose renderer, of which layouts ask sizes, draws on pixels and as vectors."""
+    """A canvas with this renderer, which layouts ask for sizes."""
 
     _both: _Both | None = None
 
@@ -267,16 +267,16 @@ class _Canvas(FigureCanvasAgg):
 
 
 def _png(pixels: _Pixels, dpi: float = 0.0) -> bytes:
-    """Return pixels of three or four colors as a PNG file; Pillow would load five other formats.
+    """Return pixels of three or four channels as a PNG file; Pillow would load five other formats.
 
-    Its encoder takes twice as long, too.
+    Pillow's encoder also takes twice as long.
     """
     height, width, colors = pixels.shape
-    rows = np.zeros((height, 1 + colors * width), np.uint8)  # each begins with its filter: none
+    rows = np.zeros((height, 1 + colors * width), np.uint8)  # each row begins with its filter: none
     rows[:, 1:] = pixels.reshape(height, -1)
     per_meter = round(dpi / 0.0254)
     size = _chunk(b"pHYs", struct.pack(">IIB", per_meter, per_meter, 1)) if dpi else b""
-    kind = {3: 2, 4: 6}[colors]  # of opaque colors, or with their opacity
+    kind = {3: 2, 4: 6}[colors]  # opaque colors, or with opacity
     return b"\x89PNG\r\n\x1a\n" + b"".join(
         [
             _chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, kind, 0, 0, 0)),
@@ -302,7 +302,7 @@ _drawn: WeakKeyDictionary[Figure, tuple[bytes, bytes]] = WeakKeyDictionary()
 
 
 def figure_bytes(figure: Figure | Picture, kind: str = "png") -> bytes:
-    """Return a figure as a PNG or SVG file; it is drawn as both, and again only when changed.
+    """Return a figure as a PNG or SVG file; both are drawn together, and again only when changed.
 
     ``figure``: figure to draw; ``kind``: ``"png"`` or ``"svg"``.
 
@@ -321,7 +321,7 @@ def figure_bytes(figure: Figure | Picture, kind: str = "png") -> bytes:
 
 
 def save_figure(figure: Figure | Picture, path: str | os.PathLike[str]) -> Path:
-    """Write a figure as PNG or SVG, whichever the ending of the path says.
+    """Write a figure as PNG or SVG, by the ending of the path.
 
     Raises
     ------
@@ -335,12 +335,12 @@ def save_figure(figure: Figure | Picture, path: str | os.PathLike[str]) -> Path:
 def write_bytes(path: str | os.PathLike[str], content: bytes) -> Path:
     """Write a file whole or not at all; an older file stays until the new one is complete.
 
-    The folder is made where it does not exist.
+    A missing folder is created.
 
     Raises
     ------
     FileError
-        When the folder cannot be made or written to; names the file and the reason.
+        When the folder cannot be created or is not writable; names the file and the reason.
     """
     target = Path(path)
     try:
@@ -363,7 +363,7 @@ _DECIMALS = re.compile(r"(\.\d)\d+")  # of a coordinate; what is kept of them
 _SECONDS = {"s": 1.0, "ms": 1e-3}
 
 BUDGET = 2_000_000
-"""bytes that the figures of a page may take together while they are vector graphics"""
+"""largest total size of vector graphics on a page [byte]"""
 
 
 def inline_figures(
@@ -374,8 +374,7 @@ def inline_figures(
     All are SVG at first; while they exceed the budget, the largest becomes a PNG if that is
     smaller.
 
-    ``figures``: figures and the texts that stand for them where they cannot be seen; ``budget``:
-    bytes for all of them.
+    ``figures``: figures and their alternative texts; ``budget``: bytes for all of them.
     """
     markup = [_svg(figure, text, f"f{k}-") for k, (figure, text) in enumerate(figures, 1)]
     largest_first = sorted(range(len(markup)), key=lambda k: -len(markup[k]))
@@ -387,20 +386,20 @@ def inline_figures(
 
 
 def _svg(figure: Figure | Picture, text: str, prefix: str) -> str:
-    """Return a figure as SVG element whose ids no other figure of the page has."""
+    """Return a figure as SVG element with ids that are unique on the page."""
     whole = figure_bytes(figure, "svg").decode("utf-8")
     svg = whole[whole.index("<svg") :].strip()
     svg = re.sub(r"<!--.*?-->|<metadata>.*?</metadata>|<style.*?</style>", "", svg, flags=re.S)
     head, body = svg.split(">", 1)
     kept = " ".join(re.findall(r'(?:viewBox|font-family)="[^"]*"', head))
     body = re.sub(r"<[^>]*>", lambda tag: _tag(tag[0], prefix), body)
-    # With a pattern that may begin with any blank this takes five times as long.
+    # A pattern that may begin with any blank would take five times as long.
     body = re.sub(r"\n\s+", "\n", body.replace(" \n", "\n"))
     return f'<svg {kept} role="img" aria-label="{_attribute(text)}"{axes_of(figure)}>{body}'
 
 
 def axes_of(figure: Figure | Picture) -> str:
-    """Return an attribute that says where axes lie, as shares of the figure, and what they span."""
+    """Return an attribute with the positions of axes, as shares of the figure, and their limits."""
     if isinstance(figure, Picture):
         return figure.axes
     known = [
@@ -418,7 +417,7 @@ def axes_of(figure: Figure | Picture) -> str:
 
 
 def _time(axes: Axes) -> dict[str, float]:
-    """Return how long a unit of an abscissa over time is [s]; nothing of any other abscissa."""
+    """Return the length of a unit of a time axis [s]; None for any other axis."""
     together = axes.get_shared_x_axes().get_siblings(axes)
     labels = (_TIME.fullmatch(each.get_xlabel()) for each in together)
     return next(({"t": _SECONDS[found[1]]} for found in labels if found), {})
@@ -429,10 +428,10 @@ def _span(limits: tuple[float, float], scale: str) -> list[float | bool]:
 
 
 def _tag(tag: str, prefix: str) -> str:
-    """Return a tag with ids of its own, and coordinates that are no finer than the eye."""
+    """Return a tag with unique ids, and coordinates at visible resolution."""
     tag = tag.replace("xlink:href=", "href=").replace(' id="', f' id="{prefix}')
     tag = tag.replace('href="#', f'href="#{prefix}').replace("url(#", f"url(#{prefix}")
-    # Put together from what is kept, in half the time that it takes to replace the rest.
+    # Assembled from its parts, in half the time that replacements would take.
     return re.sub(r' d="[^"]*"', lambda m: "".join(_DECIMALS.split(m[0])), tag)
 
 
@@ -454,17 +453,17 @@ def _attribute(text: str) -> str:
 # --- Figures drawn side by side, in copies of this process
 
 FEW = 4
-"""figures up to which copies are not worth their start"""
+"""number of figures up to which processes are not worth their start"""
 
-# What a copy draws: it has them from the process that it was copied from.
+# Data of a copy of this process, which shares them.
 _blocks: list[FigureBlock] = []
 
 
 @contextmanager
 def drawn_side_by_side(blocks: Sequence[FigureBlock]) -> Iterator[None]:
-    """Draw figures while the block runs, where they are many and this process may be copied.
+    """Draw figures while the block runs, where they are many and this process can be forked.
 
-    When it ends their place is taken by what was drawn. Others are drawn when they are asked for.
+    At its end they are replaced by the drawn ones. Others are drawn on request.
     """
     count = worker_count(most=len(blocks))
     if len(blocks) <= FEW or count == 1 or not may_copy():
@@ -472,14 +471,14 @@ def drawn_side_by_side(blocks: Sequence[FigureBlock]) -> Iterator[None]:
         return
     _blocks[:] = blocks
     with processes(count, list, is_copied=True) as pool:
-        # What is long is begun first: at the end it would have all but one copy wait.
+        # Long ones start first: at the end all other processes would wait for them.
         order = sorted(range(len(blocks)), key=lambda k: not blocks[k].is_long)
         drawn = {k: pool.submit(_picture, k) for k in order}
         yield
         try:
             for k, each in drawn.items():
                 blocks[k].__dict__["figure"] = each.result()
-        except BrokenProcessPool:  # killed, most likely for want of memory: the rest is drawn here
+        except BrokenProcessPool:  # killed, most likely out of memory: the rest is drawn here
             pass
     _blocks.clear()
 

@@ -1,4 +1,4 @@
-"""Figure: where the energy came from and where it went."""
+"""Figure: energy balance, by sources and sinks."""
 
 from __future__ import annotations
 
@@ -34,18 +34,18 @@ COLORS = {
     "E_caliper": style.YELLOW,
     "E_stored": style.BLUE,
 }
-"""the same energy has the same color in every figure; others take what a figure leaves over"""
+"""fixed colors of energies in every figure; others use the remaining colors"""
 SOURCE_COLORS = ("#4A4A4A", "#9A9A9A", "#C4C4C4")
 SMALL = 1e-3
-"""share of the energy turned over below which entries are drawn together as the rest"""
+"""share of the total energy below which entries are merged into the rest"""
 NEGLIGIBLE = 1e-9
-"""share below which even the rest is not drawn"""
+"""share below which the rest is not drawn"""
 REST_COLOR = "#E4E4E4"
 
 
 @dataclass(frozen=True)
 class Entry:
-    """One piece of a bar: what it is, its energy [J, not negative] and its color."""
+    """A piece of a bar: label, energy [J, not negative] and color."""
 
     label: str
     energy: float
@@ -58,29 +58,29 @@ def energy_balance(
     source: str | Mapping[str, str] | None = None,
     sinks: Mapping[str, str] | None = None,
 ) -> Figure:
-    """Draw two stacked bars of equal length: where energy came from and where it went.
+    """Draw two stacked bars of equal length: sources and sinks of the energy.
 
-    Every entry is signed and stands on the side that its sign says: a source that takes energy
-    back is among the receivers, a gear loss below zero and an emptied store are among the givers.
-    What the books do not explain is drawn as a hatched piece.
+    Every entry is signed, and its sign decides the side: a source that takes energy back is among
+    the sinks; a gear loss below zero and an emptied store are among the sources. The residual of
+    the energy balance is drawn as a hatched piece.
 
     Parameters
     ----------
     recording
-        Recording with energies [J]; of each the difference between end and start counts.
+        Recording with energies [J]; the difference between end and start counts.
     source
-        Variable with the energy that came from the source; or label by variable of several
-        sources; by default what the recording's brake has.
+        Variable with the energy from the source; or label by variable of several sources; by
+        default those of the recording's brake.
     sinks
-        Label by variable of every place where energy went; by default those of the recording's
-        brake. Variables a recording lacks are left out.
+        Label by variable of every sink; by default those of the recording's brake. Variables that
+        are missing in the recording are left out.
 
     Raises
     ------
     UnknownNameError
         When the recording has no such source.
     ParameterError
-        When no energy was turned over.
+        When no energy flows.
     """
     books = actuator_ledger(recording)
     if source is not None or sinks is not None:
@@ -95,12 +95,12 @@ def energy_balance(
 
 
 def ledger_bars(books: Ledger) -> Figure:
-    """Draw a ledger as `energy_balance` does.
+    """Draw a ledger in the form of `energy_balance`.
 
     Raises
     ------
     ParameterError
-        When no energy was turned over.
+        When no energy flows.
     """
     given, taken = _sides(books)
     total = max(sum(e.energy for e in given), sum(e.energy for e in taken))
@@ -123,7 +123,7 @@ def ledger_bars(books: Ledger) -> Figure:
 
 
 def _sides(books: Ledger) -> tuple[list[Entry], list[Entry]]:
-    """Return the givers and the receivers of energy."""
+    """Return the sources and the sinks of energy."""
     given: list[Entry] = []
     taken: list[Entry] = []
     for entry, color in zip(books.sources, cycle(SOURCE_COLORS)):
@@ -141,7 +141,7 @@ def _sides(books: Ledger) -> tuple[list[Entry], list[Entry]]:
 
 
 def _gathered(entries: list[Entry], total: float) -> list[Entry]:
-    """Return the entries worth a place in the legend, small ones gathered into one."""
+    """Return the entries of the legend, with small ones merged into one."""
     large = [entry for entry in entries if entry.energy >= SMALL * total]
     small = [e for e in entries if NEGLIGIBLE * total < e.energy < SMALL * total]
     if len(small) < 2:
@@ -150,7 +150,7 @@ def _gathered(entries: list[Entry], total: float) -> list[Entry]:
 
 
 def _colors(sinks: Sequence[str]) -> dict[str, str]:
-    """Return a color for every variable, no two alike while there are any left over."""
+    """Return a color for every variable, different ones as long as the palette lasts."""
     known = {COLORS[name] for name in sinks if name in COLORS}
     left = cycle([c for c in dict.fromkeys(COLORS.values()) if c not in known] or [style.BLACK])
     colors: dict[str, str] = {}
@@ -164,7 +164,7 @@ def _stack(axes: Axes, row: float, entries: list[Entry], total: float) -> None:
     left = 0.0
     for entry in entries:
         share = f"{100 * entry.energy / total:.3g} %"
-        digits = max(3, len(f"{entry.energy:.0f}"))  # no powers of ten where kilojoules are turned
+        digits = max(3, len(f"{entry.energy:.0f}"))  # no powers of ten for kilojoules
         label = f"{entry.label}: {amount(entry.energy, 'J', digits)} ({share})"
         axes.barh(
             row,
@@ -179,7 +179,7 @@ def _stack(axes: Axes, row: float, entries: list[Entry], total: float) -> None:
 
 
 def _draw_missing(axes: Axes, missing: float, total: float) -> None:
-    """Draw what the shorter bar lacks."""
+    """Draw the difference to the longer bar."""
     if abs(missing) <= 1e-6 * total:
         return
     axes.barh(

@@ -1,4 +1,4 @@
-"""Figures of identifications and replays: measured beside modeled, residuals, correlations."""
+"""Figures of identifications and replays: measured and modeled, residuals, correlations."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ from bywire.report.channel import channel, decimate, kept_samples
 from bywire.report.panels import Role
 from bywire.report.wording import amount, in_display_unit
 
-_NAMED = 8  # records up to which there is room for their names
-_ROOM = 0.06  # of the height of the first panel, for the names
+_NAMED = 8  # largest number of records with room for their names
+_ROOM = 0.06  # share of the height of the first panel for the names
 
 
 def mark_records(panels: Sequence[Axes], at: xr.DataArray) -> None:
@@ -32,10 +32,10 @@ def mark_records(panels: Sequence[Axes], at: xr.DataArray) -> None:
     Parameters
     ----------
     panels
-        Panels that share the abscissa.
+        Panels with a common abscissa.
     at
-        The abscissa as it is drawn; its coordinate ``record`` names each sample's record. Without
-        one nothing is drawn.
+        The abscissa in display units; its coordinate ``record`` names each sample's record. Without
+        this coordinate nothing is drawn.
     """
     if "record" not in at.coords or at.coords["record"].dims != at.dims:
         return
@@ -65,15 +65,15 @@ def mark_records(panels: Sequence[Axes], at: xr.DataArray) -> None:
 
 # --- Curves, measured beside modeled, and values with their band
 
-_MOST = 6  # curves of a family that have a color each
+_MOST = 6  # largest number of curves of a family with a color each
 _LINE = 1.3  # width of the line in the middle of a band [pt]
 
 
 def method_curve(curve: Curve) -> Figure:
     """Draw measured and modeled with their difference below, or values with 95 % bands.
 
-    Few measured points stand alone, without a line between them. Records that follow one another
-    are told apart by thin lines and named.
+    A few measured points are drawn without a line between them. Thin lines and names separate
+    successive records.
     """
     if "measured" in curve.data and "modeled" in curve.data:
         return _beside(curve)
@@ -122,7 +122,7 @@ def _beside(curve: Curve) -> Figure:
 
 
 def _over_frequency(upper: Axes, lower: Axes, symbol: str) -> None:
-    """Make the frequency logarithmic, and a gain too; a phase is none."""
+    """Make the frequency logarithmic, and a gain too; but not a phase."""
     lower.set_xscale("log")
     style.log_ticks(lower.xaxis)
     if symbol not in ("degree", "rad"):
@@ -138,7 +138,7 @@ def _draw_pair(
     color: str,
     few: bool,
 ) -> None:
-    """Draw measured and modeled; of a family both in its own color, measured pale and wide."""
+    """Draw measured and modeled; a curve of a family in its own color, measured pale and wide."""
     for values, role, word in zip(
         pair, (Role.MEASURED, Role.SIMULATED), ("measured", "modeled"), strict=True
     ):
@@ -161,7 +161,7 @@ def _draw_pair(
 
 
 def _draw(axes: Axes, at: Array, values: Array, alone: bool, **look: object) -> None:
-    """Draw a line, or points that stand alone."""
+    """Draw a line, or separate points."""
     if alone:
         look |= {"linestyle": "none", "marker": "o", "markersize": 3.5}
     axes.plot(*_drawn(at, values), **look)  # type: ignore[arg-type]
@@ -211,7 +211,7 @@ def _bands(axes: Axes, curve: Curve) -> None:
 
 
 def _drawn(at: Array, values: Array) -> tuple[Array, ...]:
-    """Return a line with fewer points where its abscissa does not turn back."""
+    """Return a line with fewer points where its abscissa is monotonic."""
     if np.all(np.diff(at) >= 0.0):
         keep = kept_samples(at, values)
         return at[keep], values[keep]
@@ -219,7 +219,7 @@ def _drawn(at: Array, values: Array) -> tuple[Array, ...]:
 
 
 def _family(array: xr.DataArray, x: xr.DataArray) -> list[tuple[int, str]]:
-    """Return number and label of each curve; one without a label where there is no family."""
+    """Return number and label of each curve; a curve without a family has no label."""
     others = [dim for dim in array.dims if dim != x.dims[-1]]
     if not others:
         return [(0, "")]
@@ -242,7 +242,7 @@ def _row(array: xr.DataArray, x: xr.DataArray, k: int) -> Array:
 
 
 def _abscissa(data: xr.Dataset, x: str, k: int) -> Array:
-    """Return where a curve was read, in the display unit: all at the same places, or each alone."""
+    """Return the abscissa of a curve in the display unit: common to all curves, or its own."""
     symbol = str(data[x].attrs.get("units", "s" if x == "time" else "1"))
     values = in_display_unit(np.asarray(data[x].values, dtype=float), symbol)[0]
     return np.asarray(values[k] if values.ndim > 1 else values)
@@ -254,10 +254,10 @@ def _x_label(data: xr.Dataset, x: str) -> str:
 
 
 def _band_label(axes: Axes, half: Array, symbol: str) -> str:
-    """Return the entry of a 95 % band: how wide it is, and whether the line hides it.
+    """Return the legend of a 95 % band: its width, and whether the line hides it.
 
-    ``half`` widths of the band are in ``symbol``, NaN where there is none; the limits of the axes
-    are set by what is drawn.
+    ``half`` widths of the band are in ``symbol``, NaN where there is none; the drawn data set the
+    limits of the axes.
     """
     if not np.isfinite(half).any():
         return "95 % band"
@@ -273,14 +273,14 @@ def _band_label(axes: Axes, half: Array, symbol: str) -> str:
 # --- Residuals: in their order, their distribution, their autocorrelation
 
 _LAGS = 60
-_SURE = 1.96  # standard deviations within which white residuals' correlations lie in 95 of 100
+_SURE = 1.96  # standard deviations that contain 95 % of the correlations of white residuals
 
 
 def residual_figure(estimate: Estimate) -> Figure:
-    """Draw what a model leaves unexplained.
+    """Draw the residuals of a model.
 
-    Weighted residuals over their order, their histogram beside the normal distribution of the
-    same variance, and their autocorrelation with the band in which white ones stay.
+    Weighted residuals in order, their histogram with the normal distribution of the same variance,
+    and their autocorrelation with the band for white residuals.
     """
     r = estimate.residuals
     figure = Figure(figsize=(style.WIDTH, 4.6), layout="constrained", facecolor="white")
@@ -328,7 +328,7 @@ def _histogram(axes: Axes, r: Array) -> None:
 
 # --- Correlations: which unknowns the data tells apart badly
 
-_NUMBERED = 14  # unknowns up to which there is room for numbers
+_NUMBERED = 14  # largest number of unknowns with room for numbers
 
 
 def correlation_matrix(estimate: Estimate) -> Figure:
@@ -366,9 +366,9 @@ def correlation_matrix(estimate: Estimate) -> Figure:
 def replay_figure(
     name: str, pair: xr.Dataset, inputs: xr.Dataset, fits: Sequence[SegmentFit]
 ) -> Figure:
-    """Draw demand, measured (solid blue) and simulated (dashed red), and simulated less measured.
+    """Draw demand, measured (solid blue) and simulated (dashed red), and simulated minus measured.
 
-    Segments are bounded by thin lines; one that misses a tolerance is shaded.
+    Thin lines separate segments; a segment that misses a tolerance is shaded.
 
     Parameters
     ----------
@@ -377,9 +377,9 @@ def replay_figure(
     pair
         ``measured`` and ``modeled`` over ``time`` [s].
     inputs
-        What drove the model.
+        Inputs of the model.
     fits
-        Its segments.
+        Fit of each segment.
     """
     figure, (top, middle, bottom) = style.new_figure(5.6, (0.8, 2.2, 1.0))
     scale, unit = style.time_scale(pair["time"].values)
@@ -467,7 +467,7 @@ def track_figure(track: Track, known: float | None = None) -> Figure:
     Parameters
     ----------
     track
-        What was tracked; its first parameter is drawn.
+        Tracking result; its first parameter is drawn.
     known
         Value of the parameter set, drawn as a dashed line.
     """

@@ -1,4 +1,4 @@
-"""Tables of an identification: parameters with their intervals, what is not told, checks."""
+"""Tables of an identification: parameters with intervals, undetermined ones, and checks."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ def estimate_table(
     Parameters
     ----------
     estimate
-        What was found; what the data does not tell stands below it. Where its model is simulated,
-        a column says how far the step of that moves it.
+        Result of the identification; undetermined parameters are below it. For a simulated model, a
+        column gives the numerical error due to the step.
     start
-        Values from which the search began, by label.
+        Initial values of the search, by label.
     put_in
-        What a simulated measurement is made of, by label.
+        True values of a simulated measurement, by label.
     """
     beside: dict[str, Mapping[str, float]] = {"put in": put_in or {}, "start": start or {}}
     beside = {
@@ -68,7 +68,9 @@ def estimate_table(
     for u in (kept.unknown for kept in estimate.kept):
         number, _, unit = with_interval(u.start, 0.0, u.unit)
         by_step = [] if steps is None else [Cell("-")]
-        rows.append((u, [Cell(number), Cell("not told", "bad"), *by_step, Cell("-"), Cell(unit)]))
+        rows.append(
+            (u, [Cell(number), Cell("not determined", "bad"), *by_step, Cell("-"), Cell(unit)])
+        )
     return Table(
         (
             Column("parameter"),
@@ -87,7 +89,7 @@ def estimate_table(
 
 
 def with_interval(value: float, half: float, symbol: str) -> tuple[str, str, str]:
-    """Return value, half width of its interval and unit as texts, to two digits of the latter."""
+    """Return value, half width of its interval and unit as texts, to two digits of the width."""
     number, unit = in_display_unit(value, symbol)
     reach = display_factor(symbol) * abs(half)
     digits = 6
@@ -97,7 +99,7 @@ def with_interval(value: float, half: float, symbol: str) -> tuple[str, str, str
 
 
 def _percent(share: float) -> str:
-    """Return an uncertainty in percent; a thousand of them say no more than many."""
+    """Return an uncertainty in percent; more than a thousand are not written out."""
     if share >= 1000.0:
         return "> 1000 %"
     return f"{share:.0f} %" if share >= 10.0 else f"{share:.2g} %"
@@ -151,7 +153,7 @@ def figure_table(identified: Identified) -> Table:
 
 
 def trust_table(trust: Trust) -> Table:
-    """Return how well what was put in comes back."""
+    """Return a table that compares the estimates with the true values."""
     rows = []
     for recovered in trust.recovered:
         low, high = recovered.coverage_range
@@ -173,7 +175,7 @@ def trust_table(trust: Trust) -> Table:
             Column("put in", numeric=True),
             Column("count", numeric=True),
             Column("bias / standard error", numeric=True),
-            Column("intervals that hold it"),
+            Column("intervals that contain it"),
             Column("claimed / real scatter", numeric=True),
             Column("result"),
         ),

@@ -1,4 +1,4 @@
-"""Figures of a campaign of faults: when each is too much and when it is seen; what alarms cost."""
+"""Figures of a fault campaign: times until danger and detection, and the price of alarms."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from bywire.core.typing import Array
 from bywire.report import style
 
 _ROW = 0.2  # height of a fault [inch]
-_MOST = 60  # faults in one figure
-_LEAST = 0.5e-3  # s: what is seen at once lies at the edge of a logarithmic axis
+_MOST = 60  # largest number of faults in a figure
+_LEAST = 0.5e-3  # s: times of immediate detection are drawn at the edge of a logarithmic axis
 
 
 class FaultTimes(NamedTuple):
-    """Times of a fault from its onset [s], NaN where never; shape (cases,) each."""
+    """Times of a fault from its onset [s], NaN for never; shape (cases,) each."""
 
     name: str
     violated: Array
@@ -25,16 +25,16 @@ class FaultTimes(NamedTuple):
 
 
 def fault_times(faults: Sequence[FaultTimes]) -> Figure:
-    """Draw of every fault when criteria are violated and when it is seen, the quickest on top.
+    """Draw when each fault violates criteria and when it is detected, the quickest on top.
 
-    ``faults``: at least one; those that violate nothing come last.
+    ``faults``: at least one; those without a violation come last.
     """
     ordered = sorted(faults, key=lambda f: (np.nanmin([*f.violated, np.inf]), f.name))[:_MOST]
     figure, (axes,) = style.new_figure(0.9 + _ROW * len(ordered))
     places = np.arange(len(ordered))[::-1]
     for label, color, marker, column in (
-        ("too much", style.VERMILLION, "s", 0),
-        ("seen", style.BLUE, "o", 1),
+        ("criterion violated", style.VERMILLION, "s", 0),
+        ("detected", style.BLUE, "o", 1),
     ):
         for place, fault in zip(places, ordered, strict=True):
             times = fault[1:][column]
@@ -71,14 +71,14 @@ Curve = Sequence[tuple[float, int, float, int]]
 
 
 def alarm_curves(curves: Mapping[str, Curve], healthy: int) -> Figure:
-    """Draw how late dangerous faults are seen over how many healthy runs alarm, by residual.
+    """Draw the detection delay of dangerous faults over false alarms of healthy runs, by residual.
 
     Parameters
     ----------
     curves
-        Residual -> factor of the threshold, alarms, median delay [s], runs in which it sees one.
+        Residual -> factor of the threshold, alarms, median delay [s], number of detected runs.
     healthy
-        Healthy runs that were judged.
+        Number of judged healthy runs.
     """
     figure, (axes,) = style.new_figure(3.2)
     markers = "osD^vPX*<>"

@@ -1,4 +1,4 @@
-"""Figures: the loop of drive over response that friction opens, and friction over speed."""
+"""Figures: friction loop of drive over response, and friction over speed."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 ARROWS_AT = (0.35, 0.75)
-"""where along a branch its arrows sit, as shares of its drawn length"""
+"""positions of the arrows along a branch, as shares of its drawn length"""
 
 
 def hysteresis_loop(
@@ -36,12 +36,12 @@ def hysteresis_loop(
     Parameters
     ----------
     recordings
-        Recordings of a ramp up and down again, by the label that the legend shows.
+        Recordings of a ramp up and down again, by their label in the legend.
     response, drive
         Variables, for instance a pressure and a current.
     demand
-        Variable whose maximum divides applying from releasing; where a recording lacks it, the
-        drive does.
+        Variable whose maximum separates applying from releasing; if a recording does not have it,
+        the drive.
     average
         Averaging time [s] of the loop, usually one dither period; the ripple around it is then
         drawn pale. 0 draws the raw signals.
@@ -49,7 +49,7 @@ def hysteresis_loop(
     Raises
     ------
     ParameterError
-        When there is no recording.
+        Without a recording.
     """
     from matplotlib.lines import Line2D
 
@@ -90,7 +90,7 @@ def hysteresis_loop(
 
 
 def _turn(values: Array) -> int:
-    """Return the middle of the samples at the maximum, so that a plateau is shared fairly."""
+    """Return the middle of the samples at the maximum, so that a plateau is split evenly."""
     if bool(np.all(np.isnan(values))):
         return 0
     top = np.flatnonzero(values >= np.nanmax(values))
@@ -100,7 +100,7 @@ def _turn(values: Array) -> int:
 def _draw_branch(
     axes: Axes, x: Channel, y: Channel, branch: slice, color: str, dash: style.Dash
 ) -> None:
-    """Draw one branch, thinned over time so that the extremes of both variables stay."""
+    """Draw one branch, thinned over time, with the extremes of both variables kept."""
     time, xs, ys = x.time[branch], x.values[branch], y.values[branch]
     if len(time) < 2:
         return
@@ -127,7 +127,7 @@ def _draw_branch(
 
 
 def _length_along(x: Array, y: Array) -> Array:
-    """Return the share of the drawn length up to every point, 0 to 1."""
+    """Return the share of the drawn length at every point, 0 to 1."""
     steps = np.hypot(*(np.diff(v) / (float(np.ptp(v)) or 1.0) for v in (x, y)))
     length = np.concatenate([[0.0], np.cumsum(np.nan_to_num(steps))])
     return length / (length[-1] or 1.0)
@@ -149,11 +149,11 @@ def stribeck_curve(
     Parameters
     ----------
     curve
-        Dataset with the friction over two dimensions: what it depends on, for instance a
-        pressure, and ascending speed, which contains 0 twice, once for each end of the interval
-        at rest. All say their units.
+        Dataset with the friction over two dimensions: the load, for instance a pressure, and
+        ascending speed, which contains 0 twice, once for each end of the interval at rest. All have
+        units.
     friction
-        Name of the friction in it; its first variable where empty.
+        Name of the friction in it; empty for its first variable.
     measured
         Measured speeds and frictions, SI, by level; drawn as points.
 
@@ -162,7 +162,7 @@ def stribeck_curve(
     UnknownNameError
         When the dataset has no such variable.
     ParameterError
-        When it does not depend on a level and a speed.
+        When it does not depend on a load and a speed.
     """
     friction = friction or next(map(str, curve.data_vars), "")
     if friction not in curve.data_vars:
@@ -180,7 +180,7 @@ def stribeck_curve(
     for k, p in enumerate(level.values.astype(float)):
         color = style.SEQUENCE[k % len(style.SEQUENCE)]
         values = np.asarray(array.values[k], dtype=float)
-        # Short intervals at rest lie above long ones, so that all are seen.
+        # Short intervals at rest are drawn above long ones, so that all are visible.
         above = 2.0 + 0.9 / (1.0 + float(np.ptp(values)))
         label = amount(p, unit)
         axes.plot(speed.values, values, color=color, linewidth=1.4, zorder=above, label=label)

@@ -1,4 +1,4 @@
-"""Identity of a report: when it was made, by whom, with which version, command and input files."""
+"""Identity of a report: date, user, version, command and input files."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from bywire.core.callers import is_command_line
 from bywire.core.version import __version__
 from bywire.report.wording import clean
 
-_DIGITS = 12  # of a digest and a commit: enough to tell files and commits apart
-_LARGEST = 64 * 2**20  # bytes of an input file: a digest of more would delay the report
+_DIGITS = 12  # digits of a digest and a commit: enough to distinguish files and commits
+_LARGEST = 64 * 2**20  # bytes of a hashed input file: a larger one would delay the report
 _COMMIT = frozenset("0123456789abcdef")
 
 
 def identity() -> list[tuple[str, str]]:
-    """Return what identifies a report that is written now, as pairs of label and text.
+    """Return the identity of a report that is written now, as pairs of label and text.
 
     ``SOURCE_DATE_EPOCH``, the environment variable of reproducible builds, sets the date.
     """
@@ -33,7 +33,7 @@ def identity() -> list[tuple[str, str]]:
         ("commit", commit(Path.cwd())),
     ]
     words = sys.argv[1:]
-    if is_command_line() and words[:1] != ["serve"]:  # whose forms start other commands
+    if is_command_line() and words[:1] != ["serve"]:  # its forms start other commands
         rows.append(("command", shlex.join(["bywire", *words])))
         rows += [("input", text) for text in _inputs(words)]
     else:
@@ -49,7 +49,7 @@ def _date() -> str:
 
 
 def _person() -> str:
-    """Return the user's name; empty where the system does not know it."""
+    """Return the user's name; empty if the system does not have it."""
     try:
         return getpass.getuser()
     except (KeyError, OSError):  # a user without an entry, as in some containers
@@ -57,10 +57,10 @@ def _person() -> str:
 
 
 def commit(folder: Path) -> str:
-    """Return the commit that a folder's Git repository is at; empty without one.
+    """Return the current commit of a folder's Git repository; empty without one.
 
-    The files of the repository are read, and Git is not started: its settings in a folder of
-    somebody else may name programs that it then runs.
+    This reads the files of the repository and does not start Git: the settings of somebody else's
+    folder may name programs that Git would run.
     """
     for place in (folder, *folder.parents):
         git = place / ".git"
@@ -102,7 +102,7 @@ def _short(number: str) -> str:
 
 
 def _inputs(words: Sequence[str]) -> list[str]:
-    """Return the files that a command names, each with the beginning of its SHA-256 digest."""
+    """Return the files in a command, each with the first digits of its SHA-256 digest."""
     texts = []
     for word in words:
         path = Path(word)

@@ -1,4 +1,4 @@
-"""Scripts within a page: what of them it holds, and what its policy says of them."""
+"""Scripts within a page: their text, and their entry in the page's policy."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import re
 
 
 def admitted(text: str) -> str:
-    """Return the source expression that admits this very text and no other.
+    """Return the source expression that allows exactly this text.
 
     Examples
     --------
@@ -27,7 +27,7 @@ _LEFT_OUT = re.compile(rf"{_COMMENT}|^[ \t]+", re.DOTALL | re.MULTILINE)
 def bare(script: str) -> str:
     """Return a script without comments and indentation.
 
-    No text in it may hold two slashes after a space, nor a slash before a star.
+    No text in it may contain two slashes after a space, nor a slash before a star.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Figure: slow states over a life, and what is left of the limits that end it."""
+"""Figure: slow states over a life, and the remaining margins to its limits."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from bywire.report.channel import decimate
 from bywire.report.panels import Role
 from bywire.report.wording import in_display_unit
 
-_HEIGHT = 1.15  # of a panel [inch]
+_HEIGHT = 1.15  # height of a panel [inch]
 
 
 @dataclass(frozen=True)
@@ -24,11 +24,11 @@ class Course:
     Parameters
     ----------
     label, unit
-        What the axis says, and the SI unit.
+        Label of the axis, and the SI unit.
     values
         Shape (stops + 1,).
     is_left
-        Whether it is what is left of a limit: zero is the end.
+        Whether it is a remaining margin: zero is the end.
     """
 
     label: str
@@ -38,14 +38,14 @@ class Course:
 
 
 def life_figure(courses: Sequence[Course], marks: Sequence[int]) -> Figure:
-    """Draw quantities over the number of stops, one panel each; the end is a dotted line at zero.
+    """Draw quantities over the number of stops, one panel each; a dotted line at zero is the end.
 
     Parameters
     ----------
     courses
-        What is drawn, from the top.
+        Quantities, from the top.
     marks
-        Numbers of stops at which runs were made: dots.
+        Numbers of the simulated stops: dots.
     """
     figure, rows = style.new_figure(0.5 + _HEIGHT * len(courses), [1.0] * len(courses))
     for axes, course in zip(rows, courses, strict=True):

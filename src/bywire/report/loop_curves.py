@@ -32,15 +32,15 @@ def _draw_family(
     Parameters
     ----------
     axes
-        Where to draw.
+        Axes for the lines.
     family
         Curves.
     points
         Abscissa and ordinate of a curve.
     stable_only
-        Leave out unstable loops, for quantities that mean nothing there.
+        Whether to leave out unstable loops, for quantities without a meaning there.
     label
-        What the legend calls a single curve.
+        Legend of a single curve.
     """
     for k, curve in enumerate(family.curves):
         stable = curve.margins.stable
@@ -65,7 +65,7 @@ def _draw_family(
 
 
 def _value_bar(figure: Figure, panels: list[Axes], family: Family) -> None:
-    """Put the scale of the varied parameter beside the panels; nothing for a single curve."""
+    """Add the scale of the varied parameter beside the panels; not for a single curve."""
     if family.name and len(family.curves) >= 2:
         value_scale(figure, panels, family.name, family.unit, family.values)
 
@@ -83,7 +83,7 @@ def _name(family: Family, label: str) -> str:
 
 
 def loop_gain(family: Family) -> Figure:
-    """Draw magnitude and phase of the loop gain; margins of the worst curve as vertical spans."""
+    """Draw magnitude and phase of the loop gain, with margins of the worst curve as spans."""
     figure, (upper, lower) = style.new_figure(5.0, (1.0, 1.0))
     _draw_family(upper, family, _magnitude, label="loop gain L")
     _draw_family(lower, family, _phase)
@@ -106,7 +106,7 @@ def loop_gain(family: Family) -> Figure:
 
 
 def _spans(upper: Axes, lower: Axes, worst: LoopCurve) -> None:
-    """Draw phase margin and gain margin as the spans that they are, with their frequencies."""
+    """Draw phase margin and gain margin as spans, with their frequencies."""
     margins = worst.margins
     if math.isfinite(margins.phase_at):
         text = f"phase margin {margins.phase:.3g}° at {margins.phase_at:.3g} Hz"
@@ -126,7 +126,7 @@ def _spans(upper: Axes, lower: Axes, worst: LoopCurve) -> None:
         if not 0.0 < factor < math.inf:
             continue
         text = f"{name} {factor:.3g} at {at:.3g} Hz"
-        if at > 0.0:  # rest lies beyond the axis
+        if at > 0.0:  # the rest is beyond the axis
             upper.plot(
                 [at] * 2, [-20.0 * math.log10(factor), 0.0], color=color, linewidth=2.2, zorder=4
             )
@@ -157,14 +157,15 @@ def _phase(curve: LoopCurve) -> tuple[Array, Array]:
 
 # --- Nyquist plot with the disk that the disk margin keeps free
 
-_LEFT, _RIGHT, _HALF = -3.2, 1.6, 1.9  # what of the plane is shown
+_LEFT, _RIGHT, _HALF = -3.2, 1.6, 1.9  # visible part of the plane
 
 
 def nyquist(family: Family) -> Figure:
     """Draw the loop gain in the complex plane near -1.
 
     The mirror image of negative frequencies is left out. The disk belongs to the worst curve; a
-    loop gain outside it tolerates changes of gain and phase at once. Unstable loops have none.
+    loop gain outside it tolerates simultaneous changes of gain and phase. Unstable loops have no
+    disk.
     """
     figure, (axes,) = style.new_figure(5.2)
     worst = family.curves[family.worst]
@@ -188,9 +189,9 @@ def nyquist(family: Family) -> Figure:
     )
     axes.axhline(0.0, color=style.GRAY, linewidth=0.6, zorder=1)
     axes.axvline(0.0, color=style.GRAY, linewidth=0.6, zorder=1)
-    axes.set_xlim(_LEFT, _RIGHT, auto=True)  # fixed ones matplotlib would complain about
+    axes.set_xlim(_LEFT, _RIGHT, auto=True)  # matplotlib would complain about fixed ones
     axes.set_ylim(-_HALF, _HALF, auto=True)
-    axes.set_aspect("equal", adjustable="datalim")  # more is shown where there is room
+    axes.set_aspect("equal", adjustable="datalim")  # more is visible where there is room
     axes.set_xlabel("real part of L [-]")
     axes.set_ylabel("imaginary part of L [-]")
     _value_bar(figure, [axes], family)
@@ -225,11 +226,11 @@ _MARK: dict[str, Any] = {
     "zorder": 5,
     "linestyle": "none",
 }
-"""looks of the points where margins are read"""
+"""style of the points where margins are read"""
 
 
 def _mark_on_the_circle(axes: Axes, worst: LoopCurve) -> None:
-    """Mark where phase and gain margin are read."""
+    """Mark the points where phase and gain margin are read."""
     margins = worst.margins
     if math.isfinite(margins.phase_at):
         angle = math.radians(margins.phase - 180.0)
@@ -246,7 +247,7 @@ def _mark_on_the_circle(axes: Axes, worst: LoopCurve) -> None:
 
 
 def _gain_margins(margins: LoopMargins) -> Iterator[tuple[str, str, float, float]]:
-    """Yield name, mark, factor and frequency [Hz] of the gain margins that there are."""
+    """Yield name, mark, factor and frequency [Hz] of the existing gain margins."""
     both = (
         ("gain margin", "s", margins.gain, margins.gain_at),
         ("lower gain margin", "D", margins.lower_gain, margins.lower_gain_at),
@@ -257,17 +258,17 @@ def _gain_margins(margins: LoopMargins) -> Iterator[tuple[str, str, float, float
 # --- Nichols chart with contours of the closed loop's magnitude
 
 _CONTOURS = (-20.0, -12.0, -6.0, -3.0, -1.0, 0.0, 1.0, 3.0, 6.0, 12.0)
-"""magnitudes of T = L/(1 + L) that are drawn [dB]"""
-_LOW, _HIGH = -40.0, 40.0  # gains that are shown, dB
-_TURN = 90.0  # the chart ends at multiples of it, degree
+"""contours of the magnitude of T = L/(1 + L) [dB]"""
+_LOW, _HIGH = -40.0, 40.0  # range of gains, dB
+_TURN = 90.0  # the ends of the chart are multiples of it, degree
 _GRID = 361
 
 
 def nichols(family: Family) -> Figure:
     """Draw the loop gain over its phase, with contours of constant magnitude of T.
 
-    The area around -180° is what the disk margin of the worst curve keeps free: there
-    ``|S - T|`` is larger than its largest value on the curve.
+    The disk margin of the worst curve keeps the area around -180° free: there ``|S - T|`` is larger
+    than its largest value on the curve.
     """
     figure, (axes,) = style.new_figure(5.0)
     left, right = _phases(family)
@@ -318,7 +319,7 @@ def nichols(family: Family) -> Figure:
 
 
 def _phases(family: Family) -> tuple[float, float]:
-    """Return the ends of the abscissa: all phases of gains that are shown, and -180 degrees."""
+    """Return the ends of the abscissa, which contain all visible phases, and -180 degrees."""
     shown = [np.array([-225.0, -90.0])]
     for curve in family.curves:
         size = 20.0 * np.log10(np.abs(curve.L))
@@ -335,7 +336,7 @@ def _in_decibels(curve: LoopCurve) -> tuple[Array, Array]:
 
 
 def _mark_on_the_chart(axes: Axes, worst: LoopCurve) -> None:
-    """Mark -1 and where phase and gain margin are read."""
+    """Mark -1 and the points where phase and gain margin are read."""
     margins = worst.margins
     axes.plot(
         -180.0,
@@ -373,11 +374,11 @@ def _mark_on_the_chart(axes: Axes, worst: LoopCurve) -> None:
 MOST_S, MOST_T = 2.0, 1.25
 """usual limits of max |S| and max |T|: S. Skogestad, I. Postlethwaite, "Multivariable Feedback
 Control", 2nd ed. 2005, section 2.4.3"""
-_LOWEST = -60.0  # what is drawn, dB
+_LOWEST = -60.0  # visible range, dB
 
 
 def sensitivity(family: Family) -> Figure:
-    """Draw the magnitudes of S and T over frequency; unstable loops have none."""
+    """Draw the magnitudes of S and T over frequency, without unstable loops."""
     figure, panels = style.new_figure(4.8, (1.0, 1.0))
     for axes, quantity, limit in ((panels[0], "S", MOST_S), (panels[1], "T", MOST_T)):
         _panel(axes, family, quantity, limit)
@@ -440,13 +441,13 @@ class DesignCurve:
     Parameters
     ----------
     label
-        What the legend calls it.
+        Label in the legend.
     curve
         Its loop gain.
     time, step
-        Response of the closed loop to a unit step [s, 1], shape (n,) each; it rests afterwards.
+        Response of the closed loop to a unit step [s, 1], shape (n,) each; constant afterwards.
     span
-        What of it is worth showing [s].
+        Displayed duration [s].
     """
 
     label: str
@@ -457,7 +458,7 @@ class DesignCurve:
 
 
 def loop_gains(curves: Sequence[DesignCurve], phase_margin: float | None) -> Figure:
-    """Draw magnitude and phase of the loop gains; the phase margin read as a vertical span.
+    """Draw magnitude and phase of the loop gains, with the phase margin as a vertical span.
 
     ``curves``: at most three sets of gains, in their order; ``phase_margin``: the required one
     [degree], drawn as a limit of the phase at the crossovers.
@@ -514,7 +515,7 @@ def loop_gains(curves: Sequence[DesignCurve], phase_margin: float | None) -> Fig
 
 
 def sensitivities(curves: Sequence[DesignCurve]) -> Figure:
-    """Draw |S| and |T| of the stable loops with the limits that are usually asked for."""
+    """Draw |S| and |T| of the stable loops with the usual limits."""
     figure, panels = style.new_figure(4.8, (1.0, 1.0))
     for axes, quantity, limit in ((panels[0], "S", MOST_S), (panels[1], "T", MOST_T)):
         look = style.STROKES[Role.LIMIT]
@@ -550,14 +551,14 @@ def sensitivities(curves: Sequence[DesignCurve]) -> Figure:
 
 
 def steps(curves: Sequence[DesignCurve], overshoot: float | None) -> Figure:
-    """Draw the linear responses to a unit step; the band of settling and the required overshoot.
+    """Draw the linear responses to a unit step, the settling band and the required overshoot.
 
     Parameters
     ----------
     curves
         See `loop_gains`; unstable loops are left out.
     overshoot
-        The required one [%].
+        The required value [%].
     """
     figure, (axes,) = style.new_figure(3.2)
     axes.axhspan(0.98, 1.02, color=style.SHADE, zorder=0.5, label="settled: within 2 %")

@@ -1,4 +1,4 @@
-"""One self-contained HTML file: nothing loaded from elsewhere, all text escaped.
+"""Self-contained HTML file of a report: it loads nothing, and all text is escaped.
 
 Its only script lets readers zoom figures; without it nothing is missing.
 """
@@ -50,7 +50,7 @@ def write_page(
     Parameters
     ----------
     path
-        File to write; its folder is made where it does not exist.
+        File to write; a missing folder is created.
     title
         Heading of the page.
     summary
@@ -60,9 +60,9 @@ def write_page(
     banner
         Outcome, shown above the contents.
     files
-        Names of the files that belong to it.
+        Names of the files that belong to the report.
     made
-        What identifies it, see `bywire.report.identity`.
+        Identity of the report, see `bywire.report.identity`.
 
     Raises
     ------
@@ -104,10 +104,10 @@ def page_html(
 
 
 def fragment_html(document: Document, notes: Sequence[str] = ()) -> str:
-    """Return a document as a piece of HTML for a notebook: banner, notes, sections."""
+    """Return a document as an HTML fragment for a notebook: banner, warnings, sections."""
     numbered = _numbered(document.page)
-    heed = [Section("Heed", [Listing(notes)])] if notes else []
-    sections = [*heed, *document.page]
+    warnings = [Section("Warnings", [Listing(notes)])] if notes else []
+    sections = [*warnings, *document.page]
     parts = [
         f"<h3>{_text(document.title)}</h3>\n<p>{_text(document.summary)}</p>",
         _banner(document.banner) if document.banner is not None else "",
@@ -117,7 +117,7 @@ def fragment_html(document: Document, notes: Sequence[str] = ()) -> str:
 
 
 def _policy(script: str) -> str:
-    """Return what has the browser itself refuse other scripts and anything from elsewhere."""
+    """Return the policy by which the browser blocks other scripts and external content."""
     scripts = f"script-src {admitted(script)}; " if script else ""
     return (
         '<meta http-equiv="Content-Security-Policy" content="default-src \'none\'; '
@@ -138,7 +138,7 @@ def _numbered(sections: Sequence[Section]) -> _Numbered:
 
 
 class _Numbered:
-    """Hands out the figures in their order, and the numbers of figures and tables."""
+    """Figures in order, and the numbers of figures and tables."""
 
     def __init__(self, figures: Sequence[str], has_figures: bool) -> None:
         self.figures = iter(figures)

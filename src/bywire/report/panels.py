@@ -1,4 +1,4 @@
-"""What lines mean and panels show, also where no brake declares them; loads no plotting."""
+"""Styles of lines and panels of recordings, also without a brake's declaration; no plotting."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class Role(Enum):
-    """What a line means; the same meaning looks the same in every figure."""
+    """Meaning of a line, which determines its style in every figure."""
 
     MAIN = "main"
     SECOND = "second"
@@ -30,15 +30,15 @@ class Role(Enum):
 
 # --- Panels
 
-_NO_PANEL = ("E_", "W_", "t_", "noise_")  # beginnings of names: what only accumulates, and noise
-_LINES = 2  # of a panel, set points apart: one look for each
-_LONGEST = 20  # characters along a low panel
+_NO_PANEL = ("E_", "W_", "t_", "noise_")  # prefixes of names: cumulative signals, and noise
+_LINES = 2  # line styles of different set points in a panel
+_LONGEST = 20  # characters that fit along a low panel
 
 
 @checked
 @dataclass(frozen=True)
 class Trace:
-    """A variable and what its line means."""
+    """A variable and the meaning of its line."""
 
     variable: str
     role: Role = Role.MAIN
@@ -52,18 +52,19 @@ class Panel:
     Parameters
     ----------
     quantity
-        What the ordinate says, without its unit; short, for low panels.
+        Label of the ordinate, without its unit; short, for low panels.
     traces
-        Lines of one unit, the judged one first; variables a recording lacks are left out.
+        Lines of one unit, the judged one first; variables that are missing in a recording are left
+        out.
     saturation
         Variable that is 1 while the quantity is saturated.
     saturated
-        What the legend calls that.
+        Legend of the saturation.
     limit
         Parameter of the recording that bounds the first trace on both sides; its lines are drawn
         where the trace comes near.
     levels
-        Names of the values 0, 1, 2, ... of a mode, which is then drawn in steps.
+        Names of the values 0, 1, 2, ... of a mode, which is drawn in steps.
     height
         Relative height.
     """
@@ -82,8 +83,8 @@ class Panel:
 class Panels:
     """The panels of a brake, or of a rig.
 
-    ``name``: what messages call them; ``assemblies``: names of the models whose recordings they
-    show; ``panels``: from top to bottom.
+    ``name``: name in messages; ``assemblies``: names of the models whose recordings they show;
+    ``panels``: from top to bottom.
     """
 
     name: str
@@ -96,7 +97,7 @@ PANELS = Kind("panels", ("panels",), instances(Panels))
 
 
 def declared_panels(recording: xr.Dataset) -> list[Panels]:
-    """Return the panels declared for the model of a recording; all where it does not say which."""
+    """Return the panels declared for the model of a recording; all if it names no model."""
     known, model = list(PANELS.all().values()), recording.attrs.get("model")
     return [each for each in known if model is None or model in each.assemblies]
 
@@ -104,7 +105,7 @@ def declared_panels(recording: xr.Dataset) -> list[Panels]:
 def panels_by_unit(recording: xr.Dataset) -> tuple[Panel, ...]:
     """Return panels for a recording of any model: signals of one unit, two by two.
 
-    A set point (attribute ``set_point_of``) stands beside its signal. What accumulates (energies,
+    A set point (attribute ``set_point_of``) is drawn with its signal. Cumulative signals (energies,
     times) and modes, which are 0 or 1, have no panel.
     """
     names = [str(name) for name in recording.data_vars if _is_drawn(recording, str(name))]
@@ -133,10 +134,10 @@ def _is_drawn(recording: xr.Dataset, name: str) -> bool:
 
 
 def _quantity(recording: xr.Dataset, names: Sequence[str]) -> str:
-    """Return what an ordinate says: a label, or the last words that two labels have in common.
+    """Return the label of an ordinate: a label, or the last words that two labels have in common.
 
-    Where that is too long for a panel's height, the signals' names stand in its place; the legend
-    has the labels.
+    If that is too long for a panel's height, the signals' names are used; the legend has the
+    labels.
     """
     labels = [clean(recording[name].attrs.get("long_name", name)).split() for name in names]
     shared: list[str] = []

@@ -21,7 +21,7 @@ from bywire.report.wording import amount, in_display_unit
 
 _RATIOS = (0.1, 0.2, 0.4, 0.6, 0.8)
 """damping ratios that are drawn"""
-_BEYOND = 0.35  # of the radius: what is shown of the unstable half plane
+_BEYOND = 0.35  # visible part of the unstable half plane, as a share of the radius
 
 
 def planes(titles: tuple[str, ...], height: float = 4.2) -> tuple[Figure, list[Axes]]:
@@ -43,13 +43,13 @@ def _draw_plane(axes: Axes, radius: float, period: float, growth: float = 0.0) -
     Parameters
     ----------
     axes
-        Where to draw.
+        Axes for the lines.
     radius
-        Largest size of a rate that is shown [1/s].
+        Largest magnitude of a visible rate [1/s].
     period
-        Sample time [s], 0 for none: no pole can be told above half its frequency, f_s/2.
+        Sample time [s], 0 for none. Poles cannot be distinguished above half its frequency, f_s/2.
     growth
-        Largest real part that must be seen [1/s]; at least a part of the radius is.
+        Largest real part that must be visible [1/s]; at least a share of the radius is.
     """
     right = max(_BEYOND * radius, 1.05 * growth)
     axes.axvspan(0.0, 10.0 * radius, color="#F7E3DA", zorder=0.5, linewidth=0.0)
@@ -107,7 +107,7 @@ def _draw_plane(axes: Axes, radius: float, period: float, growth: float = 0.0) -
 
 
 def _shown_radius(sizes: list[float], period: float) -> float:
-    """Return the radius that shows rates of some sizes [1/s], at most half the sampling's."""
+    """Return the radius that shows rates of given magnitudes [1/s], at most half the sampling's."""
     largest = max((s for s in sizes if math.isfinite(s) and s > 0.0), default=1.0)
     return min(1.1 * largest, 1.02 * np.pi / period) if period else 1.1 * largest
 
@@ -119,9 +119,9 @@ _SLOW = 4.0
 
 
 def pole_map(rates: NDArray[np.complex128], period: float, bandwidth: float) -> Figure:
-    """Draw poles in two planes: all that the sampling can tell, and those that set the bandwidth.
+    """Draw poles in two planes: all up to the sampling limit, and the slow, dominant ones.
 
-    Pairs are shown by the one with positive frequency. The unstable half is shaded.
+    Of each pair, the pole with positive frequency is drawn. The unstable half is shaded.
 
     Parameters
     ----------
@@ -168,11 +168,11 @@ def _slow_radius(sizes: list[float], bandwidth: float, whole: float) -> float:
     Parameters
     ----------
     sizes
-        Sizes of all rates [1/s].
+        Magnitudes of all rates [1/s].
     bandwidth
-        Bandwidth [Hz]; NaN: the median of the sizes counts instead.
+        Bandwidth [Hz]; NaN: the median of the magnitudes is used instead.
     whole
-        Radius of the plane of all [1/s].
+        Radius of the plane of all poles [1/s].
     """
     middle = 2.0 * np.pi * bandwidth
     if not math.isfinite(middle):
@@ -183,19 +183,19 @@ def _slow_radius(sizes: list[float], bandwidth: float, whole: float) -> float:
 # --- Root locus: poles of a loop or a plant against a parameter
 
 _COLORS = "viridis"
-_ROOM = 1.3  # around what must be seen
+_ROOM = 1.3  # margin around the visible poles
 
 
 def root_locus(locus: Locus, bandwidth: float) -> Figure:
-    """Draw the poles' ways in two planes: all that the sampling can tell, and the slow ones.
+    """Draw the root locus in two planes: all poles up to the sampling limit, and the slow ones.
 
     Parameters
     ----------
     locus
         The poles.
     bandwidth
-        Largest bandwidth of the loop over the range [Hz]; NaN where there is none: the poles that
-        turn unstable then choose the second plane.
+        Largest bandwidth of the loop over the range [Hz]; NaN for none: then the poles that become
+        unstable determine the second plane.
     """
     rates = locus.rates
     sizes = [float(s) for s in np.abs(rates[np.isfinite(rates)]) if s > STILL]
@@ -226,14 +226,14 @@ def _borders(locus: Locus) -> list[float]:
 
 
 def _crossing(locus: Locus) -> float:
-    """Return the radius that shows the whole ways of the poles that turn unstable; 0 for none."""
+    """Return the radius that shows the complete loci of poles that become unstable; 0 for none."""
     rates = np.where(np.isfinite(locus.rates), locus.rates, 0.0)
     turning = (rates.real > STILL).any(axis=0) & (rates.real < -STILL).any(axis=0)
     return _ROOM * float(np.max(np.abs(rates[:, turning]), initial=0.0))
 
 
 def border_text(border: Border, name: str, unit: str) -> str:
-    """Return where a loop turns unstable, and how."""
+    """Return the borders of stability of a loop, in words."""
     side = "below" if border.above else "above"
     swing = border.rate.imag / (2.0 * np.pi)
     how = f"swings at {swing:.3g} Hz" if swing > 1e-3 else "drifts away"

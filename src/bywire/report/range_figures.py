@@ -1,4 +1,4 @@
-"""Figures over what was varied: key figures over a range, a quantity over two parameters."""
+"""Figures over varied quantities: key figures over a range, a quantity over two parameters."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ from bywire.report.wording import in_display_unit
 from bywire.synthesis.study import Map
 
 _COLUMNS = 2
-_HEIGHT = 1.35  # of a panel [inch]
+_HEIGHT = 1.35  # height of a panel [inch]
 
 
 class Varied(Protocol):
-    """What a bench gave for every value of a range; a `BenchRange` is one."""
+    """Results of a bench for every value of a range; a `BenchRange` is one."""
 
     @property
     def bench(self) -> Bench:
@@ -39,7 +39,7 @@ class Varied(Protocol):
 
     @property
     def name(self) -> str:
-        """What was varied."""
+        """Name of the varied quantity."""
         ...
 
     @property
@@ -54,14 +54,14 @@ class Varied(Protocol):
 
     @property
     def results(self) -> tuple[Result, ...]:
-        """What each of them gave."""
+        """Result for each of them."""
         ...
 
 
 def kpi_curves(varied: Varied) -> Figure:
-    """Draw every key figure that changes over the values, each in a panel of its own.
+    """Draw every key figure that changes over the values, each in its own panel.
 
-    Where a requirement limits it, the limit is drawn and points that miss it are crosses.
+    Limits of requirements are drawn, and points that miss them are crosses.
     """
     shown = {name: pair for name, pair in _kpi_lines(varied).items() if _moves(pair[0])}
     shown = shown or _kpi_lines(varied)
@@ -138,9 +138,9 @@ def _missed(name: str, results: Sequence[Result]) -> Array:
 # --- A quantity over two parameters of a design
 
 _Extend = Literal["neither", "min", "max", "both"]
-_STEPS = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0)  # of a decade
-_EXACT = 1e-9  # of a step: what lies on a level
-_MOST = 14  # levels; with more the colors cannot be told apart
+_STEPS = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0)  # share of a decade
+_EXACT = 1e-9  # share of a step: tolerance for a value on a level
+_MOST = 14  # levels; with more, colors are hard to distinguish
 _MARKERS = ("*", "o", "s", "D")
 _HATCHES = ("///", "...", "xx")
 _LINES = ("-", "--", ":")
@@ -155,12 +155,12 @@ def contour(data: xr.Dataset, shown: Map) -> Figure:
     data
         Dataset of a study; variables with ``units`` and ``long_name``. NaN stays white.
     shown
-        What to draw over what, marks and limits.
+        Variable, coordinates, marks and limits to draw.
 
     Raises
     ------
     ParameterError
-        When no value is known.
+        When all values are NaN.
     """
     x, y = (_displayed(data[name]) for name in (shown.x, shown.y))
     z = _displayed(data[shown.values].transpose(shown.y, shown.x))
@@ -173,7 +173,7 @@ def contour(data: xr.Dataset, shown: Map) -> Figure:
     figure, (axes,) = style.new_figure(4.4)
     levels = levels_between(float(known.min()), float(known.max()))
     colors = mpl.colormaps["viridis_r"]
-    slack = _EXACT * (levels[-1] - levels[0])  # a share may be 1 and rounding
+    slack = _EXACT * (levels[-1] - levels[0])  # a share may be 1 plus rounding
     below, above = known.min() < levels[0] - slack, known.max() > levels[-1] + slack
     z = np.clip(z, None if below else levels[0], None if above else levels[-1])
     extend: _Extend = ("both" if above else "min") if below else ("max" if above else "neither")
@@ -205,7 +205,7 @@ def contour(data: xr.Dataset, shown: Map) -> Figure:
 
 
 def levels_between(low: float, high: float) -> list[float]:
-    """Return round levels: even ones around two numbers, or shares between them above a factor 3.
+    """Return round levels: evenly between two numbers, or 1-2-5 steps beyond a ratio of 3.
 
     Examples
     --------
@@ -227,7 +227,7 @@ def levels_between(low: float, high: float) -> list[float]:
 
 
 def _limits(axes: Axes, data: xr.Dataset, shown: Map, x: Array, y: Array) -> list[Line2D | Patch]:
-    """Draw the borders of what is possible, hatched beyond; return the legend's entries."""
+    """Draw the borders of the feasible region, hatched beyond; return the legend's entries."""
     handles: list[Line2D | Patch] = []
     for k, (label, (name, level)) in enumerate(shown.limits.items()):
         values = np.asarray(data[name].transpose(shown.y, shown.x).values, dtype=float)
@@ -253,7 +253,7 @@ def _limits(axes: Axes, data: xr.Dataset, shown: Map, x: Array, y: Array) -> lis
 
 
 def _compared_lines(axes: Axes, data: xr.Dataset, shown: Map) -> list[Line2D | Patch]:
-    """Draw the lines to compare with; return the legend's entries."""
+    """Draw the lines for comparison; return the legend's entries."""
     handles: list[Line2D | Patch] = []
     units = [str(data[name].attrs["units"]) for name in (shown.x, shown.y)]
     for k, (label, points) in enumerate(shown.curves.items()):
@@ -271,7 +271,7 @@ def _compared_lines(axes: Axes, data: xr.Dataset, shown: Map) -> list[Line2D | P
 
 
 def _marks(axes: Axes, data: xr.Dataset, shown: Map) -> list[Line2D | Patch]:
-    """Draw the marked designs that lie on the map; return the legend's entries."""
+    """Draw the marked designs within the map; return the legend's entries."""
     handles: list[Line2D | Patch] = []
     for k, mark in enumerate(shown.marks):
         inside = all(

@@ -1,4 +1,4 @@
-"""Axes of figures: readable units, labels that never touch, limits that lie far off."""
+"""Axes of figures: readable units, labels without overlaps, limits far from the data."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from bywire.report import style
 from bywire.report.wording import amount, readable_unit, unit_text
 
 CHARACTER = 0.62 * style.TEXT_SIZE / 72.0
-"""width of a digit [inch], rounded off"""
-_GAP = 2  # characters between two labels, at least
+"""width of a digit [inch], rounded"""
+_GAP = 2  # least number of characters between two labels
 _PLAIN = (1e-2, 1e5)  # the largest magnitude that is written without a power of ten
 
 
 def size_of(values: Array) -> float:
-    """Return the largest magnitude of values; 0 without any that is finite.
+    """Return the largest magnitude of values; 0 without finite ones.
 
     Examples
     --------
@@ -36,7 +36,7 @@ def size_of(values: Array) -> float:
 
 @dataclass(frozen=True)
 class Scale:
-    """How an axis writes values: times ``factor``, plus ``offset``, in ``unit``."""
+    """Scale of an axis: times ``factor``, plus ``offset``, in ``unit``."""
 
     factor: float
     unit: str
@@ -47,19 +47,19 @@ class Scale:
     @overload
     def __call__(self, values: Array) -> Array: ...
     def __call__(self, values: float | Array) -> float | Array:
-        """Return values as they are written."""
+        """Return values in this scale."""
         return self.factor * values + self.offset
 
     def label(self, name: str, gap: str = " ") -> str:
-        """Return the label of the axis; ``gap`` stands between name and unit."""
+        """Return the label of the axis; ``gap`` separates name and unit."""
         return f"{style.plain(name, 40)}{gap}[{style.plain(self.unit, 20) or '-'}]"
 
 
 def scale_of(values: Array, symbol: str) -> Scale:
-    """Return the scale in which values read best.
+    """Return the scale in which values are easiest to read.
 
-    That is the unit that tables write them in, see `bywire.report.wording.readable_unit`, with a
-    power of ten where figures are too small or too large to be written out.
+    It uses the unit of tables, see `bywire.report.wording.readable_unit`, with a power of ten where
+    numbers would be too small or too large.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def scale_of(values: Array, symbol: str) -> Scale:
 
 
 def difference_scale(size: float, symbol: str) -> Scale:
-    """Return the scale of differences of a figure: in its unit, of temperatures in K.
+    """Return the scale of differences of a figure: in its unit, for temperatures in K.
 
     ``size``: largest magnitude of the figure, in ``symbol``.
     """
@@ -95,28 +95,28 @@ def difference_scale(size: float, symbol: str) -> Scale:
 
 
 def _factor(symbol: str, unit: str) -> float:
-    """Return by what numbers of one unit are multiplied in another."""
+    """Return the factor from one unit to another."""
     return float(convert(1.0, symbol, unit)) - float(convert(0.0, symbol, unit))
 
 
 def write_out(axis: Axis) -> None:
-    """Write the values of an axis out: no offset and no factor beside it."""
+    """Write the values of an axis without a common offset or factor."""
     formatter = ScalarFormatter(useOffset=False)
     formatter.set_scientific(False)
     axis.set_major_formatter(formatter)
 
 
 def few_labels(axis: Axis, room: float, most: int = 5) -> None:
-    """Label an abscissa, once its data are drawn, with as many values as have room.
+    """Label an abscissa with as many values as fit, once its data are drawn.
 
     Parameters
     ----------
     axis
         The abscissa.
     room
-        About how long it is [inch].
+        Approximate length of the axis [inch].
     most
-        Values at most.
+        Largest number of values.
     """
     write_out(axis)
     formatter = axis.get_major_formatter()
@@ -129,10 +129,10 @@ def few_labels(axis: Axis, room: float, most: int = 5) -> None:
         return len(places) <= most and bool(is_apart)
 
     rows = []
-    for count in range(most + 1, 0, -1):  # about so many intervals
+    for count in range(most + 1, 0, -1):  # about this number of intervals
         locator = MaxNLocator(nbins=count, steps=[1, 2, 2.5, 5, 10], min_n_ticks=1)
         rows.append([at for at in locator.tick_values(low, high) if low <= at <= high])
-    # A single value tells no scale: the ends of a finer row, if all of it has no room, tell it.
+    # A single value shows no scale: then the ends of a finer row are labeled, if it does not fit.
     ends = [[row[0], row[-1]] for row in rows if len(row) > 1]
     several = [row for row in rows if len(row) > 1]
     for places in (*several, *ends, *rows):
@@ -142,7 +142,7 @@ def few_labels(axis: Axis, room: float, most: int = 5) -> None:
 
 
 def beyond(limit: float, values: Array) -> int:
-    """Return on which side a limit lies so far off that it would squeeze values; 0: on none."""
+    """Return the side of a limit that is so far away that it would squeeze values; 0: neither."""
     if not values.size:
         return 0
     low, high = float(values.min()), float(values.max())
@@ -151,7 +151,7 @@ def beyond(limit: float, values: Array) -> int:
 
 
 def limit_text(limit: float, symbol: str, size: float) -> str:
-    """Return what stands at the edge of an axis that does not reach a limit.
+    """Return the note at the edge of an axis that does not reach a limit.
 
     ``size``: largest magnitude on the axis, in ``symbol``, whose unit it takes.
     """
@@ -161,20 +161,20 @@ def limit_text(limit: float, symbol: str, size: float) -> str:
 def name_beyond(
     axes: Axes, text: str, far: int, color: str, place: Literal["left", "right"] | None = None
 ) -> None:
-    """Name a limit that an abscissa does not reach above the axes, where nothing is drawn.
+    """Write a limit beyond the abscissa above the axes, where nothing is drawn.
 
     Parameters
     ----------
     axes
         Axes without a title there.
     text
-        That of `limit_text`.
+        Text of `limit_text`.
     far
-        The side on which the limit lies, see `beyond`.
+        Side of the limit, see `beyond`.
     color
-        Of the text.
+        Color of the text.
     place
-        Where it stands; at that side by default.
+        Position of the text; at that side by default.
     """
     axes.set_title(
         f"{text} →" if far > 0 else f"← {text}",

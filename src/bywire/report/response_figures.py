@@ -34,13 +34,13 @@ class Response:
     Parameters
     ----------
     label
-        What the legend says.
+        Label in the legend.
     frequency
         Frequencies [Hz], ascending and positive, shape ``(n,)``.
     value
         Complex response, shape ``(n,)``; NaN where there is none.
     measured
-        Draw points instead of a line.
+        Whether to draw points instead of a line.
     """
 
     label: str
@@ -92,18 +92,18 @@ def bode(
     Parameters
     ----------
     responses
-        What to draw, each with its label.
+        Responses, each with its label.
     gain_unit
-        What 0 dB stands for one of, as people write it (``"bar/A"``); ``"1"`` for a pure number.
+        Unit of 0 dB, in common spelling (``"bar/A"``); ``"1"`` for a pure number.
     marks
         Frequencies [Hz] to mark by their label, for instance the crossover.
     depth
-        What lies by more than this below the largest magnitude [dB] is left out.
+        Depth below the largest magnitude [dB]; responses further below are left out.
 
     Raises
     ------
     ParameterError
-        When there is no response.
+        Without a response.
     """
     if not responses:
         raise ParameterError("bode: no response given: give at least one")
@@ -150,7 +150,7 @@ def bode(
 
 
 def _above(response: Response, depth: float) -> Response:
-    """Return a response up to where it falls by a depth [dB] for good."""
+    """Return a response up to where it stays below a depth [dB]."""
     size = response.magnitude_db
     seen = np.flatnonzero(size > np.nanmax(size, initial=-math.inf) - depth)
     if not math.isfinite(depth) or not seen.size:
@@ -174,11 +174,11 @@ def _phase_ticks(responses: Sequence[Response]) -> MultipleLocator:
 
 _POINTS = 400
 _DECADES = 3.0
-_APART = 16  # of the points that show a model beside the first one
+_APART = 16  # of the points of further models
 
 
 def plant_figures(models: Mapping[str, LinearModel], band: float) -> list[tuple[str, Figure]]:
-    """Return name and figure of every output that answers the first input.
+    """Return name and figure of every output for the first input.
 
     ``models``: label -> model, of the same inputs and outputs; ``band``: end of the frequencies
     [Hz].
@@ -195,7 +195,7 @@ def plant_figures(models: Mapping[str, LinearModel], band: float) -> list[tuple[
         unit = f"{unit_text(shown) or '1'}/{unit_text(display_unit(taken)) or '1'}"
         lines = []
         for k, (label, response) in enumerate(values.items()):
-            # Points on top of a line: models that agree would hide each other.
+            # Points on top of a line: otherwise equal models would hide each other.
             some = slice(None) if k == 0 else slice(k * _APART // 2, None, _APART)
             path = f"{label}, {signal} by {first.inputs[0]}"
             lines.append(Response(path, f[some], scale * response[some, row, 0], measured=k > 0))
@@ -207,7 +207,7 @@ def plant_figures(models: Mapping[str, LinearModel], band: float) -> list[tuple[
 
 _DASHES: tuple[style.Dash, ...] = ("-", "--", ":")
 _MARKERS = ("o", "s", "^", "D", "v", "P", "X")
-_LEAST = 0.01  # of the tolerance: smaller differences are drawn at the lower edge
+_LEAST = 0.01  # share of the tolerance: smaller differences are drawn at the lower edge
 
 
 def differences(
@@ -224,12 +224,12 @@ def differences(
     sizes
         Label -> differences of gain [dB] and phase [degree], shape (n,) each; NaN is left out.
     tolerance
-        What counts as agreement, in dB and degree: drawn as limits.
+        Tolerance in dB and degree, drawn as limits.
 
     Raises
     ------
     ParameterError
-        When there is nothing to draw.
+        Without anything to draw.
     """
     if not sizes:
         raise ParameterError("differences: nothing given: give at least one cause")
@@ -280,10 +280,10 @@ def bandwidth_range(
     Parameters
     ----------
     response
-        Dataset with ``bandwidth`` [Hz] over ``variant`` and ``amplitude``; where it lies beyond
-        the measured frequencies, an arrow stands at the last one.
+        Dataset with ``bandwidth`` [Hz] over ``variant`` and ``amplitude``; where it is beyond the
+        measured frequencies, an arrow is drawn at the last one.
     labels
-        What varies, SI, shape (variants,).
+        Values of the varied quantity, SI, shape (variants,).
     name, symbol
         Its name and SI unit.
     """

@@ -1,7 +1,7 @@
-"""A folder holds one result: a new one takes the place of the old when it is whole.
+"""Folder of one result: a new result replaces the old one when it is complete.
 
-A process that is killed while a result is computed or drawn leaves the folder as it was. While
-files are moved a file ``unfinished`` says so, and lists what belongs to either.
+A process that is killed while it computes or draws leaves the folder unchanged. While files are
+moved, a file ``unfinished`` marks the folder and lists the files of both results.
 """
 
 from __future__ import annotations
@@ -18,30 +18,30 @@ from bywire.core.errors import FileError
 from bywire.core.scratch import UNFINISHED, scratch_folder
 
 PAGE = "report.html"
-"""file of the page, which lists what belongs to it"""
+"""file of the page, which lists the files of its result"""
 
 _SAYS = "This result was not written to its end: the same command writes it anew. Its files:"
 _OURS = (".html", ".json", ".nc", ".png", ".toml")
 _META = "bywire-files"
-_HEAD = 65536  # characters of a page, which has its list at the beginning
+_HEAD = 65536  # characters of a page that contain its list, which is at the beginning
 
 
 class ResultFolder:
-    """Where the files of a result are written before they take the place of an older one.
+    """Temporary place of a result's files before they replace those of an older result.
 
     Parameters
     ----------
     folder
         The folder of the result.
     scratch
-        Where its files are written first.
+        Folder for the files until then.
     """
 
     def __init__(self, folder: Path, scratch: Path) -> None:
         self.folder, self.scratch = folder, scratch
 
     def move(self, is_whole: bool = True) -> None:
-        """Put the files in place, remove those of the older result, and mark what is not whole."""
+        """Move the files into place, remove those of the older result, and mark incomplete ones."""
         new = [path.name for path in self.scratch.iterdir() if path.is_file()]
         if not new:
             return
@@ -66,14 +66,15 @@ class ResultFolder:
 
 @contextmanager
 def result_folder(folder: Path) -> Iterator[ResultFolder]:
-    """Yield where to write the files of a result, which are moved when the block has ended.
+    """Yield the folder for the files of a result, which are moved at the end of the block.
 
     Raises
     ------
     FileError
-        When the folder cannot be made or written to; the older result then stays.
+        When the folder cannot be created or is not writable; the older result then stays.
     KeyboardInterrupt
-        When interrupted, with what to do; what is written then lies there, marked as unfinished.
+        When interrupted, with advice; the written files are then in the folder, marked as
+        unfinished.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -110,11 +111,11 @@ def listed(names: Sequence[str]) -> str:
 
 
 def earlier_files(folder: Path) -> set[str]:
-    """Return the names of the files of the result that a folder holds, whole or not."""
+    """Return the names of the files of the result in a folder, complete or not."""
     names: set[str] = set()
     for path in folder.glob("*.json"):
         files = _files_of(path)
-        names |= files if path.name in files else set()  # a record of ours lists itself
+        names |= files if path.name in files else set()  # our records list themselves
     names |= _files_of_page(folder / PAGE)
     if (folder / UNFINISHED).is_file():
         text = (folder / UNFINISHED).read_text(encoding="utf-8", errors="replace")
@@ -140,5 +141,5 @@ def _files_of_page(page: Path) -> set[str]:
 
 
 def _order(name: str) -> tuple[bool, str]:
-    """Return the order of moving: values never lie without what says whether to believe them."""
+    """Return the order of moving: values never exist without the record of their validity."""
     return Path(name).suffix != ".json", name

@@ -1,7 +1,7 @@
-"""The schematic of a model as SVG: parts as boxes, wires by their names, and its text.
+"""Schematic of a model as SVG: parts as boxes, wires by their names, and a table of them.
 
-As K. Sugiyama et al. do it: edges against the flow are turned round, every edge spans one layer
-after it has got places in those between, and nodes move toward what they are connected to.
+The layout is that of K. Sugiyama et al.: edges against the flow are reversed, every edge gets
+passages in the layers that it crosses, and nodes move toward their neighbors.
 
 References
 ----------
@@ -25,12 +25,12 @@ from bywire.report.tables import Table, text_table
 K = TypeVar("K", bound=Hashable)
 
 _SWEEPS = 24
-_LOWEST = 12.0  # height of a place that an edge only passes
+_LOWEST = 12.0  # height of a passage, which only an edge crosses
 
 
 @dataclass(frozen=True)
 class Passage:
-    """A place in a layer between, that all edges of one source share which go the same way."""
+    """A passage in a layer, shared by all edges of one source in one direction."""
 
     source: Hashable
     forward: bool
@@ -44,9 +44,9 @@ class Layers:
     Parameters
     ----------
     members
-        Of each layer, from top to bottom.
+        Nodes and passages of each layer, from top to bottom.
     layer
-        Of each node.
+        Index of the layer of each node.
     top
         Upper edge of each node and passage.
     """
@@ -56,7 +56,7 @@ class Layers:
     top: Mapping[Hashable, float]
 
     def passages(self, source: Hashable, target: Hashable) -> list[Passage]:
-        """Return the places in which an edge crosses the layers between its ends."""
+        """Return the passages of an edge in the layers between its ends."""
         first, last = self.layer[source], self.layer[target]
         step = 1 if last > first else -1
         return [Passage(source, step > 0, k) for k in range(first + step, last, step)]
@@ -65,18 +65,18 @@ class Layers:
 def layered(
     heights: Mapping[K, float], edges: Iterable[tuple[K, K]], gap: float, first: Sequence[K] = ()
 ) -> Layers:
-    """Return a layered layout in which nothing overlaps.
+    """Return a layered layout without overlaps.
 
     Parameters
     ----------
     heights
         Height of every node.
     edges
-        Source and target; nodes are no targets of their own.
+        Source and target; a node is not its own target.
     gap
-        Least distance of two nodes of a layer.
+        Least distance of two nodes in a layer.
     first
-        Nodes with a layer of their own each, before all others.
+        Nodes with a separate layer each, before all others.
     """
     links = list(dict.fromkeys(edges))
     layer = _layer_of(list(heights), links, list(first))
@@ -101,7 +101,7 @@ def layered(
 def _layer_of(
     nodes: Sequence[K], edges: Sequence[tuple[K, K]], first: Sequence[K]
 ) -> dict[Hashable, int]:
-    """Return the layer of every node: behind all that it follows in the direction of the flow."""
+    """Return the layer of every node: after all its predecessors in the direction of the flow."""
     rank = {node: k for k, node in enumerate(_flow(nodes, edges, first))}
     forward = [(a, b) if rank[a] < rank[b] else (b, a) for a, b in edges]
     layer: dict[Hashable, int] = {node: k for k, node in enumerate(first)}
@@ -116,7 +116,7 @@ def _layer_of(
 
 
 def _flow(nodes: Sequence[K], edges: Sequence[tuple[K, K]], first: Sequence[K]) -> list[K]:
-    """Return the nodes in the order in which a signal from the first ones arrives."""
+    """Return the nodes in the order in which a signal from the first ones reaches them."""
     after: dict[K, list[K]] = {node: [] for node in nodes}
     for a, b in edges:
         after[a].append(b)
@@ -149,7 +149,7 @@ def _neighbours(segments: Iterable[tuple[Hashable, Hashable]]) -> dict[Hashable,
 def _ordered(
     members: list[list[Hashable]], beside: Mapping[Hashable, Sequence[Hashable]]
 ) -> list[list[Hashable]]:
-    """Return the layers with each node near the mean place of its neighbours; the best found."""
+    """Return the layers with each node near the mean position of its neighbors; the best found."""
     best, fewest = [list(each) for each in members], _crossings(members, beside)
     for sweep in range(_SWEEPS):
         ways = range(1, len(members)) if sweep % 2 == 0 else range(len(members) - 2, -1, -1)
@@ -186,7 +186,7 @@ def _heights(
     heights: Mapping[Hashable, float],
     gap: float,
 ) -> dict[Hashable, float]:
-    """Return the upper edges: each node as near to its neighbours as the others let it."""
+    """Return the upper edges: each node as near to its neighbors as the others allow."""
     size = {node: heights.get(node, _LOWEST) for layer in order for node in layer}
     middle: dict[Hashable, float] = {}
     for layer in order:
@@ -211,11 +211,11 @@ def _heights(
 
 
 def _spread(wanted: Sequence[float], apart: Sequence[float]) -> list[float]:
-    """Return places nearest to those wanted, by least squares, that keep their distances."""
+    """Return positions nearest to the desired ones, by least squares, with their distances."""
     shifts = [0.0]
     for each in apart:
         shifts.append(shifts[-1] + each)
-    blocks: list[list[float]] = []  # sum and number of places that move as one
+    blocks: list[list[float]] = []  # sum and number of positions that move together
     for value, shift in zip(wanted, shifts, strict=False):
         blocks.append([value - shift, 1.0])
         while len(blocks) > 1 and blocks[-2][0] / blocks[-2][1] > blocks[-1][0] / blocks[-1][1]:
@@ -228,8 +228,8 @@ def _spread(wanted: Sequence[float], apart: Sequence[float]) -> list[float]:
 
 # --- The drawing
 
-_LETTER = 7.3  # width of a letter of 13 px, a little more than the mean
-_SMALL = 6.2  # of 11 px
+_LETTER = 7.3  # width of a letter at 13 px, a little more than the mean
+_SMALL = 6.2  # the same at 11 px
 _HEAD, _ROW, _PILL = 40.0, 17.0, 24.0
 _GAP, _CHANNEL, _MARGIN = 16.0, 54.0, 34.0
 _TIP = 6.0
@@ -239,15 +239,14 @@ Point = tuple[float, float]
 
 @dataclass(frozen=True)
 class Box:
-    """A node as it is drawn.
+    """A node with its position.
 
     Parameters
     ----------
     x, y, width, height
         Upper left corner and size [px].
     left, right
-        Ports on either side: what comes with the flow enters at the left, what is fed back at
-        the right.
+        Ports on either side: signals along the flow enter at the left, feedback at the right.
     """
 
     node: Node
@@ -264,12 +263,12 @@ class Box:
         return self.node.kind == "wire"
 
     def exit(self, forward: bool) -> Point:
-        """Return where what it gives leaves."""
+        """Return the position where its output leaves."""
         y = self.y + (self.height if self.is_wire else _HEAD) / 2
         return (self.x + self.width if forward else self.x), y
 
     def entrance(self, port: str, forward: bool) -> Point:
-        """Return where a port is."""
+        """Return the position of a port."""
         x = self.x if forward else self.x + self.width
         if self.is_wire:
             return x, self.y + self.height / 2
@@ -279,12 +278,12 @@ class Box:
 
 @dataclass(frozen=True)
 class Schematic:
-    """A network with a place for everything.
+    """A network with the positions of all parts.
 
     Parameters
     ----------
     network
-        What is drawn.
+        The network to draw.
     boxes
         Every node by itself.
     curves
@@ -313,7 +312,8 @@ def schematic(network: Network) -> Schematic:
     first = [node for node in network.nodes if node.kind == "stimulus"]
     first += [node for node in network.nodes if node.kind == "task"]
     edges = [(c.source, c.target) for c in network.connections]
-    # Sides follow from the layers, heights from the sides: of one pass the first, of both the rest.
+    # Sides follow from the layers, heights from the sides: the first layout gives sides, the second
+    # all.
     whole = {node: _size(node, network, network.ports.get(node, ()), ()) for node in network.nodes}
     layers = layered({node: size[1] for node, size in whole.items()}, edges, _GAP, first)
     sides = {node: _sides(node, network, layers) for node in network.nodes}
@@ -336,7 +336,7 @@ def schematic(network: Network) -> Schematic:
 def schematic_svg(network: Network, title: str) -> str:
     """Return the schematic of a model as an SVG element that takes the color of the page's text.
 
-    ``title``: what it says where it cannot be seen; every name in it is text as well.
+    ``title``: its text for screen readers; every name in it is text as well.
     """
     plan = schematic(network)
     width, height = plan.size
@@ -353,7 +353,7 @@ def schematic_svg(network: Network, title: str) -> str:
 
 
 def _sides(node: Node, network: Network, layers: Layers) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the ports at the left and at the right; one that is fed from both stands at both."""
+    """Return the ports at the left and at the right; one with inputs from both sides is at both."""
     left, right = [], []
     for port in network.ports.get(node, ()):
         ways = {layers.layer[s] < layers.layer[node] for s in network.sources(node, port)}
@@ -431,7 +431,7 @@ def _connection(connection: Connection, points: tuple[Point, ...]) -> str:
 
 
 def _box(box: Box, network: Network) -> str:
-    """Return a box with its name, what it is and its ports; of a wire its name alone."""
+    """Return a box with its name, kind and ports; for a wire only its name."""
     name, label = escape(box.node.name), escape(network.labels[box.node])
     middle = box.x + box.width / 2
     look = {
@@ -469,14 +469,14 @@ def _box(box: Box, network: Network) -> str:
 
 
 def schematic_blocks(model: Any, par: Any) -> list[Drawing | Details]:
-    """Return the drawing of a model and a table that says the same; nothing without parts.
+    """Return the drawing of a model and a table with the same content; nothing without parts.
 
     Parameters
     ----------
     model
-        What was run; only an `Assembly` knows its parts.
+        The model of the run; only an `Assembly` has parts.
     par
-        Parameters, whose choices say which equations hold.
+        Parameters, whose choices determine the equations.
     """
     if not isinstance(model, Assembly):
         return []
@@ -485,9 +485,9 @@ def schematic_blocks(model: Any, par: Any) -> list[Drawing | Details]:
     wires = sum(node.kind == "wire" for node in known.nodes)
     caption = (
         f"Schematic of {known.name}, from its equations: {parts} parts, {wires} wires (rounded). "
-        "What comes with the flow enters at the left, what is fed back at the right."
+        "Signals along the flow enter at the left, feedback enters at the right."
     )
-    title = f"Schematic of {known.name}; the table Parts and wires says the same"
+    title = f'Schematic of {known.name}; the table "Parts and wires" has the same content'
     return [
         Drawing(lambda: schematic_svg(known, title), caption),
         Details("Parts and wires", [TableBlock(connection_table(known))]),
@@ -495,7 +495,7 @@ def schematic_blocks(model: Any, par: Any) -> list[Drawing | Details]:
 
 
 def connection_table(known: Network) -> Table:
-    """Return every input and wire with what it follows from."""
+    """Return every input and wire with its sources."""
     rows = []
     for node in known.nodes:
         for port in known.ports.get(node, ()) or ("",):

@@ -1,4 +1,4 @@
-"""What a source states: levels and ranges drawn under our curves, and words for tables."""
+"""Values stated by a source: levels and ranges below our curves, and texts for tables."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ if TYPE_CHECKING:
     from bywire.report.style import Dash
 
 _DASHES: tuple[Dash, ...] = ((0, (7, 3)), (0, (7, 2, 2, 2)), (0, (2, 2)))
-_OPACITY = 0.15  # of a band: the curves' grid shines through
+_OPACITY = 0.15  # opacity of a band: the curves' grid shines through
 
 
 def draw_stated(axes: Axes, levels: Sequence[StatedLevel | StatedRange], shown: Channel) -> None:
     """Draw levels as lines across an axes and ranges as bands, each with its own legend entry.
 
-    They lie below the curves. ``shown``: a channel of the axes, for its unit.
+    They are drawn below the curves. ``shown``: a channel of the axes, for its unit.
     """
-    from bywire.report import style  # with Matplotlib, which words for tables do without
+    from bywire.report import style  # loaded with Matplotlib, which texts for tables do not need
 
     for k, each in enumerate(levels):
         low, high, *lines = (
@@ -45,14 +45,14 @@ def draw_stated(axes: Axes, levels: Sequence[StatedLevel | StatedRange], shown: 
 
 
 def stated_level(level: StatedLevel | StatedRange, unit: str) -> str:
-    """Return what is stated of a signal in an SI unit, for instance ``200 N·m ± 10 N·m``."""
+    """Return the stated value of a signal in an SI unit, for instance ``200 N·m ± 10 N·m``."""
     if len(level.levels) > 1:
         return f"{amount(level.low, unit)} to {amount(level.high, unit)}"
     return _within(level.levels[0], level.high - level.levels[0], unit)
 
 
 def stated_figure(figure: StatedFigure, unit: str) -> str:
-    """Return what is stated of a key figure in its unit, for instance ``<= 15 %``."""
+    """Return the stated limit of a key figure in its unit, for instance ``<= 15 %``."""
     written = _within(figure.value, figure.tolerance, unit)
     return f"{figure.bound} {written}".strip()
 

@@ -1,4 +1,4 @@
-"""Figures: how a variable follows its set point, with what a step is judged by."""
+"""Figures: a variable and its set point, with the criteria of a step response."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class StepLimits:
     band
         Half width of the tolerance band, as a share of the step.
     overshoot
-        Admissible overshoot as a share of the step; ``None`` for no limit.
+        Largest overshoot as a share of the step; ``None`` for no limit.
     """
 
     start: float
@@ -65,7 +65,7 @@ class StepLimits:
 
 @dataclass(frozen=True)
 class StepFacts:
-    """What was computed about a step response; ``None`` for what was not.
+    """Computed figures of a step response; ``None`` for those that were not computed.
 
     Parameters
     ----------
@@ -89,14 +89,14 @@ class StepFacts:
 def step_limits(
     definition: Experiment, options: Any, verdicts: Sequence[Verdict] = ()
 ) -> tuple[str, StepLimits] | None:
-    """Return the signal of a step and what it is judged by; None where nothing is known of one.
+    """Return the signal of a step and its criteria; None for an experiment without a step.
 
     Parameters
     ----------
     definition, options
         The experiment and its options.
     verdicts
-        Requirements, of which one on the overshoot is drawn.
+        Requirements; one on the overshoot is drawn.
     """
     setting = None if definition.step is None else definition.step(options)
     if setting is None or setting.start is None or setting.end is None:
@@ -113,8 +113,8 @@ def step_limits(
 def draw_limits(axes: Axes, limits: StepLimits, shown: Channel) -> None:
     """Draw tolerance band and overshoot limit, from the step to the end of the recording.
 
-    ``axes``: axes in the display unit of ``shown``; ``limits``: the step; ``shown``: the channel
-    that is judged.
+    ``axes``: axes in the display unit of ``shown``; ``limits``: the step; ``shown``: the judged
+    channel.
     """
     scale, _ = style.time_scale(shown.time)
     span = [scale * limits.start, scale * float(shown.time[-1])]
@@ -167,18 +167,18 @@ def step_response(
     recording
         Recording to draw.
     variable, set_point
-        What is judged, and by which set point (``None`` for no line).
+        Judged variable and its set point (``None`` for no line).
     limits
         The step; without it neither limits nor facts are drawn.
     facts
-        KPI values to mark. They are drawn, never computed here.
+        KPI values to mark. They are drawn and not computed here.
     measured
         Recording to compare with.
     smoothing
-        Averaging time [s] of the curve that was judged; that curve is then drawn thin, the raw
-        one pale behind it, and the marks sit on it. 0 where the curve itself was judged.
+        Averaging time [s] of the judged curve, which is then drawn thin, with the raw one pale
+        behind it and the marks on it. 0 if the raw curve was judged.
     stated
-        Levels and ranges that a source states; those of the variable are drawn.
+        Levels and ranges stated by a source; those of the variable are drawn.
     """
     shown = channel(recording, variable)
     figure, (axes,) = style.new_figure(3.3)
@@ -214,7 +214,7 @@ def step_response(
 
 
 def _mark_facts(axes: Axes, shown: Channel, limits: StepLimits, facts: StepFacts) -> None:
-    """Mark rise, overshoot and settling; their values stand in the legend, clear of the data."""
+    """Mark rise, overshoot and settling; the legend has their values, clear of the data."""
     scale, _ = style.time_scale(shown.time)
     if _given(facts.rise_time):
         shares = (facts.rise_from, facts.rise_to)
@@ -286,7 +286,7 @@ def _peak(shown: Channel, limits: StepLimits) -> tuple[float, float]:
 
 
 def tracking(recording: xr.Dataset, variable: str, set_point: str) -> Figure:
-    """Draw a variable with its set point, and below it the error between them.
+    """Draw a variable with its set point, and the error between them below.
 
     ``recording``: recording to draw; ``variable``, ``set_point``: two variables of the same unit.
 
@@ -304,7 +304,7 @@ def tracking(recording: xr.Dataset, variable: str, set_point: str) -> Figure:
             value=wanted.unit,
             valid=shown.unit,
         )
-    error = replace(shown, label="set point less value", values=wanted.values - shown.values)
+    error = replace(shown, label="set point minus value", values=wanted.values - shown.values)
     figure, (upper, lower) = style.new_figure(4.6, (2.0, 1.0))
     style.draw_channel(upper, shown, Role.MAIN)
     style.draw_channel(upper, wanted, Role.SET_POINT)

@@ -1,7 +1,7 @@
-"""How every figure looks: colors, line styles by meaning, legends, axes, scales.
+"""Style of every figure: colors, line styles by meaning, legends, axes, scales.
 
-Nothing here changes matplotlib's global state, and pyplot is never imported. Matplotlib itself
-is loaded with the first figure that is drawn: it takes half as long as a short command.
+Nothing here changes matplotlib's global state, and pyplot is never imported. Matplotlib itself is
+loaded for the first figure, because that takes half as long as a short command.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _FASTEST = 3 * COLUMNS
-"""points of a thinned line beyond which most pixel columns hold a whole wave of the ripple"""
+"""points of a thinned line above which most pixel columns contain a whole period of ripple"""
 
 
 def _is_band(shown: Channel) -> bool:
@@ -59,7 +59,7 @@ def inside(shown: Channel) -> tuple[Channel, float] | None:
 
 # --- Colors, lines and axes
 
-# Okabe and Ito, "Color universal design", 2008: told apart with any kind of color vision.
+# Okabe and Ito, "Color universal design", 2008: distinguishable with any kind of color vision.
 BLUE = "#0072B2"
 VERMILLION = "#D55E00"
 GREEN = "#009E73"
@@ -73,7 +73,7 @@ PALE = "#DDDDDD"
 SHADE = "#CBD8E6"
 SHADE_AGAIN = "#E9EFF5"
 SEQUENCE = (BLUE, VERMILLION, GREEN, PURPLE, SKY, ORANGE, BLACK)
-"""colors of lines without a meaning of their own, in order"""
+"""colors of lines without a fixed meaning, in order"""
 
 WIDTH = 7.2
 """width of a figure [inch]"""
@@ -81,7 +81,7 @@ TEXT_SIZE = 8.5
 """size of all text in a figure [points]"""
 
 FEW = 40
-"""points up to which each stands for itself, and no line joins them"""
+"""number of points up to which they are drawn without a line"""
 
 _EM_PER_CHARACTER = 0.58  # of the default font, a little more than its mean
 _EMS_BESIDE_TEXT = 4.4  # handle, its gap and the gap between columns in a legend
@@ -111,7 +111,7 @@ STROKES = {
 }
 
 PALE_OPACITY = 0.3
-"""of a ripple behind its average"""
+"""opacity of a ripple behind its average"""
 _BAND_ORDER = 2.4
 """drawing order of a ripple that fills an area: behind every line"""
 
@@ -122,7 +122,7 @@ def new_figure(
     """Return a figure with panels one above the other.
 
     ``height``: height of the figure [inch]; ``heights``: relative heights of the panels;
-    ``is_shared``: whether they share their abscissa, which else may show another quantity in each.
+    ``is_shared``: whether they share their abscissa; otherwise each may have another quantity.
     """
     from matplotlib.figure import Figure
 
@@ -141,7 +141,7 @@ def new_figure(
 
 
 def dress(axes: Axes) -> None:
-    """Give axes the house look: thin grid behind the data, no box."""
+    """Apply the common style to axes: thin grid behind the data, no box."""
     axes.grid(True, color=PALE, linewidth=0.5)
     axes.set_axisbelow(True)
     axes.spines[["top", "right"]].set_visible(False)
@@ -161,7 +161,7 @@ def few_ticks(axes: Axes, count: int) -> None:
 
 
 def log_ticks(axis: Axis) -> None:
-    """Label a logarithmic axis with plain numbers: 1, 2, 5, 10, or decades where it is long."""
+    """Label a logarithmic axis with plain numbers: 1, 2, 5, 10, or only decades if it is long."""
     from matplotlib.ticker import LogLocator, NullFormatter
 
     low, high = axis.get_view_interval()
@@ -172,14 +172,14 @@ def log_ticks(axis: Axis) -> None:
 
 
 def plain(text: object, longest: int = 90) -> str:
-    """Return one line that matplotlib draws as it stands: no formulas, no control characters.
+    """Return one line that matplotlib draws literally: no formulas, no control characters.
 
     Parameters
     ----------
     text
-        What a user or a recording says.
+        Text from a user or a recording.
     longest
-        Characters that have room; longer text is cut.
+        Largest number of characters; longer text is cut.
     """
     line = clean(text).replace("\n", " ")
     short = line if len(line) <= longest else line[: longest - 1] + "…"
@@ -196,7 +196,7 @@ def axis_label(label: str, symbol: str, gap: str = " ") -> str:
     symbol
         Its SI unit.
     gap
-        What stands between quantity and unit; a line break in low panels.
+        Separator of quantity and unit; a line break in low panels.
 
     Examples
     --------
@@ -222,9 +222,9 @@ def draw_channel(
 ) -> None:
     """Draw a channel over time, labeled by its name and ``suffix``.
 
-    A ripple too fast to be told apart is drawn as the pale band that it fills, with its moving
-    average on it; the label says so. Of a set point only the average is drawn then, for its band
-    would hide the one that matters.
+    Ripple that is too fast to be visible is drawn as the pale band that it fills, with its moving
+    average on it, and the label mentions it. For a set point only the average is drawn then,
+    because its band would hide the judged line.
     """
     scale, _ = time_scale(shown.time)
     look = STROKES[role]
@@ -254,14 +254,14 @@ def draw_channel(
 
 
 def legend_above(axes: Axes, handles: Sequence[Artist] | None = None) -> None:
-    """Put the legend above the axes, where it never hides data, in as few rows as fit.
+    """Put the legend above the axes, where it never hides data, in as few rows as possible.
 
     Parameters
     ----------
     axes
         Axes to put it on.
     handles
-        Entries; by default everything in the axes that has a label.
+        Entries; by default everything in the axes with a label.
     """
     entries = axes.get_legend_handles_labels()[0] if handles is None else list(handles)
     if entries:
@@ -280,7 +280,7 @@ def legend_above(axes: Axes, handles: Sequence[Artist] | None = None) -> None:
 
 
 def _fitting_columns(labels: Sequence[str]) -> int:
-    """Return how many columns of a legend fit beside each other; it fills them one by one."""
+    """Return the number of legend columns that fit; the legend fills them one by one."""
     lengths = list(map(len, labels))
     for columns in range(len(labels), 1, -1):
         longest = [float(np.max(part)) for part in np.array_split(lengths, columns)]
@@ -294,12 +294,12 @@ def _fitting_columns(labels: Sequence[str]) -> int:
 
 Color = tuple[float, float, float, float]
 
-_COLORS = "cividis"  # made for any kind of color vision
-_BRIGHTEST = 0.9  # of the color map: what is brighter cannot be seen on white
+_COLORS = "cividis"  # suitable for any kind of color vision
+_BRIGHTEST = 0.9  # part of the color map: brighter colors are not visible on white
 
 
 def value_color(values: Sequence[float], k: int) -> Color:
-    """Return the color of one of some values."""
+    """Return the color of a value among others."""
     low, high = min(values), max(values)
     share = (values[k] - low) / (high - low) if high > low else 0.0
     import matplotlib as mpl
@@ -332,7 +332,7 @@ def value_scale(
 
 # --- The one legend of a figure whose panels share what their lines mean
 
-_COLUMNS = 4  # that have room
+_COLUMNS = 4  # that fit
 
 
 def legend_outside(

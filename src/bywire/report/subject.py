@@ -1,4 +1,4 @@
-"""What an analysis is made of: parameters, what a user changed, sections of every report."""
+"""Subject of an analysis: parameters, the user's changes, and common sections of reports."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from bywire.report.tables import ParameterRow, parameter_table, text_table, valu
 from bywire.report.wording import range_text
 
 _OVERRIDDEN = "override"
-"""provenance of a value that differs from the cited one"""
+"""provenance of a value that differs from the published one"""
 
 
 def parameter_rows(
@@ -28,10 +28,10 @@ def parameter_rows(
     Parameters
     ----------
     parameters
-        Values as they were used.
+        Values in use.
     provenance
-        Cited values by dotted name; a value that differs from its citation is marked as an
-        override and the cited one is named.
+        Published values by dotted name; a value that differs is marked as an override, with the
+        published value.
     """
     leaves = leaf_fields(type(parameters))
     notes = field_notes(type(parameters))
@@ -53,7 +53,7 @@ def parameter_rows(
 
 
 def _origin(cited: Cited | None, value: object) -> tuple[str, str]:
-    """Return kind and place of a value."""
+    """Return kind and place of a value's source."""
     if cited is None:
         return "", ""
     if cited.value != value:
@@ -71,7 +71,7 @@ _SIMULATION = {"step": "s", "record": "s", "seed": "1", "engine": "1"}
 
 
 def bench_changes(bench: Bench) -> tuple[Change, ...]:
-    """Return everything that a bench sets to something else than its source and its experiment."""
+    """Return all settings of a bench that differ from its source and its experiment."""
     return (
         *_set_changes(bench.parameters, bench.par),
         *_assembly_change(bench),
@@ -102,13 +102,13 @@ def value_changes(
     now
         The values in use.
     before
-        What they would be, by name.
+        Original values, by name.
     of
-        What these belong to, as `Change` has it.
+        Owner of the original values, see `Change`.
     prefix
-        What stands before the names.
+        Prefix of the names.
     origins
-        Where the values before come from, by name; nothing by default.
+        Sources of the original values, by name; empty by default.
     """
     leaves, values = leaf_fields(type(now)), now.flat()
     units = {name: leaves[name].unit.symbol if name in leaves else "1" for name in values}
@@ -126,25 +126,25 @@ def value_changes(
 
 
 def defaults_of(name: str) -> str:
-    """Return what the default values of an experiment, or of a study, are called."""
+    """Return the name of an experiment's, or a study's, default values."""
     return f"the defaults of {name}"
 
 
 def changes_block(
     changes: Sequence[Change], parameters: str, defaults: str = "", varied: Sequence[str] = ()
 ) -> TableBlock | Paragraph:
-    """Return a table of changes, or that there are none.
+    """Return a table of changes, or a note that there are none.
 
     Parameters
     ----------
     changes
-        What was changed.
+        The changes.
     parameters
-        Name of the parameter set; empty where there is none.
+        Name of the parameter set; empty for none.
     defaults
-        Name of the experiment or study whose options are in use; empty where there are none.
+        Name of the experiment or study whose options are in use; empty for none.
     varied
-        Quantities that take several values.
+        Quantities with several values.
     """
     if changes:
         rows = [(each.name, each.now, each.before, each.where or each.of) for each in changes]
@@ -171,7 +171,7 @@ def _assembly_change(bench: Bench) -> Iterator[Change]:
 
 
 def _option_changes(bench: Bench) -> Iterator[Change]:
-    """Yield the options that are not what they would be without being set."""
+    """Yield the options that differ from their defaults."""
     chosen = bench.definition
     following = {} if chosen.following is None else chosen.following(bench.par)
     defaults = chosen.defaults.replace(following).flat()
@@ -185,7 +185,7 @@ def _option_changes(bench: Bench) -> Iterator[Change]:
 
 
 def _unset(bench: Bench, option: str) -> str:
-    """Return what an option that names a signal would be if it alone were not set."""
+    """Return the default of an option that names a signal, given all other options."""
     others = {name: value for name, value in bench.options.items() if name != option}
     try:
         unset = experiment_of(bench.experiment, bench.parameters, bench.assembly, others)
@@ -218,22 +218,22 @@ def _origin_of(cited: Cited) -> str:
 
 @dataclass(frozen=True)
 class Subject:
-    """A loop or a brake with its parameters.
+    """Subject of an analysis: a loop or a brake with its parameters.
 
     Parameters
     ----------
     name, summary
-        What it is called, and one line on it.
+        Name, and one line of description.
     parameters, par
         Name of the parameter set, and the values in use.
     point
         Operating point as text; empty for none.
     bench
-        The bench that is looked at; None where it is no bench.
+        The analyzed bench; None if it is not a bench.
     further
-        What was changed beside a parameter set or a bench.
+        Changes outside a parameter set or a bench.
     varied
-        Quantities that take several values.
+        Quantities with several values.
     """
 
     name: str
@@ -254,9 +254,9 @@ class Subject:
         varied: Collection[str] = (),
         further: tuple[Change, ...] = (),
     ) -> Subject:
-        """Return a bench as a subject, called as it is itself unless something is given.
+        """Return a bench as a subject, with its own name and summary by default.
 
-        ``varied``: quantities that take several values; ``further``: what else was changed.
+        ``varied``: quantities with several values; ``further``: other changes.
         """
         return cls(
             name or bench.name or bench.experiment,
@@ -270,14 +270,14 @@ class Subject:
 
     @property
     def changes(self) -> tuple[Change, ...]:
-        """What the user changed."""
+        """The user's changes."""
         if self.bench is not None:
             return (*bench_changes(self.bench), *self.further)
         return (*_set_changes(self.parameters, self.par), *self.further)
 
     @property
     def changes_block(self) -> TableBlock | Paragraph:
-        """The table of changes, or that there are none."""
+        """The table of changes, or a note that there are none."""
         defaults = "" if self.bench is None else self.bench.experiment
         return changes_block(self.changes, self.parameters, defaults, self.varied)
 
@@ -288,9 +288,9 @@ class Subject:
         return f"{self.summary}{at}; parameter set {self.parameters}"
 
     def provenance(self, *notes: str, has_changes: bool = True) -> Section:
-        """Return the section on how a report was made: notes, changes, source, all parameters.
+        """Return the section on the origin of a report: notes, changes, source, all parameters.
 
-        ``has_changes``: whether the changes are part of it, rather than of an earlier section.
+        ``has_changes``: whether it contains the changes, instead of an earlier section.
 
         Raises
         ------
@@ -300,7 +300,7 @@ class Subject:
         cited = PARAMETER_SETS.find(self.parameters)
         rows = parameter_rows(self.par, cited.values)
         return Section(
-            "How it was made",
+            "Settings",
             [
                 *map(Paragraph, filter(None, notes)),
                 *([self.changes_block] if has_changes else []),

@@ -1,4 +1,4 @@
-"""Tables of KPIs, of reproduced statements and of parameters, ready to be written anywhere."""
+"""Tables of KPIs, of reproduced statements and of parameters, for all outputs."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ Verdict = Literal["good", "bad", "open", "none"]
 
 @dataclass(frozen=True)
 class Cell:
-    """Text of a cell, whether it tells of something good, bad or open, and the value behind it.
+    """Text of a cell, with its verdict (good, bad or open) and its value.
 
     Parameters
     ----------
     value
-        Number, or whatever else a table of data wants; the text where there is none.
+        Number, or another value for a table of data; the text if there is none.
     unit
-        Unit of a number, SI unless the text says another one; ``"1"`` of a pure number.
+        Unit of a number, SI unless the text has another unit; ``"1"`` for a pure number.
     """
 
     text: str
@@ -33,17 +33,17 @@ class Cell:
 
     @property
     def content(self) -> object:
-        """What a table of data holds."""
+        """Value for a table of data."""
         return self.text if self.value is None else self.value
 
 
 def amount_cell(value: float | None, unit: str, digits: int = 4) -> Cell:
-    """Return the cell of a number in an SI unit; NaN stands for none."""
+    """Return the cell of a number in an SI unit; NaN for none."""
     return Cell(amount(value, unit, digits), value=math.nan if value is None else value, unit=unit)
 
 
 def measured_cell(value: float | None, unit: str, error: float, digits: int = 4) -> Cell:
-    """Return the cell of a number in the digits that its error leaves; see `amount_cell`."""
+    """Return the cell of a number with the significant digits of its error; see `amount_cell`."""
     text = measured_amount(value, unit, error, digits)
     return Cell(text, value=math.nan if value is None else value, unit=unit)
 
@@ -55,9 +55,9 @@ class Column:
     Parameters
     ----------
     numeric
-        Whether it is set to the right.
+        Whether it is aligned to the right.
     is_detail
-        Whether a terminal shows it with ``--verbose`` only.
+        Whether a terminal shows it only with ``--verbose``.
     """
 
     heading: str
@@ -74,7 +74,7 @@ class Table:
 
     @property
     def brief(self) -> Table:
-        """The same table without the columns of details."""
+        """The same table without detail columns."""
         kept = [k for k, column in enumerate(self.columns) if not column.is_detail]
         return Table(
             tuple(self.columns[k] for k in kept),
@@ -89,19 +89,19 @@ class KpiRow:
     Parameters
     ----------
     name, value, unit
-        What it is called, its value in ``unit`` (``None`` for none) and the unit.
+        Its name, its value in ``unit`` (``None`` for none) and the unit.
     definition
-        How it is computed.
+        Definition of the figure.
     limit
         The requirement as text, for instance ``"<= 15 %"``; empty for none.
     outcome
         ``met``, ``missed`` or ``undecided``; empty without a requirement.
     error
-        How far the value may be off, in ``unit``; NaN where that was not estimated.
+        Numerical error, in ``unit``; NaN if it was not estimated.
     stated, where
-        What a source states of it, as text, and its place there; empty for nothing.
+        Value stated by a source, as text, and the place there; empty for none.
     converges
-        Whether runs in several steps show an order; else ``error`` bounds what is not known.
+        Whether runs with several steps converge; otherwise ``error`` is only a bound.
     """
 
     name: str
@@ -118,7 +118,7 @@ class KpiRow:
 
 @dataclass(frozen=True)
 class ReproductionRow:
-    """A statement of a source and what we compute.
+    """A statement of a source, and our computed value.
 
     Parameters
     ----------
@@ -129,14 +129,14 @@ class ReproductionRow:
     unit
         Unit.
     tolerance
-        Text, or a number in ``unit``; ``None`` for none; ``"<="`` or ``">="`` where the statement
-        is a bound, which is then shown before it.
+        Text, or a number in ``unit``; ``None`` for none; ``"<="`` or ``">="`` for a bound, which is
+        then shown before it.
     agrees
-        ``None`` where nothing can be said.
+        ``None`` if it cannot be judged.
     note
-        What a reader should know.
+        Note for the reader.
     kind
-        What kind of statement it is, for instance ``"requirement"``.
+        Kind of the statement, for instance ``"requirement"``.
     """
 
     id: str
@@ -161,9 +161,9 @@ class ParameterRow:
     Parameters
     ----------
     name, value, unit
-        Dotted name, value in the SI ``unit``; a choice or a table may be a value.
+        Dotted name, value in the SI ``unit``; the value may also be a choice or a table.
     range
-        Admissible range as text.
+        Valid range as text.
     kind
         Provenance, for instance ``"paper"`` or ``"chosen"``.
     where
@@ -179,9 +179,9 @@ class ParameterRow:
 
 
 def kpi_table(rows: Iterable[KpiRow]) -> Table:
-    """Return the table of key figures; columns of limits, errors, statements where there are any.
+    """Return the table of key figures; columns of limits, errors, statements only if needed.
 
-    A value is written in the digits that its error leaves.
+    A value is written with the significant digits of its error.
     """
     listed = list(rows)
     limited = any(row.limit for row in listed)
@@ -215,7 +215,7 @@ def _error_cell(row: KpiRow) -> Cell:
 
 
 def reproduction_table(rows: Iterable[ReproductionRow]) -> Table:
-    """Return the table of statements of a source beside what we compute."""
+    """Return the table of a source's statements and our computed values."""
     return Table(
         (
             Column("statement"),
@@ -242,7 +242,7 @@ def reproduction_table(rows: Iterable[ReproductionRow]) -> Table:
 
 
 def verdict_table(rows: Iterable[ReproductionRow]) -> Table:
-    """Return the same without tolerances and notes, narrow enough for a terminal."""
+    """Return the same table without tolerances and notes, narrow enough for a terminal."""
     return Table(
         (
             Column("statement"),
@@ -288,7 +288,7 @@ def parameter_table(rows: Iterable[ParameterRow]) -> Table:
 
 
 def text_table(heading: Sequence[str], rows: Iterable[Sequence[object]]) -> Table:
-    """Return a table of plain text, and of cells that there are already."""
+    """Return a table of plain texts, and of ready-made cells."""
     cells = (
         (each if isinstance(each, Cell) else Cell(clean(each)) for each in row) for row in rows
     )
@@ -301,7 +301,7 @@ OUTCOMES: dict[str, Cell] = {
     "missed": Cell("missed", "bad"),
     "undecided": Cell("undecided", "open"),
 }
-"""what tables say of a requirement"""
+"""texts of a requirement's verdict in tables"""
 
 
 def _judged(holds: bool | None, good: str, bad: str) -> Cell:
@@ -324,7 +324,7 @@ def _tolerance(row: ReproductionRow) -> str:
 
 
 def value_text(value: object, unit: str) -> str:
-    """Return a parameter's value; a choice as it is, a table number by number."""
+    """Return a parameter's value; a choice unchanged, a table number by number."""
     if value is None or isinstance(value, (bool, str)):
         return "-" if value is None else clean(value)
     if isinstance(value, (int, float)):

@@ -21,18 +21,18 @@ from bywire.report.document import (
 from bywire.report.tables import Table
 
 WIDTH = 120
-"""most characters of a line of prose"""
+"""largest number of characters in a line of prose"""
 GAP = "  "
 NARROWEST = 12
 """least width of a column that is wrapped"""
 LONGEST_WORD = 40
-"""longest word that is never broken"""
+"""length of the longest word that is never broken"""
 LONGEST_VALUE = 60
-"""characters of a value, such as a table, that a sentence on changes shows"""
+"""largest number of characters of a value, such as a table, in a sentence on changes"""
 
 
 def terminal_text(document: Document, verbose: bool = False) -> str:
-    """Return what a terminal shows of a document, without its figures and without the verdict.
+    """Return the text of a document for a terminal, without its figures and the verdict.
 
     ``verbose``: with definitions, explanations and all rows of long tables.
     """
@@ -41,7 +41,7 @@ def terminal_text(document: Document, verbose: bool = False) -> str:
     lines: list[str] = []
     for block in document.brief:
         text = _text(block, verbose)
-        # An empty line stands between two texts, even where one in between is not shown.
+        # Texts are separated by empty lines, even if a hidden one is between them.
         if text or (text == "" and lines and lines[-1]):
             lines.append(text)
     if lines and not lines[-1]:
@@ -50,12 +50,12 @@ def terminal_text(document: Document, verbose: bool = False) -> str:
 
 
 def verdict_line(document: Document) -> str:
-    """Return the outcome in one line; empty where a document has none."""
+    """Return the verdict in one line; empty if a document has none."""
     return "" if document.banner is None else f"verdict: {document.banner.text}"
 
 
 def change_texts(changes: Sequence[Change]) -> list[str]:
-    """Return a sentence on what was changed of each parameter set and of all defaults."""
+    """Return a sentence on the changes of each parameter set and of all defaults."""
     texts: dict[str, list[str]] = {}
     for each in changes:
         now, before = (_shortened(text) for text in (each.now, each.before))
@@ -68,7 +68,7 @@ def _shortened(text: str) -> str:
 
 
 def _text(block: str | Block, verbose: bool) -> str | None:
-    """Return a block as text; None for one that is not shown."""
+    """Return a block as text; None for a hidden one."""
     if isinstance(block, str):
         return block
     if isinstance(block, FigureBlock | Drawing):
@@ -93,12 +93,12 @@ def _text(block: str | Block, verbose: bool) -> str | None:
 
 
 def _columns() -> int:
-    """Return the characters of the terminal's lines; of a pipe, as many as a log shows."""
+    """Return the line length of the terminal; for a pipe, that of a log."""
     return shutil.get_terminal_size((WIDTH, 24)).columns
 
 
 def _width() -> int:
-    """Return the length of a line of prose: that of the terminal, within what can be read."""
+    """Return the length of a line of prose: that of the terminal, within readable limits."""
     return max(min(_columns(), WIDTH), 20)
 
 
@@ -115,7 +115,7 @@ def _bullet(text: str) -> str:
 
 
 def table_text(table: Table, width: int = 100) -> str:
-    """Return a table as lines of at most ``width`` characters where its columns allow that.
+    """Return a table as lines of at most ``width`` characters, if its columns allow that.
 
     The widest columns are wrapped first, between words.
     """
@@ -128,7 +128,7 @@ def table_text(table: Table, width: int = 100) -> str:
 
 
 def _widths(rows: list[list[str]], width: int) -> list[int]:
-    """Return the columns' widths: as wanted, then the widest cut back until all fit."""
+    """Return the columns' widths: the natural ones, with the widest cut until all fit."""
     widths = [
         max(len(line) for row in rows for line in (row[k].splitlines() or [""]))
         for k in range(len(rows[0]))

@@ -1,4 +1,4 @@
-"""Figures of recordings over time: in panels, several on top of each other, differences."""
+"""Figures of recordings over time: panels, overlaid recordings, differences."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ if TYPE_CHECKING:
     from bywire.report.style import Color
 
 FAULTS = "faults"
-"""variable that counts the faults that are there: a bar along the lower edge shows them"""
-_HEIGHT = 0.04  # of a bar, in heights of a panel
+"""variable that counts the present faults: a bar along the lower edge shows them"""
+_HEIGHT = 0.04  # height of a bar, as a share of the panel
 
 
 def _mark_saturation(axes: Axes, panel: Panel, recording: xr.Dataset) -> None:
@@ -52,7 +52,7 @@ def _mark_saturation(axes: Axes, panel: Panel, recording: xr.Dataset) -> None:
 
 
 def _mark_faults(axes: Axes, recording: xr.Dataset, *, named: bool) -> None:
-    """Draw a bar along the lower edge while a fault is there; ``named``: with a label."""
+    """Draw a bar along the lower edge while a fault is present; ``named``: with a label."""
     if spans := _scaled(recording, FAULTS):
         _draw_fault(axes, spans, 0.0, style.PURPLE, "fault" if named else None)
 
@@ -60,21 +60,21 @@ def _mark_faults(axes: Axes, recording: xr.Dataset, *, named: bool) -> None:
 def _mark_faults_of(
     axes: Axes, recordings: Sequence[xr.Dataset], colors: Sequence[str | Color], factor: float
 ) -> list[Artist]:
-    """Draw the same of several recordings: once where their faults are there at the same times.
+    """Draw the fault bars of several recordings: a common one if their times are equal.
 
     Parameters
     ----------
     axes
         Panel over time.
     recordings, colors
-        The recordings, and the color of each, in which its own bar is drawn where they differ.
+        The recordings, and the color of each, used for its own bar if the times differ.
     factor
-        Of the time axis.
+        Factor of the time axis.
 
     Returns
     -------
     list
-        The entry of a legend; none without a fault.
+        The entry of a legend; empty without a fault.
     """
     from matplotlib.patches import Patch
 
@@ -127,8 +127,8 @@ def _spans(recording: xr.Dataset, variable: str) -> list[tuple[float, float]]:
 # --- Traces
 
 _NEAR = 0.5
-"""share of a limit from which its lines are drawn"""
-_LASTING = 0.9  # share of a phase above which its short breaks do not count
+"""share of a limit above which its lines are drawn"""
+_LASTING = 0.9  # share of a phase above which short breaks are ignored
 
 
 def time_traces(
@@ -142,30 +142,28 @@ def time_traces(
 ) -> Figure:
     """Draw panels of variables over a shared time axis.
 
-    Phases in which all that has dry friction sticks are shaded, more faintly those in which it does
-    so again and again, as under dither; saturation is a bar along the
-    upper edge.
+    Phases in which all friction elements are stuck are shaded; those with repeated sticking, as
+    under dither, more faintly. Saturation is a bar along the upper edge.
 
     Parameters
     ----------
     recording
         Recording to draw.
     panels
-        What to draw; by default those that the recording's brake or rig declares (of several, the
-        ones that the recording shows most of), else its signals by their units. Those without any
-        variable in the recording are left out, and those that stay at zero unless all do.
+        Panels to draw; by default those that the recording's brake or rig declares (of several, the
+        ones with most variables of the recording), else its signals by their units. Panels without
+        any variable are left out, and those that stay at zero unless all do.
     limits
-        Step by which the first trace of the first panel is judged: its band and limit are drawn.
+        Step that judges the first trace of the first panel: its band and limit are drawn.
     measured
-        Recording to compare with, for instance of a test rig, with the names and units of
-        ``recording``; it may lack variables, and may have samples of its own. It is solid blue,
-        ``recording`` dashed red on top. Of every panel then only the first trace and the set
-        points are drawn.
+        Recording for comparison, for instance of a test rig, with the names and units of
+        ``recording``; it may lack variables, and have other sample times. It is solid blue, with
+        ``recording`` dashed red on top. Then only the first trace and the set points of every panel
+        are drawn.
     stuck
         Variable that is 1 while shafts and pistons stick.
     stated
-        Levels and ranges that a source states; each is drawn in the first panel that shows its
-        signal.
+        Levels and ranges stated by a source; each is drawn in the first panel with its signal.
 
     Raises
     ------
@@ -197,7 +195,7 @@ def time_traces(
         left = [each for each in left if each not in here]
         axes.margins(x=0.0)
         _set_ticks(axes, panel, first)
-        if not panel.levels:  # a mode's ticks say all that its legend would
+        if not panel.levels:  # a mode's ticks replace its legend
             style.legend_above(axes)
     _, unit = style.time_scale(first.time)
     rows[-1].set_xlabel(f"time [{unit}]")
@@ -206,14 +204,14 @@ def time_traces(
 
 
 def shown_panels(recording: xr.Dataset) -> list[tuple[Panel, list[Trace]]]:
-    """Return the declared panels of which the recording shows most, or those by unit."""
+    """Return the declared panels with most variables of the recording, or those by unit."""
     known = [drawable(recording, each.panels) for each in declared_panels(recording)]
     most = max(known, key=len, default=[])
     return most or drawable(recording, panels_by_unit(recording))
 
 
 def drawable(recording: xr.Dataset, panels: Sequence[Panel]) -> list[tuple[Panel, list[Trace]]]:
-    """Return the panels that show something, with their traces."""
+    """Return the panels with visible traces."""
     present = [(panel, _present(panel, recording)) for panel in panels]
     present = [(panel, traces) for panel, traces in present if traces]
     moving = [
@@ -225,14 +223,14 @@ def drawable(recording: xr.Dataset, panels: Sequence[Panel]) -> list[tuple[Panel
 
 
 def _moves(variable: xr.DataArray) -> bool:
-    """Return whether a signal is ever anything but 0, or a temperature but its first."""
+    """Return whether a signal is ever different from 0, or a temperature from its first value."""
     values = variable.values
     is_temperature = variable.attrs.get("units") == "K"
     return bool(np.any(values != (values[:1] if is_temperature else 0.0)))
 
 
 def _present(panel: Panel, recording: xr.Dataset) -> list[Trace]:
-    """Return the traces worth drawing; a set point that is always 0 was never used."""
+    """Return the visible traces; a set point that is always 0 was never used."""
     traces = [trace for trace in panel.traces if trace.variable in recording.data_vars]
     return [
         trace
@@ -289,7 +287,7 @@ def _shade_stuck(axes: Axes, recording: xr.Dataset, variable: str, *, named: boo
         if not is_lasting:
             lasting = sum(each.share * (each.end - each.start) for each in found)
             share = lasting / sum(each.end - each.start for each in found)
-            label += f" again and again, {100 * share:.2g} % of the shade"
+            label += f" repeatedly, {100 * share:.2g} % of the shaded time"
         axes.broken_barh(
             [(scale * each.start, scale * (each.end - each.start)) for each in found],
             (0.0, 1.0),
@@ -303,7 +301,7 @@ def _shade_stuck(axes: Axes, recording: xr.Dataset, variable: str, *, named: boo
 
 
 def _mark_limit(axes: Axes, panel: Panel, recording: xr.Dataset, first: Channel) -> None:
-    """Draw the limits of a panel's first trace where it comes near; far away they say nothing."""
+    """Draw the limits of a panel's first trace where it comes near; distant ones are left out."""
     level = _limit_of(recording, panel)
     if level is None:
         return
@@ -322,7 +320,7 @@ def _mark_limit(axes: Axes, panel: Panel, recording: xr.Dataset, first: Channel)
 
 
 def _limit_of(recording: xr.Dataset, panel: Panel) -> float | None:
-    """Return the limit [SI] of a panel's first trace; None where the recording says none."""
+    """Return the limit [SI] of a panel's first trace; None if the recording has none."""
     if panel.limit is None:
         return None
     value = json.loads(str(recording.attrs.get("parameters", "{}")))
@@ -344,14 +342,14 @@ def _set_ticks(axes: Axes, panel: Panel, first: Channel) -> None:
 # --- Several recordings on top of each other, and differences
 
 _DOTS: style.Dash = (0, (1.2, 1.2))
-"""of the second line of a panel"""
-_APART = 0.03  # of what lines reach over: closer, a set point of a line's color lies below it
-_BRIEF = 0.01  # of the time axis: what shows no longer is not seen
+"""style of the second line of a panel"""
+_APART = 0.03  # of the lines' range: a closer set point of the same color is hidden
+_BRIEF = 0.01  # share of the time axis: shorter differences are not visible
 
 
 @dataclass(frozen=True)
 class Look:
-    """What tells a recording from others: its label, color and dashes."""
+    """Style of a recording: its label, color and dashes."""
 
     label: str
     color: str | Color
@@ -359,7 +357,7 @@ class Look:
 
 
 def _draw_line(axes: Axes, shown: Channel, look: Look, factor: float, *, second: bool) -> float:
-    """Draw a line, of a ripple that fills an area its average; return its averaging time [s]."""
+    """Draw a line, or the average of a ripple that fills an area; return its averaging time [s]."""
     average = inside(shown)
     shown, width = (shown, 0.0) if average is None else average
     axes.plot(
@@ -381,10 +379,10 @@ def _draw_target(
     looks: Sequence[Look],
     factor: float,
 ) -> list[Line2D]:
-    """Draw a set point: once, in black, where it is the same in all recordings.
+    """Draw a set point: once, in black, if it is equal in all recordings.
 
-    Where each has its own, in its color, they are left out that lie below the lines of their
-    recordings. ``lines``: names of those, the first one followed.
+    Different set points are drawn in their recordings' colors, without those hidden by their lines.
+    ``lines``: names of the lines, the following one first.
     """
     stroke = style.STROKES[Role.SET_POINT]
     shown = [channel(recording, name) for recording in recordings]
@@ -411,7 +409,7 @@ def _draw_target(
 
 
 def _are_seen(targets: Sequence[Channel], followed: Sequence[Channel]) -> bool:
-    """Return whether a set point of any recording shows beside the line that follows it."""
+    """Return whether a set point of any recording is visible beside the line that follows it."""
     ends = [each for line in followed for each in (np.nanmin(line.values), np.nanmax(line.values))]
     close = _APART * (max(ends) - min(ends))
     brief = _BRIEF * max(float(line.time[-1] - line.time[0]) for line in followed)
@@ -464,17 +462,17 @@ def entry(label: str, color: str | Color, dash: Any) -> Line2D:
 
 
 # --- Panels
-# Every recording has a color, of the palette that any color vision tells apart or, over a range of
-# values, of a scale; what a line is, its dashes say.
+# Every recording has a color: of the palette for any color vision or, over a range of values, of a
+# scale. Dashes distinguish the lines of a recording.
 
 _FEW = 3
-"""recordings up to which the second trace of a panel is drawn as well"""
+"""number of recordings up to which the second trace of a panel is also drawn"""
 _DASHES: tuple[style.Dash, ...] = ("-", (0, (4, 2)), (0, (6, 1.5, 1.5, 1.5)))
 
 
 @dataclass(frozen=True)
 class Scale:
-    """What recordings were varied over: name, SI unit and a value for each."""
+    """Varied quantity of recordings: name, SI unit and a value for each."""
 
     name: str
     unit: str
@@ -491,26 +489,26 @@ def overlaid_panels(
     scale: Scale | None = None,
     skipped: int = 0,
 ) -> Figure:
-    """Draw the signals that all recordings share, in the panels of the first one's brake.
+    """Draw the common signals of all recordings, in the panels of the first one's brake.
 
-    Panels that stay at zero in all recordings are left out. Set points that are the same are
-    drawn once. Of more than `_FEW` recordings, each panel shows its first trace and set points.
+    Panels that stay at zero in all recordings are left out. Equal set points are drawn once. For
+    more than `_FEW` recordings, each panel shows its first trace and set points.
 
     Parameters
     ----------
     recordings
-        Recordings by the label that the legend shows.
+        Recordings by their label in the legend.
     step
-        Signal, and the step by which it is judged: its band and limit are drawn.
+        Signal, and the step that judges it: its band and limit are drawn.
     scale
-        The range that they belong to: a scale then stands in the legend's place.
+        The range of the recordings: a color scale then replaces the legend.
     skipped
-        Colors left to other recordings, those of an earlier figure.
+        Colors of the recordings in an earlier figure, which are skipped.
 
     Raises
     ------
     ParameterError
-        When the recordings share no signal that could be drawn.
+        When the recordings have no common signal to draw.
     """
     whole = list(recordings.values())
     data = _shared(whole)
@@ -546,16 +544,16 @@ def overlaid_panels(
 
 
 def can_overlay(recordings: Sequence[xr.Dataset]) -> bool:
-    """Return whether recordings share a signal that `overlaid_panels` would draw."""
+    """Return whether recordings have a common signal for `overlaid_panels`."""
     return bool(_chosen(_shared(recordings)))
 
 
 def _shared(recordings: Sequence[xr.Dataset]) -> list[xr.Dataset]:
-    """Return recordings with the signals over time that all of them have, in one unit."""
+    """Return recordings with their common signals over time, in one unit."""
     signals = [
         {
             str(name): variable.attrs.get("units")
-            for name, variable in each.variables.items()  # arrays of all of them take 20 ms
+            for name, variable in each.variables.items()  # arrays of all variables would take 20 ms
             if name not in each.coords and variable.dims == ("time",) and variable.size > 0
         }
         for each in recordings
@@ -569,7 +567,7 @@ def _shared(recordings: Sequence[xr.Dataset]) -> list[xr.Dataset]:
 
 
 def _chosen(recordings: Sequence[xr.Dataset]) -> Chosen:
-    """Return the declared panels of which the recordings show most, or those by unit."""
+    """Return the declared panels with most variables of the recordings, or those by unit."""
     first = recordings[0]
     declared = [_present_in_any(recordings, each.panels) for each in declared_panels(first)]
     most = max(declared, key=len, default=[])
@@ -577,7 +575,7 @@ def _chosen(recordings: Sequence[xr.Dataset]) -> Chosen:
 
 
 def _present_in_any(recordings: Sequence[xr.Dataset], panels: Sequence[Panel]) -> Chosen:
-    """Return the panels that some recording shows, with the traces that some recording moves."""
+    """Return the panels with visible traces, and the traces that change in any recording."""
     each = [{id(panel): traces for panel, traces in drawable(r, panels)} for r in recordings]
     chosen: Chosen = []
     for panel in panels:
@@ -617,7 +615,7 @@ def _draw_panel(
             for recording, look in zip(recordings, looks, strict=True)
         ]
         width = max(averages)
-        if len(lines) > 1 or width:  # an ordinate names what its lines have in common
+        if len(lines) > 1 or width:  # the label of an ordinate is what its lines have in common
             dash = _DOTS if k > 0 else "-"
             label = channel(recordings[0], trace.variable).label
             label += f", {duration(width)} average" if width else ""
@@ -638,32 +636,32 @@ def _longest(recordings: Sequence[xr.Dataset]) -> xr.Dataset:
 
 
 def _factor(recordings: Sequence[xr.Dataset]) -> tuple[float, str]:
-    """Return factor and unit of the time axis, as of the longest recording."""
+    """Return factor and unit of the time axis, for the longest recording."""
     return style.time_scale(np.asarray(_longest(recordings)["time"].values, dtype=np.float64))
 
 
-# --- Differences: each less the first, at the first one's times
+# --- Differences: each minus the first, at the first one's times
 
 _LEAST = 1e-9
-"""share of a signal's largest magnitude below which a difference is rounding, and none"""
+"""share of a signal's largest magnitude below which a difference counts as rounding"""
 
 
 def difference_figure(recordings: Mapping[str, xr.Dataset]) -> Figure | None:
-    """Draw what each recording differs from the first by; None where none does.
+    """Draw the differences of each recording from the first; None where there are none.
 
-    ``recordings``: by the label that the legend shows.
+    ``recordings``: by their label in the legend.
     """
     apart = differences_from_first(recordings)
     if not apart or not can_overlay(list(apart.values())):
         return None
-    return overlaid_panels(apart, skipped=1)  # in the colors that the recordings have
+    return overlaid_panels(apart, skipped=1)  # in the colors of the recordings
 
 
 def differences_from_first(recordings: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
-    """Return the signals that all recordings share, less those of the first.
+    """Return the common signals of all recordings, minus those of the first.
 
-    Between samples of another run signals are straight lines; beyond its end there is no
-    difference. Modes, which are whole numbers, have none either.
+    Signals are interpolated linearly between samples; there is no difference beyond the end of a
+    run, nor of modes, which are whole numbers.
 
     Parameters
     ----------
@@ -673,8 +671,8 @@ def differences_from_first(recordings: Mapping[str, xr.Dataset]) -> dict[str, xr
     Returns
     -------
     dict
-        A dataset for each recording but the first, by ``"label less first label"``; none where the
-        recordings have no times in common, or do not differ.
+        A dataset for each recording but the first, by ``"label minus first label"``; empty if the
+        recordings have no common times, or do not differ.
     """
     (base_label, base), *others = recordings.items()
     low = max(float(each["time"].values[0]) for each in recordings.values())
@@ -687,7 +685,7 @@ def differences_from_first(recordings: Mapping[str, xr.Dataset]) -> dict[str, xr
         for name in base.data_vars
         if all(_is_comparable(base[name], each, str(name)) for _, each in others)
     ]
-    apart = {f"{k} less {base_label}": _less(each, base, names) for k, each in others}
+    apart = {f"{k} minus {base_label}": _less(each, base, names) for k, each in others}
     differ = any(bool(np.any(each[name].values)) for each in apart.values() for name in names)
     return apart if differ else {}
 
@@ -717,7 +715,7 @@ def _less(other: xr.Dataset, base: xr.Dataset, names: list[str]) -> xr.Dataset:
 
 # --- The same variables of several recordings, one color each
 
-_ROOM = "  "  # short labels of wide letters need more than the legend's mean width of a letter
+_ROOM = "  "  # extra space for short labels of wide letters
 _DASHES_OF_A_VARIABLE: tuple[style.Dash, ...] = ("-", (0, (4, 2)), (0, (1.5, 1.5)))
 
 
@@ -727,10 +725,10 @@ def overlaid_traces(recordings: Mapping[str, xr.Dataset], variables: Mapping[str
     Parameters
     ----------
     recordings
-        Recordings by the label that the legend shows.
+        Recordings by their label in the legend.
     variables
-        What to draw, with its name at the ordinate; those that no recording has, or that are zero
-        in all, are left out.
+        Variables, with their names at the ordinates; missing ones, and those that are zero in all
+        recordings, are left out.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Words for people: units, amounts and untrusted text, for figures, tables and pages alike."""
+"""Texts for users: units, amounts and untrusted text, for figures, tables and pages alike."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ F = TypeVar("F")
 
 
 def in_display_unit(value: F, symbol: str) -> tuple[F, str]:
-    """Return a value, or an array, and its unit as the edges show them: bar instead of Pa."""
+    """Return a value, or an array, and its unit in display units: bar instead of Pa."""
     unit = display_unit(symbol)
     return convert(value, symbol, unit), unit
 
 
 def readable_unit(size: float, symbol: str) -> str:
-    """Return the unit in which a figure of a size reads best.
+    """Return the most readable unit for a figure of a given size.
 
-    Times below 1 s are in ms and lengths from 1 m on, those of roads and not of pistons, in m.
+    Times below 1 s are in ms; lengths from 1 m on, those of roads and not of pistons, are in m.
 
     Parameters
     ----------
     size
-        Largest magnitude that is written, in ``symbol``.
+        Largest magnitude to write, in ``symbol``.
     symbol
         SI unit, or ``"%"``.
 
@@ -45,7 +45,7 @@ def readable_unit(size: float, symbol: str) -> str:
 
 
 def readable_units(symbol: str) -> str:
-    """Return all units in which figures of an SI unit are written, whatever their size.
+    """Return all units in which figures of an SI unit are written, for any size.
 
     Examples
     --------
@@ -67,9 +67,9 @@ def amount(value: float | None, symbol: str, digits: int = 4, like: float | None
     digits
         Significant digits.
     like
-        Largest magnitude of the figure that it is a value of, in ``symbol``: decides the unit, so
-        that a figure of many cases has one, see `readable_unit`. By default that of the value
-        itself, and times are in s.
+        Largest magnitude of the figure with this value, in ``symbol``. It determines the unit, so
+        that a figure of many cases has one unit, see `readable_unit`. By default the value itself
+        counts, and times are in s.
 
     Examples
     --------
@@ -96,9 +96,9 @@ def amount(value: float | None, symbol: str, digits: int = 4, like: float | None
 
 
 def measured_amount(value: float | None, symbol: str, error: float, digits: int = 4) -> str:
-    """Return a value with its unit in the digits that its error leaves; times below 1 s in ms.
+    """Return a value with the significant digits of its error and its unit; times below 1 s in ms.
 
-    The last digit written is that of the error's first one.
+    The last digit written has the place of the error's first one.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def measured_amount(value: float | None, symbol: str, error: float, digits: int 
     symbol
         Unit; SI units are shown in their display unit.
     error
-        How far the value may be off, in ``symbol``; NaN where that is not known.
+        Numerical error, in ``symbol``; NaN if it is not known.
     digits
         Most significant digits.
 
@@ -131,16 +131,16 @@ def measured_amount(value: float | None, symbol: str, error: float, digits: int 
         figures = f"{float(figures):g}" if "e+" in figures else figures
     else:
         rounded = round(number, -last)
-        is_nothing = rounded == 0 and -last >= digits  # many zeros tell no more than a single digit
+        is_nothing = rounded == 0 and -last >= digits  # many zeros show no more than one digit
         figures = "0" if is_nothing else f"{rounded:.{max(0, -last)}f}"
     written = unit_text(unit)
     return figures + (f" {written}" if written else "")
 
 
 def error_text(value: float | None, symbol: str, error: float, converges: bool = True) -> str:
-    """Return an error in one digit, in the unit in which `measured_amount` writes the value.
+    """Return an error with one digit, in the unit of the value in `measured_amount`.
 
-    ``converges``: whether it is an error, rather than a bound of one that is not known.
+    ``converges``: whether it is an error, rather than a bound of an unknown one.
 
     Examples
     --------
@@ -158,18 +158,18 @@ def error_text(value: float | None, symbol: str, error: float, converges: bool =
 
 
 def _readable_difference(number: float, value: float, symbol: str) -> tuple[float, str]:
-    """Return a difference in the unit in which a value reads best; of temperatures in K."""
+    """Return a difference in the most readable unit of a value; for temperatures in K."""
     return _readable(number, value, difference_unit(symbol))
 
 
 def _readable(number: float, value: float, symbol: str) -> tuple[float, str]:
-    """Return a number in the unit in which a value reads best."""
+    """Return a number in the most readable unit of a value."""
     unit = readable_unit(value, symbol)
     return convert(float(number), symbol, unit), unit
 
 
 def range_text(leaf: Leaf) -> str:
-    """Return the admissible range of a parameter in its display unit, for instance ``> 0 mm``."""
+    """Return the valid range of a parameter in its display unit, for instance ``> 0 mm``."""
     if leaf.low == leaf.high:
         return f"exactly {amount(leaf.low, leaf.unit.symbol, 6)}"
     limits = []
@@ -183,5 +183,5 @@ def range_text(leaf: Leaf) -> str:
 
 
 def duration(seconds: float) -> str:
-    """Return a time span in ms or s, whichever reads better."""
+    """Return a time span in ms or s, whichever is easier to read."""
     return f"{1e3 * seconds:.3g} ms" if abs(seconds) < 1.0 else f"{seconds:.4g} s"

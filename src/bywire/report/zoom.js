@@ -1,7 +1,7 @@
-// Zooms the figures of a report: wheel (with Ctrl, or once a figure has the focus), drag, double
+// Zooms the figures of a report by wheel (with Ctrl, or once a figure has the focus), drag, double
 // click, keys, buttons. A drag across panels over time looks closer at that time in all of them;
-// whatever else changes is what a figure shows of itself, its viewBox. Where the pointer is, in the
-// figure's axes, stands in its corner: zoomed, their labels may be out of sight.
+// all other actions change the figure's viewBox. The corner of a figure shows the pointer's position
+// in its axes, because their labels may be out of sight after a zoom.
 "use strict";
 (() => {
   const MOST = 40;  // a figure holds a few points per pixel column: beyond, nothing new appears
@@ -10,9 +10,9 @@
     ArrowLeft: ["pan", -0.2, 0], ArrowRight: ["pan", 0.2, 0], ArrowUp: ["pan", 0, -0.2],
     ArrowDown: ["pan", 0, 0.2],
   };
-  const HINT = "Zoom: drag a range (across a panel over time: time alone, in all such panels) or turn " +
-    "the wheel, double click for the whole; keys + − 0 and arrows";
-  const LEAST = 8;  // px of a drag that is meant
+  const HINT = "Zoom: drag a range (in a time panel: only time, in all time panels) or turn " +
+    "the wheel; double-click to reset; keys + − 0 and arrows";
+  const LEAST = 8;  // px of an intended drag
   const timePanels = [];  // of all figures of the page
 
   const element = (tag, name, text) => {
@@ -24,7 +24,7 @@
   const group = (svg) => document.createElementNS(svg.namespaceURI, "g");
   const toggled = (tag, isShown) => { if (tag) tag.style.display = isShown ? "" : "none"; };
 
-  // Round values between two, about as many as wanted, with their texts.
+  // Round values between two, about `count` of them, with their texts.
   function ticksBetween(low, high, count) {
     const decade = 10 ** Math.floor(Math.log10((high - low) / count));
     const factor = [1, 2, 2.5, 5, 10].find((each) => each * decade * count >= high - low);
@@ -160,7 +160,7 @@
 
     svg.replaceWith(place);
     place.append(svg, mark, here);
-    place.after(tools);  // beside the caption: in the figure they would cover what an axis says
+    place.after(tools);  // beside the caption: in the figure they would cover labels
     place.tabIndex = 0;
     place.setAttribute("role", "group");
     place.setAttribute("aria-label", HINT);
@@ -191,7 +191,7 @@
       if (view[2] < full[2] || isTimed()) act.whole(); else act.zoom(0.4, at(event));
     });
 
-    // A drag marks what is wanted, or moves a figure of which a part is shown. Touch scrolls.
+    // A drag marks a range, or moves a zoomed figure. Touch scrolls.
     const isAlongTime = (event) => start.panel
       && Math.abs(event.clientX - start.x) > 2 * Math.abs(event.clientY - start.y);
     svg.addEventListener("pointerdown", (event) => {

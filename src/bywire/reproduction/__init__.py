@@ -1,1 +1,1 @@
-"""Published sources reproduced: statements against our results, one file per source."""
+"""Reproductions of published sources: statements against our results."""

@@ -14,8 +14,8 @@ from bywire.report.wording import amount
 Tolerance = float | Literal["<=", ">="]
 Kind = Literal["printed", "reading", "axis", "requirement", "physical bound", "ours"]
 """kind of a statement: a number in text, table or equation; a sentence that we read as a number;
-the end of a figure's axis; a requirement on the design; a physical limit that we derive; or only
-our result"""
+the end of a figure's axis; a requirement on the design; a physical limit that we derive; or our
+result without a statement"""
 
 
 SHARE = "share"
@@ -51,7 +51,7 @@ class Allowance:
 
 @dataclass(frozen=True)
 class Fact:
-    """A number that a source states, and where; or a bound that physics sets to it.
+    """A number in a source with its place, or a physical bound on it.
 
     Parameters
     ----------
@@ -62,10 +62,10 @@ class Fact:
     where
         Place in the source.
     kind
-        What kind of statement it is.
+        Kind of the statement.
     tolerance
-        By which it is judged, see `Item`, or an `Allowance` around the number; None if none is
-        stated.
+        Tolerance for the verdict, see `Item`, or an `Allowance` around the number; None if there
+        is none.
     note
         How its counterpart is computed, if it is the same for all sets.
     """
@@ -79,7 +79,7 @@ class Fact:
 
 
 def reading(value: float, unit: str, where: str) -> Fact:
-    """Return a sentence of a source that is put as a number: ``where`` says how it was read."""
+    """Return a sentence of a source as a number; ``where`` contains its interpretation."""
     return Fact(value, unit, where, "reading")
 
 
@@ -90,20 +90,20 @@ class Item:
     Parameters
     ----------
     id
-        Name of the statement; ``@`` and the parameter set follow where it is not the main one.
+        Name of the statement, followed by ``@`` and the parameter set unless it is the main one.
     unit
         Unit of all numbers, as the source prints it.
     stated, computed
-        The two numbers; None where nothing is stated or computed.
+        The two numbers; None if missing.
     tolerance
-        Largest difference that counts as agreement; ``"<="`` or ``">="`` where the statement is
-        a bound on what is computed; None where nothing is judged.
+        Largest difference that counts as agreement; ``"<="`` or ``">="`` if the statement is a
+        bound on the computed number; None without a verdict.
     agrees
-        None where nothing is stated, or where the value was tuned to the statement.
+        None if nothing is stated, or if the value was tuned to the statement.
     note
         Place of the statement, and remarks for the reader.
     kind
-        What kind of statement it is.
+        Kind of the statement.
     """
 
     id: str
@@ -117,7 +117,7 @@ class Item:
 
     @property
     def parameter_set(self) -> str:
-        """What follows ``@`` in the id; empty for the main set."""
+        """Text after ``@`` in the id; empty for the main set."""
         return self.id.partition("@")[2]
 
 
@@ -131,22 +131,22 @@ def compared(
     *,
     tuned: Literal["", "calibrated", "an input"] = "",
 ) -> Item:
-    """Return a statement judged by its tolerance.
+    """Return a statement with our result and the verdict by its tolerance.
 
     Parameters
     ----------
     name
         The item's id.
     fact
-        What is stated.
+        The statement.
     computed
-        What we compute, in the fact's unit; NaN agrees with nothing.
+        Our result in the fact's unit; NaN agrees with nothing.
     tolerance
-        See `Item`; an `Allowance` is taken around what is stated. ``"as stated"``: the fact's.
+        See `Item`; an `Allowance` lies around the stated number. ``"as stated"``: the fact's.
     note
         Remark for the reader, after the place of the statement and the note of the fact.
     tuned
-        How the value was made to agree. Such a statement proves nothing and is not judged.
+        How the value was made to agree. Such a statement proves nothing and gets no verdict.
     """
     if tolerance == "as stated":
         tolerance = fact.tolerance
@@ -170,7 +170,7 @@ def found(name: str, unit: str, computed: float, note: str) -> Item:
 
 
 def quoted(name: str, fact: Fact, note: str) -> Item:
-    """Return a statement that we compute nothing for.
+    """Return a statement without our result.
 
     Parameters
     ----------
@@ -202,9 +202,9 @@ class RootCause:
     Parameters
     ----------
     text
-        The cause in one sentence, with its numbers.
+        The cause with its numbers, in a few sentences.
     explains
-        Ids of the statements that it explains; ``*`` stands for anything.
+        Ids of the statements that it explains; ``*`` matches anything.
     """
 
     text: str
@@ -226,17 +226,17 @@ class Quoted:
         self._items = {item.id: item for item in items}
 
     def stated(self, name: str) -> str:
-        """Return what the source states."""
+        """Return the stated number with its unit."""
         item = self._items[name]
         return amount(item.stated, item.unit, 3)
 
     def __call__(self, name: str) -> str:
-        """Return what we compute."""
+        """Return the computed number with its unit."""
         item = self._items[name]
         return amount(item.computed, item.unit, 3)
 
     def share(self, name: str) -> str:
-        """Return what we compute in percent of what is stated."""
+        """Return the computed number in percent of the stated one."""
         item = self._items[name]
         return amount(100.0 * (item.computed or 0.0) / (item.stated or 1.0), "%", 4)
 
@@ -244,7 +244,7 @@ class Quoted:
 def causes_of(
     items: Iterable[Item], *known: Callable[[Quoted], RootCause]
 ) -> tuple[RootCause, ...]:
-    """Return the causes that explain a disagreement, their numbers taken from the items."""
+    """Return the causes that explain a disagreement, with numbers from the items."""
     listed = list(items)
     causes = (cause(Quoted(listed)) for cause in known)
     return tuple(cause for cause in causes if cause.explained(listed))

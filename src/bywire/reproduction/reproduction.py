@@ -1,4 +1,4 @@
-"""The reproduction of a source: its parts, the runs that they share, its tables and its report."""
+"""The reproduction of a source: its parts, their shared runs, tables and report."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ if TYPE_CHECKING:
 
 
 class Runs:
-    """Bench results, each computed once; threads that ask for the same wait for it.
+    """Bench results, each computed once; threads that need the same result wait for it.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ class Runs:
         self._lock = threading.Lock()
 
     def report(self, label: str, share: float) -> None:
-        """Tell how far a piece of work is."""
+        """Report the progress of a piece of work."""
         if self._progress is not None:
             self._progress(label, share)
 
@@ -87,7 +87,7 @@ class Runs:
         RunError
             When a run fails.
         KeyboardInterrupt
-            When the user stopped a run, or another part failed: then there is no result.
+            When the user stopped a run, or another part failed.
         """
         bench = Bench(experiment, name, overrides or {}, options or {}, stimulus or {})
         key = repr(bench)
@@ -116,7 +116,7 @@ def kpis(result: Result) -> dict[str, float]:
 
 
 def selected(recording: xr.Dataset, *names: str) -> xr.Dataset:
-    """Return a recording with some of its variables, those that it has."""
+    """Return a recording with only the named variables, as far as it has them."""
     return recording[[name for name in names if name in recording]]
 
 
@@ -131,10 +131,10 @@ _KINDS = (
     "Kinds of statements: 'printed' is in the source's text, tables or equations, or follows "
     "from printed numbers by an equation that the note names; 'reading' is a sentence of the "
     "source that we read as a number, see its note; 'axis' is the end of a figure's axis, "
-    "beyond which the source shows nothing; 'requirement' is one on the design; 'physical "
-    "bound' is a limit that we derive; 'ours' is a number without a counterpart. There is no "
-    "verdict where nothing is stated, where a value was tuned to the statement or is an input, or "
-    "where another statement is judged instead."
+    "beyond which the source shows nothing; 'requirement' is a requirement on the design; "
+    "'physical bound' is a limit that we derive; 'ours' is a number without a counterpart. There "
+    "is no verdict if nothing is stated, if the value was tuned to the statement or is an input, "
+    "or if the verdict belongs to another statement."
 )
 
 
@@ -172,13 +172,13 @@ def tolerances(allowances: Sequence[Allowance]) -> Table:
 
 def _size(allowance: Allowance) -> str:
     if allowance.unit == SHARE:
-        return f"{100.0 * allowance.size:g} % of what is stated"
+        return f"{100.0 * allowance.size:g} % of the stated value"
     return amount(allowance.size, allowance.unit)
 
 
 @dataclass(frozen=True)
 class Tally:
-    """Numbers of verdicts."""
+    """Counts of verdicts."""
 
     agree: int
     disagree: int
@@ -195,7 +195,7 @@ def _tally(items: Iterable[Item]) -> Tally:
 
 
 def tallies(items: Iterable[Item]) -> dict[str, Tally]:
-    """Count the verdicts of each parameter set, by what follows ``@`` in the ids."""
+    """Count the verdicts of each parameter set, by the text after ``@`` in the ids."""
     listed = list(items)
     names = dict.fromkeys(item.parameter_set for item in listed)
     return {name: _tally(i for i in listed if i.parameter_set == name) for name in names}
@@ -203,12 +203,12 @@ def tallies(items: Iterable[Item]) -> dict[str, Tally]:
 
 # --- Reproductions
 
-_THREADS = 4  # more would wait for each other's Python
+_THREADS = 4  # more would only wait for the Python interpreter
 
 
 @dataclass(frozen=True, eq=False)
 class Exhibit:
-    """A figure, or what draws it once it is shown, with a name for its file and a caption."""
+    """A figure, or a function that draws it on demand, with a file name and a caption."""
 
     name: str
     figure: Figure | Callable[[], Figure]
@@ -217,7 +217,7 @@ class Exhibit:
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """A table or a figure of the source, reproduced.
+    """The reproduction of a table or a figure of the source.
 
     Parameters
     ----------
@@ -232,7 +232,7 @@ class Part:
     recordings
         Recordings to keep, by the name of their file.
     appendix
-        Tables that stay folded in the report, by title.
+        Tables that are folded in the report, by title.
     tables
         Tables that report and terminal show, by title: they replace the items' verdicts there.
     """
@@ -248,7 +248,7 @@ class Part:
 
 @dataclass(frozen=True, eq=False)
 class Reproduction(Answer):
-    """A source, reproduced.
+    """The reproduction of a source.
 
     Parameters
     ----------
@@ -259,7 +259,7 @@ class Reproduction(Answer):
     parts
         Its tables and figures.
     causes
-        Why statements disagree, the gravest cause first.
+        Causes of disagreements, the most serious first.
     allowances
         The tolerances in use, with their reasons.
     sets
@@ -290,7 +290,7 @@ class Reproduction(Answer):
 
     @property
     def in_short(self) -> list[str]:
-        """Why it disagrees, a sentence each, then how often, for each parameter set."""
+        """Lines with the root causes, then the counts of verdicts for each parameter set."""
         lines = []
         for cause in self.causes:
             number = len(cause.explained(self.items))
@@ -326,7 +326,7 @@ class Reproduction(Answer):
         )
 
     def _tables(self) -> list[str | Flat]:
-        """Return what a terminal shows: parts' own tables, and the verdicts of all others."""
+        """Return the tables for a terminal: the parts' tables, and the verdicts of all others."""
         rest = [item for part in self.parts if not part.tables for item in part.items]
         lines: list[str | Flat] = [TableBlock(verdicts(rest)), ""] if rest else []
         for title, table in (pair for part in self.parts for pair in part.tables.items()):
@@ -351,8 +351,8 @@ class Reproduction(Answer):
     def _data(self) -> dict[str, Any]:
         """Return the JSON object.
 
-        What is not stated, not computed or not defined is None; a tolerance is a number in the
-        item's unit, or ``"<="`` or ``">="`` where the statement is a bound. The note ends with the
+        Numbers that are not stated, computed or defined are None. A tolerance is a number in the
+        item's unit, or ``"<="`` or ``">="`` if the statement is a bound. The note ends with the
         kind of statement.
         """
         return {
@@ -380,7 +380,7 @@ class Source:
     Parameters
     ----------
     name
-        What the command line calls it.
+        Name on the command line.
     summary
         One line for listings.
     reproduce
@@ -399,9 +399,9 @@ def reproduced(
     parts: Mapping[str, Callable[[Any], Part]],
     causes: Callable[[tuple[Item, ...]], tuple[RootCause, ...]],
 ) -> Reproduction:
-    """Return a source with its parts, made in threads, and why they disagree.
+    """Return a reproduction with its parts, computed in threads, and its root causes.
 
-    Parts wait for kernels half of their time, which other parts use.
+    Parts wait for kernels half of the time; threads let other parts use it.
 
     Parameters
     ----------
@@ -440,5 +440,5 @@ SOURCES = Kind("source", ("paper",), instances(Source), declared="a Source")
 
 
 def _stem(name: str) -> str:
-    """Return the name of a file, without what file systems dislike."""
+    """Return a file name without characters that file systems reject."""
     return re.sub(r"[^A-Za-z0-9.-]+", "-", name)

@@ -1,8 +1,8 @@
 """Files of a source: parameter sets with the place of every value, statements, tolerances.
 
-The statements of a source, and how its sentences were read, are data: TOML files next to the brake
-that they concern. A text that many entries share is written once, under ``[places]``; entries refer
-to it by its name in braces.
+The statements of a source and the interpretation of its sentences are data, in TOML files next to
+their brake. The table ``[places]`` contains texts that several entries share; entries refer to them
+by their names in braces.
 """
 
 from __future__ import annotations
@@ -43,14 +43,14 @@ class SourceFile:
     Parameters
     ----------
     file
-        TOML file; the functions below say which keys its sections have.
+        TOML file; parameters of the functions below are the keys of its sections.
     places
-        Further texts to which the file refers by their names in braces.
+        Additional texts to which the file refers by their names in braces.
 
     Raises
     ------
     InputError
-        For anything in it that is not valid, with the file's name in front.
+        For any invalid content, with the file's name in front.
     """
 
     def __init__(self, file: Path, places: Mapping[str, str] = _NONE) -> None:
@@ -77,14 +77,14 @@ class SourceFile:
     def values(
         self, formulas: Mapping[str, Formula] = _NONE, groups: Groups = _NONE
     ) -> dict[str, Cited]:
-        """Return the values that the sets of the file have in common, by dotted name.
+        """Return the common values of the file's sets, by dotted name.
 
         Parameters
         ----------
         formulas
-            Functions of a parameter set, by the names with which derived values refer to them.
+            Functions of a parameter set, by the names that derived values use.
         groups
-            Further groups of values.
+            Additional groups of values.
         """
         groups = {**self.groups, **groups}
         with _naming(self._file):
@@ -204,7 +204,7 @@ class Facts:
         self._facts = dict(facts)
 
     def __getitem__(self, name: str) -> Fact:
-        """Return the statement of a name; the error of an unknown name lists the nearest ones."""
+        """Return the statement of a name; the error for an unknown name lists the closest ones."""
         return pick(self._facts, name, "statement")
 
     def table(self, name: str) -> dict[str, Fact]:
@@ -247,7 +247,7 @@ def _statement(
     tolerance: str = "",
     note: str = "",
 ) -> tuple[Fact, str]:
-    """Return a statement, and the name of its tolerance; a sentence that is read is a reading."""
+    """Return a statement and the name of its tolerance; with ``read_as`` it is a reading."""
     kind = kind or ("reading" if read_as else "printed")
     if kind not in get_args(Kind):
         raise unknown_name("kind of statement", kind, get_args(Kind))
@@ -277,7 +277,7 @@ def _made(make: Callable[..., T], entry: Section, place: str) -> T:
 
 
 def _filled(value: Any, places: Mapping[str, str]) -> Any:
-    """Return the content of a file with texts in place of their names in braces."""
+    """Return the content of a file with names in braces replaced by their texts."""
     if isinstance(value, dict):
         return {key: _filled(each, places) for key, each in value.items()}
     if isinstance(value, list):
@@ -326,7 +326,7 @@ def _cited(entry: Section, place: str, formulas: Mapping[str, Formula]) -> Cited
 def _facts(
     table: Section, allowances: Mapping[str, Allowance], name: str, outer: Section
 ) -> Iterator[tuple[str, Fact]]:
-    """Yield statements; keys of a table are the defaults of the statements in it."""
+    """Yield statements; a table's keys are the defaults of its statements."""
     inherited = {**outer, **{k: v for k, v in table.items() if not isinstance(v, Mapping)}}
     tables = {k: v for k, v in table.items() if isinstance(v, Mapping)}
     if name and not tables:
@@ -350,7 +350,7 @@ def _judged(fact: Fact) -> str:
 
 
 def _around(fact: Fact, unit: str) -> float:
-    """Return the tolerance around what is stated in a unit; 0 if none is stated."""
+    """Return the tolerance around the stated number in a unit; 0 if there is none."""
     if not isinstance(fact.tolerance, Allowance):
         return 0.0
     return _in_unit(fact, fact.tolerance.around(fact.value), unit)

@@ -1,6 +1,6 @@
 """`bywire serve`: a folder's benches, results and studies in a browser of this machine.
 
-A request goes through `handler` (what HTTP asks), `guard` (who asks), `routes` (what for), `pages`
-and `place` (what the folder has). What is computed is a task of `tasks`, in a process of its own
-(`jobs` here, `job_process` there), and calls the function that the command of that name calls.
+A request passes `serving` (HTTP), `guard` (who may ask), `routes` (which page), `pages` and `place`
+(the folder's contents). Computations are tasks of `task`, each in a separate process (`jobs` in the
+server, `job_process` in the process). A task calls the same function as the command of its name.
 """

@@ -1,11 +1,11 @@
-"""Where a server listens: on this machine, and on nothing else."""
+"""Address of the server: only this machine can reach it."""
 
 from __future__ import annotations
 
 from typing import Final
 
 PORT: Final = 8642
-"""port by default"""
+"""default port"""
 HERE: Final = "127.0.0.1"
 NAMES: Final = (HERE, "localhost")
-"""how this machine may be called in a link"""
+"""names of this machine that are valid in a link"""

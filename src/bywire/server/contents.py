@@ -1,4 +1,4 @@
-"""What a folder has: bench files, studies, results, measurements."""
+"""Contents of a folder: bench files, studies, results, measurements."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from bywire.data.format_registry import FORMATS
 from bywire.data.toml_file import BENCH, CAMPAIGN, HEADS, LARGEST, LIFE, STUDY, kind_of, read_toml
 from bywire.server.place import Place
 
-_DEEP, _MOST = 4, 5000  # folders in folders, and files, that are looked at
+_DEEP, _MOST = 4, 5000  # depth of nested folders, and number of files, of the search
 _LEFT_OUT = ("node_modules", "__pycache__", "venv", "chunks")
 REPORT = ".html"
 
 
 @dataclass
 class Contents:
-    """What a folder has, as paths in it.
+    """Contents of a folder, as paths relative to it.
 
     Parameters
     ----------
@@ -34,15 +34,15 @@ class Contents:
     lives
         Life files, with their life.
     results
-        Folders that runs of benches were written to, the latest first.
+        Result folders of benches, the latest first.
     reports
         Pages of results, the latest first.
     measurements
-        Files of measurement formats.
+        Measurement files.
     maps
-        Other TOML files: what the columns of measurements mean.
+        Other TOML files, with the meaning of measurement columns.
     is_whole
-        Whether everything was looked at.
+        Whether the search covered all files.
     """
 
     benches: dict[str, str] = field(default_factory=dict)
@@ -64,7 +64,7 @@ def endings() -> tuple[str, ...]:
 
 
 def contents(place: Place) -> Contents:
-    """Return what a folder has; hidden files and links that lead out are no part of it."""
+    """Return the contents of a folder, without hidden files and symbolic links."""
     there, known = Contents(), endings()
     ages, results = dict[str, float](), dict[str, float]()
     for count, path in enumerate(_files(place.root, _DEEP)):
@@ -86,12 +86,12 @@ def contents(place: Place) -> Contents:
 
 
 def _is_result(path: Path) -> bool:
-    """Return whether a recording lies beside the record of a result."""
+    """Return whether a file is a recording of a result, next to the result's record."""
     return path.suffix.lower() == ".nc" and any(path.parent.glob("*.json"))
 
 
 def _files(folder: Path, depth: int) -> Iterator[Path]:
-    """Yield the plain files of a folder and those in it, in the order of their names."""
+    """Yield the regular files of a folder and of its subfolders, ordered by name."""
     try:
         with os.scandir(folder) as entries:
             sorted_entries = sorted(entries, key=lambda entry: entry.name)

@@ -1,4 +1,4 @@
-"""A request as routes see it, what they answer, and what a server refuses."""
+"""Requests and replies of routes, and rejected requests."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from typing import Any, Protocol
 
 
 class RefusedError(Exception):
-    """A request that is not answered as it wanted.
+    """A request that the server rejects.
 
     Parameters
     ----------
     status
-        Of HTTP.
+        HTTP status.
     text
         What is wrong, and what to do.
     field
-        Of the form, beside which it is shown; none where it is no field's.
+        Field of the form that shows the text; empty if it concerns no single field.
     """
 
     def __init__(self, status: int, text: str, field: str = "") -> None:
@@ -31,44 +31,44 @@ class RefusedError(Exception):
 # --- Requests and answers
 
 LARGEST_FORM = 200_000
-"""bytes of a form"""
+"""largest form, in bytes"""
 PAGES = (
     "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; "
     "frame-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
 """policy of the server's own pages"""
 REFUSAL = "default-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'self'"
-"""policy of what is refused, which a frame of a page may show"""
+"""policy of error pages, which a frame of a page may show"""
 LIVE = "frame-ancestors 'self'"
-"""policy of live pages beside the strict one that stands in each"""
+"""policy of live pages, in addition to the strict one in each page"""
 SANDBOX = (
     "sandbox allow-scripts allow-downloads; default-src 'none'; script-src 'unsafe-inline' "
     "'wasm-unsafe-eval'; worker-src blob:; style-src 'unsafe-inline'; img-src data:; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'self'"
 )
-"""policy of files of the folder: whatever runs in them has no origin, no cookie and no network"""
+"""policy of the folder's files: scripts in them have no origin, no cookies and no network"""
 
 
 class Body(Protocol):
-    """What a request's body is read from."""
+    """Stream of a request's body."""
 
     def read(self, size: int) -> bytes:
-        """Return so many bytes, fewer only where the other side has left."""
+        """Return ``size`` bytes, fewer only if the client has disconnected."""
         ...
 
 
 @dataclass(frozen=True)
 class Request:
-    """What is asked.
+    """A request of a client.
 
     Parameters
     ----------
     method, path, query
-        From the first line, decoded.
+        From the request line, decoded.
     headers
-        As they were sent.
+        Headers as sent.
     body, length
-        Where the body is read from, and its bytes; -1 where it is not said.
+        Stream of the body, and its length in bytes; -1 if the request does not declare it.
     """
 
     method: str
@@ -79,26 +79,26 @@ class Request:
     length: int
 
     def form(self) -> dict[str, Any]:
-        """Return the object that was sent as JSON.
+        """Return the form's JSON object.
 
         Raises
         ------
         RefusedError
-            With status 415, 411, 413 or 400 where there is none.
+            With status 415, 411, 413 or 400 if the body is not a valid form.
         """
         if self.headers.get("Content-Type", "").partition(";")[0].strip() != "application/json":
-            raise RefusedError(415, "a form is sent as application/json: use the page's button")
+            raise RefusedError(415, "a form must be application/json: use the page's button")
         self.require_length(LARGEST_FORM, "a form")
         try:
-            said = json.loads(self.body.read(self.length))
+            content = json.loads(self.body.read(self.length))
         except (ValueError, RecursionError):
-            said = None
-        if not isinstance(said, dict):
+            content = None
+        if not isinstance(content, dict):
             raise RefusedError(400, "the form is not a JSON object: use the page's button")
-        return said
+        return content
 
     def require_length(self, most: int, what: str) -> None:
-        """Refuse a body whose length is not said, or too large.
+        """Reject a body whose length is undeclared or too large.
 
         Raises
         ------
@@ -106,7 +106,7 @@ class Request:
             With status 411 or 413.
         """
         if self.length < 0:
-            raise RefusedError(411, f"{what} needs a Content-Length: send it as one piece")
+            raise RefusedError(411, f"{what} needs a Content-Length: send it in one piece")
         if self.length > most:
             raise RefusedError(
                 413,
@@ -118,20 +118,20 @@ class Request:
 
 @dataclass(frozen=True)
 class Reply:
-    """What is answered.
+    """A reply of the server.
 
     Parameters
     ----------
     body
-        Bytes, or the file that has them.
+        Bytes, or the file that contains them.
     kind
         Content type.
     status
-        Of HTTP.
+        HTTP status.
     policy
         Content security policy.
     headers
-        Further ones.
+        Further headers.
     """
 
     body: bytes | Path
@@ -142,12 +142,12 @@ class Reply:
 
 
 def page(text: str) -> Reply:
-    """Return one of the server's own pages."""
+    """Return a reply with a page of the server."""
     return Reply(text.encode())
 
 
 def plain(said: Mapping[str, Any], status: int = 200) -> Reply:
-    """Return a JSON object; what is not defined becomes null."""
+    """Return a reply with a JSON object, in which undefined numbers become null."""
     from bywire.report.answer import finite
 
     return Reply(json.dumps(finite(dict(said))).encode(), "application/json", status)

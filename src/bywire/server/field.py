@@ -1,4 +1,4 @@
-"""A field of a form: what it takes, checked before anything is computed."""
+"""Fields of forms, and the checks of their values before the computation."""
 
 from __future__ import annotations
 
@@ -24,24 +24,24 @@ class Field:
     Parameters
     ----------
     name, label
-        Of the field, and what stands beside it.
+        Name of the field, and its label on the page.
     kind
         A ``text``, a ``whole`` number, ``lines`` of text, ``pairs`` (lines of ``KEY=VALUE``),
         ``changes`` (such pairs, of which some name files), ``names`` (lines of ``NAME`` or
         ``NAME=TEXT``), a ``flag``, a ``choice``, a measurement ``file`` or ``files`` of the folder,
-        or a ``thing`` or ``things``: a name that is known, or what the folder has of it.
+        or a ``thing`` or ``things``: a known name, or a file of the folder.
     hint
-        What it means; of commands' options, their help.
+        Its meaning; the help of the command's option.
     choices
-        Returns what is known by name.
+        Returns the known names.
     offered
-        Returns what the folder has of a thing.
+        Returns the things in the folder.
     is_required
         Whether it must be filled in.
     default
-        Of a whole number that is left out, and of a flag.
+        Default of a whole number or of a flag.
     least
-        Of a whole number.
+        Least valid value of a whole number.
     """
 
     name: str
@@ -55,14 +55,14 @@ class Field:
     least: int = 0
 
     def read(self, given: Any, place: Place) -> Any:
-        """Return what a form gave, checked; paths as they stand in the folder.
+        """Check and return the value of a form; paths are relative to the folder.
 
         Raises
         ------
         InputError
-            When it is of another kind, unknown, missing, or too long.
+            If the value is of another kind, unknown, missing, or too long.
         RefusedError
-            For a path that is not in the folder.
+            For a path outside the folder.
         """
         if self.kind == "flag":
             if not isinstance(given, (bool, type(None))):
@@ -111,9 +111,9 @@ class Field:
         return number
 
     def _thing(self, text: str, place: Place) -> str:
-        """Return a thing that is known by its name, or lies in the folder."""
+        """Return a thing by its known name, or by its path in the folder."""
         if text in self._known():
-            if os.path.lexists(place.root / text):  # functions may look there first
+            if os.path.lexists(place.root / text):  # the use case may read this path first
                 place.inside(text)
             return text
         path = place.inside(text)
@@ -125,5 +125,5 @@ class Field:
 
 
 def is_file_name(bench: str) -> bool:
-    """Return whether the name of a bench is that of a file, and not of an experiment."""
+    """Return whether a bench's name is a file name, not an experiment's name."""
     return bench.endswith(".toml")

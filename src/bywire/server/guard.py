@@ -1,8 +1,8 @@
-"""Who may ask: only who has the link, from this machine, and from no other site's page.
+"""Access control: only requests with the link's token, from this machine, not from another site.
 
-A page of another site can send requests to this machine (and, by a name that it lets point here,
-even read the answers): the name in Host, the site in Origin and what the browser says of where a
-request comes from tell those apart. The token tells other users and programs of this machine apart.
+A page of another site can send requests to this machine. With a name that resolves to this machine
+it could even read the answers. The headers Host, Origin and Sec-Fetch-Site identify such requests.
+The token excludes other users and programs of this machine.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from bywire.server.address import HERE, NAMES
 from bywire.server.exchange import RefusedError
 
 _PLAIN: Final = 80
-"""the port of HTTP, which addresses leave out"""
+"""default port of HTTP, which addresses omit"""
 _HERE: Final = ("same-origin", "none")
 
 
 def new_token() -> str:
-    """Return a token that nobody guesses."""
+    """Return a token that nobody can guess."""
     return secrets.token_urlsafe(32)
 
 
@@ -32,7 +32,7 @@ def cookie_name(port: int) -> str:
 
 
 def require_place(method: str, headers: Message, port: int) -> None:
-    """Refuse what was sent to another name, or by a page of another site.
+    """Reject requests to another host name, or from a page of another site.
 
     Raises
     ------
@@ -41,10 +41,10 @@ def require_place(method: str, headers: Message, port: int) -> None:
     """
     host = headers.get("Host", "").lower()
     if port == _PLAIN:
-        host = host.removesuffix(f":{port}")  # browsers leave it out, others may not
+        host = host.removesuffix(f":{port}")  # browsers omit it, other clients may not
     if host not in {name if port == _PLAIN else f"{name}:{port}" for name in NAMES}:
         raise RefusedError(
-            421, f"this server answers as {HERE}:{port} only: open the link that it printed"
+            421, f"this server answers only as {HERE}:{port}: open the link that it printed"
         )
     origin = headers.get("Origin")
     if origin is not None and origin != f"http://{host}":
@@ -59,7 +59,7 @@ def require_place(method: str, headers: Message, port: int) -> None:
 
 
 def require_token(headers: Message, query: Mapping[str, str], port: int, token: str) -> None:
-    """Refuse who has not the token, in the link or kept as a cookie.
+    """Reject requests without the token, in the link or in the cookie.
 
     Raises
     ------
@@ -69,13 +69,13 @@ def require_token(headers: Message, query: Mapping[str, str], port: int, token: 
     given = [query["token"]] if "token" in query else _kept(headers, port)
     if not given:
         raise RefusedError(
-            401, "the token is missing: open the whole link that 'bywire serve' printed"
+            401, "the token is missing: open the complete link that 'bywire serve' printed"
         )
     if not any(secrets.compare_digest(each.encode(), token.encode()) for each in given):
         raise RefusedError(
             401,
-            "the token is not this server's (a new one is made at each start): open the link that "
-            "'bywire serve' printed last",
+            "the token is not valid for this server (each start creates a new one): open the link "
+            "that 'bywire serve' printed last",
         )
 
 

@@ -1,9 +1,9 @@
-"""What runs in the process of a job: one call of a public function, told line by line.
+"""Process of a job: one call of a public function, reported line by line.
 
-The order comes as a line of JSON on standard input: ``{task, asked, folder, out, systems}``.
-Answers go as such lines to standard output: ``{progress: [label, share]}``, ``{report: true}``,
-``{so_far}`` of a study, and at last one of ``{done}``, ``{error}`` and ``{canceled}``. When the
-server is gone, its end of standard input is closed, and this process ends with all that it started.
+The order arrives as a line of JSON on standard input: ``{task, asked, folder, out, systems}``.
+Messages go as such lines to standard output: ``{progress: [label, share]}``, ``{report: true}``,
+``{so_far}`` of a study, and finally one of ``{done}``, ``{error}`` and ``{canceled}``. When the
+server ends, standard input closes, and this process ends with all that it started.
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ from bywire.core.errors import BywireError
 from bywire.core.interrupts import interrupt_heard, interrupts_noted
 from bywire.server.study_so_far import begin_to_tell, tell
 
-_PAUSE = 0.1  # s between two words on progress
+_PAUSE = 0.1  # s between two messages on progress
 
 
 def main() -> None:
-    """Compute what is asked for."""
-    # As commands do: what was registered for the end is done, and Python does not tidy up further.
+    """Run the ordered computation."""
+    # As in commands: run the registered exit functions, then skip Python's finalization.
     atexit.register(os._exit, 0)
     begin_to_tell()
-    with contextlib.suppress(OSError):  # of this machine's memory, this is what may be taken back
+    with contextlib.suppress(OSError):  # if memory runs out, end this process first
         Path("/proc/self/oom_score_adj").write_text("900")
     with interrupts_noted() as was_interrupted:
         try:
@@ -66,7 +66,7 @@ def _explained(error: Exception) -> str:
         return str(error)
     if isinstance(error, OSError):
         place = f"{error.filename}: " if error.filename else ""
-        return f"{place}{error.strerror or error}: check that it is there and that there is room"
+        return f"{place}{error.strerror or error}: check that it exists and that there is room"
     if line := foreign_line(error):
         return line
     traceback.print_exception(error)
@@ -108,13 +108,13 @@ def _compute(order: Mapping[str, Any]) -> None:
 
 
 class _Words:
-    """Progress, told now and then."""
+    """Progress, reported at intervals."""
 
     def __init__(self) -> None:
         self._last, self._next = ("", -1.0), 0.0
 
     def __call__(self, label: str, share: float) -> None:
-        """Tell it, where something has changed."""
+        """Report the progress if it has changed."""
         now, word = time.monotonic(), (label, round(float(share), 3))
         if word != self._last and (now > self._next or label != self._last[0] or share >= 1.0):
             self._last, self._next = word, now + _PAUSE

@@ -1,4 +1,4 @@
-"""Jobs: what is computed in processes of their own, with progress, and how each ends."""
+"""Jobs: computations in separate processes, their progress and their outcome."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ from bywire.server.task import Task
 
 
 def started(folder: Path) -> subprocess.Popen[bytes]:
-    """Return a new process that waits for its order; no code of the served folder runs in it."""
+    """Start a process that waits for its order; it does not run code of the served folder."""
     return start_python("bywire.server.job_process", untrusted=(folder,))
 
 
 def interrupt(process: subprocess.Popen[bytes]) -> None:
-    """Do what Ctrl-C does to a command."""
+    """Interrupt a process as Ctrl-C interrupts a command."""
     if os.name == "posix":
         _signal(process, signal.SIGINT)
     elif process.poll() is None:
@@ -36,7 +36,7 @@ def interrupt(process: subprocess.Popen[bytes]) -> None:
 
 
 def kill(process: subprocess.Popen[bytes]) -> None:
-    """End it at once, with all that it started."""
+    """Kill a process and all that it started."""
     if os.name == "posix":
         _signal(process, signal.SIGKILL)
     elif process.poll() is None:
@@ -52,24 +52,24 @@ def _signal(process: subprocess.Popen[bytes], number: int) -> None:
 # --- Jobs
 
 TOGETHER = 2
-"""jobs that compute at the same time; further ones wait"""
+"""jobs that compute at the same time; others wait"""
 MOST = 100
-"""jobs that wait or compute; more are refused"""
-_KEPT = 200  # jobs that are remembered
-_PATIENCE = 5.0  # s that a job has to end after it was asked to
+"""jobs that wait or compute; the server rejects more"""
+_KEPT = 200  # jobs in the list
+_PATIENCE = 5.0  # s that a job has to end after an interrupt
 _ENDED = ("done", "failed", "canceled")
 
 
 @dataclass(eq=False)
 class Job:
-    """Something that is computed.
+    """A computation.
 
     Parameters
     ----------
     number
-        By which it is called.
+        Number in the list of jobs.
     task, asked
-        What is computed.
+        Its task, and the values of the task's fields.
     out
         Folder, or file, of its result.
     """
@@ -89,7 +89,7 @@ class Job:
     is_unwanted: bool = False
 
     def shown(self, place: Place) -> dict[str, Any]:
-        """Return what pages are told of it."""
+        """Return the job's state for pages."""
         is_inside = not self.task.form.is_file
         page = "report.html" if self.reports else ""
         page = str(self.result.get("page", page))
@@ -119,7 +119,7 @@ class Jobs:
     Parameters
     ----------
     place
-        The folder that is served, which their paths start from.
+        The served folder, the base of their paths.
     """
 
     def __init__(self, place: Place) -> None:
@@ -130,12 +130,13 @@ class Jobs:
         self._is_open = True
 
     def start(self, task: Task, asked: Mapping[str, Any], out: Path | None = None) -> Job:
-        """Begin with a job, or have it wait for its turn.
+        """Start a job, or queue it.
 
         Raises
         ------
         RefusedError
-            With status 409 where its folder is another job's, 429 for too many, 503 at the end.
+            With status 409 if another job uses its folder, 429 for too many jobs, 503 during
+            shutdown.
         """
         with self._lock:
             active = [each for each in self._jobs.values() if each.state not in _ENDED]
@@ -160,7 +161,7 @@ class Jobs:
         return job
 
     def begun(self, task: Task, asked: Mapping[str, Any]) -> Path | None:
-        """Return the folder that holds what is asked already, to go on in it; None for none."""
+        """Return the folder with earlier results of the same task, to continue there, or None."""
         return task.begun(asked, self._place, self._place.folders(_name(task, asked)))
 
     def all(self) -> list[Job]:
@@ -174,7 +175,7 @@ class Jobs:
         Raises
         ------
         RefusedError
-            With status 404 where there is none.
+            With status 404 if there is no such job.
         """
         with self._lock:
             job = self._jobs.get(read_count(number) or 0)
@@ -183,7 +184,7 @@ class Jobs:
         return job
 
     def cancel(self, job: Job) -> None:
-        """End a job; what it finished of a study stays."""
+        """Cancel a job; finished parts of a study stay."""
         with self._lock:
             job.is_unwanted = True
             process = job.process
@@ -194,7 +195,7 @@ class Jobs:
             watch.start()
 
     def close(self) -> None:
-        """End all jobs, and wait until they have ended."""
+        """Cancel all jobs, and wait for their end."""
         with self._lock:
             self._is_open = False
         left = [job for job in self.all() if not job.ended.is_set()]
@@ -209,14 +210,14 @@ class Jobs:
         return self._place.fresh_folder(_name(task, asked))
 
     def _run(self, job: Job) -> None:
-        # A page that somebody waits for is made at once: two studies would hold it up for hours.
+        # A user waits for a live page, so it does not queue: two studies could delay it by hours.
         with nullcontext() if job.task.form.is_file else self._turn:
             try:
                 self._compute(job)
             except OSError as error:
-                job.state, job.message = "failed", f"it cannot be started: {error}"
+                job.state, job.message = "failed", f"the process cannot be started: {error}"
             finally:
-                with contextlib.suppress(OSError):  # there is a result
+                with contextlib.suppress(OSError):  # not empty: it contains a result
                     job.out.rmdir()
                 job.ended.set()
 
@@ -236,7 +237,7 @@ class Jobs:
         process = job.process
         assert process.stdin is not None
         assert process.stdout is not None
-        with contextlib.suppress(OSError):  # it has ended, which the answer will show
+        with contextlib.suppress(OSError):  # the process has ended, as its status will show
             process.stdin.write(json.dumps(order).encode() + b"\n")
             process.stdin.flush()
         last: dict[str, Any] = {}
@@ -248,19 +249,19 @@ class Jobs:
         _end(job, last, status)
 
     @staticmethod
-    def _hear(job: Job, said: dict[str, Any]) -> dict[str, Any]:
-        """Take note of a word of the process; return its last one."""
-        if "progress" in said:
-            label, share = said["progress"]
+    def _hear(job: Job, message: dict[str, Any]) -> dict[str, Any]:
+        """Handle a message of the process; return it if it is the final one."""
+        if "progress" in message:
+            label, share = message["progress"]
             job.progress = (str(label), float(share))
             return {}
-        if "so_far" in said:
-            job.so_far = said["so_far"]
+        if "so_far" in message:
+            job.so_far = message["so_far"]
             return {}
-        if "report" in said:
+        if "report" in message:
             job.reports += 1
             return {}
-        return said
+        return message
 
 
 def _name(task: Task, asked: Mapping[str, Any]) -> str:
@@ -268,7 +269,7 @@ def _name(task: Task, asked: Mapping[str, Any]) -> str:
 
 
 def _end(job: Job, last: Mapping[str, Any], status: int) -> None:
-    """Say how a job has ended."""
+    """Set the final state and message of a job."""
     if "done" in last:
         job.result, job.state = last["done"], "done"
     elif "error" in last:
@@ -278,7 +279,7 @@ def _end(job: Job, last: Mapping[str, Any], status: int) -> None:
     else:
         how = f"signal {signal.Signals(-status).name}" if status < 0 else f"status {status}"
         job.message, job.state = (
-            f"its process ended by {how}, probably out of memory: compute less, or run the "
+            f"the process was ended by {how}, probably out of memory: compute less, or run the "
             f"command 'bywire {job.task.command}' in a terminal",
             "failed",
         )

@@ -1,4 +1,4 @@
-"""Live pages of benches: made when somebody wants them, kept until their bench changes."""
+"""Live pages of benches: created on the first request, kept until their bench changes."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ class LivePages:
     Parameters
     ----------
     place, jobs
-        What is served, and who makes them.
+        The served folder, and the jobs that create the pages.
     scratch
-        Folder in which they are kept.
+        Folder that keeps the pages.
     """
 
     def __init__(self, place: Place, jobs: Jobs, scratch: Path) -> None:
@@ -36,14 +36,14 @@ class LivePages:
         self._lock = threading.Lock()
 
     def file(self, bench: str, case: str) -> Path:
-        """Return the file of a bench's live page, which is made where there is none yet.
+        """Return the file of a bench's live page, created if missing.
 
         Raises
         ------
         InputError
-            For a bench file that is none.
+            For an invalid bench file.
         RefusedError
-            With status 422 and what is wrong where it cannot be made.
+            With status 422 and the reason if the page cannot be created.
         """
         task = tasks()["page"]
         asked = task.read({"bench": bench, "case": case}, self._place)
@@ -59,7 +59,7 @@ class LivePages:
         return job.out
 
     def _state(self, asked: dict[str, Any]) -> Iterator[str]:
-        """Yield what the page is made of: the bench file, and files that stand in it."""
+        """Yield the inputs of the page: the bench file, and the files it names."""
         yield from (asked["bench"], asked["case"])
         if not is_file_name(asked["bench"]):
             return
@@ -81,12 +81,12 @@ def _texts(content: Any) -> Iterator[str]:
 
 
 def experiments() -> dict[str, str]:
-    """Return what each experiment is, by its name.
+    """Return the summary of each experiment, by its name.
 
     Raises
     ------
     FileError
-        When no index of them can be made.
+        If the index of experiments cannot be created.
     """
     from bywire.api.overview import overview
 
@@ -97,7 +97,7 @@ def experiments() -> dict[str, str]:
     return every
 
 
-# --- What a page says of a bench before anything is computed
+# --- A bench on its page, before any computation
 
 
 @dataclass(frozen=True)
@@ -113,7 +113,7 @@ class ShownBench:
     cases
         Its runs.
     trouble
-        Why it makes none as it stands.
+        Why it has no runs with its defaults.
     """
 
     name: str
@@ -123,21 +123,21 @@ class ShownBench:
 
 
 def shown_bench(path: Path, name: str) -> ShownBench:
-    """Return what is said of a bench file, or of an experiment with its defaults.
+    """Return the page content of a bench file, or of an experiment with its defaults.
 
     Raises
     ------
     InputError
-        For a bench file that does not fit.
+        For an invalid bench file.
     """
     try:
         bench = bench_file.read(path, {})
     except InputError as error:
         if is_file_name(name):
             raise
-        # What drives it is wanted, which a measurement may give.
+        # Its stimulus is missing, which a measurement may provide.
         return ShownBench(name, experiments()[name], trouble=str(error))
-    # By their preview: the runs themselves may begin where others ended, and these take a while.
+    # Use the preview: actual runs may start where earlier ones ended, which takes a while.
     cases = bench.cases_with(bench.par, bench.chosen_options, bench.definition.preview)
     summary = f"{bench.summary()}; parameters {bench.parameters}"
     return ShownBench(name, summary, tuple(case.label for case in cases))

@@ -19,18 +19,18 @@ _SEVERAL = ("files", "things")
 
 
 def text(shown: str) -> str:
-    """Return a text as HTML, harmless in content and attributes."""
+    """Return a text escaped for HTML content and attributes."""
     return escape(clean(shown), quote=True)
 
 
 def row(task: Task, field: Field, there: Contents, chosen: str) -> str:
-    """Return a field with its label and its hint; ``chosen`` is what it begins with."""
+    """Return a field with its label and its hint; ``chosen`` is its initial value."""
     name, mark = f"{task.name}-{field.name}", f'name="{text(field.name)}"'
-    said = _hint(field)
-    hint = f'<p class="hint" id="{name}-hint">{text(said)}</p>' if said else ""
-    told = f' aria-describedby="{name}-hint"' if hint else ""
-    wanted = " required" if field.is_required else ""
-    attributes = f'id="{name}" {mark}{told}{wanted}'
+    words = _hint(field)
+    hint = f'<p class="hint" id="{name}-hint">{text(words)}</p>' if words else ""
+    described = f' aria-describedby="{name}-hint"' if hint else ""
+    required = " required" if field.is_required else ""
+    attributes = f'id="{name}" {mark}{described}{required}'
     if field.kind == "flag":
         checked = " checked" if field.default else ""
         return (
@@ -44,12 +44,12 @@ def row(task: Task, field: Field, there: Contents, chosen: str) -> str:
 
 
 def _hint(field: Field) -> str:
-    said = field.hint
+    hint = field.hint
     if field.kind in _LINES:
-        said += " One per line."
+        hint += " One per line."
     if field.kind in _SEVERAL:
-        said += " Several with Ctrl."
-    return said.strip()
+        hint += " Select several with Ctrl."
+    return hint.strip()
 
 
 def _entry(field: Field, there: Contents, attributes: str, chosen: str) -> str:
@@ -69,7 +69,7 @@ def _entry(field: Field, there: Contents, attributes: str, chosen: str) -> str:
 
 
 def _select(field: Field, offered: Iterable[str], attributes: str, chosen: str) -> str:
-    """Return what is chosen from: what the folder has, and what is known by name."""
+    """Return a selection of files in the folder and of known names."""
     many = f' multiple size="{8 if field.choices else 4}"' if field.kind in _SEVERAL else ""
     here = _options(offered, chosen)
     known = _options(field.choices(), chosen) if field.choices is not None else ""
@@ -108,7 +108,7 @@ def frame(title: str, summary: str, body: Iterable[str], *, largest: int) -> str
     body
         HTML.
     largest
-        Bytes that a file may have that is dropped.
+        Largest uploaded file, in bytes.
     """
     inner = "\n".join(body)
     return f"""<!DOCTYPE html>
@@ -123,17 +123,17 @@ def frame(title: str, summary: str, body: Iterable[str], *, largest: int) -> str
 </head>
 <body data-largest="{largest}">
 <header>
-<p class="home"><a href="/">All of this folder</a></p>
+<p class="home"><a href="/">Folder overview</a></p>
 <h1>{text(title)}</h1>
 <p class="summary">{text(summary)}</p>
 <p id="message" class="status bad" role="alert" hidden></p>
-<noscript><p class="status bad">These pages need their script: allow it here.</p></noscript>
+<noscript><p class="status bad">These pages need JavaScript: allow it here.</p></noscript>
 </header>
 <main>
 {inner}
 <section aria-labelledby="jobs-title">
 <h2 id="jobs-title">Jobs</h2>
-<p id="no-jobs">Nothing was computed since the server was started.</p>
+<p id="no-jobs">No jobs since the server started.</p>
 <ul id="jobs"></ul>
 <p id="spoken" class="spoken" role="status"></p>
 </section>
@@ -181,15 +181,15 @@ def form(
     Parameters
     ----------
     task
-        What is asked for.
+        The task.
     there
-        Files that can be chosen.
+        Files to choose from.
     given
-        Values that the page itself knows: their fields are not shown.
+        Values that the page determines; their fields are hidden.
     open_fields
-        Fields that are seen at once; the others are folded.
+        Number of fields shown; the others are folded.
     chosen
-        Values with which fields begin.
+        Initial values of fields.
     """
     hidden = "".join(
         f'<input type="hidden" name="{text(name)}" value="{text(value)}">'
@@ -202,7 +202,7 @@ def form(
     ]
     first, others = "\n".join(shown[:open_fields]), "\n".join(shown[open_fields:])
     folded = f"<details>\n<summary>More</summary>\n{others}\n</details>\n" if others else ""
-    # The script makes the button work: pressed before it is there, it would send to nowhere.
+    # The script enables the button: without the script, it would send the form nowhere.
     return (
         f'<form class="task" data-task="{text(task.name)}">\n{hidden}{first}\n{folded}'
         f'<button type="submit" disabled>{text(task.form.action)}</button>\n</form>'
@@ -220,13 +220,13 @@ def index_page(folder: str, there: Contents, experiments: Mapping[str, str], lar
     Parameters
     ----------
     folder
-        How it is called.
+        Its name.
     there
-        What it has.
+        Its contents.
     experiments
-        Those of every brake that is known, with what each is.
+        Experiments of all known brakes, with their summaries.
     largest
-        Bytes that a file may have that is dropped.
+        Largest uploaded file, in bytes.
     """
     benches = [[link("/bench", name, of=name), text(what)] for name, what in there.benches.items()]
     studies = [[link("/study", name, of=name), text(what)] for name, what in there.studies.items()]
@@ -253,17 +253,17 @@ def index_page(folder: str, there: Contents, experiments: Mapping[str, str], lar
             else []
         ),
         *([section("Lives", "lives", table(["file", "life"], lives))] if lives else []),
-        section("Further work", "tools", table(["task", "what it gives"], tools)),
+        section("Tools", "tools", table(["task", "description"], tools)),
         section("Reports", "reports", _listed(["page"], reports, "reports")),
         section(
             "Experiments",
             "experiments",
             "<details>\n<summary>with their defaults, without a bench file</summary>\n"
-            f"{table(['experiment', 'what it is'], others)}\n</details>",
+            f"{table(['experiment', 'description'], others)}\n</details>",
         ),
     ]
     if not there.is_whole:
-        body.insert(0, "<p>The folder has more files than are listed: serve a smaller one.</p>")
+        body.insert(0, "<p>The folder has more files than listed here: serve a smaller one.</p>")
     return frame(folder, "Benches, studies and results of this folder", body, largest=largest)
 
 
@@ -280,11 +280,11 @@ def bench_page(bench: ShownBench, there: Contents, largest: int) -> str:
     Parameters
     ----------
     bench
-        What is said of it.
+        The bench.
     there
-        What the folder has.
+        Contents of the folder.
     largest
-        Bytes that a file may have that is dropped.
+        Largest uploaded file, in bytes.
     """
     given = {"bench": bench.name}
     body = [
@@ -303,7 +303,7 @@ def _live(bench: ShownBench) -> str:
         return f"<p>{text(bench.trouble)}</p>"
     cases = bench.cases
     if not cases:
-        return "<p>This experiment computes a characteristic without any run: run it.</p>"
+        return "<p>This experiment computes a characteristic, not a run: use Run with Python.</p>"
     address = f"/live?of={quote(bench.name, safe='')}"
     first = f"{address}&case={quote(cases[0], safe='')}" if len(cases) > 1 else address
     choice = ""
@@ -315,8 +315,8 @@ def _live(bench: ShownBench) -> str:
         )
     return (
         f'{choice}<iframe id="live" title="Live page of {text(bench.name)}" src="{text(first)}">'
-        f'</iframe>\n<p><a id="live-link" href="{text(first)}">The live page by itself</a>: it is '
-        "made when it is first opened, which takes a while.</p>"
+        f'</iframe>\n<p><a id="live-link" href="{text(first)}">The live page by itself</a>. Its '
+        "first start takes a while.</p>"
     )
 
 
@@ -331,15 +331,15 @@ def study_page(
     Parameters
     ----------
     study, bench
-        Its file, and what is varied.
+        Its file, and the bench that it varies.
     report
-        Its page in the folder, whether or not it is there; see `bywire.server.routes`.
+        Path of its page in the folder, whether or not it exists; see `bywire.server.routes`.
     progress
-        How far it is.
+        Its progress as a sentence.
     there
-        What the folder has.
+        Contents of the folder.
     largest
-        Bytes that a file may have that is dropped.
+        Largest uploaded file, in bytes.
     """
     is_there = report in there.reports
     address = text(quote(f"/file/{report}"))
@@ -351,7 +351,7 @@ def study_page(
     )
     body = [
         section("Run the study", "study", form(tasks()["study"], there, {"study": study})),
-        section("What it shows", "shown", seen),
+        section("Results", "shown", seen),
         f"<p>{link(f'/file/{study}', 'The study file')}</p>",
     ]
     return frame(study, f"Study of {bench}", body, largest=largest)
@@ -361,10 +361,10 @@ def study_page(
 
 
 def report_page(name: str) -> str:
-    """Return a page that holds a file in a frame, which the policy of this page keeps here.
+    """Return a page that shows a file in a frame, which the policy of this page restricts.
 
-    What a frame leads to, by its script, by a link or after some time, its holder's policy admits
-    or not. A page that is alone in its tab has no holder.
+    The policy of the outer page decides where a frame may navigate, by a script, a link or a timer.
+    A file opened directly in a tab would have no outer page.
     """
     address = text(quote(f"/file/{name}"))
     return f"""<!DOCTYPE html>
@@ -382,19 +382,16 @@ def report_page(name: str) -> str:
 """
 
 
-# --- A task that is no single bench's
+# --- A task that does not belong to a single bench
 
 
 def task_page(task: Task, there: Contents, chosen: Mapping[str, str], largest: int) -> str:
-    """Return the page of a task; what it is given stands in `bench_page`.
-
-    ``chosen`` has values of fields, with which the form begins.
-    """
+    """Return the page of a task; ``chosen`` has initial values of fields."""
     inner = form(task, there, {}, open_fields=4, chosen=chosen)
     return frame(
         task.form.title,
         task.case.summary,
-        [section("What is asked", task.name, inner)],
+        [section("Settings", task.name, inner)],
         largest=largest,
     )
 
@@ -402,11 +399,11 @@ def task_page(task: Task, there: Contents, chosen: Mapping[str, str], largest: i
 # --- A refusal
 
 
-def refusal_page(status: int, said: str) -> str:
-    """Return a page without style or script: who sees it may not have the token."""
+def refusal_page(status: int, message: str) -> str:
+    """Return an error page without style or script: its reader may not have the token."""
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="color-scheme" content="light dark">\n'
         f"<title>{status}</title>\n</head>\n<body>\n<h1>bywire: {status}</h1>\n"
-        f"<p>{text(said)}</p>\n</body>\n</html>\n"
+        f"<p>{text(message)}</p>\n</body>\n</html>\n"
     )

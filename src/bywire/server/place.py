@@ -1,4 +1,4 @@
-"""The folder that is served, which no path leads out of."""
+"""The served folder, which no path can leave."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from bywire.core.scratch import claim
 from bywire.server.exchange import RefusedError
 
 RESULTS, MEASUREMENTS = "results", "measurements"
-_LONGEST = 100  # characters of the name of a file that was dropped
+_LONGEST = 100  # characters of an uploaded file's name
 _LONGEST_FOLDER = 60  # characters of the name of a result's folder, of four bytes at most
 _PLAIN = re.compile(r"[^A-Za-z0-9._-]+")
 
@@ -28,20 +28,20 @@ _claiming = threading.Lock()
 
 @dataclass(frozen=True)
 class Place:
-    """A folder and what is in it.
+    """A served folder and its files.
 
     Parameters
     ----------
     root
-        The folder, resolved.
+        The folder's resolved path.
     """
 
     root: Path
 
     def inside(self, text: str) -> Path:
-        """Return the path that a text names in the folder, whether or not anything is there.
+        """Return the path that a text names in the folder, whether or not it exists.
 
-        Hidden files are no part of what is served, and links that lead out lead nowhere.
+        Hidden files and links that leave the folder are excluded.
 
         Raises
         ------
@@ -56,7 +56,7 @@ class Place:
             path = (self.root / text).resolve()
             with suppress(FileNotFoundError, NotADirectoryError):
                 path.lstat()
-        except (OSError, RuntimeError, ValueError):  # a circle of links, too long a name
+        except (OSError, RuntimeError, ValueError):  # a loop of links, too long a name
             raise self.unknown(text) from None
         if not path.is_relative_to(self.root):
             raise self.unknown(text)
@@ -70,7 +70,7 @@ class Place:
         Raises
         ------
         RefusedError
-            With status 404 where there is none.
+            With status 404 if there is no such file.
         """
         path = self.inside(text)
         if not path.is_file():
@@ -78,14 +78,14 @@ class Place:
         return path
 
     def unknown(self, text: str) -> RefusedError:
-        """Return what is said of a path that is not served."""
+        """Return the error for a path that the server does not serve."""
         shown = text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
         return RefusedError(
-            404, f"there is no {shown!r} in the folder that is served: the start page lists it"
+            404, f"there is no {shown!r} in the served folder: the start page lists its contents"
         )
 
     def named(self, path: Path) -> str:
-        """Return how links call a path of the folder."""
+        """Return the name of a path in links: relative to the folder."""
         return path.relative_to(self.root).as_posix()
 
     def fresh_folder(self, stem: str) -> Path:
@@ -94,7 +94,7 @@ class Place:
         Raises
         ------
         FileError
-            When it cannot be made.
+            If it cannot be created.
         """
         parent = self._made(RESULTS)
         for number in range(1, 10_000):
@@ -111,12 +111,12 @@ class Place:
         )
 
     def same_folder(self, name: str) -> Path:
-        """Return the one folder of a file's result that is gone on with."""
+        """Return the single folder in which a file's result is continued."""
         self._made(RESULTS)
         return self.inside(f"{RESULTS}/{folder_name(name)}")
 
     def folders(self, stem: str) -> list[Path]:
-        """Return the folders of results of a name, the latest first."""
+        """Return the result folders of a name, the latest first."""
         found = {
             int(path.name.removeprefix(f"{stem}-")): path
             for path in self._made(RESULTS).glob(f"{escape(stem)}-*")
@@ -125,27 +125,27 @@ class Place:
         return [found[number] for number in sorted(found, reverse=True)]
 
     def measurements(self) -> Path:
-        """Return the folder of measurements that were dropped.
+        """Return the folder of uploaded measurements.
 
         Raises
         ------
         FileError
-            When it cannot be made.
+            If it cannot be created.
         """
         return self._made(MEASUREMENTS)
 
     def kept(self, fresh: Path, name: str) -> Path:
-        """Give a measurement, written beside the others, the first free name; return its place.
+        """Give an uploaded measurement the first free name, and return its path.
 
-        Nothing is ever replaced, also where several files of one name arrive at once. Names that
-        differ in upper and lower case alone count as one, for the systems on which they are.
+        Existing files are never replaced, even if several files of one name arrive simultaneously.
+        Names that differ only in case count as equal, for systems that ignore case.
 
         Raises
         ------
         FileError
-            When all names are taken.
+            If all names are taken.
         OSError
-            When the folder cannot be written to.
+            If the folder is not writable.
         """
         parent, plain = self.measurements(), Path(safe_name(name))
         numbered = (f"{plain.stem}-{number}{plain.suffix}" for number in range(2, 10_000))
@@ -170,9 +170,9 @@ class Place:
 
 
 def folder_name(name: str) -> str:
-    """Return what the folder of a file's result is called: no two files of a folder share one.
+    """Return the name of a file's result folder, which is unique for each file.
 
-    Where the file lies deeper, ``~1`` stands for the slash, as in JSON pointers.
+    If the file is in a subfolder, ``~1`` stands for the slash, as in JSON pointers.
 
     Examples
     --------
@@ -183,7 +183,7 @@ def folder_name(name: str) -> str:
 
 
 def shortened(name: str) -> str:
-    """Return a name that is short enough for a folder; long ones end in a digest of the whole."""
+    """Return a name short enough for a folder; a long one ends in a digest of the full name."""
     if len(name) <= _LONGEST_FOLDER:
         return name
     digest = hashlib.sha256(name.encode(errors="replace")).hexdigest()[:8]
@@ -191,7 +191,7 @@ def shortened(name: str) -> str:
 
 
 def safe_name(name: str) -> str:
-    """Return a name that is a file's in one folder, and nothing else on any system.
+    """Return a plain file name that is safe on every system.
 
     Examples
     --------
@@ -214,11 +214,11 @@ def place_of(folder: Path) -> Place:
     Raises
     ------
     FileError
-        When it is no folder.
+        If it is not a folder.
     """
     if not folder.is_dir():
         raise FileError(
-            f"{folder} is not a folder: name the one to serve with "
+            f"{folder} is not a folder: name the folder to serve with "
             f"{'--folder' if is_command_line() else 'folder'}",
             name=str(folder),
         )
@@ -226,7 +226,7 @@ def place_of(folder: Path) -> Place:
 
 
 def require_inside(place: Place, settings: Mapping[str, str], keys: tuple[str, ...]) -> None:
-    """Refuse settings that name a file outside of the folder.
+    """Reject settings that name a file outside the folder.
 
     Raises
     ------
@@ -240,6 +240,6 @@ def require_inside(place: Place, settings: Mapping[str, str], keys: tuple[str, .
 
 def _unwritable(path: Path, error: OSError) -> FileError:
     return FileError(
-        f"cannot make {path}: {error.strerror or error}: make room there, or serve a folder that "
+        f"cannot create {path}: {error.strerror or error}: make room there, or serve a folder that "
         "you may write to"
     )

@@ -1,6 +1,6 @@
-"""Which request is answered by what.
+"""Routes of the server: the functions that answer requests.
 
-Whoever made them, their bytes are opened by the limited process of `bywire.data.limited_source`.
+Measurement files are opened only in the restricted process of `bywire.data.limited_source`.
 """
 
 from __future__ import annotations
@@ -27,15 +27,15 @@ _PIECE = 2**20
 
 
 def uploaded(place: Place, request: Request, name: str, largest: int) -> Path:
-    """Keep a file, whole or not at all, under a name that nothing has yet.
+    """Store an uploaded file, completely or not at all, under a free name.
 
     Raises
     ------
     RefusedError
-        With status 415 for an ending of no format, 411 and 413 for its length, 400 where it does
-        not come to its end.
+        With status 415 for an unknown format, 411 and 413 for the length, 400 for an incomplete
+        upload.
     OSError
-        When there is no room for it.
+        If the disk is full.
     """
     if Path(safe_name(name)).suffix.lower() not in endings():
         raise RefusedError(
@@ -53,25 +53,25 @@ def uploaded(place: Place, request: Request, name: str, largest: int) -> Path:
             while left:
                 piece = request.body.read(min(left, _PIECE))
                 if not piece:
-                    what = f"{name[:100]!r} did not come to its end: send it again"
+                    what = f"{name[:100]!r} arrived incomplete: send it again"
                     raise RefusedError(400, what)
                 stream.write(piece)
                 left -= len(piece)
         return place.kept(fresh, name)
 
 
-# --- How far a study is
+# --- Progress of a study
 
 
 def how_far(folder: Path) -> str:
-    """Return in a sentence how much of a study is computed."""
+    """Return the progress of a study as a sentence."""
     store = StudyStore(folder)
     try:
-        said = store.record()
+        record = store.record()
     except FileError:
-        return "Nothing of it is computed yet."
-    done = min(len(store.finished()) * CHUNK, int(said["cases"]))
-    return f"{done:,} of {said['cases']:,} cases are computed."
+        return "No case is computed yet."
+    done = min(len(store.finished()) * CHUNK, int(record["cases"]))
+    return f"{done:,} of {record['cases']:,} cases are computed."
 
 
 # --- Routes
@@ -92,22 +92,22 @@ _ASSETS: Final = {
 
 
 def answer(service: Service, request: Request) -> Reply:
-    """Return the answer to a request of somebody who may ask.
+    """Return the reply to an authorized request.
 
     Raises
     ------
     RefusedError
-        With status 404 for an unknown path, 405 for a method that it does not have; what routes
-        refuse.
+        With status 404 for an unknown path, 405 for a method that the path does not support, and
+        if the route rejects the request.
     InputError
-        For what does not fit.
+        For invalid values.
     """
     method = "GET" if request.method == "HEAD" else request.method
     for first, route in _ROUTES.items():
         if request.path == first or (first.endswith("/") and request.path.startswith(first)):
             if method not in route:
                 raise RefusedError(
-                    405, f"{request.method} is not answered here: use {', '.join(route)}"
+                    405, f"{request.method} is not supported here: use {', '.join(route)}"
                 )
             if first == "/" and request.path != "/":
                 continue
@@ -158,9 +158,9 @@ def _study(service: Service, request: Request, rest: str) -> Reply:
             f"{name} is not a study file: it has no bench and no section [vary]", name=name
         )
     folder = f"{RESULTS}/{folder_name(name)}"
-    said = how_far(service.place.root / folder)
+    progress = how_far(service.place.root / folder)
     text = study_page(
-        name, there.studies[name], f"{folder}/report.html", said, there, service.largest
+        name, there.studies[name], f"{folder}/report.html", progress, there, service.largest
     )
     return page(text)
 
@@ -169,7 +169,7 @@ def _file(service: Service, request: Request, rest: str) -> Reply:
     path = service.place.file(rest)
     kind = _KINDS.get(path.suffix.lower())
     if path.suffix.lower() == REPORT and request.headers.get("Sec-Fetch-Dest") == "document":
-        # Alone in a tab, a page may lead that to another site, with what it knows in the address.
+        # Directly in a tab, a page could navigate to another site and send data in the address.
         return page(report_page(service.place.named(path)))
     if kind is None:
         saved = {"Content-Disposition": "attachment"}
@@ -192,8 +192,8 @@ def _all_jobs(service: Service, request: Request, rest: str) -> Reply:
 
 def _begin(service: Service, request: Request, rest: str) -> Reply:
     del rest
-    said = request.form()
-    name, form = said.get("task"), said.get("form")
+    content = request.form()
+    name, form = content.get("task"), content.get("form")
     known = [each.name for each in tasks().values() if not each.form.is_file]
     if not isinstance(name, str) or name not in known:
         raise unknown_name("task", str(name), known)
@@ -214,7 +214,7 @@ def _job(service: Service, request: Request, rest: str) -> Reply:
 def _cancel(service: Service, request: Request, rest: str) -> Reply:
     number, slash, word = rest.partition("/")
     if not slash or word != "cancel":
-        raise RefusedError(404, f"there is no {quoted(request.path)}: jobs only have /cancel")
+        raise RefusedError(404, f"there is no {quoted(request.path)}: jobs only support /cancel")
     job = service.jobs.find(number)
     service.jobs.cancel(job)
     return plain(job.shown(service.place))
@@ -228,12 +228,12 @@ def _upload(service: Service, request: Request, rest: str) -> Reply:
 def _subject(request: Request) -> str:
     name = request.query.get("of", "")
     if not name:
-        raise ParameterError("the address names nothing: follow the links of the start page")
+        raise ParameterError("the address names no bench: follow the links of the start page")
     return name
 
 
 def _path_of(place: Place, bench: str) -> Path:
-    """Return what `bench_file.read` takes of a bench: a file of the folder, or an experiment."""
+    """Return a bench's path for `bench_file.read`: a file of the folder, or an experiment."""
     if is_file_name(bench):
         return place.file(bench)
     known = experiments()
@@ -257,6 +257,6 @@ _ROUTES: Final[dict[str, dict[str, Route]]] = {
 
 
 def addresses() -> Iterator[tuple[str, str]]:
-    """Yield the method and path of everything that is answered."""
+    """Yield the method and path of every route."""
     for path, methods in _ROUTES.items():
         yield from ((method, path) for method in methods)

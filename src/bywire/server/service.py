@@ -1,4 +1,4 @@
-"""What a server works with from its start to its end."""
+"""Resources of a server from its start to its end."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ from bywire.server.live_pages import LivePages
 from bywire.server.place import Place
 
 LARGEST_FILE = 1_000_000_000
-"""bytes of a measurement that is dropped on a page"""
+"""largest uploaded measurement, in bytes"""
 
 
 @dataclass(frozen=True)
 class Service:
-    """A folder that is served.
+    """A served folder.
 
     Parameters
     ----------
     place, jobs, live_pages
-        The folder, what is computed, and its live pages.
+        The folder, its computations, and its live pages.
     largest
-        Bytes of a measurement that is dropped.
+        Largest uploaded measurement, in bytes.
     token
-        What the link has.
+        Token of the link.
     reading
-        Held while a bench is read in the server's own process: registries know no threads.
+        Lock to read a bench in the server's process, because registries are not thread-safe.
     """
 
     place: Place
@@ -44,12 +44,12 @@ class Service:
 
 @contextmanager
 def service_of(place: Place, scratch_parent: Path, largest: int) -> Iterator[Service]:
-    """Yield what a server works with; its jobs and temporary files end with the block.
+    """Yield the resources of a server; its jobs and temporary files end with the block.
 
     Raises
     ------
     OSError
-        When the folder cannot be written to.
+        If the folder is not writable.
     """
     with scratch_folder(scratch_parent) as scratch:
         jobs = Jobs(place)

@@ -1,4 +1,4 @@
-"""`bywire.serve`: the server from its start to Ctrl-C, and the requests of its connections."""
+"""`bywire.serve`: the server from its start to Ctrl-C, and its connections."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ from bywire.server.routes import answer
 from bywire.server.service import LARGEST_FILE, Service, service_of
 
 _METHODS: Final = ("GET", "HEAD", "POST", "PUT")
-_LINGER: Final = 2.0  # s in which the rest of a refused body is taken and dropped
+_LINGER: Final = 2.0  # s in which the rest of a rejected body is read and discarded
 _HEADERS: Final = {
     "Cache-Control": "no-store",
     "X-Content-Type-Options": "nosniff",
@@ -56,7 +56,7 @@ _HEADERS: Final = {
 
 
 class Handler(BaseHTTPRequestHandler):
-    """Answers the requests of a connection."""
+    """Handler of a connection's requests."""
 
     protocol_version = "HTTP/1.1"
     server_version, sys_version = f"bywire/{__version__}", ""
@@ -64,7 +64,7 @@ class Handler(BaseHTTPRequestHandler):
     service: Service
 
     def parse_request(self) -> bool:
-        """Read a first line and headers; a line without a version of HTTP is refused."""
+        """Read request line and headers; reject a line without an HTTP version."""
         if not super().parse_request():
             return False
         if self.request_version == "HTTP/0.9":
@@ -73,9 +73,9 @@ class Handler(BaseHTTPRequestHandler):
         return True
 
     def do_GET(self) -> None:
-        """Answer, whatever the method."""
+        """Answer a request with any method."""
         reply = self._reply()
-        with contextlib.suppress(ConnectionError, TimeoutError):  # who asked has left
+        with contextlib.suppress(ConnectionError, TimeoutError):  # the client has disconnected
             self._send(reply)
             if self.close_connection:
                 self._linger()
@@ -91,10 +91,10 @@ class Handler(BaseHTTPRequestHandler):
         except BywireError as error:
             return self._refused(400, str(error))
         except (ConnectionError, TimeoutError):
-            return self._refused(408, "the request did not come to its end: send it again")
+            return self._refused(408, "the request arrived incomplete: send it again")
         except OSError as error:
             if error.errno in (errno.ENAMETOOLONG, errno.ELOOP, errno.EINVAL):
-                return self._refused(404, "there is no such file: its name is not a valid one")
+                return self._refused(404, "there is no such file: its name is not valid")
             place = f"{error.filename}: " if error.filename else ""
             return self._refused(507, f"{place}{error.strerror or error}: make room there")
         except Exception as error:  # a defect ends a request, not the server
@@ -110,12 +110,12 @@ class Handler(BaseHTTPRequestHandler):
         guard.require_place(self.command, self.headers, port)
         try:
             address = urlsplit(self.path)
-        except ValueError:  # brackets that hold no address, for instance
+        except ValueError:  # brackets without an address, for instance
             raise RefusedError(400, f"{quoted(self.path)} is not a valid address") from None
         query = dict(parse_qsl(address.query, keep_blank_values=True))
         guard.require_token(self.headers, query, port, self.service.token)
         if self.command not in _METHODS:
-            raise RefusedError(405, f"{self.command} is not answered: use {', '.join(_METHODS)}")
+            raise RefusedError(405, f"{self.command} is not supported: use {', '.join(_METHODS)}")
         request = Request(
             self.command, unquote(address.path), query, self.headers, self._body(), self._length()
         )
@@ -124,14 +124,14 @@ class Handler(BaseHTTPRequestHandler):
         return answer(self.service, request)
 
     def _welcomed(self, path: str, port: int) -> Reply:
-        """Keep the token as a cookie, and lead to the same page without it in the address."""
+        """Store the token in a cookie, and redirect to the same address without it."""
         others = "&".join(
             part for part in urlsplit(self.path).query.split("&") if not part.startswith("token=")
         )
         cookie = (
             f"{guard.cookie_name(port)}={self.service.token}; Path=/; HttpOnly; SameSite=Strict"
         )
-        # One slash: two would lead to another machine.
+        # One slash: two would mean another host.
         target = f"/{urlsplit(self.path).path.lstrip('/')}" + (f"?{others}" if others else "")
         return Reply(b"", status=303, headers={"Location": target, "Set-Cookie": cookie})
 
@@ -142,7 +142,7 @@ class Handler(BaseHTTPRequestHandler):
         return int(text) if text.isascii() and text.isdecimal() and len(text) < 16 else -1
 
     def handle_expect_100(self) -> bool:
-        """Wait with the word to go on until the request itself is found right."""
+        """Send "100 Continue" only when the request is accepted."""
         return True
 
     def _body(self) -> _Body:
@@ -160,7 +160,7 @@ class Handler(BaseHTTPRequestHandler):
         size = body.stat().st_size if isinstance(body, Path) else len(body)
         self.send_response(reply.status)
         if any(name in self.headers for name in ("Content-Length", "Transfer-Encoding")):
-            self.close_connection = True  # what nobody read of a body is no further request
+            self.close_connection = True  # an unread body must not be parsed as the next request
         headers = {
             **_HEADERS,
             "Content-Type": reply.kind,
@@ -181,9 +181,9 @@ class Handler(BaseHTTPRequestHandler):
             self.wfile.write(body)
 
     def _linger(self) -> None:
-        """Take what still comes of a body: who is cut off while sending never reads the answer."""
+        """Read the rest of a body: a client cut off while sending would never read the reply."""
         until = time.monotonic() + _LINGER
-        with contextlib.suppress(OSError):  # the other side is gone, or sends no more
+        with contextlib.suppress(OSError):  # the client has disconnected, or sends no more
             self.connection.shutdown(socket.SHUT_WR)
             while (left := until - time.monotonic()) > 0.0:
                 self.connection.settimeout(left)
@@ -191,16 +191,16 @@ class Handler(BaseHTTPRequestHandler):
                     return
 
     def send_error(self, code: int, message: str | None = None, explain: str | None = None) -> None:
-        """Say what of a request HTTP itself does not understand, always with a status line."""
+        """Reply to a request that is not valid HTTP, always with a status line."""
         self.close_connection = True
         self.request_version = self.protocol_version
         if code == HTTPStatus.NOT_IMPLEMENTED:
             code, message = (
                 405,
-                f"{quoted(self.command)} is not answered: use {', '.join(_METHODS)}",
+                f"{quoted(self.command)} is not supported: use {', '.join(_METHODS)}",
             )
         elif code == HTTPStatus.HTTP_VERSION_NOT_SUPPORTED:
-            code, message = 400, "this version of HTTP is not spoken: ask by HTTP/1.1"
+            code, message = 400, "this version of HTTP is not supported: use HTTP/1.1"
         status = HTTPStatus(code)
         body = refusal_page(code, message or status.phrase).encode()
         self.send_response(code)
@@ -216,18 +216,18 @@ class Handler(BaseHTTPRequestHandler):
         self.wfile.write(body)
 
     def log_message(self, format: str, *args: Any) -> None:
-        """Say nothing: a line would hold the token."""
+        """Log nothing, because a line would contain the token."""
 
 
 class _Body:
-    """The body of a request; who sends it is told to go on when it is first read."""
+    """The body of a request; its first read sends "100 Continue" if the client expects it."""
 
     def __init__(self, handler: Handler) -> None:
         self._handler = handler
         self._is_awaited = handler.headers.get("Expect", "").lower() == "100-continue"
 
     def read(self, size: int) -> bytes:
-        """Return so many bytes, fewer only where the other side has left."""
+        """Return ``size`` bytes, fewer only if the client has disconnected."""
         if self._is_awaited:
             self._is_awaited = False
             self._handler.wfile.write(b"HTTP/1.1 100 Continue\r\n\r\n")
@@ -235,7 +235,7 @@ class _Body:
 
 
 def _quiet_error(*_: object) -> None:
-    """Tell of an error outside of requests, unless somebody has just left."""
+    """Print an error outside of requests, unless a client has disconnected."""
     error = sys.exc_info()[1]
     if error is not None and not isinstance(error, (ConnectionError, TimeoutError)):
         traceback.print_exception(error)
@@ -246,19 +246,19 @@ def _quiet_error(*_: object) -> None:
 
 class _Server(ThreadingHTTPServer):
     daemon_threads = True
-    request_queue_size = 128  # connections that wait: by the standard library's 5, many are cut off
+    request_queue_size = 128  # waiting connections: the standard library's 5 cut many off
     allow_reuse_address = os.name == "posix"  # elsewhere it lets two servers share a port
     handle_error = _quiet_error  # type: ignore[assignment]
 
 
 @dataclass(frozen=True)
 class Opened:
-    """A server that answers while it is served.
+    """A listening server.
 
     Parameters
     ----------
     server, service
-        What listens, and what it works with.
+        The HTTP server, and its resources.
     link
         Address with the token.
     """
@@ -269,7 +269,7 @@ class Opened:
 
     @property
     def port(self) -> int:
-        """Where it listens."""
+        """Port on which it listens."""
         return int(self.server.server_address[1])
 
 
@@ -281,14 +281,14 @@ def opened(
     folder: str | Path = "",
     largest: int = LARGEST_FILE,
 ) -> Iterator[Opened]:
-    """Yield a server that listens; it answers when its ``server.serve_forever()`` is called.
+    """Yield a listening server; it answers once its ``server.serve_forever()`` is called.
 
     Parameters
     ----------
     subject, port, folder
         See `serve`.
     largest
-        Bytes that a measurement may have that is dropped on a page.
+        Largest uploaded measurement, in bytes.
 
     Raises
     ------
@@ -325,21 +325,21 @@ def serve(
     folder: str | Path = "",
     say: Callable[[str], None] = print,
 ) -> None:
-    """Show a folder's benches, results and studies in a browser of this machine, until Ctrl-C.
+    """Show a folder's benches, results and studies in a browser on this machine, until Ctrl-C.
 
-    Pages compute in the browser as those of `bywire.page` do; what needs Python (reports,
-    measurement files beside the simulation, identification, design, campaigns) is computed in
-    processes of its own. Only this machine is answered, only with the token of the link, and
-    nothing is read or written outside of the folder.
+    Live pages compute in the browser, as those of `bywire.page` do. Tasks that need Python
+    (reports, replay of measurements, identification, design, campaigns) run in separate processes.
+    The server answers only this machine, only with the token of the link. It neither reads nor
+    writes outside the folder.
 
     Parameters
     ----------
     subject
         Bench file, experiment or folder; by default the current folder.
     port
-        Where it listens, 1 to 65535; 0 for any that is free.
+        Port on which it listens, 1 to 65535; 0 for any free port.
     folder
-        What is served; by default the folder of the bench file, or the current one.
+        Folder to serve; by default the folder of the bench file, or the current one.
     say
         Called with the link.
 
@@ -351,13 +351,13 @@ def serve(
     Raises
     ------
     FileError
-        For a folder that is none, or that cannot be written to, and a bench file outside of it.
+        If the folder does not exist or is not writable, or the bench file is outside of it.
     ParameterError
-        For a port that is taken.
+        If the port is in use.
     UnknownNameError
-        For an experiment that there is not.
+        For an unknown experiment.
     KeyboardInterrupt
-        At the end; jobs have ended then, and temporary files are gone.
+        At the end, when jobs have ended and temporary files are removed.
     """
     with _ended_as_by_ctrl_c(), opened(subject, port=port, folder=folder) as it:
         say(it.link)
@@ -366,7 +366,7 @@ def serve(
 
 @contextmanager
 def _ended_as_by_ctrl_c() -> Iterator[None]:
-    """Have a termination, or a terminal that is closed, end a server as Ctrl-C does: tidied up."""
+    """Make a termination signal, or a closed terminal, end a server as Ctrl-C does: cleanly."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -381,12 +381,12 @@ def _ended_as_by_ctrl_c() -> Iterator[None]:
 
 
 def _asked(subject: str, folder: str) -> tuple[Place, str]:
-    """Return the folder to serve, and the bench that is shown first, if any."""
+    """Return the folder to serve, and the bench to show first, if any."""
     if subject and Path(subject).is_dir():
         if folder and Path(folder).resolve() != Path(subject).resolve():
             raise ParameterError(
-                f"{subject} and {_flag('folder')} {folder} are two folders, but only one is "
-                f"served, with all below it: bywire serve {subject}, or bywire serve {folder}",
+                f"{subject} and {_flag('folder')} {folder} are two folders, but bywire serves only "
+                f"one and its subfolders: bywire serve {subject}, or bywire serve {folder}",
                 name=_flag("folder"),
                 value=str(folder),
             )
@@ -418,9 +418,9 @@ def _flag(argument: str) -> str:
 def _taken(port: int, error: OSError) -> ParameterError:
     if error.errno == errno.EADDRINUSE:
         return ParameterError(
-            f"port {port} is taken, perhaps by another 'bywire serve': use the link that it "
-            f"printed, or {_flag('port')} 0 for any free one"
+            f"port {port} is in use, perhaps by another 'bywire serve': use the link that it "
+            f"printed, or {_flag('port')} 0 for any free port"
         )
     return ParameterError(
-        f"port {port}: {error.strerror or error}: try {_flag('port')} 0 for any free one"
+        f"port {port}: {error.strerror or error}: try {_flag('port')} 0 for any free port"
     )

@@ -1,4 +1,4 @@
-"""What a study shows so far, and all else that the process of a job tells its server."""
+"""Messages of a job's process to its server, with a study's results so far."""
 
 from __future__ import annotations
 
@@ -24,43 +24,43 @@ _told: list[IO[str]] = []
 
 
 def begin_to_tell() -> None:
-    """Take standard output for what is told: what a brake prints there is no answer."""
+    """Reserve standard output for messages; output of a brake's code goes to standard error."""
     _told.append(os.fdopen(os.dup(1), "w", encoding="utf-8"))
     os.dup2(2, 1)
 
 
 def tell(**said: Any) -> None:
-    """Tell the server, if there is one."""
+    """Send a message to the server, if there is one."""
     for stream in _told:
-        with contextlib.suppress(OSError):  # it is gone, which ends this process
+        with contextlib.suppress(OSError):  # the server has ended, which ends this process
             stream.write(json.dumps(said) + "\n")
             stream.flush()
 
 
 # --- A study
 
-_ESTIMATE, _REPORT = 1.0, 5.0  # s of computing between two of each at least
-_SHARE = 5.0  # and this many times what one took
+_ESTIMATE, _REPORT = 1.0, 5.0  # least time between two of each, s
+_SHARE = 5.0  # and at least this many times the duration of one
 _BINS = 30
 _MOST = 4  # figures of a study without requirements
 
 
 class StudyProgress:
-    """Tells what a study shows so far, now and then: between its chunks, which go on after it."""
+    """Reports the results of a study so far, at intervals between its chunks."""
 
     def __init__(self, folder: Path, progress: Progress) -> None:
         self._folder, self._progress = folder, progress
         self._pauses = {self._estimate: _ESTIMATE, self._report: _REPORT}
-        self._next = dict.fromkeys(self._pauses, -math.inf)  # the first chunk is shown at once
+        self._next = dict.fromkeys(self._pauses, -math.inf)  # show the first chunk immediately
 
     def __call__(self, label: str, share: float) -> None:
-        """Be the progress of the study."""
+        """Report the progress of the study."""
         self._progress(label, share)
         for tell_it, pause in self._pauses.items():
             begin = time.monotonic()
             if 0.0 < share < 1.0 and begin > self._next[tell_it]:
-                with warnings.catch_warnings(), suppress(BywireError):  # too few cases yet: the
-                    warnings.simplefilter("ignore")  # last report says what is wrong
+                with warnings.catch_warnings(), suppress(BywireError):  # if cases are too few, the
+                    warnings.simplefilter("ignore")  # last report gives the error
                     tell_it()
                 end = time.monotonic()
                 self._next[tell_it] = end + max(pause, _SHARE * (end - begin))
@@ -80,19 +80,20 @@ class StudyProgress:
 
 
 def so_far(findings: Findings) -> list[dict[str, Any]]:
-    """Return what the cases of a study say of each requirement, else of its first key figures.
+    """Return intermediate results of each requirement, otherwise of the first key figures.
 
-    Shares of cases that were sought for say nothing, and none are told.
+    A study that searches for its cases has none, because shares of such cases mean nothing.
 
     Parameters
     ----------
     findings
-        Of the cases that are there.
+        Findings from the cases so far.
 
     Returns
     -------
     list of dict
-        Of each its ``text``, the ``counts`` of its histogram, and the ``ends`` of that with units.
+        For each its ``text``, the ``counts`` of its histogram, and the histogram's ``ends`` with
+        units.
     """
     if not findings.plan.is_sampled or not len(findings.cases):
         return []

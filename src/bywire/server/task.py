@@ -1,4 +1,4 @@
-"""What can be computed from a page: every use case with a form."""
+"""Tasks of pages: every use case with a form."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ from bywire.usecases.declare import Argument, Form, UseCase
 
 @dataclass(frozen=True)
 class Task:
-    """A use case as pages ask for it, computed in a process of its own.
+    """A use case that pages offer, computed in a separate process.
 
     Parameters
     ----------
     case, form
         The use case, and its form as declared.
     fields
-        Of the form, in their order.
+        Fields of the form, in their order.
     """
 
     case: UseCase
@@ -41,24 +41,24 @@ class Task:
 
     @property
     def name(self) -> str:
-        """By which forms and results call it."""
+        """Name in forms and results."""
         return self.form.name or self.command
 
     @property
     def command(self) -> str:
-        """What is typed behind ``bywire`` for the same."""
+        """Words of the same command, after ``bywire``."""
         return self.case.commands[0].words
 
     def read(self, form: Mapping[str, Any], place: Place) -> dict[str, Any]:
-        """Return what a form gave, checked.
+        """Check and return the values of a form.
 
         Raises
         ------
         UnknownNameError
-            For fields that there are not.
+            For unknown fields.
         RefusedError
-            With the field: status 404 for a path that is not in the folder, 422 for any other
-            value that does not fit.
+            With the field: status 404 for a path outside the folder, 422 for any other invalid
+            value.
         """
         known = {field.name: field for field in self.fields}
         for name in form:
@@ -78,19 +78,19 @@ class Task:
         return answer
 
     def begun(self, asked: Mapping[str, Any], place: Place, folders: Sequence[Path]) -> Path | None:
-        """Return which folder holds what is asked, unfinished perhaps, to continue there."""
+        """Return the folder with earlier results of the same values, to continue there, or None."""
         if self.case.holds is None:
             return None
         read = self.case.read(self._from_anywhere(asked, place))
         return next((each for each in folders if self.case.holds(each, read)), None)
 
     def said_of(self, asked: Mapping[str, Any]) -> str:
-        """Return what lists of jobs call it by."""
+        """Return the subject that lists of jobs show."""
         subject = asked[self.form.subject]
         return ", ".join(subject) if isinstance(subject, list) else str(subject)
 
     def stem(self, asked: Mapping[str, Any]) -> str:
-        """Return what the folder of its result is called by."""
+        """Return the base of the result folder's name."""
         subject = asked[self.form.subject]
         if isinstance(subject, list):
             return shortened("-".join(Path(each).stem for each in subject))
@@ -102,7 +102,7 @@ class Task:
         return [known[field.name] for field in self.fields]
 
     def _filled_in(self, asked: Mapping[str, Any]) -> dict[str, Any]:
-        """Return what was filled in: a field that is empty stands for the default."""
+        """Return the filled-in values; empty fields take the default."""
         filled = {name: value for name, value in asked.items() if value not in ("", None, [], {})}
         for each in self._arguments():
             if each.ask.ticked and filled.pop(each.name, False):
@@ -110,7 +110,7 @@ class Task:
         return filled
 
     def _from_anywhere(self, asked: Mapping[str, Any], place: Place) -> dict[str, Any]:
-        """Return what was filled in, with files as they are found from any working folder."""
+        """Return the filled-in values, with absolute paths of files."""
         found = self._filled_in(asked)
         for each in self._arguments():
             value = found.get(each.name)
@@ -128,9 +128,9 @@ class Task:
         return found
 
     def _require_fitting(self, given: Mapping[str, Any], place: Place) -> None:
-        """Refuse what the use case refuses, beside the field that the error is about.
+        """Reject what the use case rejects, with the field that causes the error.
 
-        That is the first field up to which, with all behind it left out, the error is the same.
+        That is the first field for which the error stays the same without all later fields.
         """
         try:
             self.case.read(given)
@@ -184,7 +184,7 @@ def _field(argument: Argument) -> Field:
 
 
 def _words_of(argument: Argument) -> Callable[[], Sequence[str]] | None:
-    """Return what tells all that is known by name."""
+    """Return a function for all known names, if there are any."""
     words, kinds = argument.ask.words, argument.ask.known
     if kinds:
         return lambda: _names(*kinds)
@@ -201,12 +201,12 @@ def _names(*kinds: str) -> list[str]:
 
 
 def _path_of(name: str, place: Place) -> Path:
-    """Return where a file of the folder is, from anywhere; other names stay."""
+    """Return the absolute path of a file in the folder; other names stay."""
     return place.root / name if is_file_name(name) else Path(name)
 
 
 def _run_of(name: str, place: Place) -> Path:
-    """Return where a run is; a result goes before an experiment of its name."""
+    """Return the path of a run; a result takes precedence over an experiment of its name."""
     from bywire.bench.bench_file import names_experiment
     from bywire.bench.result_folder import is_result_folder
 
@@ -218,11 +218,11 @@ def _run_of(name: str, place: Place) -> Path:
 
 @contextmanager
 def _beside(field: str, place: Place) -> Iterator[None]:
-    """Have what is refused say which field it stands beside, with paths as the folder has them."""
+    """Add the field to an error, and make its paths relative to the folder."""
     try:
         yield
     except RefusedError as refused:
         raise RefusedError(refused.status, refused.text, field) from None
     except InputError as error:
-        said = str(error).replace(f"{place.root}{os.sep}", "")
-        raise RefusedError(422, said, field) from None
+        message = str(error).replace(f"{place.root}{os.sep}", "")
+        raise RefusedError(422, message, field) from None

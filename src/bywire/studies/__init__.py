@@ -1,1 +1,1 @@
-"""Studies: one bench for many values of what varies, and what its key figures make of that."""
+"""Studies: one bench with many values of its parameters, and the effect on its key figures."""

@@ -1,7 +1,7 @@
-"""Where a study computes: designs of points, of groups for indices, and such that seek.
+"""Designs of studies: sampled points, groups for sensitivity indices, and searches.
 
-A chunk of points depends on the seed and its number alone, so that chunks may be computed in any
-order, anywhere, and more of them be added later.
+A chunk of points depends only on the seed and its number. So chunks can be computed in any order,
+anywhere, and more of them can be added later.
 """
 
 from __future__ import annotations
@@ -23,30 +23,31 @@ from bywire.data.file_format import library
 from bywire.studies.distribution import TAIL, Distribution, normal_quantile
 
 SAMPLED = ("monte-carlo", "latin-hypercube", "sobol")
-"""designs that draw from the distributions: what they count are probabilities"""
+"""designs that sample the distributions: their shares of cases are probabilities"""
 SPANNED = ("grid", "corners", "one-at-a-time")
-"""designs that go to the ends: what they show is what may happen, not how often"""
+"""designs that visit the ends: they show what can happen, not how often"""
 MOST = 10_000_000
-"""cases of one study"""
+"""largest number of cases of a study"""
 _INSIDE = (2.0**-53, 1.0 - 2.0**-53)  # probabilities that have a finite quantile
 _CORNERS = 16  # quantities of which all corners are visited
 
 
 @dataclass(frozen=True)
 class Sampled:
-    """Points that are drawn, chunk by chunk.
+    """Randomly drawn points, chunk by chunk.
 
     Parameters
     ----------
     kind
-        One of `SAMPLED`. Of a Latin hypercube every chunk is one, so that more can be added; a
+        One of `SAMPLED`. Each chunk is a Latin hypercube of its own, so that more can be added; a
         Sobol sequence is scrambled.
     seed
-        Of its random numbers.
+        Seed of the random numbers.
     distributions
-        Of each quantity.
+        Distribution of each quantity.
     factor
-        Lower triangular factor of the correlation of their normal scores; None of independent ones.
+        Lower triangular factor of the correlation of the normal scores; None for independent
+        quantities.
     """
 
     kind: str
@@ -72,7 +73,7 @@ class Sampled:
         return self._quantiles(np.clip(special.ndtr(self.correlated(scores)), *_INSIDE))
 
     def correlated(self, scores: Array) -> Array:
-        """Return the normal scores of the quantities by independent ones."""
+        """Return the correlated normal scores from independent ones."""
         return scores if self.factor is None else scores @ self.factor.T
 
     def _quantiles(self, u: Array) -> list[NDArray[np.generic]]:
@@ -98,7 +99,7 @@ class Sampled:
 
 @dataclass(frozen=True)
 class Spanned:
-    """Points that are listed: all of them at once.
+    """Listed points: all of them in one table.
 
     Parameters
     ----------
@@ -110,18 +111,18 @@ class Spanned:
 
     @property
     def cases(self) -> int:
-        """How many points there are."""
+        """Number of points."""
         return len(self.columns[0])
 
     def values(self, chunk: int, size: int) -> list[NDArray[np.generic]]:
-        """Return the values of each quantity in a chunk of points; the last one is shorter."""
+        """Return the values of each quantity in a chunk of points; the last chunk is shorter."""
         return [column[chunk * size : (chunk + 1) * size] for column in self.columns]
 
 
 def spanned(
     kind: str, distributions: Sequence[Distribution], nominal: Sequence[object], levels: int
 ) -> Spanned:
-    """Return the points of a design that goes to the ends, the bench's own values first.
+    """Return the points of a design that visits the ends, the bench's own values first.
 
     Parameters
     ----------
@@ -129,16 +130,16 @@ def spanned(
         ``grid``: all combinations of ``levels`` values each; ``corners``: of both ends of each;
         ``one-at-a-time``: ``levels`` values of each, the others as they are.
     distributions
-        Of each quantity.
+        Distribution of each quantity.
     nominal
-        What the bench has.
+        Values of the bench.
     levels
-        Values of each quantity, >= 2; quantities of single values take these.
+        Values of each quantity, >= 2; quantities with discrete values use these.
 
     Raises
     ------
     ParameterError
-        For more cases than a study may have.
+        For more cases than the largest study.
     """
     if kind == "corners" and len(distributions) > _CORNERS:
         raise ParameterError(
@@ -169,25 +170,25 @@ def spanned(
 
 
 # --- Groups of cases for sensitivity indices, within which the quantities are exchanged
-# Their cases are not independent, for those of a group share values: indices come out of them, and
-# no probabilities.
+# Cases of a group share values and are not independent: they give indices, but no probabilities.
 
 MORRIS = "morris"
 SENSITIVITY = ("sobol-indices", MORRIS)
-"""designs of which indices of sensitivity come out"""
-SALIB = ("studies with indices of sensitivity", "studies")
-"""who needs the library, and the extra that brings it"""
+"""designs that give sensitivity indices"""
+SALIB = ("studies with sensitivity indices", "studies")
+"""feature that needs SALib, and its extra"""
 LEVELS = 4
-"""levels of each quantity on which Morris' trajectories go, an even number"""
+"""levels of each quantity in Morris' trajectories, an even number"""
 STEP = LEVELS / (2.0 * (LEVELS - 1.0))
 """step of a trajectory: two thirds of the way from end to end"""
-# From so many groups on, intervals of 95 % held the true value in 92 % of the studies and more.
+# With at least so many groups, intervals of 95 % held the true value in 92 % of the studies or
+# more.
 _LEAST = {"sobol-indices": 64, "morris": 16}
 
 
 @dataclass(frozen=True)
 class SensitivityDesign:
-    """Points for indices of sensitivity, by SALib.
+    """Points for sensitivity indices, by SALib.
 
     ``sobol-indices``: Saltelli's sample. Of two points A and B of a scrambled Sobol sequence, a
     group has A, A with each quantity in turn taken from B, and B. ``morris``: trajectories on four
@@ -198,11 +199,11 @@ class SensitivityDesign:
     kind
         One of `SENSITIVITY`.
     quantities
-        How many vary.
+        Number of quantities that vary.
     budget
-        Most cases.
+        Largest number of cases.
     seed
-        Of its random numbers.
+        Seed of the random numbers.
 
     References
     ----------
@@ -218,17 +219,17 @@ class SensitivityDesign:
 
     @property
     def group(self) -> int:
-        """Cases of a group."""
+        """Cases per group."""
         return self.quantities + (2 if self.kind == "sobol-indices" else 1)
 
     @cached_property
     def base(self) -> int:
-        """How many groups it has, the most that the budget admits; of Sobol's, a power of two.
+        """Number of groups: the most within the budget; for Sobol indices, a power of two.
 
         Raises
         ------
         ParameterError
-            For a budget that is too small, or larger than a study may be.
+            For a budget that is too small, or larger than the largest study.
         """
         groups, least = self.budget // self.group, _LEAST[self.kind]
         if groups < least:
@@ -245,7 +246,7 @@ class SensitivityDesign:
 
     @property
     def cases(self) -> int:
-        """How many cases it has."""
+        """Number of cases."""
         return self.base * self.group
 
     @cached_property
@@ -257,7 +258,7 @@ class SensitivityDesign:
         FileError
             When SALib is not installed.
         """
-        # A generator, for SALib takes the seed 0 as none.
+        # A generator, because SALib treats the seed 0 as no seed.
         rng = np.random.default_rng(self.seed)
         if self.kind == "sobol-indices":
             sobol = library("SALib.sample.sobol", *SALIB)
@@ -269,7 +270,7 @@ class SensitivityDesign:
 
     @property
     def problem(self) -> dict[str, object]:
-        """What SALib is told: quantities are probabilities, named by their numbers."""
+        """Problem definition for SALib: quantities are probabilities, named by their numbers."""
         count = self.quantities
         names = [str(k) for k in range(count)]
         return {"num_vars": count, "names": names, "bounds": [[0.0, 1.0]] * count}
@@ -277,9 +278,9 @@ class SensitivityDesign:
     def columns(self, distributions: Sequence[Distribution]) -> list[NDArray[np.generic]]:
         """Return the values of each quantity, shape (cases,) each.
 
-        Morris' outer levels are the ends of a distribution, and 3 standard deviations where it has
-        none, as those of a grid. Single values, whatever their weights, share the levels in their
-        order, of three the last has two: a step is always one to another value.
+        Morris' outer levels are the ends of a distribution, or 3 standard deviations where it has
+        none, as in a grid. Discrete values, whatever their weights, share the levels in their
+        order, and the last of three has two levels. So every step leads to another value.
         """
         u = self.probabilities
         if self.kind == "sobol-indices":
@@ -302,45 +303,45 @@ class SensitivityDesign:
 
 
 # --- Designs that seek: which cases come next depends on what the ones before gave
-# They go where a requirement is missed: to its rare failures, or to the worst case. In rare
-# failures noise is one of the things that vary, as in drawn cases: each case has its own.
+# They search where a requirement is missed: its rare failures, or the worst case. For rare failures
+# each case has its own noise, as in sampled designs.
 
 SUBSET, IMPORTANCE = "subset-simulation", "importance-sampling"
 RARE = (SUBSET, IMPORTANCE)
-"""designs that answer how probable the rare failure of a requirement is"""
+"""designs that estimate the probability of rare failures"""
 WORST = "worst-case"
-"""design that searches the ends of what varies for the worst case of each requirement"""
+"""design that searches the ranges for the worst case of each requirement"""
 SOUGHT = (*RARE, WORST)
 OPENTURNS = ("studies of rare failures", "studies")
-"""who needs OpenTURNS, and the extra that brings it"""
+"""feature that needs OpenTURNS, and its extra"""
 DEFAULT_CASES = {SUBSET: 25_600, IMPORTANCE: 4096, WORST: 4096}
-"""most cases of each requirement where the file does not say"""
+"""default limit of the cases of each requirement"""
 TOGETHER = 1024
 """cases of a batch of importance sampling"""
 STEPS = 10
-"""steps of each chain of subset simulation: a tenth of a level are the seeds of the next"""
+"""steps of each chain of subset simulation: a tenth of a level seeds the next one"""
 _WHOLE = 640  # a tenth of a level, the seeds of the next, are whole chunks
 _SEARCH = 1024  # chunks of a requirement that are kept for the search of its design point
 
 
 @dataclass(frozen=True)
 class SoughtDesign:
-    """How cases are sought for each requirement; requirements take turns at chunks.
+    """Budget and numbering of a search for each requirement; requirements take turns by chunks.
 
     Parameters
     ----------
     kind
         One of `SOUGHT`.
     requirements
-        How many they are sought for.
+        Number of requirements.
     asked
-        Cases asked for in each level of subset simulation.
+        Requested cases in each level of subset simulation.
     budget
-        Most cases of each requirement.
+        Largest number of cases of each requirement.
     seed
-        Of its random numbers.
+        Seed of the random numbers.
     quantities
-        How many vary.
+        Number of quantities that vary.
     """
 
     kind: str
@@ -357,35 +358,35 @@ class SoughtDesign:
 
     @property
     def together(self) -> int:
-        """Cases that are computed at once."""
+        """Cases per batch."""
         if self.kind == WORST:
             return population(self.quantities)
         return self.level // STEPS if self.kind == SUBSET else TOGETHER
 
     @property
     def first_sampled(self) -> int:
-        """First of a requirement's own chunks that is drawn and no part of a search."""
+        """First chunk of a requirement that is drawn and not part of its search."""
         return _SEARCH if self.kind == IMPORTANCE else 0
 
     def chunk(self, requirement: int, own: int) -> int:
-        """Return the number of a chunk in the study by its number within a requirement."""
+        """Return the number of a chunk in the study from its number within a requirement."""
         return own * self.requirements + requirement
 
     def has_own_noise(self, chunk: int) -> bool:
-        """Whether each case of a chunk has noise of its own.
+        """Whether each case of a chunk has its own noise.
 
-        Those of a search have the bench's: derivatives by differences would be of the noise, and
-        the worst case would be that of many draws.
+        Cases of a search have the bench's noise. Otherwise finite differences would contain noise,
+        and the worst case would be the worst of many draws.
         """
         return self.kind != WORST and chunk // self.requirements >= self.first_sampled
 
     def require_budget(self) -> None:
-        """Refuse a budget with which nothing can be said.
+        """Reject a budget that is too small for a result.
 
         Raises
         ------
         ParameterError
-            When it is below a single batch or level, or larger than a study may be.
+            When it is below a single batch or level, or larger than the largest study.
         FileError
             When OpenTURNS is not installed.
         """
@@ -402,15 +403,15 @@ class SoughtDesign:
 
 
 def population(quantities: int) -> int:
-    """Return how many cases a generation of a search has: about a chunk for eight quantities.
+    """Return the cases of a generation of a search: about a chunk for eight quantities.
 
-    A power of two, for a sequence that visits corners.
+    A power of two, because the sequence visits corners.
     """
     return 64 << (-(-quantities // 8) - 1).bit_length()
 
 
 def library_version(kind: str) -> str:
-    """Return the version of OpenTURNS, or SciPy's, for another may draw other points.
+    """Return the version of OpenTURNS, or SciPy's, because another may draw other points.
 
     Raises
     ------

@@ -1,6 +1,6 @@
-"""How a quantity varies: laws by closed forms, as SciPy's, single values, and how files write them.
+"""Distributions of quantities: laws in closed form, discrete values, and how files write them.
 
-``scipy.stats`` takes as long to load as all else of a study, and every process of one would.
+``scipy.stats`` takes as long to load as the rest of a study, in each of its processes.
 """
 
 from __future__ import annotations
@@ -26,28 +26,28 @@ from bywire.core.values import written
 
 
 class Law(Protocol):
-    """A law of probability over the real numbers."""
+    """Probability distribution over the real numbers."""
 
     def support(self) -> tuple[float, float]:
         """Return its ends."""
         ...
 
     def ppf(self, q: Array) -> Array:
-        """Return the values below which such shares lie, of shares in (0, 1)."""
+        """Return the quantiles at shares in (0, 1)."""
         ...
 
     def cdf(self, x: float) -> float:
-        """Return the probability of what lies below a value."""
+        """Return the probability below a value."""
         ...
 
     def sf(self, x: float) -> float:
-        """Return the probability of what lies above a value."""
+        """Return the probability above a value."""
         ...
 
 
 @dataclass(frozen=True)
 class Uniform:
-    """Evenly from ``low`` on, over a width."""
+    """Uniform distribution: from ``low`` on, over a width."""
 
     low: float
     width: float
@@ -71,13 +71,13 @@ class Uniform:
 
 @dataclass(frozen=True)
 class Normal:
-    """The normal one, by mean and standard deviation."""
+    """Normal distribution, by mean and standard deviation."""
 
     mean: float
     sd: float
 
     def support(self) -> tuple[float, float]:
-        """Return its ends: none."""
+        """Return its ends: infinite."""
         return -math.inf, math.inf
 
     def ppf(self, q: Array) -> Array:
@@ -95,7 +95,7 @@ class Normal:
 
 @dataclass(frozen=True)
 class LogNormal:
-    """Of which the logarithm is normal, with standard deviation ``sigma`` around the median's."""
+    """Log-normal distribution; ``sigma``: standard deviation of the logarithm."""
 
     sigma: float
     median: float
@@ -123,7 +123,7 @@ class LogNormal:
 
 @dataclass(frozen=True)
 class Triangular:
-    """Rising to a mode and falling from it; the mode as a share of the width."""
+    """Triangular distribution; the mode as a share of the width."""
 
     mode: float
     low: float
@@ -150,7 +150,7 @@ class Triangular:
 
 
 def truncated_normal(low: float, high: float, mean: float, sd: float) -> Law:
-    """Return the normal law of what lies between two scores; SciPy's, for its tails' digits."""
+    """Return the normal distribution truncated to two scores; SciPy's, for its accurate tails."""
     from scipy import stats
 
     law: Law = stats.truncnorm(low, high, mean, sd)
@@ -158,25 +158,25 @@ def truncated_normal(low: float, high: float, mean: float, sd: float) -> Law:
 
 
 def normal_quantile(share: Any) -> Any:
-    """Return the standard normal score below which a share lies."""
+    """Return the standard normal score of a cumulative probability."""
     return special.ndtri(share)
 
 
 def binomial_ranks(count: int, probability: float, beyond: float) -> tuple[int, int]:
-    """Return the ends of how often something comes, with a share beyond either of them.
+    """Return the bounds of a binomial count, with a given probability beyond either of them.
 
     Parameters
     ----------
     count, probability
-        Trials, and how probable it is in each.
+        Number of trials, and the probability in each.
     beyond
-        Share, above 0 and below 1/2.
+        Probability, above 0 and below 1/2.
 
     Returns
     -------
     tuple
-        The least number that no more come with at least this probability, and the least one that
-        more come with at most this probability.
+        The least count that is not exceeded with at least this probability, and the least count
+        that is exceeded with at most this probability.
     """
     low = _least(lambda k: special.bdtr(k, count, probability) >= beyond, count)
     high = _least(lambda k: special.bdtrc(k, count, probability) <= beyond, count)
@@ -184,7 +184,7 @@ def binomial_ranks(count: int, probability: float, beyond: float) -> tuple[int, 
 
 
 def _least(is_enough: Any, count: int) -> int:
-    """Return the least number for which something holds that holds for all above it."""
+    """Return the least number that meets a monotonic condition."""
     below, above = -1, count
     while above - below > 1:
         middle = (below + above) // 2
@@ -193,43 +193,43 @@ def _least(is_enough: Any, count: int) -> int:
 
 
 def ranked(values: Array) -> Array:
-    """Return the ranks of values from 1 on, that of equal ones their mean."""
+    """Return the ranks of values from 1 on; equal values get their mean rank."""
     _, place, times = np.unique(values, return_inverse=True, return_counts=True)
     last = np.cumsum(times)
     return np.asarray((last - 0.5 * (times - 1))[place])
 
 
 # --- Distributions
-# A range or a tolerance is a distribution as any other; a grid and a worst-case search use its
+# A range or a tolerance is a distribution like any other; a grid and a worst-case search use its
 # ends.
 
 NEVER = 1e-9
-"""probability that counts as none: of values that the model would not admit"""
+"""probability of invalid values that counts as zero"""
 TAIL = 0.5 * math.erfc(3.0 / math.sqrt(2.0))
-"""probability beyond 3 standard deviations, at which a grid ends where a distribution does not"""
+"""probability beyond 3 standard deviations, where a grid ends for an unbounded distribution"""
 
 
 @dataclass(frozen=True)
 class Distribution:
-    """How a quantity varies.
+    """Distribution of a quantity.
 
     Parameters
     ----------
     kind
-        What the study file calls it.
+        Name of its kind in a study file.
     text
-        What it is, for instance ``"normal, mean 0.39 ohm, sd 0.02 ohm"``.
+        Description, for instance ``"normal, mean 0.39 ohm, sd 0.02 ohm"``.
     quantile
-        ``quantile(u) -> values`` [SI], of probabilities in (0, 1), shape (n,) each; of choices,
+        ``quantile(u) -> values`` [SI], for probabilities in (0, 1), shape (n,) each; for choices,
         an array of texts.
     low, high
-        Ends [SI]; infinite where there is none, NaN of choices.
+        Ends [SI]; infinite where it has none, NaN for choices.
     below, above
-        ``below(x)``, ``above(x)``: probability of values below and above; None of single values,
+        ``below(x)``, ``above(x)``: probability below and above a value; None for discrete values,
         which end at ``low`` and ``high``.
     singles
-        Single values that it has [SI], or texts, in the order in which probabilities go through
-        them; none of what has any value.
+        Discrete values [SI], or texts, in the order of their probability; empty for continuous
+        distributions.
     weights
         Probability of each of them.
     """
@@ -246,14 +246,14 @@ class Distribution:
 
     @property
     def is_discrete(self) -> bool:
-        """Whether it has single values."""
+        """Whether it is discrete."""
         return bool(self.singles)
 
     def levels(self, count: int) -> NDArray[Any]:
-        """Return values for a grid: evenly from end to end; those of single values as they are.
+        """Return values for a grid: evenly from end to end; discrete values as they are.
 
-        Where it has no end, the grid ends 3 standard deviations from the middle of a normal one:
-        at a probability of 0.135 % beyond.
+        Without an end, the grid ends 3 standard deviations from the middle of a normal
+        distribution: at a probability of 0.135 % beyond.
         """
         if self.is_discrete:
             return np.array(self.singles)
@@ -263,7 +263,7 @@ class Distribution:
         return np.asarray(np.linspace(low, high, count))
 
     def between(self, places: Array) -> NDArray[Any]:
-        """Return values by their places between the ends of `levels`, 0 to 1."""
+        """Return values by their positions between the ends of `levels`, 0 to 1."""
         ends = self.levels(2)
         if self.is_discrete:
             return np.asarray(ends[np.minimum((places * ends.size).astype(int), ends.size - 1)])
@@ -273,22 +273,22 @@ class Distribution:
 # --- Single values: structural choices, and numbers of the kind ``discrete``
 
 DISCRETE = "discrete"
-"""the kind of single values, which choices need not name"""
+"""kind of discrete values; choices may omit it"""
 KEYS = ("values", "weights")
-"""keys of a section of single values"""
+"""keys of a section of discrete values"""
 
 
 def read_choice(name: str, entry: Any, admitted: Sequence[Any]) -> Distribution:
-    """Return how a choice varies: among values, each with a weight.
+    """Return the distribution of a choice: its values, each with a weight.
 
     Parameters
     ----------
     name
-        Dotted name of a structural choice, or ``options.NAME`` of the experiment's.
+        Dotted name of a structural choice, or ``options.NAME`` of an option of the experiment.
     entry
-        What the study file says.
+        Entry of the study file.
     admitted
-        What the choice may be, texts or truth values; empty where any text will do.
+        Valid values of the choice, texts or truth values; empty where any text is valid.
 
     Returns
     -------
@@ -298,7 +298,7 @@ def read_choice(name: str, entry: Any, admitted: Sequence[Any]) -> Distribution:
     Raises
     ------
     InputError
-        For what is no list of choices, for a value alone, and one that stands there twice.
+        For an invalid list of choices, a single value, and a value that is listed twice.
     """
     texts = list(map(choice_text, admitted))
     values = entry.get("values") if isinstance(entry, Mapping) else None
@@ -330,7 +330,7 @@ def read_choice(name: str, entry: Any, admitted: Sequence[Any]) -> Distribution:
 
 
 def choice_text(value: Any) -> str:
-    """Return a choice as the cases of a study hold it.
+    """Return a choice in the form of a study's cases.
 
     Examples
     --------
@@ -341,19 +341,19 @@ def choice_text(value: Any) -> str:
 
 
 def require_several(where: str, values: Sequence[Any], shown: Sequence[str]) -> None:
-    """Refuse single values that are one alone, or of which one stands there twice.
+    """Require at least two different discrete values.
 
     Parameters
     ----------
     where
-        What errors call it, for instance ``"[vary] motor.R_m"``.
+        Name of the entry in errors, for instance ``"[vary] motor.R_m"``.
     values, shown
-        Its values, and how errors show them.
+        Its values, and their texts in errors.
 
     Raises
     ------
     ParameterError
-        Naming it.
+        With the name of the entry.
     """
     if len(values) == 1:
         raise ParameterError(
@@ -373,7 +373,7 @@ def require_several(where: str, values: Sequence[Any], shown: Sequence[str]) -> 
 
 
 def among(values: list[Any], weights: Array, text: str) -> Distribution:
-    """Return the distribution of single values.
+    """Return the distribution of discrete values.
 
     Parameters
     ----------
@@ -382,7 +382,7 @@ def among(values: list[Any], weights: Array, text: str) -> Distribution:
     weights
         Their probabilities, shape (values,).
     text
-        The values as they are shown.
+        Text that lists the values.
     """
     each, edges = np.array(values), np.cumsum(weights)[:-1]
     alike = np.allclose(weights, weights[0])
@@ -397,10 +397,10 @@ def among(values: list[Any], weights: Array, text: str) -> Distribution:
 
 
 def rising(made: Distribution) -> Distribution:
-    """Return the distribution of single numbers whose quantiles rise, as those of any number.
+    """Return the distribution of discrete numbers, with rising quantiles.
 
-    A file lists them in any order, in which probabilities go through them: what they are correlated
-    with would fall with them, or neither.
+    A file may list them in any order. Unsorted, a positive correlation with another quantity could
+    become a negative one.
     """
     order = np.argsort(np.array(made.singles))
     values = [made.singles[k] for k in order]
@@ -415,19 +415,19 @@ def _picked(values: NDArray[Any], edges: Array, u: Array) -> NDArray[Any]:
 
 
 def weights_of(where: str, section: Mapping[str, Any], count: int) -> Array:
-    """Return the probabilities of single values, shape (count,), alike by default.
+    """Return the probabilities of discrete values, shape (count,); equal by default.
 
     Raises
     ------
     ParameterError
-        For what is no list of so many numbers > 0.
+        For an invalid list of ``count`` numbers > 0.
     """
     given = section.get("weights", [1.0] * count)
     is_listed = isinstance(given, list) and all(type(each) in (int, float) for each in given)
     weights = np.array(given if is_listed else [], dtype=float)
     if weights.shape != (count,) or not (weights > 0).all() or not np.isfinite(weights).all():
         raise not_valid(f"{where}.weights", quoted(given), f"{count} numbers > 0, one per value")
-    shares = weights / weights.max()  # whose sum is finite
+    shares = weights / weights.max()  # with a finite sum
     return np.asarray(shares / shares.sum())
 
 
@@ -440,30 +440,30 @@ _NEXT = {
     "log-normal": "take another 'median', or a smaller 'sd'",
     "triangular": "give 'low', 'mode' and 'high' within it",
 }
-"""what helps, by the kind of a distribution"""
-_ROUNDING = 1e-12  # share of a range by which an end may miss a limit that it was meant to be at
+"""advice, by the kind of a distribution"""
+_ROUNDING = 1e-12  # share of a range by which rounding may put an end beyond a limit
 
 
 def admitted(where: str, made: Distribution, leaf: Leaf, advice: str = "") -> Distribution:
-    """Return a distribution that stays within the admissible range of its number.
+    """Return a distribution that stays within the valid range of its number.
 
-    An end that rounding put beside a limit is at the limit. Where a distribution is truncated at a
-    limit that is itself not admissible (``> 0``), it ends there but as one without an end: designs
-    that go to the ends stop within it.
+    An end that misses a limit only by rounding is moved to it. Where a distribution is truncated at
+    an open limit (``> 0``), it counts as unbounded there, so that designs that visit the ends stop
+    within the limit.
 
     Parameters
     ----------
     where
-        What errors call it, for instance ``"[vary] motor.R_m"``.
+        Name of the entry in errors, for instance ``"[vary] motor.R_m"``.
     made, leaf
-        How it varies, and what is known about it.
+        Its distribution, and the declaration of the number.
     advice
-        What to do about a distribution that does not; by default what its kind has for that.
+        Advice for a distribution that leaves the range; by default that of its kind.
 
     Raises
     ------
     ParameterError
-        With what is admissible, and the probability of what is not, or the end that is not.
+        With the valid range, and the probability beyond it or the invalid end.
     """
     if made.singles:
         _require_singles(where, made.singles, leaf)
@@ -497,19 +497,19 @@ def admitted(where: str, made: Distribution, leaf: Leaf, advice: str = "") -> Di
 
 
 def _require_single_values(where: str, kind: str, leaf: Leaf, nominal: float) -> None:
-    """Refuse a distribution of a whole number that has any value between its ends.
+    """Reject a continuous distribution of a whole number.
 
     Parameters
     ----------
     where, kind
-        What errors call it, and the kind of its distribution.
+        Name of the entry in errors, and the kind of its distribution.
     leaf, nominal
-        What is known about it, and what the bench has.
+        Declaration of the number, and its value in the bench.
 
     Raises
     ------
     ParameterError
-        With single values that it may have.
+        With discrete values that are valid.
     """
     if not leaf.is_whole or kind == DISCRETE:
         return
@@ -525,12 +525,12 @@ def _require_single_values(where: str, kind: str, leaf: Leaf, nominal: float) ->
 
 
 def whole(where: str, values: Sequence[float], leaf: Leaf) -> list[float]:
-    """Return single values; of a whole number without the last digit that a share leaves.
+    """Return discrete values; those of a whole number without rounding errors of percentages.
 
     Raises
     ------
     ParameterError
-        For those of a whole number that are not whole.
+        For values of a whole number that are not whole.
     """
     if not leaf.is_whole:
         return list(values)
@@ -543,23 +543,23 @@ def whole(where: str, values: Sequence[float], leaf: Leaf) -> list[float]:
 
 
 def require_following(where: str, made: Distribution, leaf: Leaf, unit: Unit, ratio: float) -> None:
-    """Refuse a distribution that takes what keeps its ratio to it out of the range of that.
+    """Reject a distribution that moves a proportional quantity out of its range.
 
     Parameters
     ----------
     where
-        What errors call what follows.
+        Name of the proportional quantity in errors.
     made, unit
-        How the other one varies, and its unit.
+        Distribution of the other quantity, and its unit.
     leaf
-        What is known about the one that follows.
+        Declaration of the proportional quantity.
     ratio
-        Its value over that of the other in the bench, not zero.
+        Ratio of its value to the other's value in the bench, not zero.
 
     Raises
     ------
     ParameterError
-        As `admitted`, in the unit of the other one.
+        As `admitted`, in the unit of the other quantity.
     """
     low, high = (leaf.low, leaf.low_open), (leaf.high, leaf.high_open)
     low, high = (low, high) if ratio > 0.0 else (high, low)
@@ -580,7 +580,7 @@ def _require_singles(where: str, values: Sequence[float], leaf: Leaf) -> None:
 
 
 def _at_limit(end: float, leaf: Leaf, width: float) -> float:
-    """Return an end, or the limit that it misses by rounding alone."""
+    """Return an end, or the limit that it misses only by rounding."""
     limits = [limit for limit in (leaf.low, leaf.high) if math.isfinite(limit)]
     room = _ROUNDING * width if math.isfinite(width) else 0.0
     return next((limit for limit in limits if abs(end - limit) <= room), end)
@@ -594,28 +594,27 @@ _TOLERANCE = re.compile(r"\s*(?:\+-|\+/-|±)\s*(\S.*)")
 def read_distribution(
     name: str, entry: Any, leaf: Leaf, nominal: float, title: str = "[vary]", advice: str = ""
 ) -> Distribution:
-    """Return how a number varies.
+    """Return the distribution of a number.
 
     Parameters
     ----------
     name
         Dotted name of the parameter or option.
     entry
-        What the study file says: a tolerance as text, ``"+-5 %"``, or a section with ``kind``.
+        Entry of the study file: a tolerance as text, ``"+-5 %"``, or a section with ``kind``.
     leaf
-        Unit and admissible range of the number.
+        Unit and valid range of the number.
     nominal
-        Its value in the bench [SI]: shares are of it.
+        Its value in the bench [SI]; percentages are relative to it.
     title
-        Section of the file that says so, for errors.
+        Section of the file, for errors.
     advice
-        What to do about a distribution that leaves the admissible range; by default what its kind
-        has for that.
+        Advice for a distribution that leaves the valid range; by default that of its kind.
 
     Raises
     ------
     InputError
-        For entries that cannot be read, contradict themselves, or leave the admissible range.
+        For entries that cannot be read, contradict themselves, or leave the valid range.
     """
     tolerance = _TOLERANCE.fullmatch(entry) if isinstance(entry, str) else None
     if tolerance is not None:
@@ -650,7 +649,7 @@ def read_distribution(
 
 
 def _without_kind(where: str, entry: Mapping[str, Any], leaf: Leaf) -> ParameterError:
-    """Return the error of a section that does not say what kind of distribution it is."""
+    """Return the error for a section without a valid kind of distribution."""
     given = entry.keys() - {"together"}
     near = [kind for kind, (keys, _) in _KINDS.items() if given and given <= {*keys}]
     near = [DISCRETE] if leaf.is_whole else near
@@ -661,7 +660,7 @@ def _without_kind(where: str, entry: Mapping[str, Any], leaf: Leaf) -> Parameter
 
 @dataclass(frozen=True)
 class _Entry:
-    """A section of ``[vary]`` with what its texts are read by; ``where``: what errors call it."""
+    """A section of ``[vary]`` with the context for its texts; ``where``: its name in errors."""
 
     where: str
     section: Mapping[str, Any]
@@ -669,7 +668,7 @@ class _Entry:
     nominal: float
 
     def level(self, key: str, default: float | None = None) -> float:
-        """Return a value [SI]; a share with a sign, ``+10 %``, is a change of the nominal one."""
+        """Return a value [SI]; a signed percentage, ``+10 %``, changes the nominal value."""
         if key not in self.section and default is not None:
             return default
         text = self._given(key)
@@ -680,7 +679,7 @@ class _Entry:
         return (1.0 + share) * self.nominal
 
     def width(self, key: str, of: float) -> float:
-        """Return a width [SI] > 0; a share is of another value."""
+        """Return a width [SI] > 0; a percentage is relative to another value."""
         text = self._given(key)
         if isinstance(text, str) and text.strip().endswith("%"):
             self._refuse_share(key, text)
@@ -716,14 +715,14 @@ class _Entry:
         return float(written(value, symbol or unit.symbol, where, unit.nominal))
 
     def refused(self, why: str) -> ParameterError:
-        """Return the error of a section that contradicts itself."""
+        """Return the error for a section that contradicts itself."""
         return ParameterError(f"{self.where} (kind {self.section['kind']}): {why}", name=self.where)
 
 
 def _frozen(
     entry: _Entry, law: Law, text: str, low: float = -math.inf, high: float = math.inf
 ) -> Distribution:
-    """Return a distribution by its law; that of a tail has no end, wherever its law ends."""
+    """Return a distribution from its law; a kind with tails is unbounded, wherever its law ends."""
     return Distribution(str(entry.section["kind"]), text, law.ppf, low, high, law.cdf, law.sf)
 
 
@@ -758,7 +757,7 @@ def _normal(entry: _Entry) -> Distribution:
         return _frozen(entry, Normal(mean, sd), text)
     if not low < high:
         raise entry.refused(f"low = {entry.amount(low)} must be below high = {entry.amount(high)}")
-    law = Normal(mean, sd)  # the difference of the smaller ones, for their digits
+    law = Normal(mean, sd)  # the difference of the smaller probabilities, for accuracy
     kept = law.sf(low) - law.sf(high) if low > mean else law.cdf(high) - law.cdf(low)
     if kept < NEVER:
         raise entry.refused(
@@ -779,7 +778,7 @@ def _lognormal(entry: _Entry) -> Distribution:
     variation = entry.width("sd", median) / median
     sigma = math.sqrt(math.log1p(variation**2))
     text = f"log-normal, median {entry.amount(median)}, sd {100.0 * variation:.3g} %"
-    return _frozen(entry, LogNormal(sigma, median), text)  # ends at zero as where it has no end
+    return _frozen(entry, LogNormal(sigma, median), text)  # zero counts as unbounded
 
 
 def _triangular(entry: _Entry) -> Distribution:
@@ -813,4 +812,4 @@ _KINDS: dict[str, tuple[tuple[str, ...], Callable[[_Entry], Distribution]]] = {
     DISCRETE: (KEYS, _discrete),
 }
 ENTRY_KEYS = frozenset({"kind", "together"}).union(*(keys for keys, _ in _KINDS.values()))
-"""all keys that a section of a quantity may have"""
+"""all valid keys of a section of a quantity"""

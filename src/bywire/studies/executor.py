@@ -1,4 +1,4 @@
-"""Who computes the chunks of a study: this process, a pool of processes, or a Dask cluster."""
+"""Execution of the chunks of a study: in this process, a process pool, or a Dask cluster."""
 
 from __future__ import annotations
 
@@ -32,21 +32,21 @@ T = TypeVar("T")
 
 
 class Beside(Generic[T]):
-    """What is computed beside chunks.
+    """A computation that runs beside the chunks.
 
-    ``future``: gives its value, and what was warned of meanwhile in another process.
+    ``future``: gives its value, and the warnings from another process.
     """
 
     def __init__(self, future: Future[tuple[T, list[Warning]]]) -> None:
         self._future = future
 
     def check(self) -> None:
-        """Raise what it raised, if it did so by now."""
+        """Raise its exception if it has failed by now."""
         if self._future.done():
             self._future.result()
 
     def result(self) -> T:
-        """Wait for its value, and warn of what was warned of."""
+        """Wait for its value, and repeat its warnings."""
         value, said = self._future.result()
         for each in said:
             warnings.warn(each, stacklevel=2)
@@ -54,20 +54,20 @@ class Beside(Generic[T]):
 
 
 class Compute(Protocol):
-    """What computes chunks batch by batch."""
+    """Computation of chunks, batch by batch."""
 
     def __call__(self, chunks: _Chunks) -> Iterator[tuple[int, Columns]]:
-        """Yield number and columns of each chunk as soon as it is there, in any order."""
+        """Yield number and columns of each chunk as soon as it is computed, in any order."""
         ...
 
     def beside(self, job: Callable[[], T]) -> Beside[T]:
-        """Begin something else: at once, or in a process that then goes on with chunks."""
+        """Start another computation: right now, or in a process that then continues with chunks."""
         ...
 
 
 @dataclass(frozen=True)
 class Apart:
-    """Computes chunks by a function, and what stands beside them at once."""
+    """Computation of chunks by a function, and of everything else right away."""
 
     chunks: Callable[[_Chunks], Iterator[tuple[int, Columns]]]
 
@@ -76,22 +76,22 @@ class Apart:
         return self.chunks(chunks)
 
     def beside(self, job: Callable[[], T]) -> Beside[T]:
-        """Do it at once; see `Compute`."""
+        """Run it right away; see `Compute`."""
         done: Future[tuple[T, list[Warning]]] = Future()
         done.set_result((job(), []))
         return Beside(done)
 
 
 class Executor(Protocol):
-    """Computes chunks, in any order."""
+    """Executor of chunks, in any order."""
 
     def opened(self, plan: StudyPlan) -> AbstractContextManager[Compute]:
-        """Return what computes chunks batch by batch, each one whole before the next.
+        """Return the computation of chunks batch by batch, each batch complete before the next.
 
         Raises
         ------
         RunError
-            When workers are lost and none is left.
+            When all workers are lost.
         """
         ...
 
@@ -103,21 +103,21 @@ def single(chunk: int | PlacedChunk, plan: StudyPlan) -> tuple[int, Columns]:
 
 # --- On a cluster of dask.distributed
 
-_AHEAD = 2  # tasks in flight for each worker, so that none waits for us
+_AHEAD = 2  # tasks in flight for each worker, so that no worker is idle
 _SECONDS = 10.0  # to reach a cluster
-_TASK = 0.5  # s that a task of a cluster is to take
-# What Dask does by the clock: stacks sampled every 10 ms, ticks of 20 ms, memory looked at every
-# 100 ms. A core's worker, scheduler and client take 8 % of a core with it, and 1.4 % with these.
+_TASK = 0.5  # s: target duration of a task of a cluster
+# Dask's periodic work: stack samples every 10 ms, ticks of 20 ms, memory checks every 100 ms. A
+# core's worker, scheduler and client use 8 % of a core for it, and 1.4 % with these settings.
 CLUSTER_SETTINGS = {
     "distributed.worker.profile.enabled": False,
     "distributed.admin.tick.interval": "1s",
     "distributed.worker.memory.monitor-interval": "1s",
 }
-"""configuration of Dask with which scheduler and workers are best started"""
-# Dask has its workers give memory back at once, which the next chunk takes again page by page: an
-# eighth of its time.
+"""recommended configuration of Dask for scheduler and workers"""
+# By default Dask's workers return freed memory, and the next chunk requests it again page by page:
+# an eighth of its time.
 CLUSTER_MEMORY = {"MALLOC_TRIM_THRESHOLD_": 1 << 28, "MALLOC_MMAP_THRESHOLD_": 1 << 25}
-"""environment with which workers are best started where the C library is glibc [byte]"""
+"""recommended environment of workers where the C library is glibc [byte]"""
 
 _LOST = "the cluster lost its workers ({}): resume the study when some are there"
 _GONE = "the cluster's scheduler is gone: resume the study when it is there again, or elsewhere"
@@ -125,7 +125,7 @@ _WHAT = ("studies on a cluster", "cluster")
 
 
 _Task = tuple[float, list[tuple[int, Columns]]]
-"""what a task of a cluster gives: time [s], and its chunks"""
+"""result of a task of a cluster: time [s], and its chunks"""
 
 
 class Cluster:
@@ -134,7 +134,7 @@ class Cluster:
     Parameters
     ----------
     address
-        Of its scheduler, for instance ``tcp://host:8786``.
+        Address of its scheduler, for instance ``tcp://host:8786``.
     """
 
     def __init__(self, address: str) -> None:
@@ -142,7 +142,7 @@ class Cluster:
 
     @contextmanager
     def opened(self, plan: StudyPlan) -> Iterator[Compute]:
-        """Return what computes; see `Executor`."""
+        """Return the computation; see `Executor`."""
         with _client(self.address) as client:
             workers = len(client.scheduler_info()["workers"])
             if not workers:
@@ -162,7 +162,7 @@ def _client(address: str) -> Iterator[Any]:
             f"no cluster answers at {address!r} ({error}): start one with 'dask scheduler' and "
             "'dask worker', and give the address that the scheduler prints"
         ) from None
-    log = logging.getLogger("distributed.client")  # it would print how a connection is lost
+    log = logging.getLogger("distributed.client")  # it would print each lost connection
     before = log.level
     log.setLevel(logging.CRITICAL)
     try:
@@ -173,7 +173,7 @@ def _client(address: str) -> Iterator[Any]:
 
 
 def _timed(chunks: Sequence[int | PlacedChunk], plan: StudyPlan) -> _Task:
-    """Return chunks one after the other, and the time that they took."""
+    """Return chunks one after the other, and their computing time."""
     begin = time.perf_counter()
     given = [single(chunk, plan) for chunk in chunks]
     return time.perf_counter() - begin, given
@@ -182,13 +182,13 @@ def _timed(chunks: Sequence[int | PlacedChunk], plan: StudyPlan) -> _Task:
 def _of_cluster(
     client: Any, plan: StudyPlan, workers: int, chunks: _Chunks
 ) -> Iterator[tuple[int, Columns]]:
-    """Yield what a cluster has finished, with few tasks in flight.
+    """Yield the finished chunks of a cluster, with few tasks in flight.
 
-    A task goes through scheduler and network, which takes as long as some cases: it is as many
-    chunks as take about `_TASK`, but near the end no more than each worker's share.
+    The overhead of a task equals some cases: a task has as many chunks as take about `_TASK`, but
+    near the end no more than each worker's share.
     """
     distributed = library("distributed", *_WHAT)
-    # Once to every worker, where it stays: with each task its bench would be made anew.
+    # Once to every worker, which keeps it: otherwise each task would set up the bench again.
     kept = client.scatter(plan, broadcast=True, hash=False)
     left, size = deque(chunks), 1
     with client.as_current():
@@ -204,7 +204,7 @@ def _of_cluster(
         for _ in range(_AHEAD * workers):
             submit()
         for _, answer in tasks:
-            if isinstance(answer, BaseException):  # a task that was cancelled gives why
+            if isinstance(answer, BaseException):  # a cancelled task gives the reason
                 raise RunError(_lost(client, answer))
             seconds, given = answer
             size = max(1, round(_TASK * len(given) / seconds))
@@ -215,27 +215,27 @@ def _of_cluster(
 
 
 def _lost(client: Any, error: BaseException) -> str:
-    """Return who is gone: the scheduler, or workers alone, with what else is known."""
+    """Return which part is lost, the scheduler or only workers, with further details."""
     reason = str(getattr(error, "reason", error))
     if client.status != "running" or "scheduler" in reason:
         return _GONE
-    # Tasks are forgotten where workers took the study, which they were given once, with them.
+    # A task is forgotten if its workers, which alone have the study, are lost.
     return _LOST.format("all of them" if "forgotten" in reason else reason)
 
 
 # --- Who computes
 
-# Chunks that a graphics processor is given at once: 4,096 cases, of hard braking 2 GB of this
-# machine's memory for stimuli and rows.
+# Chunks of one batch on a graphics processor: 4,096 cases, for hard braking 2 GB of this machine's
+# memory for stimuli and rows.
 _TOGETHER = 64
 _MOST_WORKERS = 1024
-# Chunks from which on processes are worth their start; those that load all anew take a second.
+# Chunks from which processes are worth their start; a process that loads everything takes a second.
 _WORTH_COPIES, _WORTH = 2, 8
 
 
 @dataclass(frozen=True)
 class _InPool:
-    """Computes chunks, and what stands beside them, in the processes of a pool."""
+    """Computation of chunks, and other tasks, in the processes of a pool."""
 
     pool: ProcessPoolExecutor
     ahead: int
@@ -249,12 +249,12 @@ class _InPool:
 
 
 class InProcess:
-    """The process itself, with lanes on all cores, or a graphics processor.
+    """The current process, with lanes on all cores, or a graphics processor.
 
     Parameters
     ----------
     together
-        How many chunks are computed as one.
+        Number of chunks per batch.
     """
 
     def __init__(self, together: int = 1) -> None:
@@ -267,17 +267,17 @@ class InProcess:
 
     @contextmanager
     def opened(self, plan: StudyPlan) -> Iterator[Compute]:
-        """Return what computes; see `Executor`."""
+        """Return the computation; see `Executor`."""
         yield Apart(partial(self._computed, plan))
 
 
 class Pool:
-    """Processes of this machine, a core each.
+    """Processes on this machine, one per core.
 
     Parameters
     ----------
     workers
-        How many, >= 1.
+        Number of processes, >= 1.
     """
 
     def __init__(self, workers: int) -> None:
@@ -285,7 +285,7 @@ class Pool:
 
     @contextmanager
     def opened(self, plan: StudyPlan) -> Iterator[Compute]:
-        """Return what computes; see `Executor`."""
+        """Return the computation; see `Executor`."""
         fewer = f"resume it, with fewer {option('workers')}"
         with processes_with_brakes(self.workers, fewer, _give, plan) as pool:
             yield _InPool(pool, _AHEAD * self.workers)
@@ -298,20 +298,20 @@ def executor_of(
     together: int | None = None,
     engine: str = "auto",
 ) -> Executor:
-    """Return who computes: a cluster if one is named, else so many processes.
+    """Return the executor: a cluster if one is named, else that many processes.
 
     Parameters
     ----------
     workers
-        Processes; None for one a core where the work is worth their start.
+        Number of processes; None for one per core where the work is worth their start.
     cluster
         Address of a Dask scheduler; empty for this machine.
     chunks
-        How many chunks are left.
+        Number of remaining chunks.
     together
-        How many can be computed at once; all by default.
+        Largest number of chunks per batch; all by default.
     engine
-        What computes the bench: a graphics processor is given many chunks at once, by one process.
+        Engine of the bench: a graphics processor takes many chunks per batch, from one process.
 
     Raises
     ------
@@ -329,12 +329,13 @@ def executor_of(
 
 
 def require_workers(workers: int | None, cluster: str, engine: str) -> None:
-    """Refuse workers that cannot be; see `executor_of`.
+    """Reject an invalid number of workers; see `executor_of`.
 
     Raises
     ------
     ParameterError
-        For no workers or too many, for both at once, and for either beside a graphics processor.
+        For zero or too many workers, for workers with a cluster, and for either with a graphics
+        processor.
     """
     if workers is not None:
         whole_number("workers", workers, 1, _MOST_WORKERS)
@@ -351,7 +352,7 @@ def require_workers(workers: int | None, cluster: str, engine: str) -> None:
         )
 
 
-# What a process of a pool computes: given once, and not with every job.
+# Data of each process of a pool: sent once, and not with every job.
 _given: list[StudyPlan] = []
 
 
@@ -360,7 +361,7 @@ def _give(plan: StudyPlan) -> None:
 
 
 def _told(job: Callable[[], T]) -> tuple[T, list[Warning]]:
-    """Return what a job gives, and what it warns of: here nobody would hear it."""
+    """Return the result of a job and its warnings, which its own process would not show."""
     with heard_warnings() as caught:
         value = job()
     return value, [each.message for each in caught if isinstance(each.message, Warning)]

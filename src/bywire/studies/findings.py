@@ -1,4 +1,4 @@
-"""What a study found: its requirements judged, its key figures' spread, and what drives them."""
+"""Findings of a study: judged requirements, spread of key figures, and their drivers."""
 
 from __future__ import annotations
 
@@ -39,17 +39,17 @@ if TYPE_CHECKING:
     import pandas as pd
 
 ONE = "one-at-a-time"
-"""the design that shows it"""
+"""the design that shows the effect of each quantity alone"""
 
 
 @dataclass(frozen=True)
 class Effect:
-    """What a key figure does as one quantity varies.
+    """Effect of one quantity on a key figure.
 
     Parameters
     ----------
     quantity, unit
-        Its name and SI unit; of a choice no unit.
+        Its name and SI unit; a choice has no unit.
     values
         Its values [SI], or the choices, in the order of the cases, shape (levels,).
     figures
@@ -66,40 +66,41 @@ class Effect:
 
     @property
     def least(self) -> float:
-        """Least value of the key figure, that of the bench itself among them."""
+        """Least value of the key figure, including that of the bench itself."""
         return float(np.nanmin([*self.figures, self.nominal]))
 
     @property
     def largest(self) -> float:
-        """Largest value."""
+        """Largest value, including that of the bench itself."""
         return float(np.nanmax([*self.figures, self.nominal]))
 
     @property
     def swing(self) -> float:
-        """How far the key figure goes."""
+        """Largest minus least value."""
         return self.largest - self.least
 
     @property
     def lacking(self) -> int:
-        """At how many levels it is not defined."""
+        """Number of levels at which the key figure is not defined."""
         return int(np.count_nonzero(~np.isfinite(self.figures)))
 
 
 def effects(
     varied: Sequence[Varied], levels: int, columns: Sequence[Sequence[float | str]], figure: Array
 ) -> list[Effect]:
-    """Return what each quantity does to a key figure, the largest swing first.
+    """Return the effect of each quantity on a key figure, the largest swing first.
 
-    Quantities with which the figure is not defined any more come before that.
+    Quantities with undefined key figures come before all others.
 
     Parameters
     ----------
     varied, levels
-        What varies, and how many values each has; those of single values have theirs.
+        Quantities that vary, and the number of values of each; discrete quantities use their own
+        values.
     columns
         Values of each quantity in every case, the bench itself first.
     figure
-        The key figure in every case; what is not computed yet is missing at the end.
+        The key figure in every case; cases that are not computed yet are missing at the end.
     """
     found: list[Effect] = []
     begin = 1
@@ -119,16 +120,16 @@ def effects(
 
 @dataclass(frozen=True)
 class ChoiceInfluence:
-    """How a key figure goes with a choice that varies.
+    """Relation of a key figure to a choice that varies.
 
     Parameters
     ----------
     quantity
         Its name.
     correlation_ratio
-        0 to 1: beside sizes of rank correlations; it has no sign.
+        0 to 1, on the scale of rank correlations; it has no sign.
     is_distinct
-        Whether it differs from none.
+        Whether it differs significantly from zero.
     """
 
     quantity: str
@@ -137,21 +138,21 @@ class ChoiceInfluence:
 
     @property
     def strength(self) -> float:
-        """How strong it is, 0 to 1."""
+        """Strength of the relation, 0 to 1."""
         return self.correlation_ratio
 
 
 def choice_influence(
     quantity: str, choices: Sequence[str], figure: Array, confidence: float
 ) -> ChoiceInfluence | None:
-    """Return how a key figure goes with a choice; None where either does not vary.
+    """Return the relation of a key figure to a choice; None where either does not vary.
 
-    The square of the ratio is the share of the ranks' variance that lies between the choices, less
-    what chance makes of it (T. L. Kelley, An unbiased correlation ratio measure, Proc. Natl. Acad.
-    Sci. 21, 1935). With two choices it is the size of the rank correlation with either, but for
-    that. Whether it differs from none, ranks alone tell (W. H. Kruskal and W. A. Wallis, Use of
-    ranks in one-criterion variance analysis, J. Am. Stat. Assoc. 47, 1952); an interval would need
-    to know how the figure is distributed.
+    The square of the ratio is the share of the ranks' variance between the choices, minus the part
+    due to chance (T. L. Kelley, An unbiased correlation ratio measure, Proc. Natl. Acad. Sci. 21,
+    1935). With two choices it is, apart from this correction, the magnitude of the rank
+    correlation. A rank test decides whether it differs from zero (W. H. Kruskal and W. A. Wallis,
+    Use of ranks in one-criterion variance analysis, J. Am. Stat. Assoc. 47, 1952). An interval
+    would need the distribution of the figure.
 
     Parameters
     ----------
@@ -160,7 +161,7 @@ def choice_influence(
     figure
         The key figure in each case, shape (cases,); cases without one are left out.
     confidence
-        With which it differs from none, between 0 and 1.
+        Confidence of the test, between 0 and 1.
     """
     known = np.isfinite(figure)
     y = ranked(figure[known])
@@ -189,20 +190,18 @@ class Judgment:
     met
         Whether each case meets it, shape (cases,); a case without a result does not.
     share
-        How often, and the interval of the probability, whatever cases that are too close to the
-        limit are.
+        Share of the cases that meet it, with the interval of the probability. Cases too close to
+        the limit count for neither side.
     undecided
-        Cases no further from the limit than their figure may be off by the step.
+        Cases closer to the limit than the numerical error of their figure.
     outcome
-        Whether it is met with the probability that is wanted; of one that every case has to meet,
-        whether all do.
+        Whether it is met with the required probability, or in all cases if it has none.
     worst
-        Row of the case that is worst of all, or of the most probable failing one of a rare failure.
-        Worse than any other is a case that ran and does not have the figure. None where none ran,
-        or all have the same.
+        Row of the worst case, or of the most probable failure in a study of rare failures. A case
+        without the figure is worse than any other. None if no case ran, or all cases are equal.
     failure
-        How probable it is that the requirement is missed, of a study of rare failures: shares of
-        its cases are no probabilities.
+        Probability that the requirement is missed, in a study of rare failures: there, shares of
+        cases are not probabilities.
     """
 
     demand: Limit
@@ -221,7 +220,7 @@ def judgment_of(
     error: float,
     confidence: float,
 ) -> Judgment:
-    """Return a requirement judged over cases.
+    """Return a requirement judged over all cases.
 
     Parameters
     ----------
@@ -232,10 +231,10 @@ def judgment_of(
     failed
         Whether a case has no result, shape (cases,).
     error
-        What the figure may be off by, in its unit: cases closer to the limit count for neither
+        Numerical error of the figure, in its unit: cases closer to the limit count for neither
         side.
     confidence
-        Of the interval, between 0 and 1.
+        Confidence of the interval, between 0 and 1.
     """
     met, near = demand.is_met(figure), demand.is_near(figure, error)
     count = figure.size
@@ -252,13 +251,13 @@ def judgment_of(
 
 
 def _worst(figure: Array, failed: NDArray[np.bool_], is_upper: bool) -> int | None:
-    """Return the row of the case that is worst by an upper or a lower limit."""
+    """Return the row of the worst case by an upper or a lower limit."""
     known = np.isfinite(figure)
     lacking = np.flatnonzero(~known & ~failed)
     if lacking.size:
         return int(lacking[0])
     if not known.any() or (known.sum() > 1 and np.ptp(figure[known]) == 0.0):
-        return None  # whichever were named, it would be no worse than the others
+        return None  # all cases are equal: none is the worst
     return int(np.argmin(np.where(known, -figure if is_upper else figure, np.inf)))
 
 
@@ -269,7 +268,7 @@ _NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 
 @dataclass(frozen=True, repr=False)
 class Findings:
-    """The cases of a study, and what they say.
+    """The cases of a study, and their evaluation.
 
     Parameters
     ----------
@@ -278,11 +277,11 @@ class Findings:
     cases
         A row for each case that was computed; see `bywire.studies.store.computed_chunk`.
     nominal
-        Key figures of the bench itself, with their error from the step.
+        Key figures of the bench itself, with their numerical error.
     rare
-        What a study of rare failures found; of another, nothing.
+        Results of a study of rare failures; empty for other studies.
     searches
-        How searches for the worst case of each requirement ended; of another study, nothing.
+        Results of the searches for the worst case of each requirement; empty for other studies.
     """
 
     plan: StudyPlan
@@ -301,7 +300,7 @@ class Findings:
         return bench.definition.kpis_with(bench.chosen_options)
 
     def figure(self, name: str) -> Array:
-        """Return a key figure of every case in its unit, shape (cases,); NaN where one has it not.
+        """Return a key figure of every case in its unit, shape (cases,); NaN where it is undefined.
 
         Raises
         ------
@@ -312,13 +311,13 @@ class Findings:
         return np.asarray(self.cases[name], dtype=float)
 
     def size(self, name: str) -> float:
-        """Return the largest magnitude of a key figure in any case; 0 where none has it."""
+        """Return the largest magnitude of a key figure; 0 if it is undefined in all cases."""
         self._require(name)
         return self._sizes.get(name, 0.0)
 
     @cached_property
     def _sizes(self) -> Mapping[str, float]:
-        """Largest magnitude of every key figure: every cell of a table asks for it."""
+        """Largest magnitude of every key figure, kept because every cell of a table needs it."""
         return {s.name: max(abs(s.least), abs(s.largest)) for s in self.spreads}
 
     @cached_property
@@ -330,7 +329,7 @@ class Findings:
 
     @cached_property
     def spreads(self) -> tuple[Spread, ...]:
-        """Every key figure that any case has."""
+        """Every key figure that is defined in any case."""
         nominal = {kpi.name: kpi.value for kpi in self.nominal}
         return tuple(
             spread_of(
@@ -341,9 +340,9 @@ class Findings:
         )
 
     def influences(self, name: str) -> Sequence[Influence | ChoiceInfluence]:
-        """Return how a key figure goes with what varies, the strongest first.
+        """Return the relations of a key figure to the quantities, the strongest first.
 
-        Choices, which have no order, stand by their correlation ratio among sizes of rank
+        Choices have no order: their correlation ratio is ranked among magnitudes of rank
         correlations.
         """
         known, plan = self._influences, self.plan
@@ -363,14 +362,14 @@ class Findings:
         return known[name]
 
     def sensitivity(self, name: str) -> Sensitivity:
-        """Return the indices of a key figure, in a study whose design is made for them.
+        """Return the sensitivity indices of a key figure, in a study with such a design.
 
         Raises
         ------
         UnknownNameError
             For a figure that the study does not have.
         ParameterError
-            Of another design.
+            For another design.
         """
         self._require(name)
         known, design = self._sensitivities, self.plan.sensitivity
@@ -390,7 +389,7 @@ class Findings:
         return known[name]
 
     def effects(self, name: str) -> Sequence[Effect]:
-        """Return what each quantity alone does to a key figure, where the design shows that."""
+        """Return the effect of each quantity alone on a key figure, where the design shows it."""
         self._require(name)
         if self.plan.design != ONE or not len(self.cases):
             return []
@@ -398,10 +397,10 @@ class Findings:
         return effects(self.plan.varied, self.plan.levels, columns, self.figure(name))
 
     def drivers(self, name: str) -> Sequence[str]:
-        """Return the quantities that a key figure goes with, the strongest first.
+        """Return the quantities that drive a key figure, the strongest first.
 
-        By importance, by indices, by what each does alone, or by the size of rank correlations and
-        correlation ratios.
+        Ranked by importance, by indices, by the effect of each quantity alone, or by the magnitude
+        of rank correlations and correlation ratios.
         """
         if self.rare:
             return [
@@ -418,18 +417,18 @@ class Findings:
 
     @cached_property
     def failures(self) -> Mapping[int, str]:
-        """Row -> why the case has no result."""
+        """Reason why a case has no result, by row."""
         texts = self._texts(FAILURE)
         return {k: texts[k] for k in np.flatnonzero(self._failed).tolist()}
 
     @cached_property
     def _failed(self) -> NDArray[np.bool_]:
-        """Whether each case has no result, shape (cases,): texts of a million are told once."""
+        """Whether each case has no result, shape (cases,); kept, as it reads many texts."""
         return np.asarray(self._texts(FAILURE) != "")
 
     @property
     def reasons(self) -> Mapping[str, Sequence[int]]:
-        """Why cases have no result -> their rows; what differs in its numbers alone, once."""
+        """Rows of cases without a result, by reason, merged where only numbers differ."""
         said: dict[str, list[int]] = {}
         for row, text in self.failures.items():
             said.setdefault(_NUMBER.sub("#", text), []).append(row)
@@ -437,7 +436,7 @@ class Findings:
 
     @cached_property
     def warnings(self) -> Mapping[str, int]:
-        """What runs warned of -> in how many cases; what differs in its numbers alone, once."""
+        """Number of cases by warning, merged where only numbers differ."""
         said: dict[str, Counter[str]] = {}
         for text, cases in Counter(self._texts(WARNINGS).tolist()).items():
             for each in filter(None, text.split("; ")):
@@ -452,7 +451,7 @@ class Findings:
             raise unknown_name("key figure", str(name), self.units)
 
     def _texts(self, column: str) -> NDArray[np.object_]:
-        """Return a text of every case, shape (cases,); pandas would be slow to hand over each."""
+        """Return a text of every case, shape (cases,); pandas would be slow, row by row."""
         return np.asarray(self.cases[column] if len(self.cases) else (), dtype=object)
 
     def number(self, row: int) -> int:
@@ -460,13 +459,13 @@ class Findings:
         return int(self.cases[CASE].iloc[row])
 
     def values(self, row: int) -> dict[str, float | str]:
-        """Return what varied in a case [SI]."""
+        """Return the varied values of a case [SI]."""
         names = [name for v in self.plan.varied for name in (v.name, *v.together)]
         return {name: self.cases[name].iloc[row] for name in names}
 
     @cached_property
     def _sensitivities(self) -> dict[str, Sensitivity]:
-        """Indices by key figure, as they were asked for: those of many cases take a second."""
+        """Indices by key figure, kept: those of many cases take a second."""
         return {}
 
     @cached_property
@@ -475,7 +474,7 @@ class Findings:
         return {}
 
     def _rare_judgment(self, rare: RareFailure) -> Judgment:
-        """Return a requirement of which shares of the cases say nothing."""
+        """Return a requirement of a design whose shares of cases are not probabilities."""
         among, wanted = self._judgment(rare.demand), rare.demand.probability
         assert wanted is not None
         numbers, error = np.asarray(self.cases[CASE]), self._error(rare.demand.figure)
@@ -487,12 +486,12 @@ class Findings:
         )
 
     def _error(self, name: str) -> float:
-        """Return what a key figure may be off by, in its unit; nothing where that is not known."""
+        """Return the numerical error of a key figure, in its unit; 0 where it is not known."""
         error = {kpi.name: kpi.bound for kpi in self.nominal}.get(name, math.nan)
         return 0.0 if math.isnan(error) else error
 
     def is_close(self, demand: Limit) -> NDArray[np.bool_]:
-        """Return which cases are no further from a limit than their figure may be off."""
+        """Return which cases are closer to a limit than the numerical error of their figure."""
         return demand.is_near(self.figure(demand.figure), self._error(demand.figure))
 
     def _judgment(self, demand: Limit) -> Judgment:

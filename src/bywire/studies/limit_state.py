@@ -1,4 +1,4 @@
-"""A requirement as a limit state, and the rare failures beyond it: by FORM and by subsets."""
+"""A requirement as a limit state, and its rare failures, by FORM and by subset simulation."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from bywire.studies.statistics import (
 )
 
 BEYOND = -1e300
-"""margin of a case without the figure: it fails, and is beyond every level"""
+"""margin of a case without the figure: a failure beyond every level"""
 _LEAST = float(np.finfo(float).tiny)  # margin of a case that meets its limit exactly
 
 Margins = Callable[[Array], Array]
@@ -35,17 +35,17 @@ Margins = Callable[[Array], Array]
 
 
 class UnfinishedError(Exception):
-    """Cases that are asked for are not there: the budget is spent, or they are not computed."""
+    """Requested cases are missing: the budget is spent, or they are not computed."""
 
 
 class BudgetSpentError(UnfinishedError):
-    """No more cases are admitted."""
+    """The budget of cases is spent."""
 
 
 def margins_of(values: Array, limit: Limit) -> Array:
-    """Return how far each figure is from missing its limit, in its unit; it is missed at <= 0.
+    """Return each figure's margin to its limit, in its unit; the limit is missed at <= 0.
 
-    A figure that is not defined is `BEYOND`: a finite number, for levels are ranked by it.
+    An undefined figure has the margin `BEYOND`: a finite number, because levels rank margins.
 
     Examples
     --------
@@ -62,12 +62,12 @@ def margins_of(values: Array, limit: Limit) -> Array:
 
 @dataclass
 class Trail:
-    """The cases that a method asked for, in their order.
+    """The cases that a method requested, in their order.
 
     Parameters
     ----------
     margins
-        What gives their margins; see `Margins`.
+        Function of their margins; see `Margins`.
     """
 
     margins: Margins
@@ -76,7 +76,7 @@ class Trail:
     _stopped: list[BaseException] = field(default_factory=list)
 
     def __call__(self, scores: Any) -> Array:
-        """Return the margins of a batch, and remember both."""
+        """Return the margins of a batch, and record scores and margins."""
         z = np.array(scores, dtype=float)
         if self._stopped:
             raise self._stopped[0]
@@ -91,12 +91,12 @@ class Trail:
 
     @property
     def runs(self) -> int:
-        """How many cases there were."""
+        """Number of cases."""
         return sum(map(len, self._values))
 
     @property
     def nearest(self) -> tuple[int, Array] | None:
-        """The most probable failing case, its place and scores; None where none failed."""
+        """The most probable failing case, its position and scores; None where none failed."""
         if not self._values:
             return None
         scores, failed = np.vstack(self._scores), np.concatenate(self._values) <= 0.0
@@ -107,14 +107,14 @@ class Trail:
 
     @contextmanager
     def within_library(self, seed: int) -> Iterator[None]:
-        """Have what stopped a batch raised as it was: the library wraps it in an error of its own.
+        """Raise the error of a batch unchanged: the library would wrap it in its own.
 
-        Its random numbers are one sequence of the process: whoever uses them too gets theirs back.
+        The library's random numbers are global: their state is restored for other users.
         """
         ot = library("openturns", *OPENTURNS)
         state, shown = ot.RandomGenerator.GetState(), ot.Log.Flags()
         ot.Log.Show(ot.Log.NONE)
-        # It takes 32 bits.
+        # a seed has 32 bits
         ot.RandomGenerator.SetSeed(int(np.random.SeedSequence(seed).generate_state(1)[0]))
         try:
             yield
@@ -133,11 +133,11 @@ def failing_event(margins: Margins, quantities: int, step: float | None = None) 
     Parameters
     ----------
     margins
-        Of a batch of cases.
+        Function of a batch of cases.
     quantities
-        How many scores a case has.
+        Number of scores of a case.
     step
-        Of central differences for derivatives, in scores; None without any.
+        Step of central differences for derivatives, in scores; None without derivatives.
     """
     ot = library("openturns", *OPENTURNS)
 
@@ -158,28 +158,28 @@ _ITERATIONS = 30
 
 
 class _NoDesignPointError(Exception):
-    """The search ended without a point where the requirement is just missed."""
+    """The search ended without a point on the limit."""
 
 
 @dataclass
 class _Drawn:
-    """The cases drawn around the center, and how much each counts."""
+    """The cases drawn around the center, with their weights."""
 
     margins: list[Array] = field(default_factory=list)
     weights: list[Array] = field(default_factory=list)
 
     @property
     def span(self) -> tuple[float, float]:
-        """Margins around failure, of which weights are alike."""
+        """Margins around failure, with similar weights."""
         low, high = np.quantile(np.concatenate(self.margins), [0.05, 0.6])
         return float(low), max(float(high), 0.0)
 
     def below(self, confidence: float, margin: float) -> Interval:
-        """Return the probability of a margin <= one."""
+        """Return the probability of a margin <= the given one."""
         if not self.margins:
             return UNKNOWN
         weights, failed = np.concatenate(self.weights), np.concatenate(self.margins) <= margin
-        if (weights == 1.0).all():  # drawn as they are in truth: exact
+        if (weights == 1.0).all():  # drawn from the true distribution: exact
             return counted(int(failed.sum()), failed.size, confidence)
         counts = weights * failed
         value = float(counts.mean())
@@ -200,30 +200,30 @@ def importance_sampling(
 ) -> FailureProbability:
     """Return the probability of failure by importance sampling around the design point.
 
-    OpenTURNS' FORM with the algorithm of Abdo and Rackwitz finds the design point, the failing
+    OpenTURNS' FORM with the algorithm of Abdo and Rackwitz finds the design point: the failing
     point nearest to the origin of the standard normal scores. Cases are then drawn around it, each
-    weighed by how much more probable it was there than in truth: the estimate is right wherever the
-    point is, and close where most failures are near it. Other failures, far from it, are met so
-    seldom that the interval may not know of them.
+    weighted by its likelihood ratio. The estimate is unbiased wherever the point is, and accurate
+    where most failures are near it. Failures far from it are drawn so rarely that the interval may
+    not cover them.
 
     Parameters
     ----------
     margins
         Margins of a batch of cases by their standard normal scores; failure at <= 0.
     searched
-        The same without noise that differs from case to case, for the search.
+        The same without case-to-case noise, for the search.
     quantities
-        How many scores a case has.
+        Number of scores of a case.
     budget
-        Cases altogether; what the search leaves is drawn, in whole chunks.
+        Total number of cases; the search uses some, the rest is drawn in whole chunks.
     seed
-        Of the random numbers.
+        Seed of the random numbers.
     confidence
-        Of the intervals, between 0 and 1.
+        Confidence of the intervals, between 0 and 1.
     chunk
-        Cases of a chunk; more of them go on with the same sequence.
+        Cases of a chunk; further chunks continue the same sequence.
     report
-        Called with the estimate so far.
+        Called with the current estimate.
 
     Raises
     ------
@@ -256,7 +256,7 @@ def importance_sampling(
             )
             found = trail(scores)
             drawn.margins.append(found)
-            # Density in truth over that around the center.
+            # True density over that around the center.
             drawn.weights.append(np.exp(0.5 * center @ center - scores @ center))
             report(drawn.below(confidence, 0.0).value)
     except _NoDesignPointError as error:
@@ -284,7 +284,7 @@ def importance_sampling(
 
 
 def _with_result(margins: Margins, scores: Array) -> Array:
-    """Return margins of a search, which finds nothing by those of cases without a result."""
+    """Return margins of a search, which cannot use cases without a result."""
     found = margins(scores)
     if (found <= BEYOND).any():
         raise _NoDesignPointError("a case of the search has no result")
@@ -296,7 +296,7 @@ def _unknown(margin: float) -> Interval:
 
 
 def _design_point(search: Trail, quantities: int) -> Array:
-    """Return the design point; the origin where the middle of all quantities fails itself."""
+    """Return the design point; the origin where the middle of all quantities fails."""
     origin = np.zeros(quantities)
     (middle,) = search(origin[None, :])
     if middle <= 0.0:
@@ -309,14 +309,14 @@ def _design_point(search: Trail, quantities: int) -> Array:
     nearest = ot.AbdoRackwitz()
     nearest.setStartingPoint(origin)
     nearest.setMaximumIterationNumber(_ITERATIONS)
-    nearest.setMaximumAbsoluteError(0.01)  # of the point; the draw needs no more
+    nearest.setMaximumAbsoluteError(0.01)  # of the point; the sample needs no more
     nearest.setMaximumConstraintError(0.01)
     try:
         with search.within_library(0):
             form = ot.FORM(nearest, failing_event(scaled, quantities, _STEP))
             form.run()
             point = np.array(form.getResult().getStandardSpaceDesignPoint())
-    except RuntimeError:  # what OpenTURNS says of derivatives that are zero, and of no end
+    except RuntimeError:  # messages of OpenTURNS for zero derivatives, and for no convergence
         raise _NoDesignPointError("the figure does not lead to its limit") from None
     if not np.isfinite(point).all() or abs(float(scaled(point[None, :])[0])) > 0.1:
         raise _NoDesignPointError(f"{_ITERATIONS} steps did not come to the limit")
@@ -325,16 +325,16 @@ def _design_point(search: Trail, quantities: int) -> Array:
 
 # --- Subset simulation: a rare failure as a chain of failures that are not rare
 
-_FEW = 10  # failing cases that make an estimate
+_FEW = 10  # failing cases needed for an estimate
 _SEEN = 100  # cases of a level below which its tail is not shown
 
 
 @dataclass(frozen=True)
 class _Subset:
-    """A level: cases with a margin of no more than where the level before ended.
+    """A level: cases with a margin of at most the end of the previous level.
 
-    ``entry``: probability that a case is one of them; ``variation``: its coefficient of variation;
-    ``bound``: largest margin of them; ``correlation``: gamma of their chains.
+    ``entry``: probability that a case is in the level; ``variation``: its coefficient of variation;
+    ``bound``: largest margin in the level; ``correlation``: gamma of its chains.
     """
 
     entry: float
@@ -345,11 +345,11 @@ class _Subset:
     correlation: float
 
     def below(self, margin: float, confidence: float) -> Interval:
-        """Return the probability of a margin <= one that is within the level."""
+        """Return the probability of a margin <= the given one, within the level."""
         count, size = int((self.margins <= margin).sum()), self.margins.size
         if math.isinf(self.bound):  # independent cases: exact
             return counted(count, size, confidence)
-        if not count:  # none of them: no more than what one of them would say
+        if not count:  # no such case: at most the probability with one
             high = self.below_share(1.0 / size, confidence).high
             return Interval(0.0, math.nan, 0.0, high)
         return self.below_share(count / size, confidence)
@@ -364,7 +364,7 @@ class _Subset:
         return math.sqrt(alike * (1.0 - part) / (part * self.margins.size))
 
     def beyond(self, margin: float) -> tuple[float, float]:
-        """Return entry and its variation of the next level, which begins at a margin."""
+        """Return entry and variation of the next level, which begins at a margin."""
         part = float((self.margins <= margin).mean())
         return self.entry * part, self.variation + self._step(part)
 
@@ -380,28 +380,28 @@ def subset_simulation(
 ) -> FailureProbability:
     """Return the probability of failure by subset simulation, with OpenTURNS.
 
-    Each level ends where a tenth of its cases is: from these, Markov chains (modified Metropolis)
-    fill the next one, a step of all chains at once. Its coefficient of variation is summed over
-    the levels, as of levels that depend on each other fully: its upper bound. Were they
-    independent, its square would be; intervals of 95 % then held the probability of a plane in 88
-    to 92 % of the simulations only. OpenTURNS' own leaves the first level out, too.
+    Each level ends at the margin of its worst tenth. From these cases, Markov chains (modified
+    Metropolis) fill the next level, one step of all chains per batch. The coefficient of variation
+    is summed over the levels, as for fully dependent levels: its upper bound. For independent
+    levels its square would be summed; intervals of 95 % then held the probability of a plane in
+    only 88 to 92 % of the simulations. OpenTURNS' own estimate also omits the first level.
 
     Parameters
     ----------
     margins
         Margins of a batch of cases by their standard normal scores; failure at <= 0.
     quantities
-        How many scores a case has.
+        Number of scores of a case.
     level
         Cases of each level, a multiple of 10.
     seed
-        Of the random numbers.
+        Seed of the random numbers.
     confidence
-        Of the intervals, between 0 and 1.
+        Confidence of the intervals, between 0 and 1.
     negligible
-        Probability below which it is not followed further.
+        Probability below which the simulation stops.
     report
-        Called with the probability of the level that is reached.
+        Called with the probability of the current level.
 
     Raises
     ------
@@ -424,7 +424,7 @@ def subset_simulation(
     algorithm = ot.SubsetSampling(failing_event(told, quantities))
     algorithm.setConditionalProbability(1.0 / STEPS)
     algorithm.setMaximumOuterSampling(STEPS)
-    algorithm.setBlockSize(level // STEPS)  # one more, and chains would not see their last step
+    algorithm.setBlockSize(level // STEPS)  # one more, otherwise chains would miss their last step
     algorithm.setKeepSample(True)
     algorithm.setMinimumProbability(negligible)
     try:
@@ -434,13 +434,14 @@ def subset_simulation(
         state = "budget spent"
     except UnfinishedError:
         state = "unfinished"
-    except RuntimeError:  # what OpenTURNS says of less than the minimum
+    except RuntimeError:  # message of OpenTURNS for a result below the minimum
         if not list(algorithm.getProbabilityEstimatePerStep())[-1:] < [negligible]:
             raise
         state = "negligible"
     subsets, ends = _subsets(algorithm)
     if state == "done" and ends[-1] > 0.0:
-        # It ends where all cases are alike: a level too close to failure, or of single values.
+        # It ends where all cases have the same margin: a level too close to failure, or discrete
+        # values.
         if (subsets[-1].margins <= 0.0).sum() >= _FEW:
             ends[-1] = 0.0
         else:
@@ -449,9 +450,9 @@ def subset_simulation(
 
 
 def _subsets(algorithm: Any) -> tuple[list[_Subset], list[float]]:
-    """Return the levels that are whole, and the margins at which they end."""
+    """Return the complete levels, and the margins at which they end."""
     made: list[_Subset] = []
-    # One below the minimum is the last threshold, but its cases are not to be had.
+    # The last threshold may be below the minimum, but its cases are not available.
     ends = [float(x) for x in algorithm.getThresholdPerStep()][: algorithm.getStepsNumber()]
     entry, variation, bound = 1.0, 0.0, math.inf
     for k, end in enumerate(ends):
@@ -474,7 +475,7 @@ def _found(
     below = partial(_below, subsets, confidence)
     levels = tuple(Level(end, each.beyond(end)[0]) for each, end in zip(subsets, ends, strict=True))
     estimate = below(0.0)
-    if state != "done":  # failure lies within the last level: no more probable than its end
+    if state != "done":  # failure is within the last level: at most as probable as its end
         high = below(ends[-1]).high if ends else 1.0
         estimate = Interval(math.nan, math.nan, 0.0, high)
         below = partial(_end_of, below, ends[-1] if ends else math.inf, estimate)
@@ -497,7 +498,7 @@ def _found(
 
 
 def _below(subsets: list[_Subset], confidence: float, margin: float) -> Interval:
-    """Return the probability of a margin <= one, by the last level that reaches up to it."""
+    """Return the probability of a margin <= the given one, by the last level that contains it."""
     for each in reversed(subsets):
         if each.bound >= margin:
             return each.below(margin, confidence)
@@ -505,12 +506,12 @@ def _below(subsets: list[_Subset], confidence: float, margin: float) -> Interval
 
 
 def _end_of(below: partial[Interval], end: float, estimate: Interval, margin: float) -> Interval:
-    """Return what is known of a margin where failure was not come to."""
+    """Return the estimate of a margin where the simulation did not reach failure."""
     return below(margin) if margin >= end else estimate
 
 
 def _span(subsets: list[_Subset], end: float) -> tuple[float, float] | None:
-    """Return margins from the hundredth worst case of the last level to the middle of all."""
+    """Return margins from the hundredth worst case of the last level to the median of all."""
     last = subsets[-1].margins
     known = last[last > BEYOND]
     if known.size < _SEEN:

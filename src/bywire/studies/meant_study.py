@@ -1,4 +1,4 @@
-"""The study that was meant: a file, perhaps without its ending, or a folder."""
+"""The intended study: a file, perhaps without its ending, or a folder."""
 
 from __future__ import annotations
 
@@ -8,29 +8,29 @@ from pathlib import Path
 from bywire.core.errors import FileError
 from bywire.data.toml_file import STUDY, first_there, kind_of_file, near_files
 
-_FOLDER = Path("studies")  # where study files usually are
-_NEAR = 0.8  # resemblance of a study file that was meant
+_FOLDER = Path("studies")  # usual folder of study files
+_NEAR = 0.8  # resemblance of a study file that may be intended
 
 
 def require_study_file(file: Path) -> None:
-    """Refuse a study file that is not there, before a folder is made by its name.
+    """Reject a missing study file, before a folder with its name is created.
 
     Raises
     ------
     FileError
-        With the one that was meant.
+        With the intended file.
     """
     if os.path.isfile(file):
         return
     meant = meant_study(file)
     if meant is None and os.path.exists(file):
-        return  # whoever reads it says what it is
+        return  # its reader reports what it is
     advice = "check the path" if meant is None else f"did you mean {meant}?"
     raise FileError(f"the study file {file} does not exist: {advice}", name=str(file))
 
 
 def meant_study(file: Path) -> Path | None:
-    """Return the study file that is meant: its name, with its ending, is the same or near."""
+    """Return the intended study file: one with the same or a similar name, with its ending."""
     folders = dict.fromkeys((file.parent, _FOLDER)) if file.parent == Path() else (file.parent,)
     return next((path for _, path in near_files(file, (STUDY,), folders, _NEAR)), None)
 
@@ -38,17 +38,17 @@ def meant_study(file: Path) -> Path | None:
 # --- The folder of a study, where it is named
 
 RECORD = "study.json"
-"""file that says which study a folder holds"""
-_RESULTS = Path("results")  # where folders of results usually are
+"""file that identifies the study of a folder"""
+_RESULTS = Path("results")  # usual folders of results
 
 
 def require_no_file(folder: Path) -> None:
-    """Refuse a file where the folder of a study is wanted.
+    """Reject a file in place of a study's folder.
 
     Raises
     ------
     FileError
-        Naming the folder that the study was run into, where it is known.
+        With the folder of the study's results, where it is known.
     """
     try:
         if not folder.is_file():

@@ -1,4 +1,4 @@
-"""The plan of a study: which bench, what varies and how, where it is computed, what is asked."""
+"""Plan of a study: the bench, what varies and how, the design, and the requirements."""
 
 from __future__ import annotations
 
@@ -39,14 +39,14 @@ from bywire.studies.distribution import Distribution
 
 @dataclass(frozen=True)
 class StudiedBench:
-    """Where the bench of a study comes from.
+    """Source of the bench of a study.
 
     Parameters
     ----------
     bench
-        The bench file, as the study file names it, or the experiment.
+        The bench file, in the words of the study file, or the experiment.
     changes
-        What ``[set]`` and ``--set`` change of it, as texts by name.
+        Changes of it by ``[set]`` and ``--set``, as texts by name.
     """
 
     bench: str
@@ -59,12 +59,12 @@ class StudiedBench:
 def correlation_factor(
     names: Sequence[str], correlations: Mapping[tuple[str, str], float]
 ) -> Array | None:
-    """Return the Cholesky factor of a correlation matrix; None where nothing is correlated.
+    """Return the Cholesky factor of a correlation matrix; None without correlations.
 
     Raises
     ------
     ParameterError
-        When no such quantities can exist: the matrix is not positive definite.
+        When the matrix is not positive definite: no quantities can have these correlations.
     """
     if not correlations:
         return None
@@ -89,7 +89,7 @@ def correlation_factor(
 # --- The plan
 
 CHUNK = 64
-"""cases of a chunk, the piece of work that is computed, kept and counted as a whole"""
+"""cases of a chunk, the unit in which a study computes, stores and counts cases"""
 
 
 @dataclass(frozen=True)
@@ -101,13 +101,13 @@ class Varied:
     name
         Dotted name of a parameter or choice, or ``options.NAME``.
     unit
-        SI unit; empty of a choice.
+        SI unit; empty for a choice.
     nominal
-        What the bench has.
+        Value in the bench.
     distribution
-        How it varies.
+        Its distribution.
     together
-        Further parameters that vary with it, by the same ratio to what the bench has.
+        Further parameters that vary with it, in constant ratio.
     """
 
     name: str
@@ -119,38 +119,38 @@ class Varied:
 
 @dataclass(frozen=True)
 class StudyPlan:
-    """What a study file says.
+    """Content of a study file.
 
     Parameters
     ----------
     name
-        What reports call it.
+        Name in reports.
     bench
-        What is tested; its requirements are those of the study.
+        The tested bench; its requirements are those of the study.
     varied
-        What varies.
+        Quantities that vary.
     design
         One of `points.SAMPLED`, `points.SPANNED`, `designs.SENSITIVITY` or
         `designs.SOUGHT`.
     cases
-        Cases asked for; of indices, and of each rare failure, at most so many; of other listed
-        points, all there are.
+        Requested cases; for indices and for each rare failure an upper limit; for other listed
+        points all there are.
     seed
-        Of the points.
+        Seed of the points.
     demands
-        What is required.
+        Requirements.
     confidence
-        Of all intervals, between 0 and 1.
+        Confidence of all intervals, between 0 and 1.
     levels
-        Values of each quantity of a grid, or of one at a time.
+        Values of each quantity in a grid, or one at a time.
     time
-        How long cases are computed at most [s], each time that the study is run or resumed.
+        Limit of the computing time [s], each time that the study is run or resumed.
     cases_per_level
-        Cases asked for in each level of subset simulation.
+        Requested cases in each level of subset simulation.
     correlations
         Pairs of names -> correlation of their normal scores.
     tested
-        Which bench that is, as the file says; None of a plan that no file says.
+        Source of the bench, from the file; None for a plan without a file.
     """
 
     name: str
@@ -174,14 +174,14 @@ class StudyPlan:
 
     @cached_property
     def sensitivity(self) -> SensitivityDesign | None:
-        """The design of its indices of sensitivity; None of a study without them."""
+        """Design of its sensitivity indices; None for a study without them."""
         if self.design not in SENSITIVITY:
             return None
         return SensitivityDesign(self.design, len(self.varied), self.cases, self.seed)
 
     @cached_property
     def sought(self) -> SoughtDesign | None:
-        """The design whose cases follow from others; None of another study."""
+        """Design whose cases depend on earlier ones; None for other studies."""
         if self.design not in SOUGHT:
             return None
         return SoughtDesign(
@@ -195,20 +195,20 @@ class StudyPlan:
 
     @property
     def judged_demands(self) -> tuple[Limit, ...]:
-        """What is judged; of rare failures, what is wanted with a probability."""
+        """Judged requirements; for rare failures, those with a probability."""
         if self.design not in RARE:
             return self.demands
         return tuple(each for each in self.demands if each.probability is not None)
 
     @cached_property
     def scored(self) -> Sampled:
-        """The quantities over standard normal scores."""
+        """The quantities as functions of standard normal scores."""
         each = [v.distribution for v in self.varied]
         return Sampled(self.design, self.seed, each, self._factor)
 
     @cached_property
     def points(self) -> Sampled | Spanned:
-        """Where it is computed."""
+        """The points of the design."""
         each = [v.distribution for v in self.varied]
         if self.sensitivity is not None:
             return Spanned(self.sensitivity.columns(each))
@@ -218,14 +218,14 @@ class StudyPlan:
 
     @property
     def chunks(self) -> int:
-        """How many chunks it has; those of drawn points are whole."""
+        """Number of chunks; those of sampled points are complete."""
         points = self.points
         cases = points.cases if isinstance(points, Spanned) else self.cases
         return -(-cases // CHUNK)
 
     @property
     def total(self) -> int:
-        """How many cases are computed; of each rare failure, at most."""
+        """Number of cases; for each rare failure, an upper limit."""
         if self.sought is not None:
             return self.cases
         points = self.points
@@ -233,31 +233,31 @@ class StudyPlan:
 
     @cached_property
     def units(self) -> Mapping[str, str]:
-        """SI unit of every number that varies, those that follow another among them, by name."""
+        """SI unit of every number that varies, including proportional ones, by name."""
         leaves = leaf_fields(type(self.bench.par))
         units = {v.name: v.unit for v in self.varied if v.unit}
         return units | {name: leaves[name].unit.symbol for v in self.varied for name in v.together}
 
     @cached_property
     def column_units(self) -> Mapping[str, str]:
-        """Unit of every number of a case: what varies, and key figures."""
+        """Unit of every number of a case: varied quantities and key figures."""
         return {**self.units, **self.bench.definition.kpis_with(self.bench.chosen_options)}
 
     def values(self, chunk: int) -> dict[str, NDArray[Any]]:
-        """Return the values of what varies, by name, in each case of a chunk [SI].
+        """Return the values of the varied quantities, by name, in each case of a chunk [SI].
 
-        Parameters that vary together with another follow it.
+        Parameters listed in ``together`` follow in constant ratio.
         """
         return self._named(self.points.values(chunk, CHUNK))
 
     def values_at(self, scores: Array) -> dict[str, NDArray[Any]]:
-        """Return the values of what varies, by name, where a design seeks [SI].
+        """Return the values of the varied quantities, by name, for the scores of a search [SI].
 
         Parameters
         ----------
         scores
-            Independent standard normal ones, shape (cases, quantities); of a search for the worst
-            case, places between the ends, 0 to 1.
+            Independent standard normal scores, shape (cases, quantities); in a worst-case search,
+            positions between the ends, 0 to 1.
         """
         if self.design == WORST:
             return self._named(
@@ -285,7 +285,7 @@ class StudyPlan:
 
     @property
     def _choices(self) -> Iterator[dict[str, str]]:
-        """Choices that cases make, one at a time: each has equations of its own."""
+        """Choices of the cases, one combination at a time: each has its own equations."""
         for varied in self.varied:
             for value in varied.distribution.singles:
                 if isinstance(value, str):
@@ -293,12 +293,12 @@ class StudyPlan:
 
     @property
     def digest(self) -> str:
-        """What tells a study from another."""
+        """What distinguishes the study from any other."""
         return digest_of(self.identity)
 
     @cached_property
     def identity(self) -> Mapping[str, Any]:
-        """All that the figures of its cases depend on."""
+        """Everything that the figures of its cases depend on."""
         bench = self.bench
         said: dict[str, Any] = {
             "version": __version__,
@@ -332,14 +332,14 @@ class StudyPlan:
         if bench.faults:
             said["faults"] = bench.faults
         if self.sensitivity is not None:
-            # Indices are of all groups together. The points themselves, for a library draws them.
+            # Indices use all groups together. The points themselves, because a library draws them.
             said["groups"] = self.sensitivity.base
             points = self.sensitivity.probabilities.tobytes()
             said["points"] = hashlib.sha256(points).hexdigest()
             if self.design == MORRIS and any(v.distribution.is_discrete for v in self.varied):
                 said["single values"] = "in turn"
         if self.sought is not None:
-            # Where it goes depends on the requirements, and on how the library draws.
+            # The search depends on the requirements, and on the library's random numbers.
             said["points"] = library_version(self.design)
             said["cases_per_level"] = self.sought.level
             said["requirements"] = {each.figure: each.text for each in self.judged_demands}

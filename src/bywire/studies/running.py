@@ -1,4 +1,4 @@
-"""Studies run: what is not there yet is computed, and kept as soon as it is."""
+"""Running a study: missing chunks are computed, and stored as soon as they are complete."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from bywire.studies.store import Origin, StudyStore
 
 @dataclass(frozen=True)
 class Completed:
-    """What a study that was run has beside its folder.
+    """Results of a study outside its folder.
 
     Parameters
     ----------
     nominal
-        What the bench itself gave, with the error of its figures from the step.
+        Key figures of the bench itself, with their numerical error.
     damaged
-        How many chunks were damaged, and are computed again.
+        Number of damaged chunks, which are computed again.
     """
 
     nominal: Result
@@ -45,41 +45,41 @@ def complete(
     progress: Progress,
     meanwhile: Callable[[], object] = tuple,
 ) -> Completed:
-    """Compute the bench of a study itself, and the chunks that its folder lacks.
+    """Compute the bench of a study itself, and the chunks that are missing in its folder.
 
     Parameters
     ----------
     plan, store, origin
-        The study, its folder, and what it was read from.
+        The study, its folder, and its source.
     workers, cluster
         See `bywire.studies.executor.executor_of`.
     progress
         Called with a label and the finished share, 0 to 1.
     meanwhile
-        Called once when the first chunks are begun, while this process would wait for them.
+        Called once when the first chunks have started and this process would wait for them.
 
     Returns
     -------
     Completed
-        What the bench itself gave, and how many chunks were damaged.
+        Key figures of the bench itself, and the number of damaged chunks.
 
     Raises
     ------
     ParameterError
-        For workers that cannot be; nothing is written then.
+        For an invalid number of workers; then nothing is written.
     FileError
-        When the folder is another study's, or cannot be written.
+        When the folder belongs to another study, or is not writable.
     RunError
-        When the bench itself fails, or the workers are lost.
+        When the bench itself fails, or all workers are lost.
     DeviceError
-        When the bench wants a graphics processor and there is none.
+        When the bench needs a graphics processor and there is none.
     KeyboardInterrupt
-        When interrupted; what is finished stays.
+        When interrupted; finished chunks stay.
     """
     until = time.monotonic() + plan.time
     require_workers(workers, cluster, plan.bench.engine)
     if plan.bench.engine == CUDA:
-        find_device()  # else there would be a folder without a study
+        find_device()  # otherwise the folder would be left without a study
     store.open(plan, origin)
     damaged = store.drop_damaged()
     itself = partial(running.run, plan.bench, estimate_error=True)

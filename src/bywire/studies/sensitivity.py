@@ -1,4 +1,4 @@
-"""What drives a key figure, by indices: shares of its variance, and elementary effects."""
+"""Sensitivity indices of a key figure: shares of its variance, and elementary effects."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from bywire.data.file_format import library
 from bywire.studies.designs import LEVELS, SALIB, STEP, SensitivityDesign
 
 _RESAMPLES = 200  # of the groups, for intervals: their widths scatter by 5 %
-_ROUNDING = 1e-12  # share of a figure below which its differences are those of rounding
+_ROUNDING = 1e-12  # share of a figure below which its differences are rounding errors
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """An estimate and its interval, in the unit of what it is of.
+    """An estimate and its interval, in the unit of the estimate.
 
     Parameters
     ----------
     value, low, high
         Estimate, and ends of the interval.
     reach
-        How far the interval would reach to either side, did values not end anywhere.
+        Half width of the interval before it is cut at the ends of possible values.
     """
 
     value: float
@@ -35,17 +35,18 @@ class Estimate:
 
 @dataclass(frozen=True)
 class VarianceShares:
-    """How much of a figure's variance a quantity makes.
+    """Share of a quantity in the variance of a figure.
 
     Parameters
     ----------
     quantity
         Its name.
     first
-        Index of first order: the share of the variance that would go, were the quantity known.
+        Index of first order: the share of the variance that would vanish if the quantity were
+        known.
     total
-        Total index: the share that would stay, were all others known; above the first by what it
-        does together with others.
+        Total index: the share that would remain if all others were known; it exceeds the first by
+        interactions with the others.
     """
 
     quantity: str
@@ -54,23 +55,24 @@ class VarianceShares:
 
     @property
     def strength(self) -> Estimate:
-        """What quantities are ranked by."""
+        """Value by which quantities are ranked."""
         return self.total
 
 
 @dataclass(frozen=True)
 class ElementaryEffects:
-    """What a figure does as a quantity steps; in the unit of the figure.
+    """Effect of the steps of a quantity on a figure, in the unit of the figure.
 
     Parameters
     ----------
     quantity
         Its name.
     mu_star
-        Mean size of its elementary effects: what the figure changes by as the quantity goes from
-        end to end, at the rate of a single step; of single values, as it goes from one to another.
+        Mean magnitude of its elementary effects: the change of the figure from end to end, at the
+        rate of a single step; for discrete values, the change from one to another.
     sigma
-        Their standard deviation: where it is small the quantity acts linearly, whatever the others.
+        Their standard deviation: where it is small, the effect is linear and independent of the
+        others.
     """
 
     quantity: str
@@ -79,7 +81,7 @@ class ElementaryEffects:
 
     @property
     def strength(self) -> Estimate:
-        """What quantities are ranked by."""
+        """Value by which quantities are ranked."""
         return self.mu_star
 
 
@@ -90,9 +92,9 @@ class Sensitivity:
     Parameters
     ----------
     drivers
-        Of every quantity, the strongest first; none where they cannot be had.
+        One for every quantity, the strongest first; empty where they cannot be computed.
     missing
-        Why there are none; empty where there are.
+        Reason why there are none; empty otherwise.
     """
 
     drivers: Sequence[VarianceShares] | Sequence[ElementaryEffects]
@@ -106,25 +108,25 @@ def sensitivity(
     figure: Array,
     confidence: float,
 ) -> Sensitivity:
-    """Return what drives a key figure.
+    """Return the drivers of a key figure.
 
-    Estimators and their intervals are SALib's: resampled groups, as normal ones. Indices of first
-    order may come out below zero where they are none. A group with a case that has no figure is of
-    no use, and to leave it out would answer for other quantities than those that vary: there are no
+    Estimators and their intervals are SALib's: normal intervals from resampled groups. Small
+    indices of first order may be estimated below zero. A group with an undefined case cannot be
+    used, and without it the sample would no longer represent the distributions. So there are no
     indices then.
 
     Parameters
     ----------
     design
-        What was computed.
+        The computed design.
     names
         The quantities, in the order of the design.
     singles
-        Those of them that have single values.
+        Quantities with discrete values among them.
     figure
         The key figure of every case in the order of the design, shape (cases,).
     confidence
-        Of the intervals, between 0 and 1.
+        Confidence of the intervals, between 0 and 1.
 
     Raises
     ------
@@ -146,12 +148,12 @@ def sensitivity(
         return Sensitivity((), "does not vary")
     groups = figure.reshape(design.base, design.group)
     is_sobol = design.kind == "sobol-indices"
-    # The variance that is shared out is that of the points A and B, first and last of a group.
+    # The decomposed variance is that of the points A and B, first and last of a group.
     if is_sobol and np.ptp(groups[:, [0, -1]]) <= least:
         return Sensitivity((), "varies in too few cases")
     if is_sobol:
         return _variance_shares(design, names, figure, confidence)
-    # A step between single values is all that they can do: it is no part of a longer way.
+    # A step between discrete values is the whole effect, not a part of a longer way.
     ways = [STEP if name in singles else 1.0 for name in names]
     return _elementary_effects(design, names, ways, figure, confidence)
 
@@ -206,9 +208,9 @@ def _elementary_effects(
 
 
 def _estimate(value: float, reach: float, least: float = -np.inf, most: float = np.inf) -> Estimate:
-    """Return an estimate with its interval, which ends where values end that can be.
+    """Return an estimate with its interval, cut at the ends of possible values.
 
-    An estimate may scatter beyond such an end: then the interval ends at the estimate.
+    If the estimate itself lies beyond such an end, the interval ends at the estimate.
     """
     low, high = max(value - reach, min(least, value)), min(value + reach, max(most, value))
     return Estimate(float(value), float(low), float(high), float(reach))

@@ -1,8 +1,7 @@
-"""Cases that a study seeks: of rare failures, and the worst within ends.
+"""Cases of search designs: rare failures, and the worst case within ranges.
 
-A method that seeks failures is replayed from its seed each time, also for a report: what it asks
-for depends on the seed and on what cases gave, so that it asks for the same again, and finds it in
-the folder.
+A search is replayed from its seed each time, also for a report. Its requests depend only on the
+seed and on earlier results, so it requests the same cases again and finds them in the folder.
 """
 
 from __future__ import annotations
@@ -42,16 +41,16 @@ if TYPE_CHECKING:
 
 @dataclass
 class SoughtCases:
-    """The cases of a study that seeks.
+    """The cases of a search design.
 
     Parameters
     ----------
     plan, store
         The study and its folder.
     executor
-        Who computes what the folder lacks; None where nothing is computed.
+        Executor of missing cases; None to compute nothing.
     progress
-        Called with a label and the share of the budget that is used.
+        Called with a label and the used share of the budget.
     """
 
     plan: StudyPlan
@@ -67,11 +66,11 @@ class SoughtCases:
         return self
 
     def __exit__(self, *error: Any) -> None:
-        self._opened.__exit__(*error)  # who computes says what the loss of workers means
+        self._opened.__exit__(*error)  # the caller explains the loss of workers
 
     @property
     def design(self) -> SoughtDesign:
-        """How cases are sought."""
+        """Budget and numbering of the search."""
         assert self.plan.sought is not None
         return self.plan.sought
 
@@ -84,21 +83,22 @@ class SoughtCases:
         return pd.concat(frames, ignore_index=True) if frames else pd.DataFrame()
 
     def batch(self, scores: Array, numbers: list[int]) -> list[int]:
-        """Have the cases at some scores, computed where they are not there; return their chunks.
+        """Compute the missing cases at some scores; return the chunks of all of them.
 
         Parameters
         ----------
         scores
             Shape (cases, quantities).
         numbers
-            Of their chunks. A batch with the scores of another one is not computed again.
+            Numbers of their chunks. A batch with the scores of an earlier one is not computed
+            again.
 
         Raises
         ------
         UnfinishedError
-            When some are not there, and nothing is computed.
+            When some are missing, and nothing is computed.
         FileError
-            When the folder has others in their place.
+            When the folder has other cases in their place.
         """
         numbers = self._shared.setdefault(scores.tobytes(), numbers)
         wanted = {
@@ -118,13 +118,13 @@ class SoughtCases:
     def _computed(self, missing: list[PlacedChunk]) -> None:
         if self.executor is None:
             raise UnfinishedError
-        if self._compute is None:  # workers are started once, and only where they are needed
+        if self._compute is None:  # workers are started once, and only if needed
             self._compute = self._opened.enter_context(self.executor.opened(self.plan))
         for number, columns in self._compute(missing):
             self.store.write(number, columns, self.plan.column_units)
 
     def _require(self, number: int, values: Mapping[str, NDArray[np.generic]]) -> None:
-        """Refuse a chunk of other cases: the method would answer from what it never asked for."""
+        """Reject a chunk of other cases: the search would use results that it never requested."""
         found = self.chunks[number]
         for name, column in values.items():
             known = found.get(name, np.array([]))
@@ -142,16 +142,16 @@ class SoughtCases:
 
 @dataclass
 class RequirementCases:
-    """The cases that are asked for because of a requirement, in their order.
+    """The cases requested for a requirement, in their order.
 
     Parameters
     ----------
     cases
-        Those of the study.
+        Cases of the study.
     requirement
         Number of the requirement among those judged.
     numbers, failed
-        Of the cases in the order in which they were asked for, and of those that failed.
+        Numbers of the cases in the order of the requests, and of those that failed.
     """
 
     cases: SoughtCases
@@ -168,7 +168,7 @@ class RequirementCases:
         return self.cases.plan.judged_demands[self.requirement]
 
     def drawn(self, scores: Array) -> Array:
-        """Return margins of cases with noise of their own; see `limit_state.Margins`."""
+        """Return margins of cases with their own noise; see `limit_state.Margins`."""
         first = self.cases.design.first_sampled + self._drawn
         margins, chunks = self._margins(scores, first)
         self._drawn += chunks
@@ -183,7 +183,7 @@ class RequirementCases:
         return margins
 
     def report(self, estimate: float) -> None:
-        """Take note of how probable a failure seems so far."""
+        """Record the current estimate of the probability of failure."""
         self._said = f", failure {estimate:.2g} so far"
 
     def _margins(self, scores: Array, first: int) -> tuple[Array, int]:
@@ -203,25 +203,26 @@ class RequirementCases:
 
 # --- The rare failures of a study
 
-_NEGLIGIBLE = 1e-3  # of the probability of failure that is admitted: the verdict is clear
+_NEGLIGIBLE = 1e-3  # of the admissible probability of failure: the verdict is clear
 
 
 @dataclass(frozen=True)
 class Importance:
-    """How much a quantity has to do with a failure.
+    """Importance of a quantity for a failure.
 
     Parameters
     ----------
     quantity
         Its name.
     score
-        Normal score of where failures lie: standard deviations off the middle, with their sign; NaN
-        of single values, which have no middle.
+        Normal score of the failures: standard deviations from the middle, with sign; NaN for
+        discrete values, which have no middle.
     factor
-        Importance factor: share of the squared distance, 0 to 1. That of single values is twice the
-        relative entropy of failing cases to all, as it is of a normal score that is moved.
+        Importance factor: share of the squared distance, 0 to 1. For discrete values the distance
+        is twice the relative entropy of failing cases to all, which equals that of a shifted normal
+        score.
     shares
-        Share of failing cases that has each single value; empty of other quantities.
+        Share of each discrete value in the failing cases; empty for other quantities.
     """
 
     quantity: str
@@ -239,15 +240,14 @@ class RareFailure:
     demand
         The requirement.
     failure
-        How probable its failure is.
+        Estimate of its probability.
     case
         Number of the most probable failing case that was computed; None where none failed.
     importance
-        Quantities, the most important first; none where it is not known where failures lie.
+        Quantities, the most important first; empty where the location of failures is unknown.
     point
-        Values of what varies where failures lie [SI]: at the design point, or at the mean normal
-        scores of failing cases, and of single values the most frequent one; empty where that is not
-        known.
+        Values of the varied quantities at failures [SI]: at the design point, or at the mean normal
+        scores of failing cases, and the most frequent discrete value; empty where they are unknown.
     """
 
     demand: Limit
@@ -270,14 +270,14 @@ def rare_failures(
     plan, store
         The study and its folder.
     executor
-        Who computes the cases that the folder lacks; None to say what it shows so far.
+        Executor of missing cases; None to evaluate existing ones.
     progress
-        Called with a label and the share of the budget that is used.
+        Called with a label and the used share of the budget.
 
     Raises
     ------
     FileError
-        When OpenTURNS is not installed, or the folder cannot be read or written.
+        When OpenTURNS is not installed, or the folder is not readable or writable.
     RunError
         When workers are lost.
     KeyboardInterrupt
@@ -309,7 +309,7 @@ def _failure(plan: StudyPlan, cases: RequirementCases) -> RareFailure:
             CHUNK,
             cases.report,
         )
-    # Points that were asked for again, as by derivatives at the same place, are the same cases.
+    # A point that was requested twice, as by derivatives at the same place, is the same case.
     failure = replace(failure, runs=len({*cases.numbers}), failed=len(cases.failed))
     case = None if failure.place is None else cases.numbers[failure.place]
     importance = importance_of(plan, failure)
@@ -324,11 +324,11 @@ def _failure(plan: StudyPlan, cases: RequirementCases) -> RareFailure:
 
 
 def importance_of(plan: StudyPlan, failure: FailureProbability) -> tuple[Importance, ...]:
-    """Return importance factors: those of Hasofer and Lind's design point, or of the mean failure.
+    """Return importance factors: of Hasofer and Lind's design point, or of the mean failure.
 
-    Of correlated quantities they are of their own normal scores.
+    For correlated quantities they refer to each quantity's own normal scores.
     """
-    is_rare = failure.estimate.value < 0.5  # else failures lie everywhere
+    is_rare = failure.estimate.value < 0.5  # otherwise failures lie everywhere
     if failure.center is None or not is_rare:
         return ()
     moved = plan.scored.correlated(failure.center)
@@ -351,7 +351,7 @@ def importance_of(plan: StudyPlan, failure: FailureProbability) -> tuple[Importa
 
 
 def _entropy(shares: Mapping[Any, float], distribution: Distribution) -> float:
-    """Return the relative entropy of shares of single values to their probabilities."""
+    """Return the relative entropy of shares of discrete values to their probabilities."""
     return sum(
         p * math.log(p / weight)
         for p, weight in zip(shares.values(), distribution.weights, strict=True)
@@ -361,23 +361,22 @@ def _entropy(shares: Mapping[Any, float], distribution: Distribution) -> float:
 
 # --- Worst cases: searches, which prove nothing
 
-_BEYOND_ENDS = 0.1  # of a range: worst cases lie at ends, which then have a share of their own
-_WORST = -1e12  # margin of a case without a figure: the worst, and one that has a mean
+_BEYOND_ENDS = 0.1  # of a range: worst cases lie at ends, which get a share of their own
+_WORST = -1e12  # margin of a case without a figure: the worst, but finite, so that it has a mean
 _GENERATIONS = 10_000
-_TOGETHER = 1e-2  # share of the first generation's spread within which a generation is at one place
+_TOGETHER = 1e-2  # share of the first generation's spread below which a generation has converged
 
 
 @dataclass(frozen=True)
 class WorstCase:
-    """How a search for the worst case ended.
+    """Result of a search for the worst case.
 
     Parameters
     ----------
     state
-        ``done``: all of its cases came together; ``budget spent``; ``unfinished``: cases are not
-        computed yet.
+        ``done``: it converged; ``budget spent``; ``unfinished``: cases are not computed yet.
     margin
-        Least margin that was found, in the figure's unit; infinite without a case.
+        Least margin found, in the figure's unit; infinite without a case.
     runs
         Cases used.
     """
@@ -395,21 +394,21 @@ def worst_case(margins: Margins, quantities: int, seed: int) -> WorstCase:
     margins
         Margins of a batch of points of the unit cube, shape (cases, quantities).
     quantities
-        How many there are.
+        Number of quantities.
     seed
-        Of the random numbers.
+        Seed of the random numbers.
 
     References
     ----------
     R. Storn and K. Price, Differential evolution, Journal of Global Optimization 11, 1997.
     """
-    from scipy import optimize  # slow to load, both
+    from scipy import optimize  # both slow to load
     from scipy.stats import qmc
 
     tried: list[Array] = []
 
     def batch(columns: Array) -> Array:
-        # Of all at once, a column each; what lies beyond an end is the end.
+        # All points of a generation, one per column; points beyond an end are moved to it.
         points = np.clip(columns.T, 0.0, 1.0)
         tried.append(np.maximum(margins(points), _WORST))
         return tried[-1]
@@ -419,13 +418,13 @@ def worst_case(margins: Margins, quantities: int, seed: int) -> WorstCase:
         return bool(np.ptp(energies) <= _TOGETHER * np.ptp(tried[0]))
 
     rng = np.random.default_rng(seed)
-    half = population(quantities) // 2  # corners; all of them of few quantities
+    half = population(quantities) // 2  # corners; all of them for few quantities
     corners = qmc.Sobol(quantities, rng=rng).random(half).round()
     first = np.vstack([corners, qmc.LatinHypercube(quantities, rng=rng).random(half)])
     low, high = -_BEYOND_ENDS, 1.0 + _BEYOND_ENDS
     state: Literal["done", "budget spent", "unfinished"] = "done"
     try:
-        # Its own rule ends where margins differ little beside their mean: far from any limit.
+        # SciPy's own criterion ends a search if margins are large relative to their spread.
         search: Any = optimize.differential_evolution
         search(
             batch,
@@ -438,7 +437,7 @@ def worst_case(margins: Margins, quantities: int, seed: int) -> WorstCase:
             updating="deferred",
             vectorized=True,
             strategy="rand1bin",
-            callback=is_over,  # the best of all would draw them to one end
+            callback=is_over,  # the single best point would draw all of them to one end
         )
     except BudgetSpentError:
         state = "budget spent"
@@ -457,21 +456,21 @@ def worst_cases(
     executor: Executor | None = None,
     progress: Progress = silent,
 ) -> tuple[tuple[WorstCase, ...], pd.DataFrame]:
-    """Return how the search for the worst case of each requirement ended, and all cases.
+    """Return the results of the searches for the worst case of each requirement, and all cases.
 
     Parameters
     ----------
     plan, store
         The study and its folder.
     executor
-        Who computes the cases that the folder lacks; None to say what it shows so far.
+        Executor of missing cases; None to evaluate existing ones.
     progress
-        Called with a label and the share of the budget that is used.
+        Called with a label and the used share of the budget.
 
     Raises
     ------
     FileError
-        When the folder cannot be read or written.
+        When the folder is not readable or writable.
     RunError
         When workers are lost.
     KeyboardInterrupt

@@ -1,8 +1,8 @@
-"""What the cases of a study say: probabilities and quantiles with intervals, and spread.
+"""Statistics over the cases of a study: probabilities and quantiles with intervals, spread.
 
-Intervals are those of independent cases. Latin hypercubes and scrambled sequences scatter less, of
-averages at least: their intervals are on the safe side as a rule (A. B. Owen, Monte Carlo variance
-of scrambled net quadrature, SIAM J. Numer. Anal. 34, 1997).
+Intervals are those of independent cases. Averages of Latin hypercubes and scrambled sequences
+scatter less: their intervals are usually conservative (A. B. Owen, Monte Carlo variance of
+scrambled net quadrature, SIAM J. Numer. Anal. 34, 1997).
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ Outcome = Literal["met", "missed", "undecided"]
 
 @dataclass(frozen=True)
 class Share:
-    """How often something was so, and what that says of how probable it is.
+    """Relative frequency of an event, and the interval of its probability.
 
     Parameters
     ----------
     count, cases
-        How often, of how many.
+        Number of events and of cases.
     low, high
         Interval of the probability.
     """
@@ -49,14 +49,14 @@ def share(count: int, cases: int, confidence: float) -> Share:
     """Return a probability with its exact two-sided interval.
 
     C. J. Clopper and E. S. Pearson, The use of confidence or fiducial limits, Biometrika 26, 1934:
-    it holds the probability at least as often as it claims.
+    the coverage is at least the stated confidence.
 
     Parameters
     ----------
     count, cases
-        How often it was so, of how many independent cases.
+        Number of events in this number of independent cases.
     confidence
-        Of the interval.
+        Confidence of the interval.
 
     Examples
     --------
@@ -66,24 +66,24 @@ def share(count: int, cases: int, confidence: float) -> Share:
     if not cases:
         return Share(0, 0, 0.0, 1.0)
     beyond = 0.5 * (1.0 - confidence)
-    # As quantiles of beta distributions: stats.binomtest looks for the same ends a hundred times
-    # as long.
+    # As quantiles of beta distributions: stats.binomtest takes a hundred times as long for the same
+    # ends.
     low = special.betaincinv(count, cases - count + 1, beyond) if count else 0.0
     high = special.betaincinv(count + 1, cases - count, 1.0 - beyond) if count < cases else 1.0
     return Share(count, cases, float(low), float(high))
 
 
 def judged(met: Share, surely: Share, wanted: float) -> Outcome:
-    """Return whether a requirement is met with a probability.
+    """Return whether a requirement is met with the required probability.
 
     Parameters
     ----------
     met
-        Cases that meet it, or may do so within the error of their figures.
+        Share of cases that meet it, or may do so within their numerical error.
     surely
-        Cases that meet it for certain.
+        Share of cases that certainly meet it.
     wanted
-        Least probability.
+        Least required probability.
     """
     if surely.low >= wanted:
         return "met"
@@ -99,7 +99,7 @@ class Quantile:
     probability
         Share of the cases below it.
     value, low, high
-        Estimate and interval; NaN where the cases are too few for one.
+        Estimate and interval; NaN where there are too few cases.
     """
 
     probability: float
@@ -109,10 +109,10 @@ class Quantile:
 
 
 def quantile(values: Array, probability: float, confidence: float) -> Quantile:
-    """Return a quantile of independent values with an interval that needs no distribution.
+    """Return a quantile of independent values with a distribution-free interval.
 
-    W. J. Conover, Practical Nonparametric Statistics (1999), section 3.2: order statistics whose
-    ranks the binomial distribution gives.
+    W. J. Conover, Practical Nonparametric Statistics (1999), section 3.2: order statistics, with
+    ranks from the binomial distribution.
     """
     if not values.size:
         return Quantile(probability, math.nan, math.nan, math.nan)
@@ -130,16 +130,16 @@ def quantile(values: Array, probability: float, confidence: float) -> Quantile:
 
 @dataclass(frozen=True)
 class Influence:
-    """How a key figure goes with a quantity that varies.
+    """Relation of a key figure to a quantity that varies.
 
     Parameters
     ----------
     quantity
         Its name.
     correlation
-        Rank correlation (Spearman), -1 to 1; the partial one where quantities are correlated.
+        Rank correlation (Spearman), -1 to 1; the partial one for correlated quantities.
     low, high
-        Its interval.
+        Its confidence interval.
     """
 
     quantity: str
@@ -149,12 +149,12 @@ class Influence:
 
     @property
     def strength(self) -> float:
-        """How strong it is, 0 to 1, whatever its sign."""
+        """Strength of the relation, 0 to 1, whatever its sign."""
         return abs(self.correlation)
 
     @property
     def is_distinct(self) -> bool:
-        """Whether it differs from none."""
+        """Whether it differs significantly from zero."""
         return self.low > 0.0 or self.high < 0.0
 
 
@@ -165,27 +165,27 @@ def influences(
     confidence: float,
     is_partial: bool = False,
 ) -> list[Influence]:
-    """Return how a key figure goes with each quantity, the strongest first.
+    """Return the relation of a key figure to each quantity, the strongest first.
 
-    A rank correlation sees what rises or falls throughout; a quantity whose effect has an optimum
-    within its range it may miss. The interval is Fisher's with the variance of Bonett and Wright,
-    Psychometrika 65, 2000.
+    A rank correlation detects monotonic relations; it may miss a quantity with an optimum within
+    its range. The interval is Fisher's with the variance of Bonett and Wright, Psychometrika 65,
+    2000.
 
-    Of quantities that are correlated one seems to drive what the other does. The partial rank
-    correlation is that of what the others, by a straight line through ranks, do not tell of
-    either (R. L. Iman and W. J. Conover, Small sample sensitivity analysis techniques for computer
-    models, Communications in Statistics A9, 1980); its interval has a case less for each of them.
+    Correlated quantities seem to share their effects. The partial rank correlation is that of the
+    residuals after a linear regression of the ranks on those of the other quantities (R. L. Iman
+    and W. J. Conover, Small sample sensitivity analysis techniques for computer models,
+    Communications in Statistics A9, 1980); its interval has one case less for each of them.
 
     Parameters
     ----------
     names, columns
         Quantities, and their values in each case, shape (cases,) each.
     figure
-        The key figure in each case, shape (cases,); cases without one are left out.
+        The key figure in each case, shape (cases,); undefined cases are left out.
     confidence
-        Of the intervals.
+        Confidence of the intervals.
     is_partial
-        Whether correlations are partial ones.
+        Whether to compute partial correlations.
     """
     known = np.isfinite(figure)
     count = int(known.sum())
@@ -205,12 +205,12 @@ def influences(
         z = math.atanh(min(max(r, -1.0 + 1e-12), 1.0 - 1e-12))
         width = reach * math.sqrt((1.0 + 0.5 * r * r) / (count - 3 - fewer))
         low, high = math.tanh(z - width), math.tanh(z + width)
-        found.append(Influence(name, r, min(low, r), max(high, r)))  # one of 1 lies at its end
+        found.append(Influence(name, r, min(low, r), max(high, r)))  # 1 is its own end
     return sorted(found, key=lambda each: -abs(each.correlation))
 
 
 def _rests(x: Array, y: Array, others: Sequence[Array]) -> tuple[Array, Array]:
-    """Return what other ranks, by a straight line, do not tell of ranks of two."""
+    """Return the residuals of the ranks of two after a linear regression on other ranks."""
     if not others:
         return x - x.mean(), y - y.mean()
     known, both = np.column_stack([np.ones(x.size), *others]), np.column_stack([x, y])
@@ -219,15 +219,16 @@ def _rests(x: Array, y: Array, others: Sequence[Array]) -> tuple[Array, Array]:
 
 
 def _correlation(x: Array, y: Array) -> float:
-    """Return the correlation of centered values; 0 where one of them is rounding alone."""
-    # Sums, and no products of vectors: of 10,000 numbers BLAS wakes all cores, and waits for them.
+    """Return the correlation of centered values; 0 where one of them is only rounding errors."""
+    # Sums instead of products of vectors: for 10,000 numbers BLAS wakes all cores, and waits for
+    # them.
     xx, yy, xy = (float(np.sum(a * b)) for a, b in ((x, x), (y, y), (x, y)))
     size = math.sqrt(xx * yy)
     return xy / size if size > 1e-9 * x.size**3 else 0.0
 
 
 def running_share(met: NDArray[np.bool_], confidence: float, count: int = 60) -> list[Share]:
-    """Return how an estimate came about: the share of the first cases, of ever more of them."""
+    """Return the convergence of an estimate: the share of the first cases, for growing numbers."""
     sizes = np.unique(np.geomspace(1, max(met.size, 1), count).astype(int))
     return [share(int(met[:n].sum()), int(n), confidence) for n in sizes if met.size]
 
@@ -235,7 +236,7 @@ def running_share(met: NDArray[np.bool_], confidence: float, count: int = 60) ->
 # --- Spread of a key figure over the cases
 
 QUANTILES = (0.05, 0.5, 0.95)
-"""shares of the cases below the quantiles that are shown"""
+"""shares of the cases below the displayed quantiles"""
 
 
 @dataclass(frozen=True)
@@ -245,17 +246,17 @@ class Spread:
     Parameters
     ----------
     name, unit
-        The figure.
+        Name and unit of the figure.
     nominal
-        What the bench itself gives.
+        Value of the bench itself.
     undefined
-        Cases in which it is not defined, or without a result.
+        Number of cases in which it is undefined, or without a result.
     mean, sd
         Mean and standard deviation.
     quantiles
         Those of `QUANTILES`, with intervals.
     least, largest
-        Ends.
+        Extreme values.
     """
 
     name: str
@@ -270,16 +271,16 @@ class Spread:
 
 
 def spread_of(name: str, unit: str, nominal: float, figure: Array, confidence: float) -> Spread:
-    """Return the spread of a key figure that some case has.
+    """Return the spread of a key figure that is defined in some case.
 
     Parameters
     ----------
     name, unit, nominal
-        The figure, and what the bench itself gives.
+        Name and unit of the figure, and its value in the bench itself.
     figure
-        In every case, shape (cases,); NaN where a case does not have it.
+        Its value in every case, shape (cases,); NaN where it is undefined.
     confidence
-        Of the intervals of its quantiles, between 0 and 1.
+        Confidence of the intervals of its quantiles, between 0 and 1.
     """
     known = figure[np.isfinite(figure)]
     return Spread(
@@ -307,7 +308,7 @@ class Interval:
     Parameters
     ----------
     value, variation
-        The estimate and its standard deviation over it; NaN where there is none.
+        The estimate, and its standard deviation divided by it; NaN where there is none.
     low, high
         Ends of the interval.
     """
@@ -319,11 +320,11 @@ class Interval:
 
 
 UNKNOWN = Interval(math.nan, math.nan, 0.0, 1.0)
-"""what is known of a probability without any case"""
+"""estimate of a probability without any case"""
 
 
 def interval(value: float, variation: float, confidence: float) -> Interval:
-    """Return an estimate with an interval that is log-normal: products of shares are skewed.
+    """Return an estimate with a log-normal interval, because products of shares are skewed.
 
     Examples
     --------
@@ -338,7 +339,7 @@ def interval(value: float, variation: float, confidence: float) -> Interval:
 
 
 def counted(count: int, cases: int, confidence: float) -> Interval:
-    """Return a probability by independent cases, with its exact interval."""
+    """Return a probability from independent cases, with its exact interval."""
     exact = share(count, cases, confidence)
     variation = math.sqrt((1.0 - exact.value) / count) if count else math.nan
     return Interval(exact.value, variation, exact.low, exact.high)
@@ -346,14 +347,14 @@ def counted(count: int, cases: int, confidence: float) -> Interval:
 
 @dataclass(frozen=True)
 class Level:
-    """A level of subset simulation, or the only one of another method.
+    """A level of subset simulation, or the only level of another method.
 
     Parameters
     ----------
     margin
-        Margin at which it ends, in the figure's unit; zero of the last.
+        Margin at its end, in the figure's unit; zero for the last level.
     probability
-        That a case has this margin or less.
+        Probability that a case has at most this margin.
     """
 
     margin: float
@@ -362,40 +363,40 @@ class Level:
 
 @dataclass(frozen=True)
 class FailureProbability:
-    """How probable a failure is, by a method for rare ones.
+    """Probability of a failure, by a method for rare failures.
 
     Parameters
     ----------
     state
-        ``done``; ``negligible``: below what the method went on for; ``budget spent``;
+        ``done``; ``negligible``: below the least probability of interest; ``budget spent``;
         ``unfinished``: cases are not computed yet; ``level``: too many cases have the same figure;
-        ``no design point``: a search found none.
+        ``no design point``: the search found none.
     estimate
-        Of the probability that the margin is <= 0; of a method that did not come there, an upper
-        end alone.
+        Estimate of the probability that the margin is <= 0; only an upper end if the method did not
+        reach failure.
     below
         ``below(x)``: estimate of the probability that the margin is <= x, in the figure's unit.
     levels
-        How the estimate came about.
+        Levels of the method.
     runs
-        Cases used.
+        Number of cases used.
     span
-        Least and largest margin of which ``below`` has something to say; none where it has not.
+        Least and largest margin for which ``below`` has an estimate; None without any.
     place, scores
-        The most probable failing case: its place among the cases used, and its standard normal
-        scores, independent ones; None where none failed.
+        The most probable failing case: its position among the cases used, and its independent
+        standard normal scores; None where none failed.
     center
-        Where failures lie: the mean of their scores, or FORM's design point; None where it is not
-        known.
+        Center of the failures: the mean of their scores, or FORM's design point; None where it is
+        unknown.
     failing
-        Scores of failing cases, as probable as they are, shape (cases, quantities); None of another
-        method than subset simulation.
+        Scores of failing cases, distributed as failures are, shape (cases, quantities); None except
+        for subset simulation.
     first_order
-        FORM's reliability index beta; NaN of another method.
+        FORM's reliability index beta; NaN for other methods.
     failed
-        How many of the cases failed, where somebody has counted them.
+        Number of failed cases, if counted.
     why
-        What else there is to say of the state.
+        Explanation of the state.
     """
 
     state: State
@@ -413,27 +414,27 @@ class FailureProbability:
     why: str = ""
 
     def within(self, error: float) -> Interval:
-        """Return the estimate with the interval that decides.
+        """Return the estimate with the interval that decides the verdict.
 
         Parameters
         ----------
         error
-            As of `outcome`.
+            See `outcome`.
         """
         low, high = self.below(-error).low, self.below(error).high
         known = self.estimate
         return replace(known, low=min(low, known.low), high=max(high, known.high))
 
     def outcome(self, wanted: float, error: float) -> Outcome:
-        """Return whether a requirement is met with a probability.
+        """Return whether a requirement is met with the required probability.
 
         Parameters
         ----------
         wanted
-            Least probability that it is met.
+            Least required probability that it is met.
         error
-            What the figure may be off by, in its unit: cases this close to the limit count for
-            neither side.
+            Numerical error of the figure, in its unit: cases closer to the limit count for neither
+            side.
         """
         decides, allowed = self.within(error), 1.0 - wanted
         if decides.high <= allowed:

@@ -1,6 +1,6 @@
-"""The folder of a study: a Parquet file a chunk, whose they are, and how many are asked for.
+"""Folder of a study: a Parquet file per chunk, the identity of the study, and its size.
 
-It depends on the plan and its number alone, wherever and in whatever order it is computed.
+A chunk depends only on the plan and its number, wherever and in whatever order it is computed.
 """
 
 from __future__ import annotations
@@ -34,14 +34,14 @@ if TYPE_CHECKING:
     import pandas as pd
 
 CASE, FAILURE, WARNINGS = "case", "failure", "warnings"
-"""columns beside values and key figures: number, why there is no result, what the run warns of"""
+"""columns beside values and key figures: number, reason for a missing result, warnings"""
 
 Columns = dict[str, NDArray[Any]]
 
 
 @dataclass(frozen=True)
 class PlacedChunk:
-    """A chunk whose values are not those that the plan lists: its number, and columns [SI]."""
+    """A chunk whose values are not listed by the plan: its number, and columns [SI]."""
 
     number: int
     values: Mapping[str, NDArray[Any]]
@@ -69,14 +69,14 @@ def computed_chunk(
     Returns
     -------
     dict
-        Columns of equal length: the case's number, the values that varied by name [SI], every key
-        figure by name in its unit (NaN where it is not defined), and as texts why a case has no
-        result and what it warns of, empty where there is nothing.
+        Columns of equal length: the case's number, the varied values by name [SI], every key figure
+        by name in its unit (NaN where it is undefined), and two texts: the reason for a missing
+        result, and warnings. Texts may be empty.
 
     Raises
     ------
     DeviceError
-        When the bench's graphics processor fails: no case is to blame.
+        When the bench's graphics processor fails: the cases are not the cause.
     KeyboardInterrupt
         When interrupted.
     """
@@ -89,7 +89,7 @@ def computed_chunks(
 ) -> list[tuple[int, Columns]]:
     """Return the numbers and the columns of chunks whose cases are computed together.
 
-    As `computed_chunk` gives each of them, in order.
+    The result of `computed_chunk` for each of them, in order.
 
     Raises
     ------
@@ -112,9 +112,9 @@ def computed_chunks(
 
 @contextmanager
 def _garbage_later() -> Iterator[None]:
-    """Look for garbage once at the end, and not among all objects again and again meanwhile.
+    """Collect garbage once at the end instead of repeatedly among all objects.
 
-    Models that were evaluated refer to themselves.
+    Evaluated models contain reference cycles.
     """
     was_enabled = gc.isenabled()
     gc.disable()
@@ -152,7 +152,7 @@ def _computed(
 
 
 def case_bench(plan: StudyPlan, number: int, values: Mapping[str, Any]) -> Bench:
-    """Return the bench of a case: its values, and of drawn ones noise of its own.
+    """Return the bench of a case: its values, and for sampled cases its own noise.
 
     Raises
     ------
@@ -164,14 +164,14 @@ def case_bench(plan: StudyPlan, number: int, values: Mapping[str, Any]) -> Bench
 
 
 def _is_noisy(plan: StudyPlan, number: int) -> bool:
-    """Return whether a case has noise of its own."""
+    """Return whether a case has its own noise."""
     if plan.sought is not None:
         return plan.sought.has_own_noise(number // CHUNK)
     return plan.is_sampled
 
 
 def _alike(benches: Mapping[int, Bench]) -> list[list[int]]:
-    """Return cases in groups that differ in numbers alone, so that they run side by side."""
+    """Return groups of cases that differ only in numbers, so that they run side by side."""
     groups: dict[tuple[Any, ...], list[int]] = {}
     for k, bench in benches.items():
         each = (bench.par.choices(), bench.chosen_options.choices())  # names may be in both
@@ -182,10 +182,10 @@ def _alike(benches: Mapping[int, Bench]) -> list[list[int]]:
 def _fill(
     columns: Columns, cases: Sequence[int], benches: Mapping[int, Bench], threads: int | None
 ) -> None:
-    """Put what cases give into their rows; where they fail together, each for itself says why."""
+    """Store results in the rows of their cases; if they fail together, rerun each to find why."""
     try:
         given = key_figures_of([benches[k] for k in cases], threads)
-    except DeviceError:  # says nothing of a case
+    except DeviceError:  # not caused by a case
         raise
     except BywireError as error:
         if len(cases) == 1:
@@ -206,7 +206,7 @@ _WHAT = ("the files of a study", "studies")
 
 
 def _require_pyarrow() -> None:
-    """Refuse to go on without the library: nothing could be read, and nothing is damaged.
+    """Require pyarrow before resuming: without it chunks would seem damaged.
 
     Raises
     ------
@@ -224,13 +224,13 @@ def _write_chunk(
     Parameters
     ----------
     path
-        Its file.
+        Path of its file.
     columns
         Values of each quantity and figure, shape (cases,) each; texts as objects.
     units
-        Unit of those that have one.
+        Units of the columns that have one.
     marks
-        What tells the file from any other.
+        What distinguishes the file from any other.
 
     Raises
     ------
@@ -247,20 +247,20 @@ def _write_chunk(
         for name, array in arrays.items()
     ]
     table = pa.table(list(arrays.values()), schema=pa.schema(fields, dict(marks)))
-    # A dictionary of numbers that all differ would be written in vain.
+    # A dictionary of numbers that all differ would be useless.
     parquet.write_table(table, path, write_page_checksum=True, use_dictionary=texts)
 
 
 def _read_chunk(path: Path) -> tuple[Columns, Mapping[bytes, bytes]]:
-    """Return a chunk's cases as they were written, and what tells its file from any other.
+    """Return the cases of a chunk's file, and what distinguishes the file from any other.
 
     Raises
     ------
     Exception
-        Whatever pyarrow raises of a file that is damaged.
+        Any exception of pyarrow for a damaged file.
     """
     parquet = library("pyarrow.parquet", *_WHAT)
-    # Of one file: what reads folders of them takes three times as long, and loads more.
+    # A single file: the reader of folders takes three times as long, and loads more.
     with parquet.ParquetFile(path, page_checksum_verification=True, pre_buffer=False) as file:
         table = file.read(use_threads=False)
     columns = {
@@ -271,8 +271,8 @@ def _read_chunk(path: Path) -> tuple[Columns, Mapping[bytes, bytes]]:
 
 
 # --- The folder
-# The files are the truth: a chunk that is there is never computed again. Each appears whole or not
-# at all, so that whatever is killed loses the chunks that it was at.
+# The files are the truth: an existing chunk is never computed again. Each is written whole or not
+# at all, so that a killed process loses only its current chunks.
 
 _CHUNKS = "chunks"
 """folder of the chunks"""
@@ -280,14 +280,14 @@ _CHUNKS = "chunks"
 
 @dataclass(frozen=True)
 class Origin:
-    """What a study was read from.
+    """Source of a study.
 
     Parameters
     ----------
     file
         Study file.
     overrides
-        Changes of its bench, as ``--set`` takes them.
+        Changes of its bench, in the form of ``--set``.
     """
 
     file: Path
@@ -296,7 +296,7 @@ class Origin:
 
 @dataclass(frozen=True)
 class StudyStore(PieceFolder):
-    """Where the chunks of a study lie.
+    """Folder of the chunks of a study.
 
     Parameters
     ----------
@@ -319,24 +319,24 @@ class StudyStore(PieceFolder):
         "study": dict,
     }
 
-    # What was read or written here, so that nobody who judges a study waits for its files again.
+    # Cases that were read or written here, so that they are not read again.
     _known: dict[int, Columns] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     @property
     def elsewhere(self) -> str:
-        """What to do where the folder holds another study."""
+        """Advice if the folder contains another study."""
         return (
             "what is computed there does not belong to this one; run it into another folder, "
             "bywire study run FILE --out FOLDER, or remove that one"
         )
 
     def open(self, plan: StudyPlan, origin: Origin) -> None:
-        """Make the folder one of a study, or refuse that of another.
+        """Claim the folder for the study, or reject that of another.
 
         Raises
         ------
         FileError
-            When it holds another study, or cannot be written.
+            When it contains another study, or is not writable.
         """
         _require_pyarrow()
         about = {
@@ -350,10 +350,10 @@ class StudyStore(PieceFolder):
         self.begin(plan, about)
 
     def asked_and_computed(self, plan: StudyPlan) -> tuple[int, int]:
-        """Return for how many cases the folder was asked, and how many of them are computed.
+        """Return the number of requested cases, and of computed ones.
 
-        Both are zero where it does not hold this study. In designs that seek, both are of each
-        requirement: what is computed, of the one that has the most.
+        Both are zero if the folder does not contain this study. For search designs, both count per
+        requirement: the second is that of the requirement with most cases.
         """
         if not (self.folder / RECORD).exists():
             return 0, 0
@@ -369,29 +369,29 @@ class StudyStore(PieceFolder):
         return int(known["cases"]), min(int(known["cases"]), CHUNK * chunks)
 
     def record(self) -> dict[str, Any]:
-        """Return what the folder says of its study.
+        """Return the record of the folder's study.
 
         Raises
         ------
         FileError
-            When it holds none.
+            When it contains none.
         """
         require_no_file(self.folder)
         return super().record()
 
     @property
     def resume_command(self) -> str:
-        """Command that goes on with the study, with the brakes that were loaded by path."""
+        """Command that resumes the study, with the brakes that were loaded by path."""
         words = ["bywire", "study", "resume", str(self.folder)]
         return shlex.join([*words, *(w for file in loaded_files() for w in ("--system", file))])
 
     def drop_damaged(self) -> int:
-        """Take away files of chunks that cannot be read, so that they are computed again.
+        """Remove files of unreadable chunks, so that they are computed again.
 
         Returns
         -------
         int
-            How many there were.
+            Number of removed files.
         """
         _require_pyarrow()
         damaged = 0
@@ -404,14 +404,14 @@ class StudyStore(PieceFolder):
         return damaged
 
     def write(self, chunk: int, columns: Columns, units: Mapping[str, str]) -> None:
-        """Keep a chunk, whole or not at all.
+        """Store a chunk, whole or not at all.
 
         Raises
         ------
         FileError
-            When it cannot be written.
+            When it is not writable.
         """
-        columns = {  # texts as they come back from the file
+        columns = {  # texts as read from the file
             name: column.astype(object) if column.dtype.kind == "U" else column
             for name, column in columns.items()
         }
@@ -420,7 +420,7 @@ class StudyStore(PieceFolder):
         self._known[chunk] = columns
 
     def read(self, chunks: int) -> pd.DataFrame:
-        """Return all cases of the first chunks that are there, in their order.
+        """Return all cases of the first existing chunks, in their order.
 
         Raises
         ------
@@ -434,7 +434,7 @@ class StudyStore(PieceFolder):
         return pd.DataFrame({n: np.concatenate([columns[n] for columns in each]) for n in names})
 
     def columns(self, chunk: int) -> Columns:
-        """Return the cases of a chunk that is there, as they were when it was read or written here.
+        """Return the cases of an existing chunk, kept since they were first read or written.
 
         Raises
         ------
@@ -446,12 +446,12 @@ class StudyStore(PieceFolder):
         return self._known[chunk]
 
     def _read(self, chunk: int) -> Columns:
-        """Return what the file of a chunk holds; see `columns`."""
+        """Return the content of a chunk's file; see `columns`."""
         path = self.path(chunk)
         _require_pyarrow()
         try:
             columns, marks = _read_chunk(path)
-        except Exception as error:  # the library raises what it likes of damaged files
+        except Exception as error:  # the library raises all kinds of exceptions for damaged files
             raise FileError(
                 f"{path} is damaged ({type(error).__name__}): '{self.resume_command}' computes it "
                 "again",
@@ -466,7 +466,7 @@ class StudyStore(PieceFolder):
         return columns
 
     def _marks(self, chunk: int) -> dict[bytes, bytes]:
-        """Return what tells a chunk's file from any other."""
+        """Return what distinguishes a chunk's file from any other."""
         return {b"study": self._digest, b"chunk": str(chunk).encode()}
 
     @cached_property
@@ -478,23 +478,23 @@ class StudyStore(PieceFolder):
 
 
 def with_cases(plan: StudyPlan, store: StudyStore, cases: int | None) -> StudyPlan:
-    """Return the plan with so many cases, and with all that its folder was asked for.
+    """Return the plan with the requested number of cases, at least that of its folder.
 
     Parameters
     ----------
     plan
-        The study as its file says.
+        Plan from the study file.
     store
         Its folder.
     cases
-        Cases asked for; None for as many as the file and the folder say. Fewer than the folder was
-        asked for take back those that are not computed.
+        Requested cases; None for the number in the file and the folder. A smaller number than the
+        folder's cancels cases that are not computed.
 
     Raises
     ------
     ParameterError
-        For fewer than are computed, too few, too many, and where the design says how many there
-        are.
+        For fewer cases than are computed, too few, too many, and for a design with a fixed number
+        of cases.
     """
     if cases is not None:
         cases = whole_number("cases", cases, 1, MOST)
@@ -517,17 +517,17 @@ def with_cases(plan: StudyPlan, store: StudyStore, cases: int | None) -> StudyPl
             extended.sought.require_budget()
         return extended
     given = plan if cases is None else replace(plan, cases=cases)
-    given.points  # noqa: B018 - refuses too few before anything runs
+    given.points  # noqa: B018 - rejects too few cases before any run
     return given
 
 
 def require_extensible(plan: StudyPlan, cases: int) -> None:
-    """Refuse to add cases to a design that has its own.
+    """Reject further cases for a design with its own number of cases.
 
     Raises
     ------
     ParameterError
-        When it lists them, or they belong together in groups.
+        When its cases are listed, or belong together in groups.
     """
     if plan.is_sampled or plan.sought is not None:
         return

@@ -52,7 +52,7 @@ class CorrelationSection(Section):
 def _in_order(
     varied: Sequence[Varied], correlations: Mapping[tuple[str, str], float]
 ) -> tuple[Varied, ...]:
-    """Return what varies; single values that are correlated rise, however the file lists them."""
+    """Return what varies, with correlated discrete values in rising order."""
     correlated = {name for pair in correlations for name in pair}
     return tuple(
         replace(each, distribution=rising(each.distribution))
@@ -72,16 +72,16 @@ def _read_correlations(
     Parameters
     ----------
     sections
-        What the file says.
+        Sections of the file.
     varied
-        What varies.
+        Quantities that vary.
     known
-        Correlations that are known already.
+        Correlations from other sources.
 
     Raises
     ------
     InputError
-        For entries that do not fit, and correlations that no quantities can have.
+        For invalid entries, and for correlations that no quantities can have.
     """
     names = {each.name: each for each in varied}
     pairs: dict[tuple[str, str], float] = {}
@@ -119,12 +119,12 @@ _DEMAND = "99 %"
 
 
 def _read_demands(bench: Bench, section: Mapping[str, Any]) -> Iterator[Limit]:
-    """Yield what is required: by the study, and by its bench of what the study says nothing of.
+    """Yield the requirements: those of the study, and the bench's for other key figures.
 
     Raises
     ------
     InputError
-        For key figures that there are not, and limits and probabilities that cannot be read.
+        For unknown key figures, and for unreadable limits and probabilities.
     """
     units = bench.definition.kpis_with(bench.chosen_options)
     for kpi, text in {**bench.requirements, **section}.items():
@@ -136,8 +136,8 @@ def _read_demands(bench: Bench, section: Mapping[str, Any]) -> Iterator[Limit]:
 
 
 def _probability(kpi: str, text: str, given: str) -> float:
-    """Return the probability that stands behind "with" in the text of a requirement."""
-    if not _PERCENT.fullmatch(given):  # 0.9 may be a share, or 0.9 %
+    """Return the probability after "with" in the text of a requirement."""
+    if not _PERCENT.fullmatch(given):  # 0.9 may mean a share, or 0.9 %
         example = f"{100.0 * float(given):.10g} %" if _SHARE.fullmatch(given) else _DEMAND
         raise ParameterError(
             f"requirement {kpi} = {quoted(text)}: the probability after 'with' must be in percent, "
@@ -163,12 +163,12 @@ _DEPENDENT = "has cases that share values and are not independent"
 
 
 def _require_agreement(plan: StudyPlan) -> None:
-    """Refuse probabilities and correlations of designs without independent cases.
+    """Reject probabilities and correlations for designs without independent cases.
 
     Raises
     ------
     ParameterError
-        For these, and for a number of cases that the design does not admit.
+        For these, and for a number of cases that is not valid for the design.
     """
     if plan.is_sampled:
         return
@@ -179,9 +179,9 @@ def _require_agreement(plan: StudyPlan) -> None:
     others = ", ".join(map(repr, SAMPLED))
     if plan.correlations:
         why = (
-            "exchanges each quantity for itself, so that none may depend on another"
+            "exchanges each quantity separately, so that none may depend on another"
             if is_indexed
-            else "goes to the ends of each quantity for itself"
+            else "visits the ends of each quantity separately"
         )
         raise ParameterError(
             f"[[correlation]]: {plan.design!r} {why}: leave it out, or take {others}",
@@ -217,11 +217,11 @@ def _require_agreement(plan: StudyPlan) -> None:
             )
         plan.sought.require_budget()
         return
-    plan.points  # noqa: B018 - refuses what is too large, or too small for indices
+    plan.points  # noqa: B018 - rejects invalid numbers of cases
 
 
 def _require_rare(plan: StudyPlan, design: SoughtDesign) -> None:
-    """Refuse rare failures of nothing, and the search of a design point among single values."""
+    """Reject rare failures without a probability, and design points among discrete values."""
     if not plan.judged_demands:
         raise ParameterError(
             f"[requirements]: {plan.design!r} computes the probability that a requirement is "
@@ -247,7 +247,7 @@ _Cases = Annotated[int | None, Field(ge=1, le=MOST)]
 
 
 class DesignSection(Section):
-    """The section ``[design]``; what it leaves out is as of a `StudyPlan`."""
+    """The section ``[design]``; omitted keys have the defaults of `StudyPlan`."""
 
     kind: str = StudyPlan.design
     cases: _Cases = None
@@ -259,12 +259,12 @@ class DesignSection(Section):
 
 
 def _read_design(section: DesignSection) -> dict[str, Any]:
-    """Return what the section says, by the fields of a `StudyPlan`.
+    """Return the content of the section, by the fields of a `StudyPlan`.
 
     Raises
     ------
     InputError
-        For what is unknown, and what the kind of design has no use for.
+        For unknown keys, and for keys that the kind of design does not use.
     """
     if section.kind not in _KINDS:
         raise unknown_name("[design] kind", section.kind, _KINDS)
@@ -276,7 +276,7 @@ def _read_design(section: DesignSection) -> dict[str, Any]:
 
 
 def _require_of_use(kind: str, section: Mapping[str, Any]) -> None:
-    """Refuse what a design has no use for."""
+    """Reject keys that the design does not use."""
     if "levels" in section and kind not in _WITH_LEVELS:
         raise ParameterError(
             f"[design] levels: {kind!r} has none to choose"
@@ -331,17 +331,17 @@ def read_study(path: str | Path, overrides: Mapping[str, str] = MappingProxyType
     Parameters
     ----------
     path
-        TOML file with ``bench``, the section ``[vary]``, and ``[design]``, ``[[correlation]]``,
-        ``[set]`` and ``[requirements]`` as wanted; see ``docs/studies.md``.
+        TOML file with ``bench``, the section ``[vary]``, and optional sections ``[design]``,
+        ``[[correlation]]``, ``[set]`` and ``[requirements]``; see ``docs/studies.md``.
     overrides
-        Further changes of the bench, which count more than those of ``[set]``.
+        Further changes of the bench, which override those of ``[set]``.
 
     Raises
     ------
     FileError
-        When the file cannot be read or is no TOML.
+        When the file cannot be read or is not valid TOML.
     InputError
-        For anything in it that does not fit, with the file's name in front.
+        For any invalid entry, with the file's name in front.
     """
     file = Path(path)
     content = read_toml(file, "study file")
@@ -379,7 +379,7 @@ def _plan(content: Mapping[str, Any], file: Path, overrides: Mapping[str, str]) 
 
 
 def _require_no_bench(content: Mapping[str, Any]) -> None:
-    """Refuse sections of a bench, and say where they belong."""
+    """Reject sections of a bench, and name the place where they belong."""
     keys = StudyFile.model_fields
     for key in content:
         if key in bench_file.SECTIONS and key not in keys:
@@ -395,7 +395,7 @@ def _require_no_bench(content: Mapping[str, Any]) -> None:
 def read_bench(
     source: str, changes: Mapping[str, Any], folder: Path, overrides: Mapping[str, str]
 ) -> Bench:
-    """Return the bench that a file names, with the changes of its ``[set]`` and further ones."""
+    """Return the bench of a study file, with the changes of its ``[set]`` and further ones."""
     flat = bench_file.flattened(changes)
     for key, value in flat.items():
         if not isinstance(value, str):

@@ -1,4 +1,4 @@
-"""Surrogates: key figures as fitted polynomials of what varies, and how far they are off."""
+"""Surrogates: key figures as fitted polynomials of what varies, with their errors."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from bywire.studies.designs import SOUGHT
 from bywire.studies.findings import Findings
 from bywire.studies.plan import StudyPlan, Varied
 
-_SHOWN = 6  # single values that an error names
+_SHOWN = 6  # discrete values that an error lists
 _SAME = 1e-9  # share by which two texts of the same value may differ
 
 Polynomial = Callable[[Array], Array]
@@ -33,23 +33,23 @@ class Surrogate:
     kpi, unit
         Key figure, and its unit.
     nominal
-        What the bench has of each quantity [SI].
+        Value of each quantity in the bench [SI].
     units
         SI unit of each quantity.
     low, high
         Least and largest value of each quantity in the cases [SI].
     singles
-        Values of the quantities that have single ones in the cases [SI], in rising order: between
-        them nothing is known.
+        Discrete values of quantities in the cases [SI], in rising order: the surrogate is not valid
+        between them.
     cases
-        Cases that have the figure.
+        Number of cases with the figure.
     degree, terms
-        Of the polynomial.
+        Degree of the polynomial, and number of terms.
     rms, largest
-        Error of cases that the polynomial had not seen, each fifth told by the others: root mean
-        square, and largest, in ``unit``. The noise of the cases is in it.
+        Errors of cases outside the fit, by fivefold cross-validation: root mean square, and
+        largest, in ``unit``. They contain the noise of the cases.
     explained
-        Share of the variance that it tells of cases it had not seen (Q2).
+        Explained share of the variance in the cross-validation (Q2).
     """
 
     kpi: str
@@ -68,19 +68,19 @@ class Surrogate:
     polynomial: Polynomial = field(repr=False)
 
     def __call__(self, values: Mapping[str, ArrayLike]) -> Array:
-        """Return the figure at values of what varies, in `unit`.
+        """Return the figure at values of the varied quantities, in `unit`.
 
         Parameters
         ----------
         values
-            Quantities by name [SI], numbers or arrays of one shape; the others as in the bench.
+            Quantities by name [SI], numbers or arrays of one shape; others have the bench's value.
 
         Raises
         ------
         UnknownNameError
-            For what did not vary.
+            For a quantity that did not vary.
         ParameterError
-            Beyond what the cases have shown, and between the values of a quantity of single ones.
+            For values beyond the cases, and for values between discrete ones.
         """
         if not isinstance(values, Mapping):
             raise ParameterError(
@@ -103,7 +103,7 @@ class Surrogate:
         except ValueError:
             raise ParameterError("values of quantities must have the same shape") from None
         points = np.column_stack([column.ravel() for column in wide])
-        if not points.size:  # OpenTURNS takes no empty sample
+        if not points.size:  # OpenTURNS rejects an empty sample
             return np.zeros(wide[0].shape)
         return np.asarray(self.polynomial(points).reshape(wide[0].shape))
 
@@ -136,7 +136,7 @@ class Surrogate:
 
 
 def _listed(values: Array, unit: str) -> str:
-    """Return single values as an error lists them: not all where they are many."""
+    """Return discrete values as text for an error, abbreviated where they are many."""
     texts = [shown(float(value), unit) for value in values]
     if len(texts) > _SHOWN:
         texts = [*texts[: _SHOWN - 1], "...", texts[-1]]
@@ -149,24 +149,24 @@ def _listed(values: Array, unit: str) -> str:
 # 2011).
 
 LIBRARY = ("surrogates of studies", "studies")
-_FEWEST = 30  # cases of which a surrogate may be made
+_FEWEST = 30  # designs whose cases allow a surrogate
 _LARGEST = 4  # degree: with five quantities the fifth gains little, and takes ten times as long
-_FOLDS = 5  # a fifth of the cases is told by the others, in turn
-_LACKING = ("one-at-a-time", "corners", "morris", *SOUGHT)  # they show no more than some places
+_FOLDS = 5  # cross-validation: each fifth of the cases is predicted from the others
+_LACKING = ("one-at-a-time", "corners", "morris", *SOUGHT)  # designs that visit only a few points
 
 
 def surrogate_of(findings: Findings, kpi: str) -> Surrogate:
     """Return the surrogate of a key figure from the cases of a study.
 
-    The degree is the one that tells a fifth of the cases best which it has not seen.
+    The degree is chosen by fivefold cross-validation.
 
     Raises
     ------
     UnknownNameError
         For a figure that the study does not have.
     ParameterError
-        For designs that do not show what lies between their points, structural choices among what
-        varies, too few cases, and a figure that does not vary.
+        For designs without points between their levels, structural choices among the varied
+        quantities, too few cases, and a figure that does not vary.
     FileError
         When OpenTURNS is not installed.
     """
@@ -214,12 +214,12 @@ def surrogate_of(findings: Findings, kpi: str) -> Surrogate:
 
 
 def require_fittable(plan: StudyPlan) -> None:
-    """Refuse studies whose cases no polynomial goes through: see `surrogate_of`.
+    """Reject studies whose cases cannot be fitted by a polynomial: see `surrogate_of`.
 
     Raises
     ------
     ParameterError
-        For designs that show no more than some places, and choices among what varies.
+        For designs that visit only a few points, and choices among the varied quantities.
     """
     if plan.design in _LACKING:
         raise ParameterError(
@@ -238,7 +238,7 @@ def require_fittable(plan: StudyPlan) -> None:
 
 
 def _within(varied: Sequence[Varied], x: Array) -> dict[str, float]:
-    """Return what the bench has of each quantity; where no case comes so far, the nearest."""
+    """Return the bench's value of each quantity; beyond all cases, the nearest."""
     singles = _singles(varied, x)
     return {
         v.name: min(singles[v.name], key=lambda single: abs(single - v.nominal))
@@ -249,7 +249,7 @@ def _within(varied: Sequence[Varied], x: Array) -> dict[str, float]:
 
 
 def _singles(varied: Sequence[Varied], x: Array) -> dict[str, tuple[float, ...]]:
-    """Return the values in the cases of each quantity that has single ones."""
+    """Return the values in the cases of each discrete quantity."""
     return {
         v.name: tuple(np.unique(x[:, k]).tolist())
         for k, v in enumerate(varied)
@@ -258,7 +258,7 @@ def _singles(varied: Sequence[Varied], x: Array) -> dict[str, tuple[float, ...]]
 
 
 def _degrees(shape: tuple[int, ...]) -> list[int]:
-    """Return degrees whose polynomial has fewer terms than half of the cases it is fitted to."""
+    """Return degrees whose polynomial has fewer terms than half of the fitted cases."""
     cases, quantities = shape
     fit = [
         degree
@@ -270,7 +270,7 @@ def _degrees(shape: tuple[int, ...]) -> list[int]:
 
 @dataclass(frozen=True)
 class _Fit:
-    """A polynomial through cases, its degree, and how many terms it has."""
+    """A polynomial fitted to cases, its degree, and its number of terms."""
 
     degree: int
     terms: int
@@ -280,7 +280,7 @@ class _Fit:
 def _of_unseen(
     varied: Sequence[Varied], x: Array, y: Array, degree: int, fifth: int
 ) -> tuple[Array, _Fit]:
-    """Return the errors of a fifth of the cases, told by the others, and what told them."""
+    """Return the errors of a fifth of the cases, predicted from the others, and their fit."""
     apart = np.arange(y.size) % _FOLDS == fifth
     fit = _fitted(varied, x[~apart], y[~apart], degree)
     return fit.polynomial(x[apart]) - y[apart], fit
@@ -310,7 +310,7 @@ def _fitted(varied: Sequence[Varied], x: Array, y: Array, degree: int) -> _Fit:
 
 
 def _marginal(ot: Any, varied: Varied, values: NDArray[np.float64]) -> Any:
-    """Return the law whose polynomials a quantity has: any will do that is as wide."""
+    """Return a distribution as wide as a quantity, for its polynomials: any such will do."""
     low, high = float(values.min()), float(values.max())
     if low == high:
         return ot.Uniform(low - 1.0, high + 1.0)

@@ -1,4 +1,4 @@
-"""The section ``[vary]``: what varies of a bench, and what varies as it was measured."""
+"""The section ``[vary]``: what varies of a bench, and how, also from measured estimates."""
 
 from __future__ import annotations
 
@@ -37,10 +37,10 @@ from bywire.studies.plan import Varied
 # --- What varies as it was measured
 
 _ESTIMATE = "estimate.json"
-"""file of an identification's folder that holds its estimates"""
-_LARGEST = 20_000_000  # bytes of a file that is read
+"""file with the estimates in an identification's folder"""
+_LARGEST = 20_000_000  # largest size of the file in bytes
 _TRUNCATE = "cut it off, with truncate = true"
-_WEAK = 1e-9  # correlation that counts as none
+_WEAK = 1e-9  # correlation that counts as zero
 
 
 class MeasuredSection(Section):
@@ -92,24 +92,24 @@ class Measured:
 def _varied_as_measured(
     bench: Bench, section: MeasuredSection, folder: Path
 ) -> tuple[tuple[Varied, ...], dict[tuple[str, str], float]]:
-    """Return parameters that vary as they were measured, and the correlations of their estimates.
+    """Return parameters that vary by their measured uncertainty, with correlations of estimates.
 
-    Each is normal, with its estimate as mean.
+    Each is normally distributed around its estimate.
 
     Parameters
     ----------
     bench
-        What is tested.
+        The tested bench.
     section
         ``[measured]`` of a study file: ``file``; ``of``, names, by default all that the bench has;
-        ``truncate``, whether what leaves the admissible range is cut off.
+        ``truncate``, whether to cut distributions off at the valid range.
     folder
-        Where the path of the file starts.
+        Base folder of the file's path.
 
     Raises
     ------
     InputError
-        For a section that does not fit, and estimates that leave the admissible range.
+        For an invalid section, and for estimates that leave the valid range.
     """
     measured = _read_measured(folder / section.file)
     leaves, values = leaf_fields(type(bench.par)), bench.par.flat()
@@ -142,22 +142,22 @@ def _varied_as_measured(
 
 
 def _text(value: float, unit: str) -> str:
-    """Return a value as a study file has it; a pure number has no unit."""
+    """Return a value in the form of a study file; a pure number has no unit."""
     return repr(value) if unit == "1" else f"{value!r} {unit}"
 
 
 def _read_measured(path: Path) -> Measured:
-    """Read what an identification estimated.
+    """Read the estimates of an identification.
 
     Parameters
     ----------
     path
-        Folder that ``bywire identify --out`` has written, or its ``estimate.json``.
+        Folder written by ``bywire identify --out``, or its ``estimate.json``.
 
     Raises
     ------
     FileError
-        When there is none, or it is damaged.
+        When it is missing or damaged.
     """
     file = path / _ESTIMATE if path.is_dir() else path
     try:
@@ -203,7 +203,7 @@ def _estimates(said: Mapping[str, Any]) -> Iterator[Measured]:
 
 
 def _joined(each: Sequence[Measured]) -> Measured:
-    """Return several estimates as one: those of different ones are independent."""
+    """Return several identifications as one: their estimates are independent of each other."""
     names = [name for file in each for name in file.values]
     if not names:
         raise ParameterError("nothing is estimated in it")
@@ -230,21 +230,21 @@ def _number(value: Any) -> float:
 def read_all_varied(
     bench: Bench, section: Mapping[str, Any], estimates: MeasuredSection | None, folder: Path
 ) -> tuple[tuple[Varied, ...], Mapping[tuple[str, str], float]]:
-    """Return what varies, as the file says or as it was measured, and what goes together so.
+    """Return what varies, from the file or from measurements, with its correlations.
 
     Parameters
     ----------
     bench
-        What is tested.
+        The tested bench.
     section, estimates
-        ``[vary]`` and ``[measured]`` of its file.
+        ``[vary]`` and ``[measured]`` of a study file.
     folder
-        Where its paths start.
+        Base folder of its paths.
 
     Raises
     ------
     InputError
-        For sections that do not fit, and what varies twice.
+        For invalid sections, and for a quantity that varies twice.
     """
     measured: tuple[Varied, ...] = ()
     correlations: Mapping[tuple[str, str], float] = {}
@@ -261,7 +261,7 @@ def read_all_varied(
 
 
 def _put_once(places: dict[str, str], name: str, place: str) -> None:
-    """Note where a quantity varies, or refuse one that varies elsewhere too."""
+    """Record where a quantity varies, or reject one that varies elsewhere too."""
     if name in places:
         raise ParameterError(
             f"[vary] {name} varies twice, by {places[name]} and by {place}: leave one of them out",
@@ -271,12 +271,12 @@ def _put_once(places: dict[str, str], name: str, place: str) -> None:
 
 
 def read_varied(bench: Bench, section: Mapping[str, Any]) -> Iterator[Varied]:
-    """Yield what a section ``[vary]`` varies of a bench.
+    """Yield the quantities of a bench that a section ``[vary]`` varies.
 
     Raises
     ------
     InputError
-        For names that are no numbers or choices of the bench, and values that do not fit.
+        For names that are not numbers or choices of the bench, and for invalid values.
     """
     values, choices = quantities_of(bench), varied_choices(bench)
     for name, entry in entries_of(section, values).items():
@@ -327,10 +327,10 @@ def quantities_of(bench: Bench) -> dict[str, Any]:
 
 
 def _require_alike(bench: Bench, name: str, values: Sequence[str]) -> None:
-    """Refuse values of an option with which the experiment is another one.
+    """Reject values of an option that change the experiment.
 
-    What it drives may have another unit with them, and its key figures may be others: neither a
-    stimulus nor a requirement would mean the same in all cases.
+    The driven signal may have another unit, and the key figures may be others: then a stimulus or a
+    requirement would not mean the same in all cases.
     """
     if not name.startswith(OPTION):
         return
@@ -354,19 +354,19 @@ def _require_alike(bench: Bench, name: str, values: Sequence[str]) -> None:
 
 
 def entries_of(section: Mapping[str, Any], known: Collection[str]) -> dict[str, Any]:
-    """Return the entries of ``[vary]`` by dotted name, however the file nests them.
+    """Return the entries of ``[vary]`` by dotted name, however they are nested in the file.
 
     Parameters
     ----------
     section
-        What the file holds.
+        Content of the section.
     known
-        Names that may vary: a table under one of them is an entry, whatever it holds.
+        Names that may vary: a table under such a name is an entry, whatever its content.
 
     Raises
     ------
     ParameterError
-        For a name that is written in two ways, ``motor.R_m`` and ``"motor.R_m"``.
+        For a name in two spellings, ``motor.R_m`` and ``"motor.R_m"``.
     """
     entries: dict[str, Any] = {}
     for name, entry in _spread(section, known):
@@ -392,10 +392,10 @@ def _spread(
 
 
 def _is_entry(name: str, value: Mapping[str, Any], known: Collection[str]) -> bool:
-    """Return whether a table says how a quantity varies, and is no group of quantities."""
+    """Return whether a table is the distribution of a quantity, and not a group of quantities."""
     if name in known or any(each.startswith(f"{name}.") for each in known):
         return name in known
-    return "kind" in value or value.keys() <= ENTRY_KEYS  # of a name that nothing answers to
+    return "kind" in value or value.keys() <= ENTRY_KEYS  # of a name that does not exist
 
 
 def _together(name: str, entry: Any, bench: Bench, values: Mapping[str, Any]) -> tuple[str, ...]:

@@ -1,7 +1,7 @@
 r"""Figures of gains on the nonlinear bench: sines by amplitude, and the brake's step.
 
-Many sets of gains run side by side, in the lanes of one ensemble. A set is measured in stages,
-and left where what is known of it already says that it is not wanted.
+Many sets of gains run side by side, in the lanes of one ensemble. A set is measured in stages, and
+dropped as soon as it cannot be the best.
 
 Controller and sensor are linear between their limits. What the closed loop G, measured with a sine
 of one amplitude, leaves for the rest P (actuator, friction, dither) follows from the loop's laws
@@ -46,24 +46,24 @@ _ROUGH_WINDOWS, _ROUGH = 8, 5e-3
 
 @dataclass(frozen=True)
 class Small:
-    """Figures of the loop's answer to sines of one amplitude.
+    """Figures of the closed loop's response to sines of one amplitude.
 
     Parameters
     ----------
     amplitude
-        Of the sine, in the input's SI unit.
+        Amplitude of the sine, in the input's SI unit.
     bandwidth
-        Frequency at which it has fallen to -3 dB [Hz]; the highest measured one where it stays
-        above; 0 where it is below, or sticks, from the lowest on.
+        Frequency at which the gain has fallen to -3 dB [Hz]; the highest measured one where it
+        stays above; 0 where the gain is below, or the mechanism is stuck, from the lowest one on.
     least
-        Smallest gain up to the target; 0 where it sticks.
+        Smallest gain up to the target; 0 for a stuck mechanism.
     phase_margin, crossover
-        Of the describing function [degree, Hz], see `crossings.measured_margin`; NaN where laws
-        are not known.
+        Margin and crossover of the describing function [degree, Hz], see
+        `crossings.measured_margin`; NaN where the laws are not known.
     peak
         Largest gain.
     settled
-        Whether every response repeated itself.
+        Whether every response became periodic.
     """
 
     amplitude: float
@@ -81,7 +81,7 @@ class Sines:
     Parameters
     ----------
     loop, par, value, amplitudes, gains, target, rough
-        As of `bench_figures.wanted_figures`.
+        See `bench_figures.wanted_figures`.
 
     Attributes
     ----------
@@ -114,7 +114,7 @@ class Sines:
         self._size, self._settled = np.zeros(shape), np.zeros(shape, dtype=bool)
 
     def measure(self, sets: Sequence[int], which: Sequence[int]) -> None:
-        """Measure some sets of gains at some frequencies, which are indices both."""
+        """Measure some sets of gains at some frequencies, both by index."""
         if not sets or not which:
             return
         chosen = {name: [float(values[k]) for k in sets] for name, values in self._gains.items()}
@@ -134,7 +134,7 @@ class Sines:
         at = np.ix_(sets, range(len(self._amplitudes)), which)
         self._f[list(which)] = responses["frequency"].values
         self._closed[at] = complex_values(responses)
-        self._size[at] = np.nan_to_num(responses["gain"].values)  # what sticks: with nothing
+        self._size[at] = np.nan_to_num(responses["gain"].values)  # a stuck mechanism has no gain
         self._settled[at] = responses["settled"].values > 0
 
     def first_look(self, k: int) -> tuple[Small, ...]:
@@ -183,10 +183,10 @@ class Sines:
 
 
 def _frequencies(run: Run, whole: Sequence[float], target: float) -> list[float]:
-    """Return ascending frequencies of which few periods are whole sample times and dithers.
+    """Return ascending frequencies with few periods in whole sample times and dither periods.
 
-    Several periods, at another phase of the dither each: friction would lock one period of 10 Hz
-    to five of 50 Hz, and what is measured would depend on how both began.
+    Several periods are used, each at another phase of the dither. With one period, friction would
+    lock 10 Hz to five periods of 50 Hz, and the result would depend on the initial phase.
     """
     common = common_interval(run, whole)
     limit = nyquist(run)
@@ -211,14 +211,14 @@ def loop_gain(
     Parameters
     ----------
     loop, par, value
-        Loop, and the parameters and operating point it was measured with.
+        The loop, and the parameters and operating point of the measurement.
     closed, frequencies
         Response and frequencies [Hz], shape (n,).
 
     Returns
     -------
     numpy.ndarray or None
-        Shape (n,); None for a loop whose laws are not known.
+        Shape (n,); None for a loop with unknown laws.
     """
     laws = laws_of(loop, par, value, frequencies)
     return None if laws is None else _behind(closed, *laws)
@@ -227,7 +227,7 @@ def loop_gain(
 def laws_of(
     loop: Loop, par: ParameterSet, value: float, frequencies: Array
 ) -> tuple[Complex, Complex] | None:
-    """Return the controller's response to set point and measured value; None if not known."""
+    """Return the controller's response to set point and measured value; None if unknown."""
     if loop.laws is None:
         return None
     with taking(loop.side):
@@ -245,17 +245,17 @@ STEP_FIGURES = ("overshoot", "settling_time", "steady_state_error")
 
 @dataclass(frozen=True)
 class BenchFigures:
-    """Figures of one set of gains on the nonlinear bench, as far as they are known.
+    """Figures of one set of gains on the nonlinear bench, as far as measured.
 
     Parameters
     ----------
     small
-        By amplitude.
+        Figures by amplitude.
     step
         Overshoot [%], settling time [s] and steady-state error [% of the step] of the loop's
         experiment; empty where it has no step response. NaN where not defined.
     reasons
-        Why a figure of the step is not defined, by its name.
+        Reasons why figures of the step are not defined, by name.
     """
 
     small: tuple[Small, ...]
@@ -264,7 +264,7 @@ class BenchFigures:
 
 
 Worth = Callable[[int, BenchFigures], bool]
-"""``worth(k, figures) -> bool``: whether set k, with what is known of it so far, is measured on"""
+"""``worth(k, figures) -> bool``: whether to continue with set k, given its figures so far"""
 
 
 def bench_figures(
@@ -284,13 +284,13 @@ def bench_figures(
         Loop, parameters and operating point, friction, dither and limits on; the loop's
         ``sustained`` are set for the sines.
     amplitudes
-        Of the sines, SI.
+        Amplitudes of the sines, SI.
     gains
         Dotted name -> its value in each set [SI].
     bench
-        The experiment whose step is judged; None for none.
+        The experiment with the judged step; None for none.
     target
-        Frequency around which is measured [Hz], from a quarter to three times of it.
+        Center of the measured frequencies [Hz], from a quarter to three times of it.
     """
     everything = wanted_figures(
         loop, par, value, amplitudes, gains, bench, target, lambda k, known: True
@@ -310,24 +310,24 @@ def wanted_figures(
     *,
     rough: bool = False,
 ) -> tuple[BenchFigures | None, ...]:
-    """Return the figures of several sets of gains, measured as far as they are promising.
+    """Return the figures of several sets of gains, measured as long as they are promising.
 
-    The step is cheap and comes first; then the sines next to the target, of which only the
-    smallest gain is known so far; then all others.
+    The step is cheap and comes first; then the sines next to the target, which give only the
+    smallest gain so far; then all others.
 
     Parameters
     ----------
     loop, par, value, amplitudes, gains, bench, target
-        As of `bench_figures`.
+        See `bench_figures`.
     worth
-        Asked before every stage but the first. Unknown figures are NaN, or not there.
+        Called before every stage but the first. Unknown figures are NaN, or missing.
     rough
         Whether settling to 0.5 % is enough, as in a search.
 
     Returns
     -------
     tuple
-        None for the sets that were left.
+        None for the dropped sets.
     """
     steps = _steps(bench, gains) if bench is not None else None
     sines = Sines(loop, par, value, amplitudes, gains, target, rough=rough)
@@ -345,14 +345,14 @@ def wanted_figures(
 
 
 def has_step(bench: Bench) -> bool:
-    """Return whether an experiment has one run and a step that it is judged by."""
+    """Return whether an experiment has a single run, with a judged step."""
     return bench.definition.step is not None and len(bench.cases()) == 1
 
 
 def _steps(
     bench: Bench, gains: Mapping[str, Sequence[float]]
 ) -> list[tuple[dict[str, float], dict[str, str]]] | None:
-    """Return the step's figures for every set of gains, and why some are not defined."""
+    """Return the step's figures for every set of gains, and the reasons for undefined ones."""
     definition = bench.definition
     if definition.step is None or not has_step(bench):
         return None

@@ -1,9 +1,9 @@
-r"""Gains of a loop from requirements, for a set of models: the worst slack as large as possible.
+r"""Gains of a loop from requirements, for a set of models, with the largest worst slack.
 
 .. math:: \max_{x, t} t \quad \text{with} \quad s_{jk}(x) \ge t
 
-for every requirement j and model k: the largest of smallest slacks, without the kinks that a
-plain minimum has. Sequential quadratic programming from several starts, then a simplex where it
+for every requirement j and model k: the largest of the smallest slacks, without the kinks of a
+plain minimum. Sequential quadratic programming from several starts, then a simplex search where it
 stopped at a kink of a figure itself.
 """
 
@@ -29,7 +29,7 @@ from bywire.synthesis.linear_case import LinearCase, read, room, slack, state_of
 from bywire.synthesis.outcome import MISSED, Binding, Conflict, Design, Status
 
 Report = Callable[[float], None]
-"""``report(share)``: the share of a stage that is done, 0 to 1"""
+"""``report(share)``: finished share of a stage, 0 to 1"""
 
 
 def stage(progress: Progress | None, label: str) -> Report:
@@ -55,9 +55,9 @@ def suffixed(progress: Progress | None, text: str) -> Progress | None:
 
 UNSTABLE = -12.0
 """slack of an unstable loop, before its growth is counted"""
-_LEAST, _LARGEST = -10.0, 3.0  # slacks beyond do not count as worse or better
+_LEAST, _LARGEST = -10.0, 3.0  # larger slacks do not count as worse or better
 KEPT_MISSED = -1e3
-"""below this, a search has found nothing that meets the requirements to keep"""
+"""below this, no point of a search meets the requirements to keep"""
 _STEP = 1e-5  # of differences, share of a range
 _SAMPLES, _STARTS = 64, 3
 _ITERATIONS = 40
@@ -86,7 +86,7 @@ class Problem:
 
     @property
     def evaluations(self) -> int:
-        """Loops that were computed so far."""
+        """Number of loops computed so far."""
         return len(self._known)
 
     def gains(self, z: Array) -> dict[str, float]:
@@ -98,7 +98,7 @@ class Problem:
         return values
 
     def point(self, gains: Mapping[str, float]) -> Array:
-        """Return the point of the unit cube for gains, the nearest where they lie outside."""
+        """Return the point of the unit cube for gains, the nearest where they are outside."""
         shares = []
         for name, (low, high) in self.tunables.items():
             value = min(max(gains[name], low), high)
@@ -109,12 +109,12 @@ class Problem:
     def slacks(self, z: Array, cases: Sequence[int], *, plain: bool = False) -> Array:
         """Return the slack of every requirement for some cases, shape (cases, requirements).
 
-        ``plain``: a bandwidth by its frequency, see `linear_case.room`.
+        ``plain``: measures a bandwidth by its frequency, see `linear_case.room`.
         """
         return np.array([self._of(z, k)[int(plain)] for k in cases])
 
     def points_seen(self, cases: Sequence[int]) -> list[Array]:
-        """Return all points that were computed for every one of some cases."""
+        """Return all points that were computed for each of some cases."""
         keys = [{z for z, k in self._known if k == case} for case in cases]
         return [np.frombuffer(z) for z in sorted(set.intersection(*keys))]
 
@@ -142,20 +142,20 @@ class Search:
     Parameters
     ----------
     problem
-        What is searched.
+        Design problem.
     cases
-        Models that count.
+        Indices of the models to consider.
     wanted
-        Requirements whose worst slack grows; all by default.
+        Requirements whose worst slack is maximized; all by default.
     kept
-        Requirements that must hold meanwhile.
+        Requirements that must be met meanwhile.
     best, slack
         Best point found so far and its worst slack, also after an interrupt.
     seen
-        Slack and place of every point that was looked at.
+        Slack and position of every visited point.
     plain
-        Whether a bandwidth counts by its frequency: where requirements cannot be met, the room of
-        the magnitude up to the limit says nothing of how far the frequency itself can go.
+        Whether to measure a bandwidth by its frequency. If requirements cannot be met, the margin
+        of the magnitude up to the limit does not show how far the frequency itself can go.
     """
 
     problem: Problem
@@ -168,20 +168,20 @@ class Search:
     plain: bool = False
 
     def recall(self) -> Array | None:
-        """Return the best of all points that any search over these cases has seen."""
+        """Return the best point of all searches over these cases."""
         for z in self.problem.points_seen(self.cases):
             self._judged(z)
         return self.best
 
     def run(self, starts: Sequence[Array], report: Report = lambda share: None) -> None:
-        """Climb from each start, then from the best with a simplex and once more.
+        """Climb from each start, then from the best with a simplex search and once more.
 
         Parameters
         ----------
         starts
             Points of the unit cube.
         report
-            Called with the share that is done, at every iteration.
+            Called with the finished share, at every iteration.
         """
         parts = len(starts) + 2
         for k, start in enumerate(starts):
@@ -189,7 +189,7 @@ class Search:
         if self.best is None:
             report(1.0)
             return
-        # A figure such as an overshoot has kinks of its own: SQP stops there, a simplex goes on.
+        # A figure such as an overshoot has kinks: SQP stops there, a simplex search continues.
         n = self.best.size
         corners = np.vstack(
             [self.best, self.best + 0.04 * np.where(self.best < 0.5, 1, -1) * np.eye(n)]
@@ -241,7 +241,7 @@ class Search:
             wanted = slacks[:, self._chosen()] - v[n]
             return np.concatenate([wanted.ravel(), slacks[:, list(self.kept)].ravel()])
 
-        # Forward differences of our own: one loop per gain serves all requirements at once.
+        # Own forward differences: one loop per gain serves all requirements together.
         def slope(v: Array) -> Array:
             here, columns = excess(v), []
             for k in range(n):
@@ -253,7 +253,8 @@ class Search:
             rate[: len(self.cases) * len(self._chosen())] = -1.0
             return np.column_stack([*columns, rate])
 
-        # The slack is a variable of its own (epigraph): smallest slacks have kinks, these do not.
+        # The slack is a separate variable (epigraph): smallest slacks have kinks, the constraints
+        # do not.
         first = self._slacks(start)[:, self._chosen()].min()
         constraints: Any = [{"type": "ineq", "fun": excess, "jac": slope}]
         options: Any = {"maxiter": _ITERATIONS, "ftol": 1e-5}
@@ -281,22 +282,22 @@ def starts_of(problem: Problem, given: Sequence[Array], seed: int) -> list[Array
 
 
 # --- The design
-# A loop that is asked for a bandwidth alone is best at the border of stability; one that is asked
-# for a phase margin alone needs no integral action. The disk margin :math:`\alpha` guarantees (P.
+# Without further constraints, a required bandwidth alone leads to the border of stability, and a
+# phase margin alone to no integral action. The disk margin :math:`\alpha` guarantees (P.
 # Seiler, A. Packard, P. Gahinet, "An Introduction to Disk Margins", IEEE Control Systems Magazine
 # 40(5), 2020, section on disk-based gain and phase margins)
 #
 # .. math:: g_m \ge \frac{2 + \alpha}{2 - \alpha}, \quad
 #     g_l \le \frac{2 - \alpha}{2 + \alpha}, \quad \varphi_m \ge 2 \arctan\frac{\alpha}{2}
 #
-# and by it the user's own requirements of margins tell how much less is wanted.
+# and by this formula required margins of the user lower it.
 
 DISK = 0.5
-"""disk margin that is kept: gain by a factor of 1.67, phase by 28 degree"""
+"""least disk margin: gain by a factor of 1.67, phase by 28 degree"""
 ERROR = 5.0
-"""steady-state error that is kept [%]"""
-_WORSE = 1.5  # what may become of the start's figures where these are kept
-_TRACKS = 50.0  # error above which an output does not follow the set point by design, %
+"""largest steady-state error [%]"""
+_WORSE = 1.5  # largest factor by which kept figures of the start may worsen
+_TRACKS = 50.0  # error above which an output does not track the set point by design, %
 
 
 def linear_floors(requirements: Sequence[Limit], error: float) -> tuple[Limit, ...]:
@@ -305,11 +306,11 @@ def linear_floors(requirements: Sequence[Limit], error: float) -> tuple[Limit, .
     Parameters
     ----------
     requirements
-        The user's; a margin below what `DISK` guarantees lowers that, and a requirement of the
-        same figure takes its place.
+        The user's; a required margin below the one guaranteed by `DISK` lowers the constraint, and
+        a requirement of the same figure replaces it.
     error
-        The start's largest steady-state error [%]; NaN for an unstable start. An error larger
-        than `ERROR` may grow by half; one of a loop that does not track is not kept.
+        The start's largest steady-state error [%]; NaN for an unstable start. An error larger than
+        `ERROR` may grow by half; a loop that does not track has no constraint.
     """
     texts = []
     named = {wanted.figure for wanted in requirements}
@@ -332,11 +333,11 @@ def bench_floors(
     Parameters
     ----------
     requirements
-        The user's.
+        The user's requirements.
     floors
         See `linear_floors`.
     trials
-        The linear design on the bench, in every trial.
+        Results of the linear design on the bench, in every trial.
     """
     steps = [figures.step for figures in trials if figures.step]
     kept = list(floors)
@@ -355,7 +356,7 @@ def bench_floors(
 def _implied(wanted: Limit) -> float:
     """Return the disk margin that guarantees a required margin; infinity for other figures.
 
-    Half of it where the margin must not be larger.
+    Half of it for an upper limit of the margin.
     """
     if wanted.figure == "phase_margin":
         disk = 2.0 * math.tan(math.radians(0.5 * wanted.bound))
@@ -373,12 +374,12 @@ def _implied(wanted: Limit) -> float:
 
 # --- The designer
 
-_FINE = 4000  # points of the grid for what is reported
+_FINE = 4000  # points of the grid for reported figures
 _BINDS = 0.01  # slacks this close to the worst one bind
 _ROUNDS, _PAIRED = 8, 3
-_CONFIRMED, _ALIKE = 40, 1e-3  # points looked at anew, and how far apart
+_CONFIRMED, _ALIKE = 40, 1e-3  # points evaluated again, and their least distance
 _CONFIRMED_FIGURES, _APART = 150, 1e-2  # the same where a figure itself is searched
-_HELD = -1e-3  # slack of what is kept that rounding may leave
+_HELD = -1e-3  # slack of kept figures that rounding may leave
 
 
 def design(
@@ -390,11 +391,11 @@ def design(
     seed: int = 0,
     progress: Progress | None = None,
 ) -> Design:
-    """Choose gains that meet requirements for every model with the largest room.
+    """Choose gains that meet requirements for every model with the largest slack.
 
-    Models are taken in as they turn out to be the worst; all of them are checked in the end. An
-    interrupt ends the search, and the best so far is returned. What `linear_floors` names is kept
-    besides.
+    Models are added as they turn out to be the worst; all of them are checked at the end. An
+    interrupt ends the search, and the best gains so far are returned. The constraints of
+    `linear_floors` are also enforced.
 
     Parameters
     ----------
@@ -405,9 +406,9 @@ def design(
     cases
         Models, the nominal one first.
     start
-        Gains to begin with, besides a sample.
+        Initial gains, in addition to a sample.
     seed
-        Of that sample.
+        Seed of that sample.
     progress
         Called with a label and the finished share.
 
@@ -467,7 +468,7 @@ def _require_sampled(problem: Problem, start: Mapping[str, float]) -> None:
 def _over_all(
     search: Search, starts: Sequence[Array], seed: int, progress: Progress | None
 ) -> None:
-    """Search over the nominal model, and take in the worst of the others until none is worse."""
+    """Search over the nominal model, and add the worst of the others until none is worse."""
     problem, everything = search.problem, range(len(search.problem.cases))
     begin = starts_of(problem, starts, seed)
     for _ in range(_ROUNDS):
@@ -485,7 +486,7 @@ def _over_all(
 
 
 def _by_figures(search: Search, progress: Progress | None) -> Search:
-    """Return a search by the figures themselves, from the best point seen."""
+    """Return a search by the figures themselves, from the best visited point."""
     by_room = Search(search.problem, search.cases, plain=True)
     best = by_room.recall()
     if best is not None:
@@ -494,10 +495,10 @@ def _by_figures(search: Search, progress: Progress | None) -> Search:
 
 
 def _confirmed(search: Search) -> Array:
-    """Return the best point on a finer grid of frequencies, all models counted.
+    """Return the best point on a finer grid of frequencies, for all models.
 
-    A coarse grid may step over a narrow dip of the closed loop to -3 dB: the best points lie
-    where figures jump.
+    A coarse grid may miss a narrow dip of the closed loop to -3 dB: the best points are where
+    figures jump.
     """
     problem = search.problem
 
@@ -515,9 +516,9 @@ def _confirmed(search: Search) -> Array:
 
 
 def _confirmed_by_figures(search: Search, wanted: Limit, kept: Limit) -> Array | None:
-    """Return the point whose figure is best on a finer grid while another requirement holds.
+    """Return the point with the best figure on a finer grid that meets another requirement.
 
-    None where no point seen holds it.
+    None if no visited point meets it.
     """
     problem = search.problem
 
@@ -539,11 +540,10 @@ def _looked_anew(
     gain: float,
     limits: tuple[int, float],
 ) -> Array | None:
-    """Return the visited point that a finer evaluation prefers, checking the coarsely best first.
+    """Return the visited point that a finer evaluation prefers, the coarsely best ones first.
 
-    Ends where the coarse slack is not above ``least`` or promises no ``gain`` any more. Of points
-    nearer to each other than the second of the limits, one is looked at, and the first of them is
-    how many at most.
+    Ends when the coarse slack is not above ``least`` or cannot improve by ``gain``. The first of
+    the limits is the largest number of evaluated points, and the second their least distance.
     """
     most, apart = limits
     best, place = -np.inf, None
@@ -594,7 +594,7 @@ def _extreme(
 def _judged(
     problem: Problem, z: Array, status: Status | None, conflicts: tuple[Conflict, ...]
 ) -> Design:
-    """Return the design of a point, all models computed anew on the fine grid."""
+    """Return the design of a point, with all models computed again on the fine grid."""
     gains = problem.gains(z)
     every = {case.label: case.figures(gains, _FINE) for case in problem.cases}
     rows = {label: values_of(figures) for label, figures in every.items()}
@@ -626,5 +626,5 @@ def _judged(
 
 
 def _size(value: float) -> float:
-    """Return a figure by which models are ordered; a model without it is the worst."""
+    """Return the figure by which models are ranked; a model without it is the worst."""
     return -np.inf if np.isnan(value) else value

@@ -32,20 +32,20 @@ from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.units import shown
 
 _ZERO = 1e-3
-"""What counts as zero where the limit is zero; all figures that can be zero are in %."""
+"""Value that counts as zero if the limit is zero; all figures that can be zero are in %."""
 
 STEADY = 0.05
-"""Steady-state error that counts as none where zero is required [%]; converters round."""
+"""Steady-state error that counts as zero if zero is required [%]; converters round."""
 
 _BY_WORD: Mapping[str, LoopFigure] = {
     **{figure.margin: figure for figure in LOOP_FIGURES.values() if figure.margin},
     **LOOP_FIGURES,
 }
-"""figures by their names in requirements: their own, and those of `bywire margins --json`"""
+"""figures by their names in requirements, also by those of `bywire margins --json`"""
 
 
 def share_left(limit: Limit, value: float) -> float:
-    """Return how far a value is on the right side, as a share of the limit; NaN is not."""
+    """Return the margin of a value to its limit, as a share of the limit; NaN has none."""
     bound = limit.bound or (STEADY if limit.figure == "steady_state_error" else _ZERO)
     share = (bound - value if limit.is_upper else value - bound) / bound
     return -math.inf if math.isnan(share) else share
@@ -57,18 +57,18 @@ def read(texts: Sequence[str]) -> tuple[Limit, ...]:
     Parameters
     ----------
     texts
-        Such as ``"bandwidth >= 10 Hz"``; blanks and hyphens in a figure's name are let pass, and
-        so are the names of `bywire.margins`, such as ``phase``.
+        Such as ``"bandwidth >= 10 Hz"``; the name of a figure may contain blanks and hyphens, or be
+        a name of `bywire.margins`, such as ``phase``.
 
     Raises
     ------
     UnknownNameError
         When a figure is unknown.
     ParameterError
-        When a text cannot be read, a limit is beyond what any loop can have, or two texts
-        contradict each other.
+        When a text cannot be read, no loop can meet or miss a limit, or two texts contradict each
+        other.
     UnitError
-        When a limit's unit measures something else.
+        When a limit's unit has another dimension.
     """
     if not texts:
         raise ParameterError(
@@ -94,7 +94,7 @@ def _read(text: str) -> Limit:
         raise unknown_name("figure of a loop", word, LOOP_FIGURES)
     figure, is_least = _BY_WORD[word], compare in (">=", ">")
     bound = _bound(written, figure)
-    # A limit at the end of what is possible demands nothing, or what no loop has.
+    # A limit at the end of the possible range is met by every loop, or by none.
     possible = figure.low <= bound <= figure.high and not (is_least and bound >= figure.high)
     if not possible or not math.isfinite(bound) or (is_least and bound <= 0):
         low, high = figure.low, figure.high
@@ -165,10 +165,11 @@ class LinearCase:
     label
         Label of the case, for instance ``"motor.R_m = 0.2"``.
     build
-        ``build(gains) -> (loop gain, closed loop)`` for gains by dotted name, both sampled alike.
+        ``build(gains) -> (loop gain, closed loop)`` for gains by dotted name, with equal sample
+        times.
     changes, at
-        Parameters in which it differs from the nominal model, and its operating point [SI]; None
-        for a model that is no loop of the bench, for instance an identified one.
+        Differences of its parameters from the nominal model, and its operating point [SI]; None for
+        a model that is not a loop of the bench, for instance an identified one.
     """
 
     label: str
@@ -177,13 +178,13 @@ class LinearCase:
     at: float | None = None
 
     def figures(self, gains: Mapping[str, float], points: int = 400) -> LoopFigures:
-        """Return the figures of the loop with some gains, see `LoopFigures`."""
+        """Return the figures of the loop with given gains, see `LoopFigures`."""
         with interrupts_deferred():  # CasADi would swallow them
             return LoopFigures(*self.build(gains), points)
 
 
 def state_of(figures: LoopFigures) -> str:
-    """Return why a model has no figures of a loop; empty where it has."""
+    """Return why a model has no figures of a loop; empty if it has them."""
     if not figures.has_loop:
         return NO_LOOP
     return "" if figures.is_stable else "unstable"
@@ -204,8 +205,8 @@ def room(figures: LoopFigures, requirement: Limit) -> float:
 def slack(figures: LoopFigures, requirement: Limit) -> float:
     """Return the slack of a requirement, as a share of its limit: the objective of the search.
 
-    For a bandwidth it is the room of the closed loop's magnitude above -3 dB up to the limit:
-    the frequency itself jumps where a dip touches that level.
+    For a bandwidth it is the margin of the closed loop's magnitude above -3 dB up to the limit,
+    because the frequency itself jumps where a dip touches that level.
     """
     if requirement.figure != "bandwidth" or requirement.is_upper:
         return room(figures, requirement)
@@ -234,7 +235,7 @@ def cases_of(
     UnknownNameError
         When the parameter is unknown.
     ParameterError
-        When a tunable is among them, there are too many combinations, or one does not exist.
+        When a tunable is varied, there are too many combinations, or a model does not exist.
     """
     for name in over:
         require_given(loop, name)
@@ -264,7 +265,7 @@ def require_given(loop: Loop, name: str) -> None:
 
 
 def _shown(loop: Loop, par: ParameterSet, name: str, value: float) -> str:
-    """Return a value of a range as a user writes it."""
+    """Return a value of a range in the user's units."""
     known = leaf_fields(type(par))  # tables have their unit under the name of the table
     leaf = known.get(name) or known.get(name.rpartition(".")[0])
     unit = loop.at.unit if leaf is None else leaf.unit.symbol
@@ -296,7 +297,7 @@ def existing_case(
 def case_of(
     loop: Loop, label: str, par: ParameterSet, changes: Mapping[str, Any], at: float
 ) -> LinearCase:
-    """Return a model of a loop with other parameters, that exists."""
+    """Return a model of a loop with other parameters, which must exist."""
     base = par.replace(changes)
 
     def build(gains: Mapping[str, float]) -> tuple[LinearModel, LinearModel]:

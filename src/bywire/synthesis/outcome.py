@@ -15,21 +15,21 @@ from bywire.synthesis.linear_case import LinearCase, room, share_left, values_of
 
 Status = Literal["met", "infeasible", "interrupted"]
 MISSED = -1e-3
-"""slack below which a requirement counts as missed: share of the limit"""
+"""slack below which a requirement counts as missed, as a share of the limit"""
 ROOMY = 0.05
-"""slack from which on a requirement does not bind any more"""
+"""slack above which a requirement is not binding"""
 
 
 @dataclass(frozen=True)
 class Binding:
-    """A requirement that leaves no room.
+    """A binding requirement.
 
     Parameters
     ----------
     requirement, case
-        Which one, and for which model.
+        The requirement, and the label of the model.
     value, slack
-        What was reached, and its distance from the limit as a share of it.
+        Achieved value, and its distance from the limit as a share of it.
     """
 
     requirement: Limit
@@ -45,11 +45,11 @@ class Conflict:
     Parameters
     ----------
     wanted, kept
-        The requirement that was pushed, while the other one held.
+        The optimized requirement, and the one that was met meanwhile.
     best
-        The best value of the wanted one.
+        The best value of the optimized one.
     gains
-        Where it was reached.
+        Gains with this value.
     """
 
     wanted: Limit
@@ -72,23 +72,23 @@ class Design:
     gains
         By dotted name [SI].
     status
-        ``"met"``, ``"infeasible"``, or ``"interrupted"`` with the best until then.
+        ``"met"``, ``"infeasible"``, or ``"interrupted"`` with the best gains until then.
     nominal
         All figures of the nominal model.
     worst
         Figure -> worst value over all models, and the model's label.
     binding
-        What leaves no room, the worst first.
+        Binding requirements, the worst first.
     conflicts
         For infeasible requirements, the best values of the others that each binding one allows.
     slack
         The worst normalized slack.
     evaluations
-        Loops that were computed.
+        Number of computed loops.
     kept
-        What was kept besides the requirements, see `floors`.
+        Constraints that were also enforced, see `floors`.
     unsound
-        Models without figures, by label: unstable, or no loop.
+        Models without figures, by label: unstable, or not a loop.
     """
 
     gains: Mapping[str, float]
@@ -123,9 +123,9 @@ def bench_text(
     title
         Comment at the top.
     experiment
-        What it runs; empty for a loop without experiment of its own: the section alone.
+        Experiment of the bench; empty for a loop without one: then only the section.
     parameters, changes
-        Name of the parameter set, and what the user changed in it, as texts.
+        Name of the parameter set, and the user's changes of it, as texts.
     par
         Any parameters of that class, for the units.
     gains
@@ -154,11 +154,11 @@ class Across:
     Parameters
     ----------
     label, at, region
-        The model, its operating point [SI], and the region that it belongs to.
+        Label of the model, its operating point [SI], and its region.
     figures
         All figures of the linear model.
     slack
-        Of the requirement that is worst off there; negative infinity where it is unstable.
+        Slack of the worst requirement there; negative infinity if unstable.
     """
 
     label: str
@@ -175,12 +175,12 @@ class ScheduleDesign:
     Parameters
     ----------
     regions
-        Design of each region, by ascending operating point, where anything was left to choose;
-        each sees its own models alone.
+        Design of each region, by ascending operating point, where it had free gains; each uses only
+        its own models.
     points
         Operating points [SI] for which each region was designed.
     gains
-        Of all regions together, by dotted name [SI].
+        Gains of all regions together, by dotted name [SI].
     nominal
         All figures of the nominal model.
     cases
@@ -215,20 +215,20 @@ class ScheduleDesign:
 
 @dataclass(frozen=True)
 class Judged:
-    """Requirements over drawn models.
+    """Statistics of requirements over drawn models.
 
     Parameters
     ----------
     models
-        How many were judged; one that does not exist, or is unstable, meets nothing.
+        Number of judged models; one that does not exist, or is unstable, meets no requirement.
     unstable
-        How many are unstable with the gains, or do not exist.
+        Number of models that are unstable with the gains, or do not exist.
     met
-        How many meet each requirement, in their order.
+        Number of models that meet each requirement, in their order.
     all_met
-        How many meet all of them.
+        Number of models that meet all of them.
     worst
-        Worst value of each requirement's figure over the stable ones, NaN without any.
+        Worst value of each requirement's figure over the stable models, NaN without any.
     """
 
     models: int
@@ -244,7 +244,7 @@ def judged_over(
     gains: Mapping[str, float],
     progress: Progress = silent,
 ) -> Judged:
-    """Return how many models meet requirements with some gains.
+    """Return the number of models that meet requirements with given gains.
 
     Parameters
     ----------

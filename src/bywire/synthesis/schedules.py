@@ -22,9 +22,9 @@ from bywire.synthesis.linear_case import LinearCase, cases_of, room, values_of
 from bywire.synthesis.outcome import Across, Design, ScheduleDesign
 from bywire.synthesis.verification import GENERATIONS, Trial, Tuning, Verification, verify
 
-_FINE = 4000  # points of the grid for what is reported
+_FINE = 4000  # points of the grid for reported figures
 _ACROSS = 15
-"""operating points of the scheduled loop that are looked at between the designed ones"""
+"""operating points of the scheduled loop that are checked between the designed ones"""
 
 
 def scheduled(loop: Loop) -> LoopSchedule:
@@ -46,14 +46,14 @@ def scheduled(loop: Loop) -> LoopSchedule:
 def points_by_region(
     loop: Loop, par: ParameterSet, points: Sequence[float]
 ) -> dict[str, tuple[float, ...]]:
-    """Return operating points [SI] by the region that they fall into.
+    """Return operating points [SI] by their region.
 
     Parameters
     ----------
     loop, par
-        Loop, and the parameters that hold the borders.
+        Loop, and the parameters that contain the borders.
     points
-        At least one in each region; none: the loop's own, where the borders leave them there.
+        At least one in each region; none: the loop's own, if the borders allow them.
 
     Raises
     ------
@@ -90,11 +90,11 @@ def design_schedule(
     seed: int = 0,
     progress: Progress | None = None,
 ) -> ScheduleDesign:
-    """Design the gains of every region, the main one first, and look at the loop across them.
+    """Design the gains of every region, the main one first, and check the loop across them.
 
-    The regions share what only the main one chooses, for instance a filter. A region begins with
-    the gains of the main one. Models are those of the frozen gains: what small motion about an
-    equilibrium has, and slow motion between equilibria.
+    The regions share parameters that only the main one chooses, for instance a filter. A region
+    starts with the gains of the main one. Models have frozen gains: they describe small motion
+    about an equilibrium, and slow motion between equilibria.
 
     Parameters
     ----------
@@ -105,16 +105,16 @@ def design_schedule(
     points
         See `points_by_region`.
     tunables
-        By region; empty for one whose gains stay as they are.
+        Tunable gains by region; empty for a region with fixed gains.
     over
-        Ranges that every region must serve as well, see `cases_of`.
+        Ranges that every region must also serve, see `cases_of`.
     seed, progress
         See `designer.design`.
 
     Raises
     ------
     ParameterError
-        As `designer.design` and `cases_of`, and when no region has anything to tune.
+        See `designer.design` and `cases_of`; also when no region has anything to tune.
     """
     schedule = scheduled(loop)
     if not any(tunables.values()):
@@ -207,7 +207,7 @@ def _across(
 
 
 def slack_of(figures: LoopFigures, requirements: Sequence[Limit]) -> float:
-    """Return the room of the requirement that is worst off; negative infinity where unstable."""
+    """Return the slack of the worst requirement; negative infinity if unstable."""
     if not figures.is_stable:
         return -math.inf
     return float(min(room(figures, requirement) for requirement in requirements))
@@ -225,7 +225,7 @@ def _ranges(
 
 
 def _between(par: ParameterSet, schedule: LoopSchedule, points: Sequence[float]) -> list[float]:
-    """Return evenly spread operating points, the designed ones and the borders among them."""
+    """Return evenly spread operating points, including the designed ones and the borders."""
     leaves = par.leaves()
     spread = np.linspace(min(points), max(points), _ACROSS)
     borders = [leaves[name] for name in schedule.borders]
@@ -235,7 +235,7 @@ def _between(par: ParameterSet, schedule: LoopSchedule, points: Sequence[float])
 def _start(
     par: ParameterSet, schedule: LoopSchedule, region: str, tunables: Mapping[str, Any]
 ) -> dict[str, float]:
-    """Return gains of a region to begin with: those of the main one, by their last names."""
+    """Return initial gains of a region: those of the main one, by their last names."""
     leaves = par.leaves()
     main = {name.rpartition(".")[2]: leaves[name] for name in schedule.regions[schedule.main]}
     return {name: main[name.rpartition(".")[2]] for name in tunables}
@@ -256,21 +256,21 @@ def verify_schedule(
     generations: int = GENERATIONS,
     progress: Progress | None = None,
 ) -> Verification:
-    """Try a schedule on the nonlinear bench at every point it was designed for, and retune it.
+    """Try a schedule on the nonlinear bench at every designed point, and retune it.
 
     Of several models at a point, the worst linear one is tried. Regions are retuned one after the
-    other, the main one first, each at its own points and in the experiment that may pass through
-    all of them; the schedule as a whole is then tried again. A search over all gains at once has
-    twice the dimensions and ends worse at the same expense.
+    other, the main one first, each at its own points and in the experiment, which may pass through
+    all of them. The schedule as a whole is then tried again. A search over all gains together has
+    twice the dimensions, and gives worse results at the same expense.
 
     Parameters
     ----------
     design, tunables
-        The schedule, and what may be chosen in each region.
+        The schedule, and the tunable gains of each region.
     requirements
-        As in `design_schedule`.
+        See `design_schedule`.
     trial
-        At the first point of the main region, the schedule switched on.
+        Trial at the first point of the main region, with the schedule switched on.
     seed, generations, progress
         See `verification.verify`; generations of each region.
     """
@@ -337,7 +337,7 @@ def _corners(
 def _in_region(
     design: ScheduleDesign, region: str, gains: Mapping[str, float], trial: Trial
 ) -> tuple[Trial, tuple[LinearCase, ...]]:
-    """Return trial and models at a region's points, the gains of the other regions held."""
+    """Return trial and models at a region's points, with the gains of the other regions fixed."""
     bench = None if trial.bench is None else trial.bench.with_overrides(dict(gains))
     value = design.points[region][0]
     regional = replace(trial, par=trial.par.replace(gains), value=value, bench=bench)

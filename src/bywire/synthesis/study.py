@@ -27,7 +27,7 @@ class Mark:
     label
         Text of the legend.
     x, y
-        Where it lies, SI.
+        Coordinates, SI.
     """
 
     label: str
@@ -48,7 +48,7 @@ class Map:
     marks
         Designs to mark; the first is the optimum.
     limits
-        Label -> variable and the level at which it draws the border of what is possible. Beyond
+        Label -> variable, and the level at which it draws the border of the feasible region. Beyond
         it the variable is larger.
     curves
         Label -> abscissas and ordinates [SI] of a line to compare with, for instance a closed form.
@@ -70,7 +70,7 @@ class Cut:
     Parameters
     ----------
     title
-        What is listed.
+        Title of the list.
     data
         Variables over one dimension.
     columns
@@ -185,7 +185,7 @@ def require_ranges(options: ParameterSet, ranges: Iterable[tuple[str, str, str]]
     Raises
     ------
     ValueError
-        As a validator of the options wants it.
+        In the form that a validator of the options needs.
     """
     for low, high, unit in ranges:
         a, b = getattr(options, low), getattr(options, high)
@@ -196,16 +196,16 @@ def require_ranges(options: ParameterSet, ranges: Iterable[tuple[str, str, str]]
 def edge_warnings(
     name: str, value: float, ends: tuple[float, float], unit: str, within: float = 1e-9
 ) -> tuple[str, ...]:
-    """Return a warning where an optimum lies at an end of what was compared.
+    """Return a warning where an optimum is at an end of the compared range.
 
     Parameters
     ----------
     name, value, unit
-        What was chosen, its value [SI] and SI unit.
+        Chosen quantity, its value [SI] and SI unit.
     ends
         Ends of the range.
     within
-        Share of an end by which the value may miss it.
+        Share of an end that counts as equal.
     """
     return tuple(
         f"the optimum lies at the edge of the designs, {name} = {shown(end, unit)}: widen the range"

@@ -1,12 +1,11 @@
 """Gains on the nonlinear bench, where friction and dither change the loop: judged and retuned.
 
-Differential evolution of a library, every generation one ensemble: what the linear model cannot
-know (friction under dither, converter, limits) is measured. The search takes up a candidate only
-where its worst slack is not below that of the member whose place it would take. A worst slack is
-a minimum, so whatever is measured first bounds it, the linear models' figures before all:
-candidates whose bound is too low are measured no further, which changes no step of the search.
-Those that may come near the best so far are measured in any case, for they make the edge that is
-shown.
+A library's differential evolution runs every generation as one ensemble. It measures effects that
+the linear model omits (friction under dither, converter, limits). A candidate replaces a member
+only if its worst slack is not smaller. A worst slack is a minimum, so early results bound it, first
+of all the figures of the linear models. Candidates with too low a bound are not measured further,
+which does not change the search. Candidates that may come near the best so far are always measured,
+because they form the displayed trade-off.
 """
 
 from __future__ import annotations
@@ -48,7 +47,7 @@ from bywire.synthesis.linear_case import NOMINAL, LinearCase, share_left, values
 
 _LEAST = -3.0
 MEASURED = frozenset({"bandwidth", "crossover", *STEP_FIGURES})
-"""figures that the bench alone decides on, where it shows them"""
+"""figures that only the bench decides, where it shows them"""
 
 
 @dataclass(frozen=True)
@@ -60,17 +59,17 @@ class Candidate:
     gains
         By dotted name [SI].
     figures
-        On the bench at the nominal point.
+        Figures on the bench at the nominal point.
     slacks
-        By requirement's text: share of the limit, worst amplitude and worst trial.
+        Slack by requirement's text, as a share of the limit, for the worst amplitude and trial.
     corners
         Figures of further trials, by label.
     rooms
-        The same as ``slacks``, but of a bandwidth by its frequency: what is shown. Those that are
-        not named are as ``slacks`` has them.
+        Displayed values: as ``slacks``, but a bandwidth is measured by its frequency. Requirements
+        that are missing here are as in ``slacks``.
     shown
-        By requirement's text: in how many sines and steps the bench shows its figure, and in how
-        many of them it might; without any, the linear model alone decides.
+        By requirement's text: number of sines and steps in which the bench shows the figure, and in
+        which it could. Without any, only the linear model decides.
     """
 
     gains: Mapping[str, float]
@@ -92,8 +91,8 @@ class Candidate:
     def standing(self, enough: float) -> tuple[float, float]:
         """Return the objective of gains, the larger the better.
 
-        Where a requirement is missed, how far the figures are off; else the worst slack, and
-        from a slack that is enough on the worst bandwidth.
+        If a requirement is missed, the shortfall of the figures; otherwise the worst slack, and,
+        once that is sufficient, the worst bandwidth.
         """
         if self.slack < 0.0:
             return min(-1e-12, *(self.room(text) for text in self.slacks)), self.slack
@@ -103,11 +102,11 @@ class Candidate:
 def bench_slacks(
     requirements: Sequence[Limit], figures: BenchFigures, linear: Mapping[str, float]
 ) -> dict[str, float]:
-    """Return how far each requirement is met on the bench.
+    """Return the slack of each requirement on the bench.
 
-    Bandwidth counts at the worst amplitude, by the room of the gain above -3 dB; a phase margin
-    in the linear model (what large motion comes near) and in each describing function; figures
-    of the step where the experiment has one; the rest is the linear model's alone.
+    A bandwidth counts at the worst amplitude, by the margin of the gain above -3 dB. A phase margin
+    counts in the linear model (the limit for large motion) and in each describing function. Figures
+    of the step count where the experiment has one; the linear model decides the rest.
 
     Parameters
     ----------
@@ -121,7 +120,8 @@ def bench_slacks(
     slacks = {}
     for wanted in requirements:
         slack = _on_bench(wanted, figures)
-        # What the bench does not show, the linear model says; of a phase margin the worse counts.
+        # The linear model decides figures that the bench does not show; for a phase margin the
+        # worse counts.
         if math.isinf(slack) or wanted.figure == "phase_margin":
             slack = min(slack, linear[str(wanted)])
         slacks[str(wanted)] = max(slack, _LEAST)
@@ -140,7 +140,7 @@ def ceiling(
     requirements, linear
         As in `bench_slacks`.
     known
-        What is known of some trials; figures that are still unknown are NaN, or not there.
+        Known figures of some trials; figures that are still unknown are NaN, or missing.
     """
     highest = math.inf
     for wanted in requirements:
@@ -156,7 +156,7 @@ def judged(
     trials: Mapping[str, BenchFigures],
     linear: Mapping[str, float],
 ) -> Candidate:
-    """Return gains with what they showed, judged by the worst of several trials.
+    """Return gains with their results, judged by the worst of several trials.
 
     Parameters
     ----------
@@ -165,9 +165,9 @@ def judged(
     gains
         By dotted name [SI].
     trials
-        Figures by the trial's label, that of the nominal point among them.
+        Figures by the trial's label, including that of the nominal point.
     """
-    # A trial without a step has the parameters of the nominal one: so is its step.
+    # A trial without a step has the nominal parameters, and so the nominal step.
     nominal = trials[NOMINAL]
     each = [replace(figures, step=figures.step or nominal.step) for figures in trials.values()]
     rows = [bench_slacks(requirements, figures, linear) for figures in each]
@@ -183,7 +183,7 @@ def judged(
 
 
 def shown_on_bench(wanted: Limit, trials: Sequence[BenchFigures]) -> tuple[int, int]:
-    """Return in how many sines and steps the bench shows a figure, and in how many it might."""
+    """Return the number of sines and steps in which the bench shows a figure, and could show it."""
     sines = [s for figures in trials for s in figures.small]
     if wanted.figure == "bandwidth" and not wanted.is_upper:
         return len(sines), len(sines)
@@ -204,7 +204,7 @@ def _room(wanted: Limit, rows: Sequence[BenchFigures], slack: float) -> float:
 
 
 def _on_bench(wanted: Limit, figures: BenchFigures) -> float:
-    """Return the slack of what the bench measures; infinity for what it does not."""
+    """Return the slack of a measured figure; infinity for others."""
     if wanted.figure == "bandwidth" and not wanted.is_upper:
         return min((s.least / math.sqrt(0.5) - 1.0 for s in figures.small), default=math.inf)
     if wanted.figure == "phase_margin":
@@ -230,33 +230,32 @@ Promising = Callable[[int, Sequence[BenchFigures]], bool]
 Measure = Callable[
     [Mapping[str, Sequence[float]], Promising], Sequence[Mapping[str, BenchFigures] | None]
 ]
-"""``measure(gains, worth)``: figures by label of several sets, None of those that were left where
+"""``measure(gains, worth)``: figures by label of several sets, None for those dropped because
 ``worth(k, known figures)`` was false"""
 
 _ENOUGH = 0.02  # worst slack at which the search ends
-_NEAR = 0.03  # of the best worst slack: what is measured in full wherever the search stands
+_NEAR = 0.03  # distance to the best worst slack below which all is measured
 _MEMBERS = 36
 GENERATIONS = 60
-"""of a search, at most"""
+"""largest number of generations of a search"""
 _REACH = 0.5  # of the linear ranges (logarithmic), around the linear design
 
 
 @dataclass(frozen=True)
 class Tuning:
-    """Outcome of a tuning.
+    """Result of a tuning.
 
     Parameters
     ----------
     best
-        The candidate with the largest worst slack; among those with enough of it, the one with
-        the largest worst bandwidth, and where requirements are missed, the one whose figures
-        are nearest.
+        The candidate with the largest worst slack. Among several with sufficient slack, it has the
+        largest worst bandwidth; if requirements are missed, the nearest figures.
     tried
-        All candidates that were measured in full, in the order in which they ran.
+        All fully measured candidates, in the order of their runs.
     interrupted
         Whether the user ended it.
     untold
-        Candidates besides, judged by a part of the trials only.
+        Number of further candidates, judged by only a part of the trials.
     """
 
     best: Candidate
@@ -266,11 +265,11 @@ class Tuning:
 
     @property
     def count(self) -> int:
-        """Candidates that were judged."""
+        """Number of judged candidates."""
         return len(self.tried) + self.untold
 
     def curve(self, first: str, second: str) -> list[tuple[float, float]]:
-        """Return the edge of what was reached in two figures while the rest was met.
+        """Return the trade-off between two figures while the other requirements were met.
 
         Parameters
         ----------
@@ -280,7 +279,8 @@ class Tuning:
         Returns
         -------
         list of (float, float)
-            Pairs of distances from the limits, none better in both than another, by the first.
+            Pairs of distances from the limits, sorted by the first, with no pair dominated by
+            another.
         """
         pairs = sorted(
             (
@@ -311,15 +311,15 @@ def tune(
     Parameters
     ----------
     problem
-        Requirements, tunables, and the linear models: all of them must stay stable.
+        Requirements, tunables, and the linear models, which must all stay stable.
     start
-        The linear design's gains, one of the first generation.
+        The linear design's gains, a member of the first generation.
     measure
         See `Measure`.
     seed
-        Of the search.
+        Seed of the search.
     generations
-        At most; it ends when the worst slack is 2 %.
+        Largest number; the search ends when the worst slack is 2 %.
     progress
         Called with a label and the finished share.
     """
@@ -328,7 +328,7 @@ def tune(
     first = low + (high - low) * qmc.LatinHypercube(n, rng=np.random.default_rng(seed)).random(
         _MEMBERS
     )
-    first[0] = center  # the linear design itself: the search cannot end worse than it
+    first[0] = center  # the linear design itself, so that the search cannot end worse
     tried: list[Candidate] = []
     count, left = [0], [0]
     to_beat = np.full(_MEMBERS, -np.inf)
@@ -350,7 +350,7 @@ def tune(
 
     interrupted = False
     try:
-        evolution: Any = differential_evolution  # its stubs know no cost of many points at once
+        evolution: Any = differential_evolution  # its stubs omit costs of many points together
         evolution(
             cost,
             list(zip(low, high, strict=True)),
@@ -372,7 +372,7 @@ def tune(
 
 
 def standing(candidate: Candidate) -> tuple[float, float]:
-    """Return what a search prefers gains by, see `Candidate.standing`."""
+    """Return the objective of a search, see `Candidate.standing`."""
     return candidate.standing(_ENOUGH)
 
 
@@ -382,18 +382,18 @@ def _candidates(
     measure: Measure,
     to_beat: Array,
 ) -> list[Candidate | float]:
-    """Return candidates, or what the slack of those that were left cannot exceed.
+    """Return candidates, or an upper bound of the slack of dropped ones.
 
-    Those that a linear model says are unstable are not run.
+    Gains that are unstable in a linear model are not run.
 
     Parameters
     ----------
     problem, measure
-        As in `tune`.
+        See `tune`.
     rows
         Gains of each candidate.
     to_beat
-        Worst slack of each below which it is left.
+        Worst slack below which each candidate is dropped.
     """
     linear = [linear_slacks(problem, row) for row in rows]
     bounds = [ceiling(problem.requirements, (), slacks) for slacks in linear]
@@ -425,23 +425,23 @@ def _candidates(
 # --- Verification
 
 MOST = 8
-"""corners that are tried, at most"""
+"""largest number of tried corners"""
 
 
 @dataclass(frozen=True)
 class Trial:
-    """What a design is tried on.
+    """Conditions for the trial of a design.
 
     Parameters
     ----------
     loop, par, value
         Loop, parameters and operating point; nothing switched off.
     amplitudes
-        Of the sines, SI.
+        Amplitudes of the sines, SI.
     bench
         The loop's experiment with the same parameters; None where it has none.
     label
-        What distinguishes it.
+        Label that distinguishes it.
     """
 
     loop: Loop
@@ -454,7 +454,7 @@ class Trial:
     def at(self, case: LinearCase) -> Trial:
         """Return the trial of a model's own parameters and operating point.
 
-        Its experiment is left out where the parameters are the same: so is then its outcome.
+        It has no experiment if the parameters are the same, because the result would be the same.
         """
         bench = None
         if self.bench is not None and case.changes:
@@ -471,7 +471,7 @@ class Trial:
         *,
         rough: bool = False,
     ) -> tuple[BenchFigures | None, ...]:
-        """Return the figures of the sets of gains that are worth it, see `wanted_figures`."""
+        """Return the figures of the promising sets of gains, see `wanted_figures`."""
         bench = self.bench if self.bench is not None and has_step(self.bench) else None
         return wanted_figures(
             self.loop,
@@ -507,21 +507,21 @@ def wanted(
     rough: bool = False,
     report: Report = lambda share: None,
 ) -> list[dict[str, BenchFigures] | None]:
-    """Return the figures of the sets of gains that stay worth it through all trials.
+    """Return the figures of the sets of gains that stay promising through all trials.
 
     Parameters
     ----------
     trials, gains, target, rough
         As in `bench_figures.wanted_figures`.
     worth
-        ``worth(k, figures)``: whether set k is measured on, with what is known of it so far.
+        ``worth(k, figures)``: whether to continue with set k, given its figures so far.
     report
-        Called with the share that is done.
+        Called with the finished share.
 
     Returns
     -------
     list
-        By the label of each trial; None for the sets that were left.
+        By the label of each trial; None for the dropped sets.
     """
     rows: dict[int, dict[str, BenchFigures]] = {
         k: {} for k in range(len(next(iter(gains.values()))))
@@ -545,15 +545,15 @@ def wanted(
 
 
 def corners_of(problem: Problem, gains: Mapping[str, float]) -> list[LinearCase]:
-    """Return the models at the ends of all ranges, and the one that is worst off among all.
+    """Return the models at the ends of all ranges, and the worst of all models.
 
-    Of more than `MOST`, those that the linear models say are worst. Where these do not tell
-    corners apart (dry friction is not in them), the bench does.
+    If there are more than `MOST`, those that are worst in the linear models. Where these do not
+    distinguish corners (they contain no dry friction), the bench decides.
 
     Parameters
     ----------
     problem
-        Its cases, the nominal one first.
+        Design problem; its first case is the nominal one.
     gains
         By dotted name [SI].
     """
@@ -584,22 +584,22 @@ def worst_of(
     target: float,
     report: Report = lambda share: None,
 ) -> list[Trial]:
-    """Return the trial, at one of several corners, in which gains are worst off; none of none.
+    """Return the trial at the worst of several corners; None without corners.
 
     Parameters
     ----------
     trial
-        At the nominal point.
+        Trial at the nominal point.
     corners
         See `corners_of`.
     problem, gains
-        As there.
+        See `corners_of`.
     linear
         Slack in the linear models, see `candidate.linear_slacks`.
     target
-        Frequency around which is measured [Hz].
+        Center of the measured frequencies [Hz].
     report
-        Called with the share that is done.
+        Called with the finished share.
     """
     trials = [trial.at(corner) for corner in corners]
     if not trials:
@@ -624,22 +624,22 @@ def _coordinates(case: LinearCase) -> dict[str, float]:
 
 @dataclass(frozen=True)
 class Verification:
-    """What the nonlinear bench says of a design.
+    """Verdict of the nonlinear bench on a design.
 
     Parameters
     ----------
     linear
-        The linear design's gains there.
+        Results of the linear design's gains.
     tuning
-        The search for better ones; None where the linear design's meet everything.
+        The search for better gains; None if the linear design meets all requirements.
     kpis
         Key figures of the loop's experiment with the final gains.
     nominal
         All figures of the nominal linear model with the final gains.
     corners
-        Corners that were looked at; the figures shown are those of the worst.
+        Checked corners; the displayed figures are those of the worst.
     kept
-        What was kept of the linear design besides the requirements, see `floors`.
+        Constraints from the linear design that were also enforced, see `floors`.
     """
 
     linear: Candidate
@@ -651,7 +651,7 @@ class Verification:
 
     @property
     def final(self) -> Candidate:
-        """The gains to use."""
+        """The final gains."""
         return self.linear if self.tuning is None else self.tuning.best
 
     @property
@@ -660,9 +660,9 @@ class Verification:
         return self.final.slack >= 0.0
 
     def conflict(self) -> tuple[str, str, list[tuple[float, float]]] | None:
-        """Return the two requirements that are worst off, and the edge between them.
+        """Return the two worst requirements, and the trade-off between them.
 
-        None where everything is met, only one requirement counts, or no candidates are at hand.
+        None if everything is met, only one requirement counts, or no candidates are available.
         """
         if self.met or self.tuning is None or not self.tuning.tried:
             return None
@@ -686,24 +686,24 @@ def verify(
     generations: int = GENERATIONS,
     progress: Progress | None = None,
 ) -> Verification:
-    """Try a design on the nonlinear bench, and retune there what falls short.
+    """Try a design on the nonlinear bench, and retune it if it misses requirements.
 
     Parameters
     ----------
     gains
-        The linear design's.
+        Gains of the linear design.
     requirements, tunables, cases
         As in `designer.design`.
     trial
-        What it is tried on.
+        Conditions of the trial.
     corners
-        Further models at whose parameters and operating points it is tried as well; by default
-        that corner of the ranges at which it is worst off on the bench.
+        Further models for trials at their parameters and operating points; by default the corner of
+        the ranges that is worst on the bench.
     kept
-        What retuned gains keep of the linear design's figures besides the requirements; by default
-        what `floors.bench_floors` says of ``gains``.
+        Constraints of retuned gains from the linear design, which are also enforced; by default
+        `floors.bench_floors` of ``gains``.
     seed, generations
-        Of the search, see `tune`; no generation: only try.
+        Of the search, see `tune`; without generations, the design is only tried.
     progress
         Called with a label and the finished share.
 
@@ -725,7 +725,7 @@ def verify(
     def on_bench(chosen: Mapping[str, float], label: str) -> dict[str, BenchFigures]:
         report = stage(progress, label)
         report(0.0)
-        share = len(unseen) / (len(unseen) + len(trials) + 1)  # of what looks for the worst corner
+        share = len(unseen) / (len(unseen) + len(trials) + 1)  # of the search for the worst corner
         linear = linear_slacks(problem, chosen)
         known = {trial.label for trial in trials}
         worst = worst_of(
@@ -773,7 +773,7 @@ def verify(
 
 
 def _target(requirements: Sequence[Limit], case: LinearCase, gains: Mapping[str, float]) -> float:
-    """Return the frequency around which to measure: that required, or that of the linear loop."""
+    """Return the center of the measured frequencies: required, or that of the linear loop."""
     for figure in ("bandwidth", "crossover"):
         limits = [w.bound for w in requirements if w.figure == figure and not w.is_upper]
         if limits:

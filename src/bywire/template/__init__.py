@@ -1,1 +1,1 @@
-"""What ``bywire new`` writes: a brake, its project's files, its tests, under other names."""
+"""Templates of ``bywire new``: a brake, its project files and its tests."""

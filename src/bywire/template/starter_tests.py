@@ -1,4 +1,4 @@
-"""The brake starter keeps what every brake has to keep, and does what it is for."""
+"""The brake starter fulfills every contract of a brake, and reaches its clamp force."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ PACKAGE = Path(__file__).parents[1] / "src" / "bywire.template.starter"
 
 @pytest.fixture(autouse=True, scope="module")
 def known() -> None:
-    """Have the brake known, installed or not."""
+    """Register the brake, installed or not."""
     if "starter" not in brake.brakes():
         load_system(PACKAGE)
 
@@ -28,21 +28,21 @@ def recording() -> xr.Dataset:
 
 
 def test_every_contract_holds() -> None:
-    """Hold all that ``bywire check`` looks at."""
+    """Pass all checks of ``bywire check``."""
     check = bywire.check("starter")
     assert check.holds, "\n".join(map(str, check.broken))
 
 
 def test_demanded_force_is_reached(recording: xr.Dataset) -> None:
-    """Clamp with what is demanded, to 1 %."""
+    """Reach the demanded clamp force within 1 %."""
     assert float(recording["F"].sel(time=0.59, method="nearest")) == pytest.approx(15e3, rel=0.01)
 
 
 def test_release_opens(recording: xr.Dataset) -> None:
-    """Let go of the disc."""
+    """Release the disc."""
     assert float(recording["F"][-1]) < 100.0
 
 
 def test_loop_has_margins() -> None:
-    """Have at least 45 degrees of phase margin at every point that is usual."""
+    """Have at least 45 degrees of phase margin at every usual operating point."""
     assert bywire.margins("starter-force").holds

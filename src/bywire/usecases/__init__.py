@@ -1,7 +1,7 @@
-"""What bywire does for its user, one use case per module; `declare` says what follows from one.
+"""The use cases of bywire, one per module; `declare` derives commands and forms from them.
 
-Light to load, because every start of the command line reads all of them: what a use case computes
-with, its function imports when it is called.
+These modules load fast, because every start of the command line reads all of them. A use case
+imports what it computes with when its function is called.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What makes a loop nonlinear, cause by cause."""
+"""The causes of a loop's nonlinearity, one by one."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any
@@ -35,7 +35,7 @@ def _read(
 
 
 @use_case(
-    Command("agreement", status_1="when it does not add up"),
+    Command("agreement", status_1="if the causes do not add up"),
     form=Form("Nonlinearity of a loop", "Measure", "loop"),
     check=_read,
 )
@@ -50,31 +50,31 @@ def agreement(
     progress: "Progress | None" = None,
     side: Side = "",
 ) -> "LoopAgreement":
-    """Show what makes a loop nonlinear, cause by cause.
+    """Attribute the nonlinearity of a loop to its causes, one by one.
 
     Parameters
     ----------
     loop, parameters, at, overrides
-        As of `bywire.margins`.
+        See `bywire.margins`.
     frequencies
-        ``"1 Hz:150 Hz:20"``, or a list with commas; six over the loop's band by default.
+        ``"1 Hz:150 Hz:20"``, or a list with commas. By default six over the loop's band.
     amplitudes
-        A small and a large one, ``"0.001 rad, 1 rad"``; the loop's own by default.
+        A small and a large one, ``"0.001 rad, 1 rad"``. By default those that the loop declares.
     progress
         Called with a label and the finished share, 0 to 1.
     side
-        Of the linear model, as of `bywire.margins`.
+        Side of the linear model; see `bywire.margins`.
 
     Returns
     -------
     LoopAgreement
-        What the loop's responses differ by, cause by cause: frequencies in Hz, gains and phases in
-        degree, shares of the difference in percent.
+        Differences of the loop's responses by cause: frequencies in Hz, gains, phases in degree,
+        shares of the difference in percent.
 
     Raises
     ------
     InputError
-        For names that are unknown, values out of range, sets of another brake, unstable loops.
+        For unknown names, values out of range, parameter sets of another brake, unstable loops.
     """
     from bywire.api.agreement import compared_responses
 

@@ -56,13 +56,13 @@ BenchChanges = Annotated[Mapping[str, str], BENCH_CHANGES]
 ErrorEstimate = Annotated[
     bool,
     Ask(
-        "Run in other steps too, for the error of all figures.",
+        "Repeat in other steps to estimate the numerical error.",
         "Estimate the error",
         name="error_estimate",
     ),
 ]
 LastBenchChanges = Annotated[Mapping[str, str], replace(BENCH_CHANGES, is_last=True)]
-NeededCase = Annotated[str, Ask("Run of the experiment; needed where there are several.", "Run")]
+NeededCase = Annotated[str, Ask("Run of the experiment; required if there are several.", "Run")]
 CaseName = Annotated[str, Ask("Run of the experiment; the first by default.", "Run")]
 OUT = Ask("Folder for recordings, figures and the report.", is_folder=True)
 LastOutFolder = Annotated[str | Path | None, replace(OUT, is_last=True)]
@@ -71,19 +71,19 @@ ExportFolder = Annotated[str | Path, Ask("Folder of the export.", is_folder=True
 Cases = Annotated[
     int | None,
     Ask(
-        "Cases instead of the file's; more extend the study, fewer drop those that are not "
-        "computed.",
+        "Number of cases, in place of the file's. A larger number extends the study, a smaller "
+        "one drops cases not yet computed.",
         "Cases",
     ),
 ]
-Workers = Annotated[int | None, Ask("Processes; by default one per core, where worthwhile.")]
-ClusterAddress = Annotated[str, Ask("Dask scheduler that computes instead.", metavar="ADDRESS")]
+Workers = Annotated[int | None, Ask("Processes; by default one per core, if worthwhile.")]
+ClusterAddress = Annotated[str, Ask("Dask scheduler that runs the cases.", metavar="ADDRESS")]
 EngineName = Annotated[str, Ask("Engine, e.g. cuda for a GPU.")]
 StudyFolder = Annotated[str | Path, Ask("Folder of the study.", metavar="FOLDER")]
 
 
 def require_study_folder(folder: Path, **others: Any) -> None:
-    """Refuse a file in the place of a study's folder, before anything is made for it."""
+    """Reject a file in place of a study's folder, before the command creates anything."""
     from bywire.studies.meant_study import require_no_file
 
     del others
@@ -93,9 +93,9 @@ def require_study_folder(folder: Path, **others: Any) -> None:
 STUDY_FOLDER: dict[str, Any] = {
     "before": require_study_folder,
     "writes": "folder",
-    "advice": "see that you may write there",  # its chunks are there
+    "advice": "check that you may write there",  # its chunks are there
 }
-"""of commands that write into the folder of a study"""
+"""settings of commands that write into the folder of a study"""
 
 TestBench = Annotated[
     "Bench | str | Path",
@@ -111,7 +111,7 @@ MeaningFile = Annotated[
     str | Path | None,
     Ask(
         "Meaning of the columns (TOML).",
-        "What the columns mean",
+        "Meaning of the columns",
         name="map",
         metavar="PATH",
         offered=("maps",),
@@ -129,5 +129,5 @@ Inputs = Annotated[
 ]
 Time = Annotated[
     str,
-    Ask("Column of the instants, e.g. 'Zeit [s]', or a rate, '1 kHz'.", "Time", metavar="COLUMN"),
+    Ask("Time column, e.g. 'Zeit [s]', or a sample rate, '1 kHz'.", "Time", metavar="COLUMN"),
 ]

@@ -1,4 +1,4 @@
-"""A brake, or a part of one, put to the test of every contract."""
+"""Test of a brake, or of a part of one, against every contract."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,49 +14,49 @@ if TYPE_CHECKING:
 Checked = Annotated[
     str | None,
     Ask(
-        "A brake, model, experiment, element, control law or parameter set; what --system loads, "
-        "else all.",
+        "A brake, model, experiment, element, control law or parameter set. By default what "
+        "--system loads, otherwise all.",
         is_positional=True,
     ),
 ]
 
 
-@use_case(Command("check", status_1="where one fails"))
+@use_case(Command("check", status_1="if one fails"))
 def check(
     name: Checked = None,
     *,
     system: str | Path | None = None,
     progress: "Progress | None" = None,
 ) -> "Check":
-    """Put a brake or an element to the test of every contract.
+    """Test a brake or an element against every contract.
 
-    Elements and laws: units, back ends, derivatives, energy, losses, round trip and ranges of
-    their parameters. Models: units, order of the step, exact rest, energy of a run, engines,
+    Elements and control laws: units, back ends, derivatives, energy, losses, round trip and ranges
+    of their parameters. Models: units, order of the step, exact rest, energy of a run, engines,
     lanes, linear model, derivatives of a run. Experiments: the assembly, figures, stimuli and
     signals that they name, and the key figures that they declare.
 
     Parameters
     ----------
     name
-        Of a brake, a model, an experiment, an element, a control law or a parameter set; by
-        default the brake of ``system``, else those that were loaded from files, else everything
+        Name of a brake, a model, an experiment, an element, a control law or a parameter set. By
+        default the brake of ``system``, otherwise those loaded from files, otherwise everything
         that is installed.
     system
-        File or folder of a brake to load first; its code is run.
+        File or folder of a brake to load first; bywire executes its code.
     progress
-        Called with what is being checked and the finished share, 0 to 1.
+        Called with the subject of the check and the finished share, 0 to 1.
 
     Returns
     -------
     Check
-        What holds, what does not, and what could not be checked.
+        Contracts that pass, that fail, and that could not be checked.
 
     Raises
     ------
     UnknownNameError
-        With the nearest known names.
+        If the name is unknown, with the closest matches.
     FileError, ModelError
-        When the system cannot be loaded.
+        If the system cannot be loaded.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Benches beside each other: result folders as they lie, all else run now."""
+"""Comparison of runs: result folders are read, benches and experiments are run."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -26,7 +26,7 @@ IsFull = Annotated[
     bool,
     Ask(
         "Also show settings and key figures that are equal.",
-        "Show what is the same, too",
+        "Also show what is equal",
         name="full",
     ),
 ]
@@ -57,33 +57,33 @@ def compare(
     Parameters
     ----------
     runs
-        Two or more, each a result folder (what ``run --out`` or `BenchResult.write` leaves), a
-        `BenchResult`, or what is run now: a `Bench`, a bench file, an experiment's name. A result
-        folder goes before an experiment of its name.
+        Two or more, each a result folder (written by ``run --out`` or `BenchResult.write`), a
+        `BenchResult`, or a bench to run: a `Bench`, a bench file, an experiment's name. A result
+        folder takes precedence over an experiment of the same name.
     overrides
-        Changes of every bench that is run now, as ``--set`` takes them.
+        Changes of every bench that this call runs, as ``--set`` takes them.
     is_full
-        Whether settings and key figures that are the same are shown as well.
+        Whether to also show equal settings and key figures.
     progress
         Called with a label and the finished share, 0 to 1.
     estimate_error
-        Whether what is run now is run in half and double steps too; see `bywire.run`. Key figures
-        that differ by less than both are off, as estimated or as a folder says, are not distinct.
+        Whether to repeat the runs of this call in half and double steps; see `bywire.run`. Key
+        figures are not distinct if they differ by less than their numerical errors, as estimated
+        here or recorded in a result folder.
 
     Returns
     -------
     Comparison
-        What differs in settings and parameters, and the key figures of all runs in SI units.
+        Differences in settings and parameters, and the key figures of all runs in SI units.
 
     Raises
     ------
     InputError
-        For fewer than two runs, folders that are not finished or damaged, and benches that
-        cannot be set up.
+        For fewer than two runs, incomplete or damaged folders, and benches that cannot be set up.
     RunError
-        When a run fails.
+        If a run fails.
     KeyboardInterrupt
-        When interrupted: half a run compares with nothing.
+        If interrupted: an incomplete run cannot be compared.
     """
     from bywire.api.comparison import compared
 

@@ -1,4 +1,4 @@
-"""Measurement files in other formats."""
+"""Conversion of measurement files."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -18,14 +18,16 @@ Signals = Annotated[
     Sequence[str],
     Ask("Signals to keep, e.g. 'p_mc, x_mc' or 'p_mc=Pressure [psi]'.", is_listing=True),
 ]
-Rate = Annotated[str | float | None, Ask("Bring all signals to one time axis, e.g. '1 kHz'.")]
-Method = Annotated[str, Ask("How: linear (default), previous, nearest, average.")]
+Rate = Annotated[str | float | None, Ask("Resample all signals to one time axis, e.g. '1 kHz'.")]
+Method = Annotated[str, Ask("Resampling: linear (default), previous, nearest, average.")]
 Exclude = Annotated[
     Sequence[str] | None,
     Ask("Leave out gaps, missing (both by default), clipped; or nothing.", is_listing=True),
 ]
-MaxGap = Annotated[str, Ask("Longest pause that is not a gap, e.g. '50 ms'; 10 steps by default.")]
-Format = Annotated[str, Ask("Format to write, e.g. mat73; else by the ending.")]
+MaxGap = Annotated[
+    str, Ask("Pauses up to this length are not gaps, e.g. '50 ms'; 10 steps by default.")
+]
+Format = Annotated[str, Ask("Format to write, e.g. mat73; by default from the file name's ending.")]
 Force = Annotated[bool, Ask("Replace an existing file.")]
 
 
@@ -52,38 +54,37 @@ def convert(
     source, target
         File to read, and file to write: CSV, TSV, Parquet, MAT, MDF4, NetCDF.
     mapping
-        File that says what the columns mean.
+        File with the meaning of the columns.
     signals
-        Signals to keep, all by default: names, or columns such as ``"Pressure [psi]"`` and
-        ``"p_mc=Pressure [psi]"``, which gives one a name.
+        Signals to keep, all by default: names, columns such as ``"Pressure [psi]"``, or columns
+        with a new name, ``"p_mc=Pressure [psi]"``.
     time
-        Column of the instants, such as ``"Zeit [s]"``, or a sample rate; that of the file by
-        default.
+        Time column, such as ``"Zeit [s]"``, or a sample rate. By default as the file declares it.
     rate
-        Rate of the one time axis, for instance ``"1 kHz"`` [Hz]; by default every signal keeps its
-        own instants.
+        Sample rate of the common time axis, for instance ``"1 kHz"`` [Hz]. By default every signal
+        keeps its time axis.
     method
-        How to resample: ``linear`` (default), ``previous``, ``nearest`` or ``average``.
+        Resampling method: ``linear`` (default), ``previous``, ``nearest`` or ``average``.
     exclude
-        What is left out: ``gaps`` and ``missing`` (both by default), ``clipped``.
+        Samples to leave out: ``gaps`` and ``missing`` (both by default), ``clipped``.
     max_gap
-        Longest pause that is no gap, for instance ``"50 ms"``; 10 steps by default.
+        Pauses up to this length are not gaps, for instance ``"50 ms"``; 10 steps by default.
     format
-        Format to write, for instance ``mat73``; else by the ending.
+        Format to write, for instance ``mat73``; by default from the file name's ending.
     force
-        Whether a file that is there is replaced.
+        Whether to replace an existing file.
     progress
         Called with a label and the finished share, 0 to 1.
 
     Returns
     -------
     Conversion
-        What was read, resampled and written, with rates in Hz and gaps in s.
+        The signals read, resampled and written, with rates in Hz and gaps in s.
 
     Raises
     ------
     InputError
-        When the file cannot be read or written, or something does not fit.
+        If the file cannot be read or written, or an argument is invalid.
     """
     from bywire.api.convert import Conversion, aligned
     from bywire.core.errors import ParameterError

@@ -1,7 +1,7 @@
 """Declare a use case by an annotated function: its command, form and public name follow from it.
 
-An argument's annotation holds its type and an `Ask`: the help of the flag and the hint of the
-form's field, its label, what completes. The first line of the docstring is the summary, which the
+An argument's annotation holds its type and an `Ask`: the help of the flag, the label and hint of
+the form's field, and its completions. The first line of the docstring is the summary, which the
 help of the command, the form and the reference show. Messages name an argument by
 `bywire.core.callers.option`.
 """
@@ -39,50 +39,50 @@ NOTHING: Mapping[str, Any] = MappingProxyType({})
 
 @dataclass(frozen=True)
 class Ask:
-    """What a command's flag and a form's field say and accept, beside the type of the argument.
+    """Texts and valid values of a command's flag and of a form's field, for one argument.
 
     Parameters
     ----------
     help
         Help of the flag, hint of the field.
     label
-        Label of the field; an argument without one has no field.
+        Label of the field; an argument without a label has no field.
     name
-        Of flag and field, where it differs from the argument's.
+        Name of flag and field, if it differs from the argument's.
     kind
-        Of the field, where it does not follow from the type.
+        Kind of the field, if it does not follow from the type.
     metavar
-        What stands for the value in the command's help; derived from the type by default.
+        Placeholder of the value in the command's help; derived from the type by default.
     known
-        Kinds of things whose names are valid, as `bywire.overview` calls them: they complete.
+        Kinds of things whose names are valid and complete, as `bywire.overview` calls them.
     files
-        Ending of files that are valid beside these names, for instance ``".toml"``.
+        Ending of files that are also valid, for instance ``".toml"``.
     offered
         Parts of `bywire.server.contents.Contents` that the form offers.
     words
         All valid words: a tuple, or a function that returns them.
     completes
-        ``"changes"`` or ``"parameters"`` of a bench, where these complete.
+        Names that complete: ``"changes"`` or ``"parameters"`` of a bench.
     least, most
         Range of a whole number.
     ticked
-        Value for which a box of the form stands, in place of a field for any value.
+        Value that a checkbox of the form sets, in place of a field for any value.
     is_flag
         Whether a required argument is a flag of the command.
     is_positional
-        Whether an argument with a default is none.
+        Whether an argument with a default is positional in the command.
     is_listing
-        Whether a command takes the parts between commas, in place of the flag several times.
+        Whether a command takes a list with commas, in place of the flag several times.
     is_text
         Whether a command takes a text where the function also takes a path.
     is_folder
-        Whether it names a folder that is written to.
+        Whether it names a folder that the command writes to.
     is_last
-        Whether the command lists it behind all others.
+        Whether the command lists it after all others.
     shown_default
-        What the command's help says of the default; the default itself where None.
+        Text for the default in the command's help; the default itself if None.
     panel
-        Heading of the command's help under which it stands.
+        Heading of the command's help that lists it.
     """
 
     help: str
@@ -114,27 +114,26 @@ class Command:
     Parameters
     ----------
     words
-        What is typed behind ``bywire``.
+        Words to type after ``bywire``.
     help
-        What it does, where a second command of the same use case does something else; the summary
-        of the use case by default.
+        Its help; the summary of the use case by default.
     status_1
-        When the exit status is 1, to end the sentence "exit status 1 ...".
+        End of the sentence "exit status 1 ...".
     before
-        ``before(**asked)``: refuses what must not even make the folder of results.
+        ``before(**asked)``: rejects invalid arguments before the folder of results is created.
     writes
-        Argument that names the folder into which the result is written; nothing is written where
-        empty. A flag ``--out`` is added where no argument is called ``out``.
+        Argument that names the folder of the result; empty if the command writes no result. The
+        command gets a flag ``--out`` if no argument is called ``out``.
     default_folder
-        ``default_folder(**asked)``: returns that folder where none is named.
+        ``default_folder(**asked)``: returns the folder if the user names none.
     advice
-        What to do about a folder that cannot be written.
+        Next step if the folder is not writable.
     first
         Arguments that it lists first.
     without
         Arguments for which it has no flag.
     required
-        Arguments that it needs although the function has a default, with the help of each.
+        Arguments that the command requires although the function has a default, with their help.
     """
 
     words: str
@@ -158,15 +157,15 @@ class Form:
     title, action
         Heading, and label of the button.
     subject
-        Field after which the result's folder is named.
+        Field that names the result's folder.
     name
-        Of the task; the words of the command by default.
+        Name of the task; the words of the command by default.
     fields
-        Fields in their order, where these are not all arguments with a label in theirs.
+        Fields in their order; by default all arguments with a label.
     is_listed
-        Whether it has a page of its own, to which the start page leads.
+        Whether the start page links to a separate page for it.
     is_kept
-        Whether the same subject is continued in the same folder.
+        Whether a repeated subject continues in the same folder.
     is_file
         Whether ``out`` is a file that the use case writes itself.
     """
@@ -190,11 +189,11 @@ class Argument:
     argument
         Its name in Python.
     ask
-        What is asked for.
+        Texts and valid values of flag and field.
     type, default
-        Of the function's signature.
+        From the function's signature.
     is_many
-        Whether it stands for any number of positional arguments.
+        Whether it takes any number of positional arguments.
     """
 
     argument: str
@@ -231,7 +230,7 @@ class Argument:
 
     @property
     def kind(self) -> Kind:
-        """Kind of the field; `ticked` apart, also how a command reads it."""
+        """Kind of the field; a command reads its flag likewise, except for `ticked`."""
         ask, outer = self.ask, get_origin(self.type)
         if ask.kind is not None:
             return ask.kind
@@ -258,11 +257,11 @@ class UseCase:
     Parameters
     ----------
     public, function
-        The public function, and what command and form call: most often the same.
+        The public function, and the one that command and form call, usually the same.
     arguments
-        What they ask for.
+        Arguments of command and form.
     commands, form, check, holds
-        As declared.
+        See `use_case`.
     takes
         Names of all arguments of ``function``.
     """
@@ -283,23 +282,23 @@ class UseCase:
 
     @property
     def summary(self) -> str:
-        """What it does: the first line of the docstring."""
+        """First line of the docstring."""
         return (inspect.getdoc(self.public) or "").partition("\n")[0]
 
     def call(self, asked: Mapping[str, Any], **more: Any) -> Any:
-        """Call the function with what was asked by the names of fields, and what else it takes."""
+        """Call the function with the values of fields by name, and with further arguments."""
         others = {name: value for name, value in more.items() if name in self.takes}
         given = {a.argument: asked[a.name] for a in self.arguments if a.name in asked}
         many = [value for a in self.arguments if a.is_many for value in given.pop(a.argument, ())]
         return self.function(*many, **given, **others)
 
     def read(self, asked: Mapping[str, Any]) -> Any:
-        """Check what was asked, by the names of fields, and compute nothing.
+        """Check the values of fields by name, without computing anything.
 
         Raises
         ------
         InputError
-            For what does not fit.
+            If a value is invalid.
         """
         if self.check is None:
             return None
@@ -312,7 +311,7 @@ class UseCase:
 
 
 DECLARED: dict[str, UseCase] = {}
-"""use cases that were declared so far, by the names of their functions"""
+"""use cases declared so far, by the names of their functions"""
 
 
 def use_case(
@@ -322,21 +321,22 @@ def use_case(
     holds: Callable[[Path, Any], bool] | None = None,
     asked: Callable[..., Any] | None = None,
 ) -> Callable[[Callable[Asked, Given]], Callable[Asked, Given]]:
-    """Declare a use case: its function warns of what its answer warns of, and checks its arguments.
+    """Declare a use case; its function checks its arguments and emits the result's warnings.
 
     Parameters
     ----------
     commands
-        Commands, or the words behind ``bywire`` of one.
+        Commands, each a `Command` or the words after ``bywire``.
     form
         Its form.
     check
-        ``check(...)``: reads arguments of its choice and computes nothing.
+        ``check(...)``: reads any of the arguments and computes nothing.
     holds
-        ``holds(folder, read)``: returns whether a folder holds what ``check`` read, to go on in it.
+        ``holds(folder, read)``: returns whether a folder holds results of what ``check`` read, so
+        that the command can continue there.
     asked
-        Function whose arguments command and form ask for, and which they call, where these are not
-        the public ones.
+        Function that command and form call, with the arguments they offer; the public function by
+        default.
     """
 
     def declare(function: Callable[Asked, Given]) -> Callable[Asked, Given]:
@@ -366,7 +366,7 @@ def _arguments(function: Callable[..., Any]) -> list[Argument]:
 
 
 def _bare_signature(function: Callable[..., Any]) -> inspect.Signature:
-    """Return a signature with types alone, as texts: what `help` and checks of arguments read."""
+    """Return a signature with plain types as texts, for `help` and for argument checks."""
     written = inspect.signature(function)
     bare = [p.replace(annotation=_bare(p.annotation)) for p in written.parameters.values()]
     return written.replace(parameters=bare)

@@ -19,32 +19,32 @@ Required = Annotated[
 RequirementsFile = Annotated[str | Path | None, Ask("TOML file with a section 'requirements'.")]
 Ranges = Annotated[
     Sequence[str],
-    Ask("Further range to cover, e.g. motor.R_m=0.2ohm:0.6ohm:5 or at=5bar:35bar:7.", "Ranges"),
+    Ask("Range to cover also, e.g. motor.R_m=0.2ohm:0.6ohm:5 or at=5bar:35bar:7.", "Ranges"),
 ]
 SineAmplitudes = Annotated[
     str, Ask("Amplitudes of the sines on the bench, e.g. '1 bar, 3 bar'.", "Amplitudes")
 ]
 Schedule = Annotated[
-    bool, Ask("Gains by region; --at then lists points of all regions.", "Gains by region")
+    bool, Ask("Schedule gains by region; --at lists the points of all regions.", "Gains by region")
 ]
-LinearOnly = Annotated[bool, Ask("Leave out the nonlinear bench.", "Linear only (quicker)")]
+LinearOnly = Annotated[bool, Ask("Skip the nonlinear bench.", "Linear only (faster)")]
 FreeDerivative = Annotated[
     bool,
-    Ask(
-        "Let the derivative's filter be faster than the sampling, and differentiate the set point."
-    ),
+    Ask("Allow a derivative filter faster than the sampling, and differentiate the set point."),
 ]
 DrawnFrom = Annotated[
     str | Path,
     Ask(
-        "Study file: gains for models drawn as its cases are, judged by others.",
+        "Study file: draw models as it draws cases, and judge the gains by further models.",
         metavar="FILE",
         is_text=True,
     ),
 ]
 Drawn = Annotated[int, Ask("Models drawn for the gains.")]
-Probability = Annotated[str, Ask("Of all requirements together, e.g. '99 %'; needs --vary.")]
-Seed = Annotated[int, Ask("Seed of the searches.", least=0)]
+Probability = Annotated[
+    str, Ask("Probability to meet all requirements, e.g. '99 %'; needs --vary.")
+]
+Seed = Annotated[int, Ask("Random seed of the searches.", least=0)]
 
 
 def _read(loop: str, parameters: str, overrides: Mapping[str, Any], side: str) -> None:
@@ -54,7 +54,7 @@ def _read(loop: str, parameters: str, overrides: Mapping[str, Any], side: str) -
 
 
 @use_case(
-    Command("design", status_1="when they cannot be met"),
+    Command("design", status_1="if they cannot be met"),
     form=Form(
         "Design a loop",
         "Design",
@@ -100,47 +100,48 @@ def design(
     Parameters
     ----------
     loop, parameters, at, overrides
-        As of `bywire.margins`; parameters that are set are not chosen. With ``schedule``, ``at``
-        lists points of all regions.
+        See `bywire.margins`. A parameter that is set is fixed. With ``schedule``, ``at`` lists the
+        points of all regions.
     require
         Requirements, for instance ``"bandwidth >= 10 Hz"``.
     requirements
         TOML file with a section ``requirements``.
     over
-        Ranges to serve too, ``"NAME=LOW:HIGH:COUNT"`` each.
+        Ranges to cover also, ``"NAME=LOW:HIGH:COUNT"`` each.
     amplitudes
-        Of the sines on the bench, with units and commas; the loop's own by default.
+        Amplitudes of the sines on the bench, with units and commas. By default those that the loop
+        declares.
     schedule
-        Whether the gains are chosen by region.
+        Whether to schedule the gains by region.
     linear_only
-        Whether the nonlinear bench is left out.
+        Whether to skip the nonlinear bench.
     free_derivative
-        Whether the derivative's filter may be faster than the sampling and the set point be
-        differentiated: better figures of gains that one would hardly put into an ECU.
+        Whether the derivative's filter may be faster than the sampling and act on the set point.
+        The figures get better, but the gains are hardly suitable for an ECU.
     vary
-        Study file: the gains are chosen for models that are drawn as its cases are, and judged by
-        others.
+        Study file. The gains are chosen for models drawn as its cases are, and judged by further
+        models.
     drawn
-        How many models they are chosen for.
+        Number of models drawn to choose the gains.
     probability
-        With which all requirements are to be met together, for instance ``"99 %"``.
+        Required probability to meet all requirements together, for instance ``"99 %"``.
     seed
-        Of the searches.
+        Random seed of the searches.
     progress
         Called with a label and the finished share, 0 to 1.
     side
-        Of the linear models, as of `bywire.margins`.
+        Side of the linear models; see `bywire.margins`.
 
     Returns
     -------
     LoopDesign or LoopScheduleDesign
-        Gains in SI units, the figures that they give, which requirement binds, and what the bench
-        shows of them.
+        Gains in SI units, the figures they achieve, the binding requirement, and the results on
+        the nonlinear bench.
 
     Raises
     ------
     InputError
-        For names that are unknown, values out of range, and requirements that make no sense.
+        For unknown names, values out of range, and invalid requirements.
     """
     from bywire.api.design import designed_at_point, designed_by_region, requirements_of
     from bywire.api.loop_case import loop_case
@@ -150,7 +151,7 @@ def design(
     whole_number("seed", seed, 0, 2**63 - 1)
     if schedule and vary:
         raise ParameterError(
-            "schedule and vary exclude each other: gains by region are not chosen for drawn models",
+            "give either schedule or vary: bywire cannot choose gains by region for drawn models",
             name="schedule",
         )
     sizes = None if linear_only else amplitudes

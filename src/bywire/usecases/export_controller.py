@@ -8,16 +8,16 @@ from bywire.usecases.declare import NOTHING, Ask, Command, use_case
 if TYPE_CHECKING:
     from bywire.api.exports import ControllerExport
 
-Precision = Annotated[str, Ask("Numbers of the C: double, or single.")]
-Vectors = Annotated[int, Ask("Test vectors of each task.")]
+Precision = Annotated[str, Ask("Floating-point precision of the C: double, or single.")]
+Vectors = Annotated[int, Ask("Test vectors per task.")]
 IsChecked = Annotated[
     bool,
     Ask(
-        "Run it here and on emulated Cortex-M3, M4F and M7, in both precisions; exit status 1 "
-        "where a bit differs."
+        "Run the C here and on emulated Cortex-M3, M4F and M7, in both precisions; exit status 1 "
+        "if a bit differs."
     ),
 ]
-Bus = Annotated[bool, Ask("Also describe its memory for a CAN bus.")]
+Bus = Annotated[bool, Ask("Also describe the ECU's memory for a CAN bus.")]
 Prefix = Annotated[
     str,
     Ask(
@@ -44,24 +44,24 @@ def export_controller(
     Parameters
     ----------
     bench
-        Bench, bench file, or name of an experiment: its parameters and choices are those of the
-        ECU; of several cases the first one's. Faults of the bench are left out.
+        Bench, bench file, or name of an experiment. The ECU gets its parameters and options; of
+        several cases, those of the first. The export ignores faults of the bench.
     out
-        Folder, made where it is missing; files of an earlier export in it are replaced.
+        Folder, created if missing. The export replaces files of an earlier export in it.
     overrides
         Changes of a bench file or experiment, as ``--set`` takes them.
     precision
-        ``"double"``, equal to Python in every bit, or ``"single"``.
+        ``"double"``, bit-identical to Python, or ``"single"``.
     vectors
-        Test vectors of each task.
+        Test vectors per task.
     check
-        Whether the C is compiled in both precisions, for this machine and, where
-        arm-none-eabi-gcc and qemu-system-arm are installed, for Cortex-M3, M4F and M7; run there
-        on the vectors, compared bit by bit, and measured.
+        Whether to compile the C in both precisions, run it on the vectors, compare it bit by bit,
+        and measure it. This happens on this machine and on Cortex-M3, M4F and M7, if
+        arm-none-eabi-gcc and qemu-system-arm are installed.
     dbc
-        Whether the memory is described as signals of a CAN bus, with the C that fills messages.
+        Whether to describe the memory as signals of a CAN bus, with C that fills the messages.
     name
-        What files and symbols begin with, an identifier of C; the model's name by default. ECUs of
+        Prefix of files and symbols, a C identifier; the model's name by default. ECUs with
         different names link into one program.
 
     Returns
@@ -72,13 +72,13 @@ def export_controller(
     Raises
     ------
     ParameterError
-        When the name is no identifier of C.
+        If the name is not a valid C identifier.
     ModelError
-        With file, line and operation of what cannot be translated.
+        If an operation cannot be translated, with its file and line.
     FileError
-        When the folder cannot be written.
+        If the folder is not writable.
     CompilerError
-        When a check finds no compiler, or one fails.
+        If a check finds no compiler, or a compiler fails.
     """
     import os
     from dataclasses import replace

@@ -11,12 +11,14 @@ if TYPE_CHECKING:
     from bywire.api.exports import ExportedFmu
     from bywire.core.typing import Progress
 
-Part = Annotated[str, Ask("brake, plant or ecu.", shown_default="brake; plant for model-exchange")]
-UnitKind = Annotated[str, Ask("co-simulation, or model-exchange of the plant.")]
-Version = Annotated[int, Ask("Version of the interface: 2 or 3.")]
+Part = Annotated[
+    str, Ask("Part: brake, plant or ecu.", shown_default="brake; plant for model-exchange")
+]
+UnitKind = Annotated[str, Ask("Kind: co-simulation, or model-exchange of the plant.")]
+Version = Annotated[int, Ask("FMI version: 2 or 3.")]
 Targets = Annotated[
     Sequence[str],
-    Ask("System, e.g. linux64 or win64; may be given several times.", name="target"),
+    Ask("Target platform, e.g. linux64 or win64; may be repeated.", name="target"),
 ]
 
 
@@ -33,43 +35,43 @@ def export_fmu(
     targets: Targets = (),
     progress: "Progress | None" = None,
 ) -> "ExportedFmu":
-    """Write a functional mock-up unit for co-simulation, or model exchange.
+    """Write a functional mock-up unit for co-simulation or model exchange.
 
     Parameters
     ----------
     bench
         A `Bench`, the path of a bench file, or the name of an experiment.
     out
-        Folder in which the file ``NAME_PART.fmu`` is written; one that is there is replaced.
+        Folder for the file ``NAME_PART.fmu``; an existing file is replaced.
     overrides
         Changes of a bench file or experiment, as ``--set`` takes them.
     part
-        ``"brake"``: all; ``"plant"``: what the ECU holds are inputs, its readings outputs;
-        ``"ecu"``: the reverse. The brake by default; the plant where that is exchanged.
+        ``"brake"``: everything; ``"plant"``: its inputs are the ECU's outputs, its outputs are the
+        ECU's readings; ``"ecu"``: the reverse. By default the brake; for model exchange the plant.
     kind
-        ``"co-simulation"``: it steps by itself, as the bench does; ``"model-exchange"``: the plant
-        for a client's solver, with derivatives, event indicators and modes.
+        ``"co-simulation"``: the unit steps by itself, as the bench does; ``"model-exchange"``: the
+        plant for a client's solver, with derivatives, event indicators and modes.
     fmi
-        Version of the interface: 2 for 2.0, 3 for 3.0 (tasks are clocks, tables arrays).
+        FMI version: 2 for 2.0, 3 for 3.0 (tasks are clocks, tables are arrays).
     case
-        Which run of the experiment is exported; may be left out where there is but one.
+        Run of the experiment to export; optional if there is only one.
     targets
-        Systems that binaries are made for: ``linux64``, ``win64``, ``darwin64``,
-        ``aarch64-linux``, ``aarch64-darwin``; this system by default.
+        Platforms of the binaries: ``linux64``, ``win64``, ``darwin64``, ``aarch64-linux``,
+        ``aarch64-darwin``; by default the platform of this machine.
     progress
         Called with a label and the finished share, 0 to 1.
 
     Returns
     -------
     ExportedFmu
-        The file, and what it holds; all values in it are SI.
+        The file and its contents; all values in it are SI.
 
     Raises
     ------
     InputError
-        When the bench cannot be exported, or the file cannot be written.
+        If the bench cannot be exported, or the file cannot be written.
     CompilerError
-        When there is no compiler for a system, or it fails.
+        If a platform has no compiler here, or the compiler fails.
     """
     from bywire.api.exports import ExportedFmu, export_folder
     from bywire.api.run import bench_of
@@ -85,7 +87,7 @@ def export_fmu(
         raise unknown_name("part", part, PARTS)
     if kind == "model-exchange" and part != "plant":
         raise ParameterError(
-            f"part = {part!r}: model exchange is only for the plant, because the ECU runs in "
+            f"part = {part!r}: model exchange supports only the plant, because the ECU runs in "
             "ticks; export the ECU separately, for co-simulation",
             name="part",
             value=repr(part),

@@ -24,11 +24,11 @@ def export_wasm(
     bench
         A `Bench`, the path of a bench file, or the name of an experiment.
     out
-        Folder of the files; those that are there are replaced.
+        Folder of the files; existing files are replaced.
     overrides
         Changes of a bench file or experiment, as ``--set`` takes them.
     case
-        Which run of the experiment is exported; may be left out where there is but one.
+        Run of the experiment to export; optional if there is only one.
 
     Returns
     -------
@@ -39,9 +39,9 @@ def export_wasm(
     Raises
     ------
     InputError
-        When the bench cannot be exported, or files cannot be written.
+        If the bench cannot be exported, or files cannot be written.
     CompilerError
-        Without the extra ``compiler``.
+        If the extra ``compiler`` is not installed.
     """
     import os
 

@@ -32,7 +32,7 @@ Excitation = Annotated[
     ),
 ]
 BandwidthRange = Annotated[
-    str, Ask("Range, for bandwidths, e.g. motor.R_m=0.2ohm:0.6ohm:5.", "Range")
+    str, Ask("Range of a parameter for bandwidths, e.g. motor.R_m=0.2ohm:0.6ohm:5.", "Range")
 ]
 
 
@@ -77,22 +77,22 @@ def frequency_response(
     Parameters
     ----------
     loop, parameters, at, overrides
-        As of `bywire.margins`.
+        See `bywire.margins`.
     frequencies
-        ``"1 Hz:150 Hz:20"``, or a list with commas; twenty over the loop's band by default.
+        ``"1 Hz:150 Hz:20"``, or a list with commas. By default twenty over the loop's band.
     amplitudes
-        With their unit and commas; the loop's own by default.
+        Amplitudes with their unit and commas. By default those that the loop declares.
     excitation
         ``"sine"`` (one frequency at a time), ``"multisine"``, or ``"chirp"``.
     over
-        Range for bandwidths, ``"NAME=LOW:HIGH:COUNT"``.
+        Range of a parameter for bandwidths, ``"NAME=LOW:HIGH:COUNT"``.
     progress
         Called with a label and the finished share, 0 to 1.
     estimate_error
-        Whether the response is measured in half steps too: gain, phase and bandwidths then say
-        how large their error from the step is (``NAME_step_error`` in ``data``).
+        Whether to repeat the measurement in half steps. Gain, phase and bandwidths then come with
+        their numerical error (``NAME_step_error`` in ``data``).
     side
-        Of the linear models, as of `bywire.margins`.
+        Side of the linear models; see `bywire.margins`.
 
     Returns
     -------
@@ -102,7 +102,7 @@ def frequency_response(
     Raises
     ------
     InputError
-        For names that are unknown, values out of range, sets of another brake, unstable loops.
+        For unknown names, values out of range, parameter sets of another brake, unstable loops.
     """
     from bywire.api.frequency_response import measured_response
     from bywire.core.errors import unknown_name

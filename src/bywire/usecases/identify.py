@@ -41,7 +41,7 @@ Measurements = Annotated[
 MethodOptions = Annotated[
     Mapping[str, Any],
     Ask(
-        "Its options: 'bywire list METHOD'.",
+        "Option of the method, see 'bywire list METHOD'.",
         "Options of the method",
         name="option",
         metavar="KEY=VALUE",
@@ -49,10 +49,10 @@ MethodOptions = Annotated[
 ]
 Starts = Annotated[
     int | None,
-    Ask("Starts of the search: 16; with --study 1.", "Starts of the search", least=1),
+    Ask("Starts of the search: 16, or 1 with --study.", "Starts of the search", least=1),
 ]
 Seed = Annotated[
-    int, Ask("Seed of the starts, or the study's first.", "Seed of the starts", least=0)
+    int, Ask("Seed of the starts, or first seed of --study.", "Seed of the starts", least=0)
 ]
 Synthetic = Annotated[
     int | None,
@@ -64,7 +64,7 @@ Synthetic = Annotated[
     ),
 ]
 Experiments = Annotated[
-    int | None, Ask("Try the method on many simulated ones.", metavar="COUNT", least=2)
+    int | None, Ask("Test the method on many simulated measurements.", metavar="COUNT", least=2)
 ]
 AnyBench = Annotated[
     Path | None,
@@ -79,7 +79,7 @@ AnyBench = Annotated[
 NoisyOutputs = Annotated[
     Mapping[str, str],
     Ask(
-        "Measured output, its column or noise: 'p_mc=Pressure [psi] +- 0.02 bar'.",
+        "Measured output, with column and noise: 'p_mc=Pressure [psi] +- 0.02 bar'.",
         "Outputs",
         name="output",
         kind="names",
@@ -90,7 +90,7 @@ NoisyOutputs = Annotated[
 Unknowns = Annotated[
     Mapping[str, str],
     Ask(
-        "Unknown to estimate, e.g. 'motor.R_m=0.1..1 ohm', offset.i_meas.",
+        "Unknown to estimate, e.g. 'motor.R_m=0.1..1 ohm' or offset.i_meas.",
         "Unknowns",
         name="unknown",
         kind="names",
@@ -102,7 +102,7 @@ Priors = Annotated[
     Mapping[str, str],
     Ask(
         "Prior knowledge of an unknown, e.g. 'motor.R_m=0.35 +- 0.02 ohm'.",
-        "Known before",
+        "Prior knowledge",
         name="prior",
         kind="pairs",
         metavar="NAME=VALUE+-DEV",
@@ -122,7 +122,7 @@ States = Annotated[
 Loss = Annotated[
     str,
     Ask(
-        "linear, soft_l1, huber or cauchy.",
+        "Loss: linear, soft_l1, huber or cauchy.",
         "Loss",
         words=("linear", "soft_l1", "huber", "cauchy"),
         panel=_ANY_BENCH,
@@ -131,7 +131,7 @@ Loss = Annotated[
 Holdout = Annotated[
     Path | None,
     Ask(
-        "Measurement for validation, which is not fitted.",
+        "Measurement for validation, excluded from the fit.",
         "Measurement for validation",
         kind="file",
         panel=_ANY_BENCH,
@@ -163,9 +163,9 @@ def _asked(
     out: LastOutFolder = None,
     progress: "Progress | None" = None,
 ) -> "Identification | TrustStudy":
-    """Identify parameters, or try a method on many simulated experiments.
+    """Identify parameters, or test a method on many simulated experiments.
 
-    A command names what a `Question` holds one by one.
+    A command takes the fields of a `Question` one by one.
     """
     from bywire.api.trust import trust
     from bywire.identification.question import Question
@@ -199,7 +199,7 @@ def _asked(
     for name, value in {"mapping": mapping, "time": time or None, "holdout": holdout}.items():
         if value is not None:
             raise ParameterError(
-                f"{option(name)} is for measurement files: leave it out", name=option(name)
+                f"{option(name)} is only for measurement files: leave it out", name=option(name)
             )
     return trust(method, study, starts=starts or 1, **shared)
 
@@ -258,43 +258,41 @@ def identify(
     method
         Name of the method, see ``bywire list``.
     measurements
-        A measurement or several records of it: files, or what `bywire.read_measurement` gives.
+        One measurement, or several records of it: files, or results of `bywire.read_measurement`.
     parameters, overrides
-        Parameter set from which the search begins (of the method's brake, the main one by
-        default), and what of it is changed: SI numbers, or texts with units.
+        Parameter set at which the search begins (by default the main one of the method's brake),
+        and changes of it: SI numbers, or texts with units.
     question
-        For methods of any bench: which one, what is measured there, and what is unknown. Of a
-        method of a brake's own, ``outputs`` may name the columns of its signals.
+        For methods of any bench: the bench, the measured outputs, and the unknowns. For a method of
+        one brake, ``outputs`` may name the columns of its signals.
     mapping
-        File that says what the columns of measurement files mean.
+        File with the meaning of the columns of measurement files.
     time
-        Column of the instants, such as ``"Zeit [s]"``, or a sample rate; that of the file by
-        default.
+        Time column, such as ``"Zeit [s]"``, or a sample rate. By default as the file declares it.
     options
-        Options of the method, likewise.
+        Options of the method: SI numbers, or texts with units.
     starts, seed
         Starts of the search, and the seed of all but the first.
     synthetic
-        Seed of a simulated measurement, which is identified in place of a measured one.
+        Seed of a simulated measurement, in place of a measured one.
     folder
-        Where the result will be written: a folder with the result of another method is refused, an
-        earlier result is removed, and finished starts are kept there, so that an interrupted
-        search goes on.
+        Folder of the result. A folder with the result of another method is rejected, an earlier
+        result is removed. Finished starts stay there, so that an interrupted search can continue.
     progress
         Called with a label and the finished share, 0 to 1.
 
     Returns
     -------
     Identification
-        Parameters in SI units with their 95 % intervals, the checks of the result, and what it was
-        identified from.
+        Parameters in SI units with their 95 % intervals, the checks of the result, and its
+        measurements.
 
     Raises
     ------
     InputError
-        When something that is asked for does not fit, or a measurement cannot be used.
+        If an argument is invalid, or a measurement cannot be used.
     KeyboardInterrupt
-        When interrupted.
+        If interrupted.
 
     Examples
     --------

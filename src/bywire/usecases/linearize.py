@@ -13,20 +13,24 @@ if TYPE_CHECKING:
 LoopOrPlant = Annotated[
     str, Ask("Loop or plant, see 'bywire list'.", "Loop", name="loop", known=("loops", "plants"))
 ]
-LocusRange = Annotated[str, Ask("Poles over a range, e.g. motor.R_m=0.1ohm:1ohm:71.", "Root locus")]
+LocusRange = Annotated[
+    str, Ask("Root locus over a range, e.g. motor.R_m=0.1ohm:1ohm:71.", "Root locus")
+]
 Reduce = Annotated[
-    str, Ask("Reduce it to an order, e.g. 4, or to a band, e.g. '150 Hz'.", "Reduce")
+    str, Ask("Reduce the model to an order, e.g. 4, or a band, e.g. '150 Hz'.", "Reduce")
 ]
 FrictionKind = Annotated[
     str,
     Ask(
-        "Of a plant: removed (as of loops), sliding, or stuck.",
+        "Dry friction of a plant: removed (as in loops), sliding, or stuck.",
         "Dry friction",
         words=("removed", "sliding", "stuck"),
     ),
 ]
-Speed = Annotated[str, Ask("Motor speed of sliding, e.g. '5 rad/s'.", "Speed")]
-Dither = Annotated[bool, Ask("Also about its motion under dither, friction on.", "Under dither")]
+Speed = Annotated[str, Ask("Motor speed for sliding, e.g. '5 rad/s'.", "Speed")]
+Dither = Annotated[
+    bool, Ask("Also linearize about the motion under dither, with friction.", "Under dither")
+]
 
 
 def _read(
@@ -81,7 +85,7 @@ def linearize(
     dither: Dither = False,
     side: Side = "",
 ) -> "LinearizedLoop | LinearizedPlant | PlantLocus":
-    """Make the exact linear model of a closed loop, with its sampling, or of a plant.
+    """Derive the exact linear model of a closed loop, with its sampling, or of a plant.
 
     Parameters
     ----------
@@ -90,31 +94,31 @@ def linearize(
     parameters
         Parameter set; the main one of its brake by default.
     at
-        Operating point with its unit, for instance ``"20 bar"``; the loop's own by default.
+        Operating point with its unit, for instance ``"20 bar"``. By default the loop's nominal one.
     overrides
         Other parameters by dotted name: SI numbers, or texts with units.
     locus
-        Range over which the poles are followed, ``"NAME=LOW:HIGH:COUNT"``.
+        Range of the root locus, ``"NAME=LOW:HIGH:COUNT"``.
     reduce
-        An order, or a band such as ``"150 Hz"``, to which the model is reduced.
+        Order of the reduced model, or its band, such as ``"150 Hz"``.
     friction, speed
-        Of a plant: ``"removed"``, ``"sliding"`` or ``"stuck"``, and the motor's speed of sliding.
+        For a plant: ``"removed"``, ``"sliding"`` or ``"stuck"``, and the motor speed for sliding.
     dither
-        Of a loop: whether it is also linearized about its motion under dither, friction on.
+        For a loop: whether to linearize also about its motion under dither, with friction.
     side
-        As of `bywire.margins`.
+        See `bywire.margins`.
 
     Returns
     -------
     LinearizedLoop, LinearizedPlant or PlantLocus
-        The linear model, SI units inside, with its poles in 1/s; along a range its poles alone.
+        The linear model in SI units, with its poles in 1/s; over a range only the poles.
 
     Raises
     ------
     InputError
-        For names that are unknown, values out of range, and options that do not fit together.
+        For unknown names, values out of range, and incompatible options.
     SolverError
-        When the motion under dither does not repeat itself.
+        If the motion under dither does not become periodic.
     """
     from bywire.api.linearize import linearized
 

@@ -1,4 +1,4 @@
-"""Margins and bandwidth of a loop as it is sampled, at a point or over a range."""
+"""Margins and bandwidth of a sampled loop, at a point or over a range."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any
@@ -32,7 +32,7 @@ def margins(
     *,
     side: Side = "",
 ) -> "Margins":
-    """Show margins and bandwidth of a loop as it is sampled, and the worst case over a range.
+    """Compute margins and bandwidth of a sampled loop, and the worst case over a range.
 
     Parameters
     ----------
@@ -41,26 +41,26 @@ def margins(
     parameters
         Parameter set; the main one of the loop's brake by default.
     at
-        Operating point with its unit, for instance ``"20 bar"``; the loop's own by default.
+        Operating point with its unit, for instance ``"20 bar"``. By default the loop's nominal one.
     overrides
         Other parameters by dotted name: SI numbers, or texts with units.
     over
         Range, for instance ``"motor.R_m=0.2 ohm:0.6 ohm:9"``, or ``"at=5 bar:35 bar:7"``.
     side
-        Side of the corners of operations on which the operating point lies: ``"above"``,
-        ``"below"``, or of single operations ``"FILE:LINE=above"``, with commas. Without, a point
-        on a corner whose sides have different linear models is refused.
+        Side of a corner to take if the operating point lies on one: ``"above"``, ``"below"``, or
+        for single operations ``"FILE:LINE=above"``, with commas. Without it, a point on a corner
+        is rejected if the linear models of both sides differ.
 
     Returns
     -------
     Margins
         Gain margins as factors, phase margin in degree, crossover and bandwidth in Hz, delay margin
-        in s: at the operating point, or at each value of the range with the worst.
+        in s: at the operating point, or at each value of the range, with the worst case.
 
     Raises
     ------
     InputError
-        For names that are unknown, values out of range, and sets of another brake.
+        For unknown names, values out of range, and parameter sets of another brake.
 
     Examples
     --------

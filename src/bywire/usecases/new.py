@@ -19,26 +19,26 @@ ProjectFolder = Annotated[
 
 @use_case(Command("new", writes=""))
 def new(name: BrakeName, folder: ProjectFolder = ".") -> "NewBrake":
-    """Write a package for a brake of your own, with tests, that passes bywire check.
+    """Write a package for your own brake, with tests, that passes bywire check.
 
     Parameters
     ----------
     name
-        Of the brake: small letters, digits and single dashes, such as ``my-brake``.
+        Name of the brake: lowercase letters, digits and single dashes, such as ``my-brake``.
     folder
-        Where its folder ``my-brake`` is made; the current one by default, made where it is missing.
+        Parent of its folder ``my-brake``, created if missing; by default the current folder.
 
     Returns
     -------
     NewBrake
-        Its name, the folder of its project, and its package.
+        The brake's name, the folder of its project, and its package.
 
     Raises
     ------
     ParameterError
-        When the name is none that Python and bywire can take, with the reason.
+        If the name is not valid for Python or bywire, with the reason.
     FileError
-        When there is such a folder already, or it cannot be written.
+        If the folder already exists, or is not writable.
     """
     from bywire.api.new import NewBrake, write_package
 

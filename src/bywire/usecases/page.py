@@ -1,4 +1,4 @@
-"""A bench as one page that anybody can open."""
+"""A bench as one page that anyone can open."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -15,7 +15,7 @@ PageFile = Annotated[str | Path, Ask("File of the page (.html).", is_flag=True)]
 Sliders = Annotated[
     Sequence[str],
     Ask(
-        "Parameter that stands first in the page; may be given several times.",
+        "Parameter at the top of the page; may be repeated.",
         completes="parameters",
     ),
 ]
@@ -35,21 +35,21 @@ def page(
     vary: Sliders = (),
     case: NeededCase = "",
 ) -> "BenchPage":
-    """Write a bench as one HTML file that computes it: parameters to move, curves that follow.
+    """Write a bench as one interactive HTML file: move parameters, and the curves follow.
 
     Parameters
     ----------
     bench
         A `Bench`, the path of a bench file, or the name of an experiment.
     out
-        File of the page (.html); one that is there is replaced.
+        File of the page (.html); an existing file is replaced.
     overrides
         Changes of a bench file or experiment, as ``--set`` takes them.
     vary
-        Parameters that stand first in the page; by default those that the bench changes,
-        else those that its brake declares (`bywire.authoring.Sliders`).
+        Parameters at the top of the page. By default those that the bench changes, otherwise
+        those that its brake declares (`bywire.authoring.Sliders`).
     case
-        Which run of the experiment it computes; may be left out where there is but one.
+        Run of the experiment that the page computes; optional if there is only one.
 
     Returns
     -------
@@ -59,10 +59,10 @@ def page(
     Raises
     ------
     InputError
-        When the bench cannot be exported, for a name in ``vary`` that is no number of the bench or
-        has no effect in it, and when the file cannot be written.
+        If the bench cannot be exported, the file cannot be written, or a name in ``vary`` is not
+        a numeric parameter of the bench or has no effect.
     CompilerError
-        Without the extra ``compiler``.
+        If the extra ``compiler`` is not installed.
     """
     import gzip
 

@@ -1,4 +1,4 @@
-"""How a brake wears over thousands of stops, and when its life ends."""
+"""Projection of a brake's wear over thousands of stops, and of its end of life."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -25,7 +25,7 @@ LifeName = Annotated[
 ]
 CheckedStops = Annotated[
     int,
-    Ask("Stops to run one by one too, to check the projection.", "Stops one by one", least=0),
+    Ask("Stops to simulate one by one, to check the projection.", "Stops one by one", least=0),
 ]
 
 
@@ -46,17 +46,17 @@ def project_life(
     check: CheckedStops = 0,
     progress: "Progress | None" = None,
 ) -> "LifeResult":
-    """Project how a brake wears over thousands of stops, and when its life ends.
+    """Project a brake's wear over thousands of stops, and its end of life.
 
     Parameters
     ----------
     source
         Life file, see ``docs/life.md``; or the name of a life.
     overrides
-        Changes of the bench, of wear (``wear.NAME``) and of what is between stops
+        Changes of the bench, of wear (``wear.NAME``) and of the time between stops
         (``stop.NAME``), as texts with units.
     check
-        Stops that are also run one by one, to check the projection, in whole rounds of the
+        Stops to simulate one by one also, to check the projection, in whole rounds of the
         population; none by default.
     progress
         Called with a label and the finished share, 0 to 1.
@@ -64,16 +64,16 @@ def project_life(
     Returns
     -------
     LifeResult
-        Stops until the end, with an interval; slow states after every stop in SI units.
+        Stops until the end of life, with an interval; slow states after every stop in SI units.
 
     Raises
     ------
     InputError
-        For a life file that does not fit, and a brake that is at its end from the start.
+        For an invalid life file, and a brake that starts at the end of its life.
     RunError
-        When a run fails, or a stop lacks a key figure that wear is computed from.
+        If a run fails, or a stop lacks a key figure on which wear depends.
     KeyboardInterrupt
-        When interrupted.
+        If interrupted.
     """
     from bywire.api.life import LifeResult
     from bywire.core.typing import silent

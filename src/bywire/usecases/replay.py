@@ -1,4 +1,4 @@
-"""A measured demand that drives the model, compared with what was measured."""
+"""Replay of a measured demand: the model's response against the measured one."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -44,8 +44,8 @@ Tolerances = Annotated[
 Segments = Annotated[
     str | Path,
     Ask(
-        "Judge stretches: auto (steps and holds), or a TOML file.",
-        "Judge steps and holds each for itself",
+        "Segments to judge: auto (steps and holds), or a TOML file.",
+        "Judge steps and holds separately",
         is_text=True,
         ticked="auto",
     ),
@@ -99,40 +99,39 @@ def replay(
     progress: "Progress | None" = None,
     estimate_error: ErrorEstimate = True,
 ) -> "Replay":
-    """Drive the model with a measured demand and compare.
+    """Drive the model with a measured demand and compare the responses.
 
     Parameters
     ----------
     measurement
-        A file, or what `bywire.read_measurement` gives.
+        A file, or the result of `bywire.read_measurement`.
     bench, overrides
-        A `Bench`, the path of a bench file, or an experiment's name; and what of it is changed,
-        as ``--set`` takes it.
+        A `Bench`, the path of a bench file, or an experiment's name; and its changes, as ``--set``
+        takes them.
     mapping
-        File that says what the columns of a measurement file mean.
+        File with the meaning of the columns of a measurement file.
     inputs
         Stimulus of the model -> measured signal, or column such as ``"Demand [bar]"``; by default
         all of the same name.
     outputs
-        What is compared; by default all that are measured and tell how well the model fits. A
+        Signals to compare; by default all measured ones that show how well the model fits. A
         mapping names their columns: ``{"p_mc": "Pressure [psi]"}``, empty for the same name.
     time
-        Column of the instants, such as ``"Zeit [s]"``, or a sample rate; that of the file by
-        default.
+        Time column, such as ``"Zeit [s]"``, or a sample rate. By default as the file declares it.
     case
         Run of the experiment; the first by default.
     tolerances
-        Such as ``"nrmse <= 5 %"`` or ``"p_mc.max_error <= 2 bar"``.
+        Limits such as ``"nrmse <= 5 %"`` or ``"p_mc.max_error <= 2 bar"``.
     segments
-        Stretches that are judged: ``"auto"`` for steps and holds, or a TOML file; by default the
-        whole record.
+        Segments to judge: ``"auto"`` for steps and holds, or a TOML file; by default the whole
+        record.
     track
-        Parameters that drift and are tracked, for instance ``"mu_B"``.
+        Drifting parameters to track, for instance ``"mu_B"``.
     progress
         Called with a label and the finished share, 0 to 1.
     estimate_error
-        Whether the model runs in half and double steps too, for the error of the figures from the
-        step. A tolerance that is closer than this error is undecided, neither met nor missed.
+        Whether to repeat the run in half and double steps, to estimate the numerical error of the
+        figures. A tolerance closer than this error is undecided, neither met nor missed.
 
     Returns
     -------
@@ -142,7 +141,7 @@ def replay(
     Raises
     ------
     InputError
-        When something that is asked for does not fit, or the measurement cannot be used.
+        If an argument is invalid, or the measurement cannot be used.
     """
     from bywire.api.replay import Replay, columns_of_bench, driven_bench, stretches_of, units_of
     from bywire.core.typing import silent

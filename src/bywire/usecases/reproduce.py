@@ -1,4 +1,4 @@
-"""A paper's tables and figures: stated, computed, agrees or not."""
+"""Reproduction of a paper's tables and figures: published against computed values."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated
@@ -23,7 +23,7 @@ SourceName = Annotated[str, Ask("Published source, e.g. dardanelli2010.", "Sourc
 @use_case("reproduce", form=Form("Reproduce a source", "Reproduce", "source"))
 @on_one_thread()
 def reproduce(source: SourceName, *, progress: "Progress | None" = None) -> "Reproduction":
-    """Make a paper's tables and figures: stated, computed, agrees or not.
+    """Reproduce a paper's tables and figures: published and computed values, and their agreement.
 
     Parameters
     ----------
@@ -35,14 +35,14 @@ def reproduce(source: SourceName, *, progress: "Progress | None" = None) -> "Rep
     Returns
     -------
     Reproduction
-        What is stated beside what is computed, each in the unit of the statement.
+        Published and computed values side by side, each in the unit of the source.
 
     Raises
     ------
     UnknownNameError
-        With the nearest known sources.
+        If the source is unknown, with the closest matches.
     RunError
-        When a run fails.
+        If a run fails.
     """
     from bywire.reproduction.reproduction import SOURCES
 

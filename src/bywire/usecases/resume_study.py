@@ -1,4 +1,4 @@
-"""A study that goes on: interrupted, killed, or with more cases."""
+"""Continuation of a study: interrupted, killed, or with more cases."""
 
 from typing import TYPE_CHECKING
 
@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     Command("study resume", without=("cases",), **STUDY_FOLDER),
     Command(
         "study extend",
-        "Add cases to a study, by points of the same sequence.",
-        required={"cases": "Cases altogether."},
+        "Add cases to a study, from the same sequence of points.",
+        required={"cases": "Total number of cases."},
         **STUDY_FOLDER,
     ),
 )
@@ -35,15 +35,15 @@ def resume_study(
     engine: EngineName = "auto",
     progress: "Progress | None" = None,
 ) -> "StudyRun":
-    """Go on with a study that was interrupted or killed.
+    """Continue a study that was interrupted or killed.
 
     Parameters
     ----------
     folder
         Folder of the study.
     cases
-        Cases in place of those that were asked for so far; more of them extend the study by points
-        of the same sequence, fewer take back what is not computed.
+        Number of cases, in place of the number so far. A larger number extends the study by points
+        of the same sequence, a smaller one drops cases not yet computed.
     workers, cluster, engine, progress
         See `run_study`.
 
@@ -55,11 +55,11 @@ def resume_study(
     Raises
     ------
     InputError
-        When the folder holds no study, its file is gone, or says something else by now.
+        If the folder contains no study, or the study file is missing or has changed.
     RunError
-        When workers are lost.
+        If workers are lost.
     KeyboardInterrupt
-        When interrupted; finished chunks stay.
+        If interrupted; finished chunks stay.
     """
     from pathlib import Path
 

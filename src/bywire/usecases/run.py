@@ -1,4 +1,4 @@
-"""A bench or an experiment, run and judged."""
+"""Run of a bench or an experiment, judged by its requirements."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -19,7 +19,7 @@ Over = Annotated[str, Ask("Run for each value, e.g. motor.R_m=0.2ohm:0.6ohm:9.")
 Faults = Annotated[
     Sequence[str],
     Ask(
-        "What fails, see 'bywire list faults'.",
+        "Fault to inject, see 'bywire list faults'.",
         "Faults",
         name="fault",
         metavar="NAME[=VALUE][@ONSET]",
@@ -40,7 +40,7 @@ def _require_folder(animate: bool, out: Path | None, **others: Any) -> None:
     del others
     if animate and out is None:
         raise InputError(
-            f"{option('animate')} writes into a folder: give one by {option('out')}",
+            f"{option('animate')} needs a folder to write to: add {option('out')}",
             name=option("animate"),
         )
 
@@ -93,41 +93,42 @@ def run(
     Parameters
     ----------
     bench
-        What is tested: a `Bench`, the path of a bench file, or the name of an experiment, which
-        is then run with its defaults and the main parameter set of its brake.
+        A `Bench`, the path of a bench file, or the name of an experiment, which runs with its
+        defaults and the main parameter set of its brake.
     overrides
         Changes of a bench file or experiment, as ``--set`` takes them.
     over
         Range, for instance ``"motor.R_m=0.2 ohm:0.6 ohm:9"`` or ``"options.p_to=20 bar, 30 bar"``:
         the values run side by side, and the result is a `BenchRange`.
     faults
-        What fails beside what the bench says, as ``--fault`` takes it, for instance
+        Faults in addition to the bench's, as ``--fault`` takes them, for instance
         ``"pressure.stuck=20 bar@1 s"``.
     progress
         Called with the run's label and its finished share, 0 to 1.
     engine
         ``compiled``, ``virtual-machine``, or the compiled C of the ECU in the loop, ``sil``
-        (double precision) or ``sil-single``; ``auto`` is what the bench says.
+        (double precision) or ``sil-single``; ``auto`` takes the bench's engine.
     estimate_error
-        Whether all runs are made in half and double steps too, for the error from the step of key
-        figures and recorded signals. A requirement that is closer to its limit than this error
-        is undecided, neither met nor missed.
+        Whether to repeat all runs in half and double steps, to estimate the numerical error of key
+        figures and recorded signals. A requirement closer to its limit than this error is
+        undecided, neither met nor missed.
     animate
-        Whether the result's folder gets a page that plays each run, where its assembly has one.
+        Whether to write a page that plays each run into the result's folder, if the assembly has
+        an animation.
 
     Returns
     -------
     BenchResult
-        Recordings and key figures in SI units, verdicts on what was required, books of energy in J.
+        Recordings and key figures in SI units, verdicts on requirements, energy balance in J.
     BenchRange
-        Over a range: the same of every value.
+        For a range: the same for every value.
 
     Raises
     ------
     InputError
-        When the experiment cannot be set up.
+        If the experiment cannot be set up.
     RunError
-        When a run fails.
+        If a run fails.
     """
     from bywire.api.run import bench_of, faulty, require_scene, run_once
 

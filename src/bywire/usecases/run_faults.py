@@ -39,7 +39,7 @@ def _holds(folder: Path, plan: "CampaignPlan") -> bool:
 
 @use_case(
     "faults",
-    form=Form("Fault campaign", "Run, or go on", "campaign"),
+    form=Form("Fault campaign", "Run or continue", "campaign"),
     check=_read,
     holds=_holds,
 )
@@ -50,15 +50,15 @@ def run_faults(
     *,
     progress: "Progress | None" = None,
 ) -> "FaultCampaign":
-    """Let every part fail in a maneuver: what it does, when it is seen, what is covered.
+    """Simulate every fault of a maneuver: effect, detection, coverage.
 
     Parameters
     ----------
     campaign
-        Campaign file, see ``docs/faults.md``; or the name of one that comes with a brake.
+        Campaign file, see ``docs/faults.md``; or the name of a campaign that comes with a brake.
     out
-        Folder in which outcomes are kept, so that the same call goes on after an interrupt;
-        nothing is kept by default.
+        Folder that keeps the outcomes, so that the same call continues after an interrupt. By
+        default nothing is kept.
     overrides
         Changes of the bench, as texts with units.
     progress
@@ -67,17 +67,17 @@ def run_faults(
     Returns
     -------
     FaultCampaign
-        Of every fault its effect, fault tolerant time, time to detection [s] and class;
-        diagnostic coverage, false alarms.
+        Effect, fault tolerant time, time to detection [s] and class of every fault; diagnostic
+        coverage, false alarms.
 
     Raises
     ------
     InputError
-        For a campaign that does not fit, and a folder that holds another one.
+        For an invalid campaign, and a folder that contains another campaign.
     RunError
-        When a run fails.
+        If a run fails.
     KeyboardInterrupt
-        When interrupted; finished faults stay in the folder.
+        If interrupted; finished faults stay in the folder.
     """
     from bywire.api.run_faults import FaultCampaign
     from bywire.bench import running
@@ -93,7 +93,7 @@ def run_faults(
             raise
         kept = len(store.kept(plan))
         raise KeyboardInterrupt(
-            f"{kept} of {len(plan.faults)} faults are kept: the same command goes on"
+            f"{kept} of {len(plan.faults)} faults are kept: repeat the command to continue"
         ) from None
     nominal = running.run(plan.bench, estimate_error=False)
     return FaultCampaign(findings, None if store is None else store.folder, nominal)

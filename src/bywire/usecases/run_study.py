@@ -1,4 +1,4 @@
-"""A study: a bench for many values of what varies."""
+"""A study: a bench run for many values of the varied quantities."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -16,7 +16,7 @@ StudyFile = Annotated[
 ]
 FolderOfStudy = Annotated[
     str | Path | None,
-    Ask("Folder of the study; by default named as the file.", is_folder=True),
+    Ask("Folder of the study; by default named like the file.", is_folder=True),
 ]
 
 
@@ -47,7 +47,7 @@ def _named_as_file(study: Path, **others: Any) -> Path:
     Command("study run", before=_require_study_file, default_folder=_named_as_file),
     form=Form(
         "Run the study",
-        "Run, or go on",
+        "Run or continue",
         "study",
         name="study",
         fields=("study", "cases", "set"),
@@ -67,29 +67,29 @@ def run_study(
     engine: EngineName = "auto",
     progress: "Progress | None" = None,
 ) -> "StudyRun":
-    """Run a bench for many values of what varies: probabilities, spread, what drives them.
+    """Run a bench for many values of varied quantities: probabilities, spread, main influences.
 
-    What its folder holds is not computed again, so that the same call goes on with a study that
-    was interrupted or killed.
+    Results in the study's folder are not computed again. The same call therefore continues a study
+    that was interrupted or killed.
 
     Parameters
     ----------
     study
         Study file; see ``docs/studies.md``.
     out
-        Its folder; by default the name of the file, without its ending, in the current folder.
+        Folder of the study; by default the file's name without its ending, in the current folder.
     overrides
         Changes of the bench, as texts with units; kept with the study.
     cases
-        Cases in place of the file's, up to 10 million. More than were asked for so far extend what
-        is there, fewer take back those that are not computed. Where the folder has more than the
-        file asks for, all are judged.
+        Number of cases, in place of the file's, up to 10 million. A number larger than so far
+        extends the study, a smaller one drops cases not yet computed. If the folder has more cases
+        than the file asks for, all are judged.
     workers
-        Processes; by default one a core where the work is worth their start.
+        Processes; by default one per core, if the work justifies their start.
     cluster
-        Address of a Dask scheduler that computes instead.
+        Address of a Dask scheduler that runs the cases.
     engine
-        What computes; ``auto`` is what the bench says. ``cuda``: a graphics processor.
+        Engine; ``auto`` takes the bench's engine, ``cuda`` a graphics processor.
     progress
         Called with a label and the finished share, 0 to 1.
 
@@ -97,17 +97,16 @@ def run_study(
     -------
     StudyRun
         Probabilities of the requirements with intervals, the spread of key figures in SI units,
-        what drives them, the worst cases.
+        the main influences, the worst cases.
 
     Raises
     ------
     InputError
-        For a study file that does not fit, and a folder that holds another study.
+        For an invalid study file, and a folder that contains another study.
     RunError
-        When the bench itself fails, or workers are lost. A case that fails is a case without a
-        result.
+        If the nominal bench fails, or workers are lost. A failed case only lacks a result.
     KeyboardInterrupt
-        When interrupted; finished chunks stay.
+        If interrupted; finished chunks stay.
     """
     from bywire.api.study_run import completed, with_engine
     from bywire.studies.meant_study import require_study_file

@@ -1,4 +1,4 @@
-"""Designs of a brake compared at equal demands: a sizing study."""
+"""Sizing study: designs of a brake compared at equal demands."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -34,7 +34,7 @@ def _read(name: str, parameters: str, overrides: Mapping[str, Any]) -> "AskedStu
 
 
 def _require_sizing(name: str, **others: Any) -> None:
-    """Refuse a word that is no sizing study, with what was perhaps meant: a study file."""
+    """Reject an unknown sizing study; suggest the study file that the user may have meant."""
     from bywire.core.brake import loaded_files
     from bywire.studies.meant_study import meant_study
     from bywire.synthesis.study import STUDIES
@@ -45,14 +45,14 @@ def _require_sizing(name: str, **others: Any) -> None:
     file = meant_study(Path(name))
     if file is not None:
         raise UnknownNameError(
-            f"unknown sizing study {name!r}: the study file {file} is run by 'bywire study run "
+            f"unknown sizing study {name!r}: to run the study file {file}, type 'bywire study run "
             f"{file}'"
         )
     if loaded_files():
-        raise STUDIES.unknown(name)  # with how a brake of one's own declares one
+        raise STUDIES.unknown(name)  # explains how a user's brake declares a sizing study
     error = str(unknown_name("sizing study", name, STUDIES.all()))
     more = (
-        "; one of a brake of your own takes --system PATH, and a study file is run by 'bywire "
+        "; for one of your own brake add --system PATH, and to run a study file type 'bywire "
         "study run FILE'"
     )
     raise UnknownNameError(error if error.endswith("?") else error + more)
@@ -71,7 +71,7 @@ def study(
     *,
     progress: "Progress | None" = None,
 ) -> "StudyResult":
-    """Compare designs of a brake at equal demands: the best, what limits it, at what price.
+    """Compare designs of a brake at equal demands: the best, its limits and its cost.
 
     Parameters
     ----------
@@ -88,12 +88,12 @@ def study(
     Returns
     -------
     StudyResult
-        The designs with their figures in SI units, the best, and what limits it.
+        The designs with their figures in SI units, the best, and its limits.
 
     Raises
     ------
     InputError
-        For names that are unknown, values out of range, and changes without effect.
+        For unknown names, values out of range, and changes without effect.
     """
     from bywire.api.study import StudyResult
     from bywire.core.typing import silent

@@ -1,4 +1,4 @@
-"""What a study shows so far."""
+"""Progress and results of a study so far."""
 
 from typing import TYPE_CHECKING
 
@@ -12,15 +12,15 @@ if TYPE_CHECKING:
 @use_case(
     Command(
         "study report",
-        "Judge what a study has so far, by the requirements of its file, and write its report.",
+        "Judge the results of a study so far by its file's requirements, and write its report.",
         **STUDY_FOLDER,
     ),
     Command("study status", before=require_study_folder, writes=""),
 )
 def study_report(folder: StudyFolder) -> "StudyRun":
-    """Say how far a study is, and what it shows so far; nothing is written.
+    """Show the progress of a study and its results so far, without writing anything.
 
-    Requirements are those that its file says now.
+    The requirements are those that are now in the study file.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ def study_report(folder: StudyFolder) -> "StudyRun":
     Raises
     ------
     InputError
-        When the folder holds no study, its file is gone, or says something else by now.
+        If the folder contains no study, or the study file is missing or has changed.
     """
     from bywire.api.study_run import kept_study
 

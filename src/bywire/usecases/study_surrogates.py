@@ -1,4 +1,4 @@
-"""Key figures between the cases of a study, by polynomials."""
+"""Polynomial surrogates of key figures between the cases of a study."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Annotated, Any
@@ -15,7 +15,7 @@ KeyFigures = Annotated[
 ]
 Values = Annotated[
     Mapping[str, Any],
-    Ask("Tell the figures here, e.g. motor.R_m=0.4ohm.", metavar="KEY=VALUE"),
+    Ask("Values at which to estimate, e.g. motor.R_m=0.4ohm.", metavar="KEY=VALUE"),
 ]
 
 
@@ -25,17 +25,17 @@ def study_surrogates(
     kpis: KeyFigures = (),
     at: Values = NOTHING,
 ) -> "StudySurrogates":
-    """Tell key figures between the cases of a study by polynomials, with their error.
+    """Estimate key figures between the cases of a study by polynomials, with their error.
 
     Parameters
     ----------
     folder
         Folder of the study.
     kpis
-        Key figure, or several; by default those that something is required of, or all.
+        Key figure, or several; by default those with a requirement, or all.
     at
-        Values of what varies at which to tell them: SI numbers, texts with units, or changes such
-        as ``"+5 %"`` of what the bench has; the others as in the bench.
+        Values of the varied quantities at which to estimate: SI numbers, texts with units, or
+        changes such as ``"+5 %"`` of the bench's value. The others are as in the bench.
 
     Returns
     -------
@@ -46,9 +46,9 @@ def study_surrogates(
     Raises
     ------
     InputError
-        When the folder holds no study, for names that are unknown, values beyond what the cases
-        have shown, or between those of a quantity that has single ones, too few cases, designs that
-        do not show what lies between their points, and structural choices among what varies.
+        If the folder contains no study or too few cases, for unknown names, values outside the
+        range of the cases or between the values of a discrete quantity. Also for designs that do
+        not determine what lies between their points, and if structural choices vary.
     """
     from bywire.api.study_run import kept_study
     from bywire.api.study_surrogate import StudySurrogates
@@ -59,7 +59,7 @@ def study_surrogates(
     from bywire.studies.surrogate import Surrogate, require_fittable, surrogate_of
 
     report = kept_study(folder)
-    require_fittable(report.plan)  # before values are read: those of a choice are no numbers
+    require_fittable(report.plan)  # before values are read: those of a choice are not numbers
     findings = report.findings
     quantities = {v.name: v for v in report.plan.varied}
     values: dict[str, float] = {}

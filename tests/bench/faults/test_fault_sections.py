@@ -141,7 +141,7 @@ def test_a_drive_comes_late_by_one_number_of_ticks_in_a_run():
 def test_a_fault_that_no_row_meets_is_told():
     section = {"fault": "pressure.stuck", "onset": "10.3 ms", "lasts": "1 us"}
     said = bywire.run(bench(section), estimate_error=False).document().data["remarks"]
-    assert "no recorded row meets it" in said[0]
+    assert "not active in any recorded sample" in said[0]
 
 
 def test_a_fault_that_came_and_went_for_long_before_the_run_still_does():

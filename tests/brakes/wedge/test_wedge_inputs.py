@@ -147,7 +147,7 @@ def test_screw_that_holds_is_allowed_and_said(eta_b):
     texts = warnings("power-off-hold", wedge__mu_B=0.2, screw__eta_b=eta_b)
     assert texts == (
         [
-            "screw.eta_b = 0: no load drives these screws back, so that the brake keeps its moment "
+            "screw.eta_b = 0: no load drives these screws back, so the brake keeps its moment "
             "when the power goes off"
         ]
         if eta_b == 0.0

@@ -105,7 +105,7 @@ def test_pads_that_touch_from_the_start():
 
 UNMET = [
     ("moment-pulse-950", {"wedge.mu_B": 0.0}, {}, "950 N*m was not reached: the moment is 0 N*m"),
-    ("moment-pulses", {"flywheel.Omega_0": 0.0}, {}, "0 N*m at most, as the disc stands"),
+    ("moment-pulses", {"flywheel.Omega_0": 0.0}, {}, "0 N*m at most, as the disc is at rest"),
     ("moment-pulses", {}, {"M_high": 5.0}, "parked up to control.moment.M_on = "),
 ]
 

@@ -1,4 +1,4 @@
-"""Starts of the motorcycle brake's runs: at rest at a pressure, or where dither lets it settle."""
+"""Starts of the motorcycle brake's runs: at rest at a pressure, or settled under dither."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def case_from_rest(
     """Return a run that starts in equilibrium.
 
     ``mode``: quantity that the stimulus commands; ``p_start``: pressure at the start [Pa];
-    ``changes``: further parameters that the experiment sets; ``timing``: ``settle``, ``keep`` and
+    ``changes``: other parameters that the experiment sets; ``timing``: ``settle``, ``keep`` and
     ``record`` of the case [s].
     """
     changed = par.replace({"drive.mode": mode, **(changes or {})})
@@ -63,10 +63,10 @@ def smoothing(par: MotorcycleParameters) -> dict[str, float]:
     return {"smoothing": 1.0 / par.ecu.dither.f_dit}
 
 
-# --- Where dither lets the pressure settle
+# --- Settling under dither
 
 _ROUNDS, _TOLERANCE = 12, 2e-3
-_WINDOW = 0.2  # of the settling time: the mean is taken over it
+_WINDOW = 0.2  # of the settling time: averaging window
 _SUBSTEPS, _LONGEST = 50, 20e-6  # substeps per sample time at least, and their longest length [s]
 
 
@@ -74,8 +74,8 @@ def settled_start(p: float, par: MotorcycleParameters, settle: float) -> float:
     """Return the frictionless equilibrium [Pa] whose current lets the pressure settle at ``p``.
 
     Under dither the asymmetric friction shifts the mean pressure by several bar from the
-    equilibrium without friction. Each run of the settling time corrects the current by
-    the ratio of the pressures of the run before.
+    frictionless equilibrium. Each run over the settling time corrects the current by the
+    pressure ratio of the previous run.
 
     ``p``: required mean pressure [Pa]; ``settle``: settling time [s] of a run.
 

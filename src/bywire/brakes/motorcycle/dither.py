@@ -1,4 +1,4 @@
-"""Dithers of the motorcycle brake: tried on the nonlinear model, compared, and chosen."""
+"""Dithers of the motorcycle brake: trials on the nonlinear model, comparison and choice."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ from bywire.synthesis.study import Cut, variable
 
 Par = MotorcycleParameters
 
-_LEAST = 4  # samples in a period, the fewest that show a triangle
+_LEAST = 4  # samples per period, the fewest that show a triangle
 
 
 def admissible_frequencies(par: Par, low: float, high: float, count: int) -> list[float]:
@@ -122,9 +122,9 @@ def needed_gain(par: Par, f: float, p: float) -> float:
 
     .. math:: A_{dit} = \frac{T_{brk,p} + T_{brk,n}}{2 \eta_g K_e r(f)}
 
-    with the reach r: the mean current settles in the middle of the dead band. Against the ECU's
-    own eqs. (18) and (19), which take the apply direction alone, neither efficiency nor
-    attenuation, and what the ECU believes of the friction.
+    with the reach r: the mean current settles in the middle of the dead band. The ECU's own
+    eqs. (18) and (19), in contrast, use only the apply direction and the ECU's estimate of the
+    friction. They include neither efficiency nor attenuation.
     """
     amplitude = 0.5 * dead_band(par, p) / reach(par, f, p)
     return amplitude / float(dither.breakaway_current(p, par.ecu.est_par))
@@ -138,7 +138,7 @@ def _efficiency(par: Par) -> float:
 
 FIGURES = {
     "stuck": ("1", "share of the time stuck"),
-    "band": ("1", "dead band left"),
+    "band": ("1", "remaining dead band"),
     "ripple_sensor": ("Pa", "ripple at the sensor, p-p"),
     "ripple_caliper": ("Pa", "ripple at the caliper, p-p"),
     "current_rms": ("A", "dither's motor current, rms"),
@@ -156,9 +156,9 @@ _STEP = 20e-6
 class Trial:
     """Settings of a trial.
 
-    ``settle``, ``window``: time [s] until the pressure loop has settled, and over which figures are
-    taken, rounded down to whole periods of each dither; ``approach``: distance [Pa] from which the
-    pressure is approached, from below and from above.
+    ``settle``, ``window``: time [s] for the pressure loop to settle, and for measuring the figures,
+    rounded down to whole periods of each dither; ``approach``: distance [Pa] from which the
+    pressure loop approaches the pressure, from below and from above.
     """
 
     settle: float = 4.0
@@ -190,9 +190,9 @@ def tried(
     Raises
     ------
     ParameterError
-        When a pressure cannot be held, or a value is out of range.
+        When the brake cannot hold a pressure, or a value is out of range.
     SolverError
-        When a trajectory leaves the numbers.
+        When a trajectory diverges.
     """
     controlled = par.replace({"drive.mode": "pressure"})
     pairs = [(g, f) for g in gains for f in frequencies]
@@ -257,17 +257,17 @@ def _figures(par: Par, values: Array, periods: int, samples: int) -> dict[str, f
 def _ripple(pressure: Array, samples: int) -> float:
     """Return the dither's ripple: the median over all periods of the span of the pressure.
 
-    If dither is too weak to free the piston, the integral part of the controller does so now and
-    then. The median leaves these jumps out.
+    If dither is too weak to free the piston, the controller's integral part does so occasionally.
+    The median ignores these jumps.
     """
     return float(np.median(np.ptp(pressure.reshape(-1, samples), axis=1)))
 
 
 def area_ratios(par: Par, designs: Sequence[tuple[float, float]]) -> list[float]:
-    """Return the area of each design's loop of current over pressure, over that without dither.
+    """Return each design's loop area (current over pressure), relative to the area without dither.
 
-    Loops are averaged over one dither period. Most of what is left is delay rather than friction,
-    and shrinks with the ramp's slope.
+    Loops are averaged over one dither period. Most of the remaining area is delay rather than
+    friction, and shrinks with the ramp's slope.
 
     ``designs``: gain and frequency [Hz] of each dither.
     """
@@ -298,7 +298,7 @@ COSTS = ("ripple_caliper", "current_share", "duty_share")
 
 NAMES = {
     "stuck": "share of the time stuck",
-    "band": "dead band left",
+    "band": "remaining dead band",
     "ripple_caliper": "ripple at the caliper",
     "current_share": "current limit",
     "duty_share": "duty cycle's limit",
@@ -313,11 +313,11 @@ class Least:
     Parameters
     ----------
     gain
-        Of the dither's law; NaN where none on the grid does.
+        Gain of the dither's law; NaN if none on the grid is enough.
     binding
-        Which of `OVERCOMES` requires that gain.
+        The figure of `OVERCOMES` that requires that gain.
     exceeded
-        Which of `COSTS` it then exceeds.
+        Figures of `COSTS` beyond their limits at that gain.
     figures
         All figures at that gain, interpolated.
     """
@@ -329,7 +329,7 @@ class Least:
 
 
 def least(gains: Array, figures: Figures, limits: Mapping[str, float]) -> Least:
-    """Return the weakest dither that overcomes the friction, from there on upward.
+    """Return the weakest dither that overcomes the friction at its gain and all higher ones.
 
     ``gains``: shape (n,), ascending; ``figures``: name -> values at these gains, shape (n,);
     ``limits``: largest value of each of `OVERCOMES` and `COSTS`.
@@ -352,7 +352,7 @@ def _at_gain(
 
 
 def crossing(gains: Array, values: Array, limit: float) -> float:
-    """Return the gain above which values stay within a limit, linear between points; NaN for none.
+    """Return the gain above which values stay within a limit, linear between points, or NaN.
 
     Examples
     --------
@@ -372,7 +372,7 @@ def crossing(gains: Array, values: Array, limit: float) -> float:
 
 @dataclass(frozen=True)
 class Candidate:
-    """The least gain of one frequency that is enough at every pressure.
+    """The least sufficient gain of one frequency for all pressures.
 
     ``gain``: NaN if none on the grid is enough; ``decisive``: index of the pressure that requires
     that gain; ``binding``: which of `OVERCOMES` requires it; ``price``: copper power [W], mean over
@@ -389,7 +389,7 @@ class Candidate:
 
     @property
     def verdict(self) -> str:
-        """Reason against the candidate; empty if it is admissible."""
+        """Reason to reject the candidate; empty if it is admissible."""
         if math.isnan(self.gain):
             return f"{NAMES[self.binding]}: no gain is enough"
         return ", ".join(NAMES[name] for name in self.exceeded)
@@ -403,7 +403,7 @@ def candidates(
     Parameters
     ----------
     figures
-        Of every pressure: name -> values, shape (gains, frequencies).
+        For every pressure: name -> values, shape (gains, frequencies).
     """
     count = next(iter(figures[0].values())).shape[1]
     return [
@@ -471,15 +471,15 @@ def figures_of(par: Par, grid: Grid, report: Report) -> list[Mapping[str, Array]
 def mapped(
     par: Par, grid: Grid, figures: Sequence[Mapping[str, Array]], limits: Mapping[str, float]
 ) -> xr.Dataset:
-    """Return all figures, the worst over the pressures, and the least gain that is enough.
+    """Return all figures, the worst over the pressures, and the least sufficient gain.
 
     Returns
     -------
     xarray.Dataset
         Dimensions ``pressure``, ``gain``, ``frequency``: the variables of `FIGURES`; without
         pressure as ``worst_NAME``; ``least_gain`` and ``least_copper`` over pressure and
-        frequency, NaN where no gain is enough; ``predicted_gain`` likewise and ``reach`` over
-        frequency, of linear models alone.
+        frequency, NaN if no gain is enough; ``predicted_gain`` likewise and ``reach`` over
+        frequency, from linear models alone.
     """
     dims = ("pressure", "gain", "frequency")
     gains = np.asarray(grid.gains)
@@ -529,7 +529,7 @@ def mapped(
 
 
 def by_frequency(grid: Grid, each: list[Candidate]) -> Cut:
-    """Return the gain that is enough at every pressure, its price, and the limits it exceeds."""
+    """Return the least gain for all pressures, its price, and the limits that it exceeds."""
     names = ("gain", "price", "ripple")
     units = {"price": "W", "ripple": "Pa"}
     words = {
@@ -548,7 +548,7 @@ def by_frequency(grid: Grid, each: list[Candidate]) -> Cut:
 
 
 def by_pressure(par: Par, data: xr.Dataset) -> Cut:
-    """Return the least dither of every pressure, each at the frequency where it costs least."""
+    """Return the least dither of every pressure, each at its cheapest frequency."""
     rows: dict[str, list[float]] = {}
     for k, p in enumerate(data["pressure"].values):
         copper = data["least_copper"].values[k]
@@ -589,7 +589,7 @@ def by_pressure(par: Par, data: xr.Dataset) -> Cut:
 
 
 def law(par: Par, data: xr.Dataset, best: int, grid: Grid) -> list[Kpi]:
-    """Return the friction that the ECU must assume so that gain 1 is just enough."""
+    """Return the friction that the ECU must assume for a gain of 1 to be just enough."""
     f = grid.frequencies[best]
     p, est = np.asarray(grid.pressures), par.ecu.est_par
     current = np.array([float(breakaway_current(pressure, est)) for pressure in p])
@@ -651,8 +651,8 @@ class DitheredPlant:
 def dithered_plant(par: Par, p: float, step: float | None = None) -> DitheredPlant:
     """Return the linear model from current demand to pressure at a mean pressure under dither.
 
-    Seals that rub more while applying than while releasing shift the mean pressure: the current
-    that holds it is found by Newton's iteration with the model's own gain.
+    Seals that rub more while applying than while releasing shift the mean pressure. A Newton
+    iteration with the model's own gain finds the current that holds it.
 
     Parameters
     ----------
@@ -666,8 +666,8 @@ def dithered_plant(par: Par, p: float, step: float | None = None) -> DitheredPla
     Raises
     ------
     SolverError
-        When no motion repeats itself, or none has this mean pressure: where the dither leaves
-        the piston stuck, pressure does not follow the current.
+        When no motion is periodic, or none has this mean pressure: if the piston stays stuck under
+        dither, pressure does not follow the current.
     """
     driven = par.replace({"drive.mode": "current", "adc.law": "ideal"})
     dither = driven.ecu.dither
@@ -679,7 +679,7 @@ def dithered_plant(par: Par, p: float, step: float | None = None) -> DitheredPla
         start = Point(MotorcycleBrake(), driven, state, memory, stimulus)
         model = periodic_model(start, ("i_set",), "p_mc", whole, step)
         require_moving(model)
-        gain = model.steady_gain  # negative or zero: the orbit is not the one that attracts
+        gain = model.steady_gain  # zero or negative: this orbit is not attracting
         if not gain > 0.0:
             break
         if abs(model.mean - p) <= _CLOSE * p:

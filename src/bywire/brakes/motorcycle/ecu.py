@@ -12,7 +12,7 @@ from bywire.plant import adc, current_sensor, h_bridge, pedal, pressure_sensor
 
 
 class Stimulus(NamedTuple):
-    """External inputs; which of them act depends on ``drive.mode``."""
+    """External inputs; ``drive.mode`` determines which of them act."""
 
     p_set: Annotated[float, Signal("Pa", "pressure demand", 2e6)]
     pedal_force: Annotated[float, Signal("N", "foot force", 100.0)]
@@ -51,14 +51,14 @@ class Memory(NamedTuple):
 
 
 class Readings(NamedTuple):
-    """Filtered sensor readings at the converter's inputs, shares of the spans."""
+    """Filtered sensor readings at the converter's inputs, as shares of the spans."""
 
     p: Annotated[float, Signal("1", "pressure reading", 0.5)]
     i: Annotated[float, Signal("1", "current reading", 0.5)]
 
 
 def tick(readings: Readings, m: Memory, u: Stimulus, par: MotorcycleParameters) -> Memory:
-    """Run the ECU once: convert, pressure control in the modes that have it, current control."""
+    """Run the ECU once: conversion, pressure control if the mode has it, current control."""
     p_share = adc.sample(readings.p, u.noise_p, par.adc)
     i_share = adc.sample(readings.i, u.noise_i, par.adc)
     p_before = m.p_meas
@@ -83,8 +83,8 @@ def tick(readings: Readings, m: Memory, u: Stimulus, par: MotorcycleParameters) 
 def source_tick(readings: Readings, m: Memory, u: Stimulus, par: MotorcycleParameters) -> Memory:
     """Hold the value of an ideal source, and the readings of the converters.
 
-    Only the recording reads these, and ``shown`` rounds them: a rounding within the tick would
-    interrupt derivatives as if it were in a loop.
+    Only the recording uses the readings, and ``shown`` rounds them. Rounding within the tick would
+    interrupt derivatives as in a closed loop.
     """
     p_share = adc.noisy(readings.p, u.noise_p, par.adc)
     i_share = adc.noisy(readings.i, u.noise_i, par.adc)
@@ -129,7 +129,7 @@ def _derated(m: Memory, par: MotorcycleParameters) -> Memory:
 def _demand(m: Memory, p_before: float, u: Stimulus, par: MotorcycleParameters) -> Memory:
     """Return the memory with a new unfiltered current demand.
 
-    ``p_before``: pressure of the last tick; its scheduled gains hand over to the new ones.
+    ``p_before``: pressure of the last tick, for a bumpless change of the scheduled gains.
     """
     if par.drive.mode == "current":
         return m._replace(i_star=u.i_set)

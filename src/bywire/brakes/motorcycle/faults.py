@@ -77,13 +77,13 @@ FAULTS = (
     ),
     Fault(
         "battery.lost",
-        "battery lost, the bridge opens: no current",
+        "loss of battery, the bridge opens: no current",
         _source("current-source"),
         NAME,
     ),
     Fault(
         "battery.shorted",
-        "battery lost, the bridge shorts the motor",
+        "loss of battery, the bridge shorts the motor",
         _source("voltage-source"),
         NAME,
     ),
@@ -95,7 +95,7 @@ FAULTS = (
     ),
     Fault(
         "gear.jammed",
-        "the screw jams where it is",
+        "the screw jams at its position",
         lambda par, value: {"seal.T_pr": value},
         NAME,
         "N*m",
@@ -103,7 +103,7 @@ FAULTS = (
     ),
     Fault(
         "caliper.knocked-back",
-        "the disc has pushed the pads back, by the gap",
+        "the disc has pushed the pads back by a gap",
         _knocked_back,
         NAME,
         "m",

@@ -97,7 +97,7 @@ class Rational:
         return np.where(np.asarray(t) >= 0.0, y.real, 0.0)
 
     def transfer_function(self) -> Any:
-        """Return it as ``control.TransferFunction`` [Pa/A]."""
+        """Return the model as ``control.TransferFunction`` [Pa/A]."""
         import control
 
         return control.tf(list(self.num), list(self.den), name=self.name)
@@ -171,9 +171,9 @@ def coefficients(par: Par, p: float = 20e5, x: float | None = None) -> Coefficie
     Parameters
     ----------
     par
-        Parameters; other laws of gear, fluid and caliper give their own slopes.
+        Parameters; other laws of gear, fluid and caliper contribute their own slopes.
     p
-        Pressure [Pa]; acts with air or a nonlinear caliper only.
+        Pressure [Pa]; matters only with air or a nonlinear caliper.
     x
         Piston travel [m]; ``x_nominal`` by default.
 
@@ -187,7 +187,7 @@ def coefficients(par: Par, p: float = 20e5, x: float | None = None) -> Coefficie
     """
     if par.caliper.leak == "leaking" or par.port.law == "leaking":
         raise ParameterError(
-            "eq. (14) has no leak, with which no pressure is an equilibrium: set caliper.leak = "
+            "eq. (14) has no leak, because a leak has no equilibrium: set caliper.leak = "
             "'tight' and port.law = 'makeup', or simulate",
             name="caliper.leak" if par.caliper.leak == "leaking" else "port.law",
             value="'leaking'",
@@ -327,8 +327,8 @@ def with_slow_pair(K: float, tau_L: float, T_1: float, T_2: float, T_L: float) -
     K
         Static gain [Pa/A].
     tau_L, T_L
-        Time constants of the slow zero and pole [s]: a response that creeps on after its step
-        where tau_L < T_L, one that overshoots and falls where tau_L > T_L.
+        Time constants of the slow zero and pole [s]. The step response creeps upward if
+        tau_L < T_L; it overshoots and falls if tau_L > T_L.
     T_1, T_2
         Time constants of the brake [s].
 
@@ -350,7 +350,7 @@ def with_slow_pair(K: float, tau_L: float, T_1: float, T_2: float, T_L: float) -
 
 
 # --- The ECU's laws, current loop and pressure loop
-# Scheduled gains are frozen at the pressure: the schedule is bumpless, so that it does not enter
+# Scheduled gains are frozen at the pressure: the schedule is bumpless, so it does not affect
 # the linear model of small motion about an equilibrium.
 
 Rotor = Literal["locked", "free"]
@@ -372,7 +372,7 @@ def pressure_demand(ecu: EcuParameters, p: float) -> LinearModel:
 
 
 def _pressure_control(ecu: EcuParameters, p: float) -> LinearModel:
-    """Return the PID at a pressure p from set point and measured one [Pa] to the demand [A]."""
+    """Return the PID at a pressure p from set point and measurement [Pa] to the demand [A]."""
     return _pressure_law(
         "pressure-control",
         ecu,
@@ -423,8 +423,8 @@ def demand_filter(ecu: EcuParameters) -> LinearModel:
 def current_loop(par: MotorcycleParameters, p: float, rotor: Rotor) -> LinearModel:
     """Return the loop from the set point ``i_set`` to the currents ``i`` and ``i_meas``.
 
-    PI at the ECU's sample time, battery and bridge, winding, anti-alias filter; the converter's
-    resolution is left out.
+    The model includes the PI at the ECU's sample time, battery and bridge, winding, and anti-alias
+    filter. It neglects the converter's resolution.
 
     Parameters
     ----------
@@ -433,7 +433,7 @@ def current_loop(par: MotorcycleParameters, p: float, rotor: Rotor) -> LinearMod
     p
         Pressure of the operating point [Pa].
     rotor
-        ``"locked"``: no back-EMF, as where friction holds the shaft. ``"free"``: the shaft moves
+        ``"locked"``: no back-EMF, as if friction held the shaft. ``"free"``: the shaft moves
         against the brake, without dry friction.
     """
     driven = par.replace({"drive.mode": "current-direct", "adc.law": "ideal"})
@@ -493,8 +493,8 @@ BAND = (0.02, 200.0)
 class PressureLoop:
     """PID, low-pass, sampled current loop and anti-alias filters around a linear brake.
 
-    The current loop is that of the locked rotor: a model from current to pressure has the
-    rotor's motion in it. Converters are ideal, the dither is off.
+    The current loop has a locked rotor, because a model from current to pressure already contains
+    the rotor's motion. Converters are ideal, the dither is off.
 
     ``par``: parameters of ECU, motor, supply and filters; ``brake``: transfer function from motor
     current to pressure [Pa/A]; ``p``: pressure of the operating point [Pa].
@@ -556,7 +556,7 @@ class PressureLoop:
         return margin(self.open, BAND)
 
     def _inner(self, frequencies: Array, output: int) -> Complex:
-        """Return the way from the current demand to an output of the plant."""
+        """Return the response from the current demand to an output of the plant."""
         plant = self.plant.response(frequencies)[:, :, 0]
         pi = _gain(current_control(self.par.ecu), frequencies)
         current = pi / (1.0 + pi * plant[:, 0])
@@ -570,8 +570,8 @@ def _gain(law: LinearModel, frequencies: Array) -> Complex:
 def cancelling_pi(loop: PressureLoop, T: float, crossover: float) -> PressureLoop:
     """Return the loop with a PI whose zero cancels a time constant T [s].
 
-    ``loop``: the loop whose PID is replaced; ``T``: time constant [s]; ``crossover``: frequency
-    [Hz] at which the gain shall be 1.
+    ``loop``: loop whose PID the PI replaces; ``T``: time constant [s]; ``crossover``: required
+    crossover frequency [Hz].
     """
     unit = loop.par.replace(
         {"ecu.pressure.k_p": 1e-5, "ecu.pressure.k_i": 1e-5 / T, "ecu.pressure.k_d": 0.0}
@@ -583,7 +583,7 @@ def cancelling_pi(loop: PressureLoop, T: float, crossover: float) -> PressureLoo
 
 
 def _single(block: Any, output: str) -> LinearModel:
-    """Return a block with one pressure in and one out as a plain model."""
+    """Return a block with one input and one output pressure as a plain model."""
     states = tuple(f"x{k}" for k in range(block.nstates))
     return LinearModel(
         "pressure-loop",
@@ -612,7 +612,7 @@ def _companion(brake: Rational) -> tuple[Array, Array, Array]:
 
 
 def _cascade(motor: LinearModel, brake: Rational, f_aa: float) -> LinearModel:
-    """Return motor, brake and the pressure channel's filter in a row, continuous.
+    """Return motor, brake and the pressure channel's filter in series, in continuous time.
 
     The motor's first state is the current that drives the brake.
     """

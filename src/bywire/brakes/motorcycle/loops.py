@@ -27,7 +27,7 @@ CAUSES: Mapping[str, Mapping[str, Any]] = {
 
 
 def _require_pressed(p: float) -> None:
-    """Refuse a released brake: a piston that just touches its stop has no linear model."""
+    """Reject a released brake: a piston that just touches its stop has no linear model."""
     if p == 0.0:
         raise not_valid(
             "pressure", "0 bar", "> 0 bar", "because the piston just touches its stop at 0 bar"
@@ -35,7 +35,7 @@ def _require_pressed(p: float) -> None:
 
 
 def current_point(par: ParameterSet, value: float) -> Point:
-    """Return the brake held at a pressure [Pa] by its current."""
+    """Return the brake that its current holds at a pressure [Pa]."""
     _require_pressed(value)
     closed = cast(MotorcycleParameters, par.replace({"drive.mode": "current-direct"}))
     state, memory = state_at(value, closed), memory_at(value, closed)
@@ -60,7 +60,7 @@ def pressure_point(par: ParameterSet, value: float) -> Point:
 
 
 def dither_frequency(par: ParameterSet) -> Sequence[float]:
-    """Return the dither's frequency [Hz]; nothing without dither."""
+    """Return the dither's frequency [Hz]; empty without dither."""
     dither = cast(MotorcycleParameters, par).ecu.dither
     return () if dither.waveform == "off" else (dither.f_dit,)
 

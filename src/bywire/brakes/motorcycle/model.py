@@ -2,9 +2,6 @@
 
 Source: A. Dardanelli, G. Alli, S. M. Savaresi, "Modeling and control of an electro-mechanical
 brake-by-wire actuator for a sport motorbike", 5th IFAC Symposium on Mechatronic Systems, 2010.
-
-Source: A. Dardanelli, G. Alli, S. M. Savaresi, "Modeling and control of an electro-mechanical
-brake-by-wire actuator for a sport motorbike", 5th IFAC Symposium on Mechatronic Systems, 2010.
 """
 
 from __future__ import annotations
@@ -48,7 +45,7 @@ class MotorcycleBrake(Assembly[MotorcycleParameters, ecu.Memory]):
     """Model of the brake.
 
     One dry friction (seals, and the gear when ``directional``) on the shaft; the chamber's
-    pressure is one-sided because the reservoir makes up what is missing; two end stops.
+    pressure is one-sided because the reservoir makes up missing fluid; two end stops.
     """
 
     name: ClassVar[str] = "motorcycle-brake"
@@ -62,7 +59,7 @@ class MotorcycleBrake(Assembly[MotorcycleParameters, ecu.Memory]):
     supply = Part(battery_supply, loss="E_supply")
     motor = Part(dc_motor, loss="E_copper")
     gear = Part(ball_screw_gear, output={"x": "x_mc"})
-    # Eq. (8) returns energy where the load drives the gear, at most what it took before.
+    # Eq. (8) returns energy when the load drives the gear, at most the energy taken before.
     E_gear = Integral(
         "J",
         "loss of gear and screw, signed",
@@ -81,7 +78,7 @@ class MotorcycleBrake(Assembly[MotorcycleParameters, ecu.Memory]):
     port = Part(reservoir_port)
     E_port = Integral(
         "J",
-        "energy out through port and leak, less that of fluid that warms",
+        "energy out through port and leak, minus that of warming fluid",
         role=Role("sink", "port, leak, warming fluid", returns="any"),  # which expands
     )
     W_shaft = Integral("J", "work of the motor on the gear")
@@ -200,7 +197,7 @@ class MotorcycleBrake(Assembly[MotorcycleParameters, ecu.Memory]):
         w.load = force + end_stop.load(w.stop.f)
         w.gear.u = ball_screw_gear.Input(w.torque, w.load, 0.0)
         w.seal.u = seal_friction.Input(w.gear.x.omega, w.chamber.x.p)
-        # Value-only: the brake does not feel its sensors.
+        # Value-only: the sensors do not act on the brake.
         w.pressure_sensor.u = pressure_sensor.Input(_gauge(w) + w.par.fluid.p_atm)
         seen = pressure_sensor.reading(w.pressure_sensor.u.p, w.pressure_sensor.par)
         w.filter_p.u = anti_alias_filter.Input(seen)
@@ -249,7 +246,7 @@ class MotorcycleBrake(Assembly[MotorcycleParameters, ecu.Memory]):
         friction, makeup = w.reaction
         F_stop = end_stop.load(w.stop.f)
         ideal = w.par.drive.mode in IDEAL
-        # With motor_heat.law = 'off' this flow is zero: it costs no operation of its own.
+        # With motor_heat.law = 'off' this flow is zero and needs no operation.
         heat, cold = motor_heat.stored(w.heat.x, w.heat.par), w.heat.par.law == "off"
         return {
             **ecu.shown(w.m, w.par),
@@ -268,7 +265,7 @@ class MotorcycleBrake(Assembly[MotorcycleParameters, ecu.Memory]):
         }
 
     def tasks(self, par: Par) -> tuple[Task, ...]:
-        """Return the ECU's task, or that of an ideal source."""
+        """Return the task of the ECU, or of an ideal source."""
         if par.drive.mode in IDEAL:
             return (Task("source", par.drive.T_source, _source),)
         return (Task("ecu", par.ecu.T_s, _ecu),)
@@ -343,7 +340,7 @@ def _gauge(w: MotorcycleBrake) -> float:
 def _dry_losses(w: MotorcycleBrake, friction: float) -> tuple[float, float]:
     """Return the powers lost in the gear's and in the seals' dry friction.
 
-    The seals take what their friction allows at this speed, the gear the rest.
+    The seals' share is their friction at this speed; the gear has the rest.
     """
     total = -friction * w.gear.x.omega
     if w.gear.par.law == "paper":

@@ -1,4 +1,4 @@
-"""What time traces of the motorcycle brake show."""
+"""Panels of the motorcycle brake's time traces."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Parameters of the motorcycle brake: one group per element, the ECU's apart."""
+"""Parameters of the motorcycle brake: one group per element, and a separate group for the ECU."""
 
 from __future__ import annotations
 
@@ -49,8 +49,8 @@ class DriveParameters(ParameterSet):
     """Source of the motor's command.
 
     ``pressure`` and ``pedal`` close the pressure loop; ``current`` is a demand to the current
-    loop through dither and low-pass filter, ``current-direct`` past both; ``voltage-source`` and
-    ``current-source`` are ideal sources at the motor, open loop.
+    loop through dither and low-pass filter, ``current-direct`` bypasses both; ``voltage-source``
+    and ``current-source`` are ideal sources at the motor, open loop.
     """
 
     mode: DriveMode
@@ -143,9 +143,9 @@ class MotorcycleParameters(ParameterSet):
 
     @model_validator(mode="after")
     def _sticks_on_fluid_alone(self) -> MotorcycleParameters:
-        """Refuse a sticking piston with laws of the caliper's fluid.
+        """Reject a sticking piston together with laws of the caliper's fluid.
 
-        They need the pressure of the fluid, but the state is that of the pads.
+        These laws need the pressure of the fluid, but the state is the pressure of the pads.
         """
         fluid_laws = {
             "caliper.leak": self.caliper.leak == "leaking",
@@ -156,7 +156,8 @@ class MotorcycleParameters(ParameterSet):
         if self.piston.law == "sticking" and clashing:
             value = self.value(clashing[0])
             raise ValueError(
-                f"piston.law = 'sticking' does not go with {clashing[0]} = {value!r}: the pressure "
-                "of the fluid then differs from that of the pads, and is no state; set one of both"
+                f"piston.law = 'sticking' excludes {clashing[0]} = {value!r}: the fluid's "
+                "pressure then differs from that of the pads and is not a state; change one of "
+                "them"
             )
         return self

@@ -1,4 +1,4 @@
-"""The motorcycle brake's plant at an operating point: behind its current loop, or its bridge."""
+"""The motorcycle brake's plant at an operating point, driven by current or by voltage."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _AT = (_PRESSURE, _CURRENT)
 def linear(
     par: ParameterSet, at: PlantPoint, mode: str, inputs: tuple[str, ...], outputs: tuple[str, ...]
 ) -> LinearModel:
-    """Return the exact plant with a source in place of the ECU.
+    """Return the exact plant with an ideal source instead of the ECU.
 
     ``par``, ``at``: parameters and operating point; ``mode``: value of ``drive.mode``; ``inputs``,
     ``outputs``: as in `linearize`.

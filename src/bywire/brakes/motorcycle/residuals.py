@@ -1,8 +1,8 @@
 """Residuals that the motorcycle's ECU can compute from its sensors and demands.
 
 Source of the relations: Dardanelli et al. (2010), eqs. (1), (4) and (8). The paper's rear brake has
-no sensor of angle or stroke. Residuals count only while the demand is steady: during a step all of
-them are large in a healthy brake, and thresholds above that would detect nothing.
+no sensor of angle or stroke. Residuals count only while the demand is steady. During a step all of
+them are large even in a healthy brake, and higher thresholds would detect nothing.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _STEADY = 0.3  # s after which a step of the demand is over: several times the l
 
 
 def _period(par: Any, dt: float) -> int:
-    """Return the rows of a period of the dither."""
+    """Return the number of rows in a dither period."""
     period: float = 1.0 / par.ecu.dither.f_dit
     return max(round(period / dt), 1)
 

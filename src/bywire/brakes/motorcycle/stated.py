@@ -1,4 +1,4 @@
-"""What Dardanelli et al. (2010) state of pressures and currents: Figs. 3 and 6, and section 6."""
+"""Pressures and currents stated by Dardanelli et al. (2010): Figs. 3 and 6, and section 6."""
 
 from __future__ import annotations
 

@@ -42,20 +42,20 @@ _NOTHING = zeros(Memory)
 
 
 def travel_at(p: float, par: Par) -> float:
-    r"""Return the piston travel [m] at a pressure [Pa], filled slowly from the retracted end.
+    r"""Return the piston travel [m] at a pressure [Pa], after slow filling from the retracted end.
 
     With port law "dead-stroke" the filling begins where the port is covered.
 
     Notes
     -----
-    The piston displaces what compresses the chamber and what fills the caliper. The chamber's
-    fluid, F = A_mc (s_mc - x) - V_g(p) with the gas V_g, then follows
+    The displaced volume compresses the chamber and fills the caliper. The chamber's fluid,
+    F = A_mc (s_mc - x) - V_g(p) with the gas V_g, then follows
 
     .. math:: \frac{dF}{dp} = -\frac{F}{\beta} - C_{pd}(p), \quad
         F(p) = F(0) e^{-p/\beta} - \int_0^p C_{pd}(s) e^{(s - p)/\beta} ds
 
-    The integral runs from node to node of the caliper's table, by Gauss, whose points are never
-    nodes: there the slope jumps.
+    Gauss quadrature integrates from node to node of the caliper's table. Its points never coincide
+    with nodes, where the slope jumps.
     """
     cylinder, fluid, port, pads = par.master_cylinder, par.fluid, par.port, par.caliper
     start = cylinder.x_rest + reservoir_port.closed_at(port)
@@ -85,7 +85,7 @@ def _nodes(
     return tuple(looked_at), ops.exp(-p / beta)
 
 
-_kept_nodes = lru_cache(maxsize=64)(_nodes)  # a study rarely varies what they depend on
+_kept_nodes = lru_cache(maxsize=64)(_nodes)  # a study rarely varies their parameters
 
 
 def highest_pressure(par: Par) -> float:
@@ -117,7 +117,7 @@ def state_at(p: float, par: Par, current: float | None = None) -> Any:
     Raises
     ------
     ParameterError
-        When the piston would have to stand beyond its end stop, or the pressure is negative.
+        When the piston would be beyond its end stop, or the pressure is negative.
     """
     x = par.master_cylinder.x_rest if p == 0 else travel_at(p, par)
     if not ops.is_symbol(x) and not (p >= 0 and x <= par.master_cylinder.x_end):

@@ -1,4 +1,4 @@
-"""Warnings of the motorcycle brake that no element can give: those of its stops."""
+"""Warnings of the whole motorcycle brake, which no element can give: its stops."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def _pulled_back(recording: xr.Dataset, choices: Mapping[str, Any]) -> list[str]
     text = f"at the end {i:.3g} A pull the piston against its retracted stop"
     if choices["port.law"] == "makeup":
         text += (
-            f", with {p / 1e5:.2g} bar left in the caliper: the compensation port is not modeled "
-            "(port.law = 'makeup'), port.law = 'dead-stroke' lets the fluid out"
+            f", with {p / 1e5:.2g} bar remaining in the caliper: port.law = 'makeup' does not "
+            "model the compensation port; port.law = 'dead-stroke' lets the fluid out"
         )
     return [text]

@@ -1,4 +1,4 @@
-"""A two-wheeler whose brakes by wire are known by the loop of their pressure alone."""
+"""A two-wheeler with brakes by wire, each modeled by its pressure loop alone."""
 
 from bywire.core.brake import Brake
 

@@ -38,7 +38,7 @@ def rolling_case(
     heat: Mapping[str, Any] | None = None,
     vehicle: Vehicle = (TwoWheelerByWire, at_speed),
 ) -> Case:
-    """Return a run that begins rolling at a speed [m/s]; the rider demands from time zero on.
+    """Return a run that starts rolling at a speed [m/s]; the rider brakes from t = 0 on.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ def rolling_case(
     heat
         Temperatures of the brakes at the start, by their parts; cold by default.
     vehicle
-        Its model, and ``at_speed(v, par, heat)`` of that model.
+        Vehicle model, and its ``at_speed(v, par, heat)``.
     """
     model, rolling = vehicle
     changed = par.replace(dict(changes or {}))
@@ -74,12 +74,12 @@ def rolling_case(
 
 
 def on_surface(first: SurfaceName, further: SurfaceName | None = None) -> dict[str, float]:
-    """Return the parameters of a road of a surface, and of a further one; "own" changes none."""
+    """Return the parameters of a road with one or two surfaces; "own" changes none."""
     return laid("vehicle.road", first, further)
 
 
 def vehicle_of(run: xr.Dataset) -> VehicleParameters:
-    """Return the parameters of the vehicle with which a recording was made, whatever its brakes."""
+    """Return the vehicle parameters of a recording, for any kind of brakes."""
     par = getattr(run, "par", None)
     if par is not None:
         vehicle: VehicleParameters = par.vehicle

@@ -123,7 +123,7 @@ def tick(r: Readings, m: Memory, u: Stimulus, par: Par) -> Memory:
             abs_r=on_rear.acts,
         )
     if par.ecu.lift == "pi":
-        # Last, as it needs the demand that it lowers: the road's adhesion may rise soon.
+        # Last, because it needs the demand that it lowers: the road's adhesion may rise soon.
         seen = lift_pi.Input(m.a_hat, u.p_f_set, p_f, before.p_f_most)
         lift, out = lift_pi.output(
             lift_pi.State(m.lift_integral), seen, par.ecu.T_s, par.ecu.front_lift
@@ -198,7 +198,7 @@ def _by_rules(
 
 
 def _measured(r: Readings, m: Memory, par: Par) -> Memory:
-    """Return the memory with speeds, slips and deceleration as the ECU sees them."""
+    """Return the memory with speeds, slips and deceleration as the ECU estimates them."""
     T, ecu, vehicle = par.ecu.T_s, par.ecu, par.vehicle
     front = wheel_speed.output(
         wheel_speed.State(m.edge_f, m.age_f, m.omega_f_hat),

@@ -1,6 +1,6 @@
 """Failures of the two-wheeler other than those that its elements declare.
 
-A whole brake at the rear adds the failures that it declares, under its path.
+A whole brake at the rear adds its declared failures, under its path.
 """
 
 from __future__ import annotations

@@ -32,9 +32,9 @@ _LOADED = 1.0  # N: a wheel off the ground leaves no mark
 def road_marks(run: xr.Dataset, par: VehicleParameters) -> Figure:
     """Draw the speeds of a two-wheeler and of its treads over the road, and the marks on it.
 
-    Surfaces are bands with their names. A tyre marks the road where it slides, black where its
-    wheel stands, each at the place of its contact. Speeds are drawn at the place of the front
-    wheel, which is zero at time zero. The end of the ideal stop is drawn on a single surface.
+    Surfaces are bands with their names. A tyre leaves a mark at its contact where it slides, black
+    where its wheel is locked. The abscissa of the speeds is the place of the front wheel, which is
+    zero at t = 0. On a single surface, the figure also shows the end of the ideal stop.
 
     Parameters
     ----------
@@ -105,12 +105,12 @@ def _draw_surfaces(axes: Axes, par: VehicleParameters, span: tuple[float, float]
 
 
 def _draw_marks(axes: Axes, run: xr.Dataset, place: Array, wheel: str, row: int) -> None:
-    """Mark where a tyre slides, and where its wheel stands."""
+    """Mark where a tyre slides, and where its wheel is locked."""
     slides = (run[f"sliding_{wheel}"].values > 0.5) & (run[f"N_{wheel}"].values > _LOADED)
     stands = slides & (run[f"omega_{wheel}"].values == 0)
     marks = (
         ("tyre slides", slides, style.VERMILLION, _LANE, 2.0),
-        ("wheel stands", stands, style.BLACK, 0.5 * _LANE, 2.1),
+        ("wheel locked", stands, style.BLACK, 0.5 * _LANE, 2.1),
     )
     for label, flags, color, width, order in marks:
         spans = [(begin, end - begin) for begin, end in phases(place, flags)]

@@ -1,4 +1,4 @@
-"""Life of the front brake's pads: they thin, and fluid from the reservoir fills their place.
+"""Life of the front brake's pads: they wear, and fluid from the reservoir fills their place.
 
 The seals retract the pistons by the same travel after every stop: the clearance is constant, and
 wear draws fluid through the compensating port instead. See `bywire.life`.
@@ -50,7 +50,7 @@ def effects(
     par: TwoWheelerParameters,
     wear: WearParameters,
 ) -> Effects:
-    """Return the wear by each stop, and the fluid that follows the pistons of all faces."""
+    """Return the wear of each stop, and the fluid that follows the pistons of all faces."""
     work = figures["disc_energy"] * figures["disc_share_front"] / 100.0
     before, after = warm_stops.temperatures(work, stops["pause"], stops["T_air"], wear.disc)
     thinned = warm_stops.thinned(work, before, after, wear.pads)
@@ -84,7 +84,7 @@ TWO_WHEELER_PADS = Life(
         "V_reservoir": Slow("m**3", "fluid in the reservoir"),
         "work": Slow("J", "friction work in front", is_drawn=False),
     },
-    limits={"lining": Slow("m", "lining left"), "fluid": Slow("m**3", "fluid left")},
+    limits={"lining": Slow("m", "remaining lining"), "fluid": Slow("m**3", "remaining fluid")},
     begin=begin,
     follows=follows,
     effects=effects,

@@ -1,4 +1,4 @@
-"""Slip loop of a wheel, around the loop of its brake's pressure."""
+"""Slip loop of a wheel, around the pressure loop of its brake."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ SPEED = Quantity("speed", "m/s", 20.0)
 
 
 def point(par: ParameterSet, value: float) -> Point:
-    """Return the wheel held at its set slip while the vehicle keeps a speed [m/s].
+    """Return the wheel at its slip set point while the vehicle keeps a speed [m/s].
 
     Raises
     ------
     ParameterError
-        When the speed is not positive, or the slip lies beyond the peak, where slip is unstable
+        When the speed is not positive, or the slip is beyond the peak, where slip is unstable
         without control.
     """
     SPEED.require_positive(value)

@@ -1,4 +1,4 @@
-"""The two-wheeler with two pressure loops for brakes."""
+"""The two-wheeler with two pressure loops as brakes."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Par = TwoWheelerParameters
 
 
 class TwoWheelerByWire(HotBrakes[TwoWheelerParameters, ecu.Memory]):
-    """A vehicle whose brakes follow their demands as loops of second order."""
+    """A vehicle whose brakes follow their demands as second-order loops."""
 
     name: ClassVar[str] = "two-wheeler-by-wire"
     Memory: ClassVar = ecu.Memory
@@ -113,7 +113,7 @@ class TwoWheelerByWire(HotBrakes[TwoWheelerParameters, ecu.Memory]):
         return (Task("ecu", par.ecu.T_s, tick),)
 
     def remarks(self, recording: Any, par: Par) -> list[str]:
-        """Return remarks on a slip that is held far below that of the largest adhesion."""
+        """Return remarks on a slip far below the slip of the largest adhesion."""
         if par.ecu.abs != "pi" or par.ecu.mix.alpha < 1.0:
             return []
         ways, x = par.vehicle.road, recording["x"].values
@@ -143,7 +143,7 @@ class TwoWheelerByWire(HotBrakes[TwoWheelerParameters, ecu.Memory]):
 
 
 def at_speed(v: float, par: Par, heat: Mapping[str, Any] | None = None) -> tuple[Any, ecu.Memory]:
-    """Return the vehicle rolling at a speed [m/s], brakes open, its ECU awake.
+    """Return the vehicle rolling at a speed [m/s], brakes open, ECU running.
 
     ``heat``: temperatures of the brakes by their parts, see `cold_start`, which is the default.
     """
@@ -153,7 +153,7 @@ def at_speed(v: float, par: Par, heat: Mapping[str, Any] | None = None) -> tuple
 
 
 def awake(v: float, vehicle: VehicleParameters, T_s: float) -> ecu.Memory:
-    """Return the memory of an ECU with a sample time [s], while the vehicle rolls [m/s]."""
+    """Return the memory of a running ECU with a sample time [s], at a vehicle speed [m/s]."""
     front, rear = v / vehicle.front_wheel.r, v / vehicle.rear_wheel.r
     return zeros(ecu.Memory)._replace(
         v_hat=v,

@@ -57,7 +57,7 @@ class EcuParameters(ParameterSet):
     lift: Literal["off", "pi"]
     """control of the rear wheel's lift"""
     sees: Literal["estimated", "known"]
-    """whether speed and slip are estimated"""
+    """source of speed and slip: estimated from the sensors, or known exactly"""
     p_rate: PressureRate
     """fastest build-up of a demand"""
     wheel_speed: wheel_speed.Parameters
@@ -80,7 +80,7 @@ class TwoWheelerParameters(ParameterSet):
 
 
 class WholeBrakeParameters(ParameterSet):
-    """A brake with all of its actuator, the disc, and its heat."""
+    """A brake with its whole actuator, its disc, and its heat."""
 
     actuator: MotorcycleParameters
     disc: brake_disc.Parameters

@@ -1,7 +1,7 @@
 """Residuals by which the two-wheeler's ECU can detect failures of encoders and accelerometer.
 
-A standing wheel, or a speed that no vehicle can have, is either a slip that control ends within a
-moment, or a wrong reading.
+A locked wheel, or a speed that is impossible for the vehicle, is either a short-lived slip that
+control ends, or a wrong reading.
 """
 
 from __future__ import annotations

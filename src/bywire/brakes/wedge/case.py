@@ -34,7 +34,7 @@ def case_from_parked(
     Parameters
     ----------
     changes
-        Parameters that the experiment sets; the command mode is "moment" unless given.
+        Parameters that the experiment sets; the command mode is "moment" by default.
     timing
         ``settle``, ``keep`` and ``record`` of the case [s].
     """
@@ -53,7 +53,7 @@ def case_from_parked(
 
 
 def steps(t: Array, levels: Mapping[float, float]) -> Array:
-    """Return a signal that takes each level from its time [s] on, and zero before the first."""
+    """Return a signal with each level from its time [s] on, and zero before the first."""
     y = np.zeros(t.shape)
     for begin, level in sorted(levels.items()):
         y = np.where(t >= begin - 1e-9, level, y)
@@ -61,7 +61,7 @@ def steps(t: Array, levels: Mapping[float, float]) -> Array:
 
 
 def parameters_of(run: xr.Dataset) -> WedgeParameters:
-    """Return the parameters with which a recording was made."""
+    """Return the parameters of a recording."""
     par = getattr(run, "par", None)  # plain rows carry them
     if isinstance(par, WedgeParameters):
         return par
@@ -74,7 +74,7 @@ def release_time(run: xr.Dataset, begin: float, name: str = "release_time") -> K
     pressing = np.flatnonzero(after["F_N"].values > 0)
     value, note = math.nan, ""
     if not after.sizes["time"]:
-        note = "no row of the recording lies after the demand"
+        note = "the recording has no row after the demand"
     elif not pressing.size:
         note = "the pads do not press when the demand falls"
     elif pressing[-1] + 1 == after.sizes["time"]:
@@ -96,7 +96,7 @@ def parking_time(run: xr.Dataset, begin: float, name: str = "parking_time") -> K
 
 
 def first(run: xr.Dataset, name: str, level: float) -> float:
-    """Return when a signal first exceeds a level [s], interpolated; NaN where it never does."""
+    """Return the time [s] at which a signal first exceeds a level, interpolated, or NaN."""
     t, y = run["time"].values, run[name].values
     above = np.flatnonzero(y > level)
     if above.size == 0:
@@ -108,13 +108,13 @@ def first(run: xr.Dataset, name: str, level: float) -> float:
 
 
 def mean(run: xr.Dataset, name: str, begin: float, end: float) -> float:
-    """Return the mean of a signal between two times [s]; NaN where no row lies there."""
+    """Return the mean of a signal between two times [s]; NaN without a row in between."""
     values = run[name].sel(time=slice(begin - 1e-9, end + 1e-9)).values
     return float(values.mean()) if values.size else math.nan
 
 
 def swing(run: xr.Dataset, name: str, begin: float, end: float) -> float:
-    """Return the peak-to-peak value of a signal between two times [s]; NaN where no row is."""
+    """Return the peak-to-peak value of a signal between two times [s]; NaN without a row."""
     values = run[name].sel(time=slice(begin - 1e-9, end + 1e-9)).values
     return float(np.ptp(values)) if values.size else math.nan
 
@@ -126,7 +126,7 @@ def along_disc(run: xr.Dataset) -> xr.Dataset:
     """Return a recording whose moments and speed count positive in the disc's first direction."""
     if not float(run["Omega"].values[0]) < 0:
         return run
-    # Not negated, which would make negative zeros.
+    # Subtraction, because negation would give negative zeros.
     return run.assign({name: 0.0 - run[name] for name in ("M_B", "y_M", "Omega")})
 
 
@@ -144,20 +144,20 @@ FRICTIONLESS = {
     "wedge_friction.mu_R": 0.0,
     "encoder.law": "ideal",
 }
-"""changes that leave the pads on the disc as the brake's only dry friction; without friction the
-counts of an encoder would keep the shafts moving"""
+"""changes that remove all dry friction except the pads' on the disc; the encoder is ideal, because
+without friction its counts would keep the shafts moving"""
 
 
 def distinct(
     name: Callable[[float], str], unit: str = ""
 ) -> Callable[[tuple[float, ...]], tuple[float, ...]]:
-    """Return a validator of values whose names in labels must differ."""
+    """Return a validator of values that need different names in labels."""
 
     def check(values: tuple[float, ...]) -> tuple[float, ...]:
         names = [name(value) for value in values]
         for k, value in enumerate(values):
             if names[k] in names[:k]:
-                raise ValueError(f"{value:g}{unit} is given twice: leave one out")
+                raise ValueError(f"{value:g}{unit} appears twice: remove one of them")
         return values
 
     return check
@@ -189,8 +189,8 @@ def with_friction(par: WedgeParameters, mu_B: float, known: bool) -> dict[str, A
     Parameters
     ----------
     known
-        Whether the moment controller knows the coefficient and assumes the slope that belongs to
-        it. That slope keeps its ratio to the brake's, so that a mismatch remains.
+        Whether the moment controller knows the coefficient and assumes the corresponding slope.
+        That slope keeps its ratio to the brake's slope, so an existing mismatch remains.
     """
     slope = par.control.moment.slope_hat
     if known and par.wedge.mu_B > 0:

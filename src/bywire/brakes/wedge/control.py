@@ -19,7 +19,7 @@ _MOST = Limited("control.position.i_max")
 
 
 class Stimulus(NamedTuple):
-    """External inputs; which of them act depends on ``command.mode``."""
+    """External inputs; ``command.mode`` determines which of them act."""
 
     M_set: Annotated[float, Signal("N*m", "moment demand", 300.0)]
     theta_1_set: Annotated[float, Signal("rad", "demanded angle 1", 3.0)]
@@ -138,7 +138,7 @@ def position_tick(r: Readings, m: Memory, u: Stimulus, par: WedgeParameters) -> 
 
 
 def adjuster_tick(m: Memory, u: Stimulus, par: WedgeParameters) -> Memory:
-    """Run the adjuster once: a turn takes it one sample, and the moment control follows."""
+    """Run the adjuster once: a turn takes one sample, and the moment control follows."""
     law = par.control.adjuster
     braking = ops.where(u.M_set > par.control.moment.M_on, 1.0, 0.0)
     x, out = gap_adjusting.output(
@@ -157,7 +157,7 @@ def adjuster_tick(m: Memory, u: Stimulus, par: WedgeParameters) -> Memory:
 
 
 def current_tick(m: Memory, u: Stimulus, par: WedgeParameters) -> Memory:
-    """Hand the demanded currents, within their limit, to the drives."""
+    """Pass the limited current demands to the drives."""
     on = 1.0 - u.power_off
     m = _derated(m, par)
     most = par.control.position.i_max if par.control.derating.law == "off" else m.i_most
@@ -166,9 +166,10 @@ def current_tick(m: Memory, u: Stimulus, par: WedgeParameters) -> Memory:
 
 
 def _derated(m: Memory, par: WedgeParameters) -> Memory:
-    """Return the memory with the limit of both currents that the hotter motor sets.
+    """Return the memory with the limit of both currents, from the hotter motor.
 
-    The drives follow their demands, which therefore serve as the currents: these are not measured.
+    The controllers do not measure the currents. The drives follow their demands, which serve
+    instead.
     """
     control, T = par.control.derating, par.control.T_fast
     if control.law == "off":
@@ -197,11 +198,11 @@ def _derated(m: Memory, par: WedgeParameters) -> Memory:
 
 
 def _position(m: Memory, par: WedgeParameters) -> position_pd.Parameters:
-    """Return the position control with the current limit that derating sets."""
+    """Return the position control with the current limit from derating."""
     control = par.control.position
     if par.control.derating.law == "off":
         return control
-    # Not validated: the limit may be a symbol, and it is only smaller.
+    # Not validated: the limit may be a symbol, and it can only be smaller.
     return position_pd.Parameters.model_construct(**{**dict(control), "i_max": m.i_most})
 
 
@@ -210,7 +211,7 @@ def _references(m: Memory, r: Readings, u: Stimulus, par: WedgeParameters) -> Me
     if par.command.mode == "position":
         return m._replace(theta_1_ref=u.theta_1_set, theta_2_ref=u.theta_2_set)
     advanced = m.theta_ref + _allowed(m, par) * par.control.T_fast
-    # While the power is off the reference follows the shafts, so that nothing jumps afterwards.
+    # While the power is off, the reference follows the shafts for a bumpless return.
     common = ops.where(m.on > 0.5, advanced, 0.5 * (r.theta_1 + r.theta_2))
     position, offset = par.control.position, par.control.offset
     F_M = position.K_hat * (m.i_1_ref + m.i_2_ref) / offset.k_hat
@@ -223,9 +224,9 @@ def _references(m: Memory, r: Readings, u: Stimulus, par: WedgeParameters) -> Me
 
 
 def _allowed(m: Memory, par: WedgeParameters) -> float:
-    """Return the speed of the common reference [rad/s]: 0 where both motors are on their limit.
+    """Return the speed of the common reference [rad/s]: 0 if both motors are at their limit.
 
-    Anti-wind-up: a reference that moved on would have to return all the way at a release.
+    Anti-windup: a reference that moved on would have to return all the way at a release.
     """
     limit, speed = _position(m, par).i_max, m.direction * m.rate
     push = ops.where(speed < 0, -1.0, 1.0)

@@ -27,7 +27,7 @@ class Command(NamedTuple):
 
 
 class Demand(NamedTuple):
-    """Demands of a rig's operator on one motor, whose mode selects the one that acts."""
+    """A rig operator's demands on one motor; its mode selects the active one."""
 
     theta: Annotated[float, Signal("rad", "demanded angle", 3.0)]
     i: Annotated[float, Signal("A", "demanded current", 5.0)]

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FARTHEST = 60.0
-"""largest brake factor on the ordinate: at the neutral point it has no bound"""
+"""largest brake factor on the ordinate: it is unbounded at the neutral point"""
 
 
 @dataclass(frozen=True)
@@ -43,8 +43,8 @@ class WedgeForces:
         if sizes == {0} or len(sizes) != 1:
             raise ParameterError(
                 "WedgeForces: mu_B, free, rising and falling have "
-                f"{', '.join(str(len(column)) for column in columns)} entries: give as many of "
-                "each, at least one"
+                f"{', '.join(str(len(column)) for column in columns)} entries: they need equal "
+                "lengths, at least one"
             )
 
 

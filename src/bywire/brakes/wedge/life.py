@@ -1,4 +1,4 @@
-"""Life of the wedge brake's pads: they thin, the clearance grows, the caliper gets stiffer.
+"""Life of the wedge brake's pads: they wear, the clearance grows, the caliper gets stiffer.
 
 Stops of a car's corner supply the friction work; see `bywire.life`.
 """
@@ -40,7 +40,7 @@ class WearParameters(ParameterSet):
     h_min: Length
     """thickness at which pads are replaced"""
     M_full: SomeMoment
-    """moment that the wedge's travel must allow"""
+    """moment that must be possible within the wedge's travel"""
 
 
 def begin(par: WedgeCornerParameters, wear: WearParameters) -> Values:
@@ -68,10 +68,10 @@ def effects(
     par: WedgeCornerParameters,
     wear: WearParameters,
 ) -> Effects:
-    """Return the wear by each stop: both pads thin equally, and the clearance grows by both.
+    """Return the wear of each stop: both pads wear equally, and the clearance grows by both.
 
     The readings between stops are the travel to contact, estimated by the moment control, minus
-    the clearance, and the temperature of the disc when a stop begins.
+    the clearance, and the temperature of the disc at the start of a stop.
     """
     work = figures["energy_braked"]
     before, after = warm_stops.temperatures(work, stops["pause"], stops["T_air"], wear.disc)
@@ -86,7 +86,7 @@ def effects(
 def between(
     z: Values, readings: Mapping[str, float], par: WedgeCornerParameters, wear: WearParameters
 ) -> Values:
-    """Return the slow states with the stiffness of thinner pads, and after the adjuster."""
+    """Return the slow states with the stiffness of the worn pads, after the adjuster has turned."""
     worn = wear.h_new - z["h_pad"]
     z = {**z, "K_cal": pad_wear.stiffness(par.caliper.K_cal, worn, wear.pads)}
     if wear.mechanism == "none":
@@ -108,7 +108,7 @@ def between(
 
 
 def left(z: Values, par: WedgeCornerParameters, wear: WearParameters) -> Values:
-    r"""Return the remaining lining, wedge travel, and clearance until a hot disc drags.
+    r"""Return the remaining lining, wedge travel, and clearance before a hot disc drags.
 
     .. math:: x_{stop} \tan\alpha - c - F_N/K_{CAL}
 
@@ -125,7 +125,7 @@ def left(z: Values, par: WedgeCornerParameters, wear: WearParameters) -> Values:
 
 WEDGE_PADS = Life(
     name="wedge-pads",
-    summary="pads of the wedge brake on a car's corner, until they or the wedge's travel end",
+    summary="pads of the wedge brake on a car's corner, until lining or wedge travel is used up",
     experiment="corner-stop",
     wear=WearParameters,
     values={
@@ -146,13 +146,13 @@ WEDGE_PADS = Life(
         "clearance": Slow("m", "clearance"),
         "clicks": Slow("1", "teeth turned"),
         "K_cal": Slow("N/m", "stiffness"),
-        "counted": Slow("1", "teeth as the adjuster counts them", is_drawn=False),
+        "counted": Slow("1", "teeth counted by the adjuster", is_drawn=False),
         "wide": Slow("1", "applications in a row with too much clearance", is_drawn=False),
         "work": Slow("J", "friction work", is_drawn=False),
     },
     limits={
-        "lining": Slow("m", "lining left"),
-        "travel": Slow("m", "travel left"),
+        "lining": Slow("m", "remaining lining"),
+        "travel": Slow("m", "remaining travel"),
         "free": Slow("m", "free when hot"),
     },
     begin=begin,

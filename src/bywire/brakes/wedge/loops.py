@@ -50,16 +50,16 @@ _CAUSES: Causes = {
 _DRIVE_LIMITS = (
     Saturation("sat_current", ("i_1_ref", "i_2_ref"), ("control.position.i_max", "drive.i_max")),
 )
-"""current demand of a drive at the controller's or at its own limit"""
+"""current demand of a drive at the controller's or the drive's limit"""
 
 
 def beyond(name: str, value: str, need: str, limit: str) -> InputError:
-    """Build the error of an operating point that needs more than a limit gives.
+    """Build the error for an operating point that exceeds a limit.
 
     Parameters
     ----------
     name, value
-        Quantity that gives the operating point, and its value with its unit.
+        Quantity that defines the operating point, and its value with its unit.
     need
         Quantity that the brake would need, with its unit.
     limit
@@ -78,18 +78,18 @@ COUNTED = ", counted against the disc's rotation whatever its direction"
 def moment_point(par: ParameterSet, value: float) -> Point:
     """Return the brake that holds a moment [N m].
 
-    Screws and references stand where the wedge is in balance: the actuation force presses both
-    contacts of the heart, and the currents hold it.
+    Screws and references are where the wedge is in equilibrium: the actuation force presses on both
+    contacts of the brake heart, and the currents hold it.
 
     Raises
     ------
     ParameterError
         When the moment is not positive, beyond the wedge's travel or the drives' current, or
-        when the disc stands.
+        when the disc is at rest.
 
     Notes
     -----
-    The wedge stands on the side to which the disc turns; the moment counts in that direction.
+    The wedge is on the side to which the disc turns; the moment counts in that direction.
     """
     closed = cast(WedgeParameters, par.replace({"command.mode": "moment"}))
     _require_braking(value, closed)
@@ -107,7 +107,7 @@ def moment_point(par: ParameterSet, value: float) -> Point:
 def _require_braking(value: float, par: WedgeParameters) -> None:
     MOMENT.require_positive(value, COUNTED)
     if not ops.is_symbol(par.flywheel.Omega_0) and par.flywheel.Omega_0 == 0.0:
-        speed, advice = "the speed at which the loop works", "as a standing disc gives no moment"
+        speed, advice = "the speed at which the loop works", "as a disc at rest gives no moment"
         raise not_valid("flywheel.Omega_0", "0 rad/s", speed, advice)
 
 
@@ -137,7 +137,7 @@ MOMENT_LOOP = Loop(
     causes=_CAUSES,
     band=(0.5, 100.0),
     amplitudes=(0.5, 20.0),
-    # The law depends on f_c over slope_hat alone: one of them is enough.
+    # The law depends only on f_c/slope_hat: varying one of them is enough.
     tunables={"control.moment.f_c": (0.3, 60.0)},
     sustained=_CAUSES["run-out, disc slowing"],
     proof="moment-pulses",
@@ -155,7 +155,7 @@ _TUNABLES: Mapping[str, tuple[float, float]] = {
     "control.position.zeta": (0.2, 4.0),
     "control.position.c": (0.0, 1.0),
 }
-"""gains of the law -> lowest and highest values worth trying"""
+"""gains of the law -> range of the search"""
 
 
 def _two_motor_loop(
@@ -195,7 +195,7 @@ def position_point(par: ParameterSet, value: float) -> Point:
     Raises
     ------
     ParameterError
-        When the pads would press.
+        When the pads would touch the disc.
     """
     closed = cast(WedgeParameters, par.replace({"command.mode": "position"}))
     free = min(travel_for(0.0, closed), closed.wedge.x_stop)
@@ -259,8 +259,8 @@ SCREW_POSITION_LOOP = Loop(
 def force_point(par: ParameterSet, value: float) -> Point:
     """Return both motors in position control, at rest with a force [N] between their screws.
 
-    Each stands half the compression away from the middle. The controllers have no integral part:
-    the references lie further away, by the angle errors that give the holding currents.
+    Each is half the compression away from the middle. The controllers have no integral part, so
+    the references are further away, by the angle errors that produce the holding currents.
 
     Raises
     ------
@@ -327,7 +327,7 @@ FORCE_FIGHT = _two_motor_loop(
 FORCE_AGAINST = Loop(
     name="force-against",
     assembly="wedge-brake",
-    summary="force between two motors, one excited against the other that holds, 5 kHz",
+    summary="force between two motors, one excited while the other holds, 5 kHz",
     at=_FORCE,
     inputs=("theta_1_set",),
     output="F",
@@ -344,7 +344,7 @@ FORCE_AGAINST = Loop(
 
 # --- Current loop of the drives, the shaft clamped
 
-_SAMPLE = 20e-6  # sample time of the demand [s]; an analog drive takes it without sampling
+_SAMPLE = 20e-6  # sample time of the demand [s]; the analog drive itself does not sample
 _STEP = 5e-6  # substep [s]
 
 

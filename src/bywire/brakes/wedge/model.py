@@ -34,7 +34,7 @@ from bywire.plant import (
 
 Par = WedgeParameters
 LOSSES = {"E_copper": "copper_loss", "E_damping": "damping_loss"}
-"""energies that the motors lose, both together"""
+"""energies lost in both motors together"""
 _SLOW = motor_heat.State._fields
 _SUPPLY = Role(
     "source", "supply", whole="W_electric", rest="E_standby", rest_label="standby of the drives"
@@ -269,7 +269,7 @@ class WedgeBrake(Assembly[WedgeParameters, control.Memory]):
         motors = drive_train.power(w.motor_1) + drive_train.power(w.motor_2)
         heat_1 = motor_heat.stored(w.heat_1.x, w.heat_1.par)
         heat_2 = motor_heat.stored(w.heat_2.x, w.heat_2.par)
-        # Heat that is off costs no operation: cold motors show the zero heat to the air.
+        # Without the heat model no operation is needed: cold motors have zero heat to the air.
         cold, none = w.par.motor_heat.law == "off", w.flow.E_motor_air
         given = w.flow.W_electric + w.flow.W_disc + w.flow.W_runout
         adjusts = w.par.adjuster.law != "none"
@@ -353,7 +353,7 @@ def readings(x: Any, par: Par) -> control.Readings:
 
 
 def _stuck(w: WedgeBrake) -> float:
-    """Return 1 where shafts and wedge stand still, else 0."""
+    """Return 1 while shafts and wedge are at rest, else 0."""
     shafts = ops.fabs(w.motor_1.x.omega) + ops.fabs(w.motor_2.x.omega)
     return ops.where(shafts == 0, 1.0, 0.0) * ops.where(w.body.x.v == 0, 1.0, 0.0)
 
@@ -368,7 +368,7 @@ def _contact_number(forces: brake_heart.Forces) -> float:
 
 
 def travel_for(F_N: float, par: Par) -> float:
-    """Return the wedge travel [m] at a normal force [N], run-out left out."""
+    """Return the wedge travel [m] at a normal force [N], without run-out."""
     return (par.caliper.clearance + wedge_caliper.travel(F_N, par.caliper)) / wedge.slope(par.wedge)
 
 

@@ -36,7 +36,7 @@ BRAKING = Panels(
             saturated="on the software rate limit",
         ),
         Panel("current", (Trace("i_1"), Trace("i_2", Role.SECOND)), limit="drive.i_max"),
-        # The rig measures the filtered power; the peaks of the raw power would hide it.
+        # The rig measures the filtered power; peaks of the raw power would hide it.
         Panel("power", (Trace("P_meas"), Trace("P_in", Role.SECOND))),
         Panel("force", (Trace("F_M"),)),
         _MODE,

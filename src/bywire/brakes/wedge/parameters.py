@@ -1,4 +1,4 @@
-"""Parameters of the wedge brake and its rigs: one group per element, and the controllers'."""
+"""Parameters of the wedge brake and its rigs: groups for the elements and the controllers."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ class RigParameters(ParameterSet):
     """Fixtures and operating modes of the rigs; the assembled brake does not have them."""
 
     mode_1: Literal["position", "current"]
-    """quantity that the operator commands of motor 1"""
+    """quantity of motor 1 that the operator commands"""
     mode_2: Literal["position", "current"]
-    """quantity that the operator commands of motor 2"""
+    """quantity of motor 2 that the operator commands"""
     load: Literal["dummy", "screw"]
     """load of a single motor: a solid dummy shaft, or a preloaded screw"""
     clamp: Literal["open", "closed"]

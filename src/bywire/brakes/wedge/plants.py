@@ -34,10 +34,10 @@ SMOOTH: dict[str, Any] = {
     "flywheel.runout": 0.0,
     "flywheel.law": "driven",
 }
-"""parameters without the torques and travels that alternate within small motions, which a linear
-model leaves out"""
+"""parameters without torques and travels that alternate within small motions, which a linear model
+neglects"""
 _FREE = 1e3
-_RECORDING = ("phi", "y_P")  # states that are only shown
+_RECORDING = ("phi", "y_P")  # states for display only
 
 
 def point(par: Par, F_N: float, speed: float = 0.0) -> Point:
@@ -46,9 +46,9 @@ def point(par: Par, F_N: float, speed: float = 0.0) -> Point:
     Parameters
     ----------
     par
-        Parameters; cogging and run-out are left out, the disc keeps its speed.
+        Parameters; the model neglects cogging and run-out, and the disc keeps its speed.
     F_N
-        Normal force [N], > 0; the wedge stands on the side to which the disc turns.
+        Normal force [N], > 0; the wedge is on the side to which the disc turns.
     speed
         Speed of both motors [rad/s], positive toward clamping: a moment of steady motion.
 
@@ -66,7 +66,7 @@ def point(par: Par, F_N: float, speed: float = 0.0) -> Point:
         limit = f"wedge.x_stop = {smooth.wedge.x_stop * 1e3:g} mm"
         raise beyond("normal force", f"{F_N:g} N", f"{x * 1e3:.3g} mm of wedge travel", limit)
     turning = -1.0 if smooth.flywheel.Omega_0 < 0.0 else 1.0
-    # Beyond the limit the drives do not respond: the search finds the currents that it would take.
+    # Beyond the limit the drives do not respond: the search finds the required currents.
     free = smooth.replace({"drive.i_max": _FREE * smooth.drive.i_max})
     state, memory = equilibrium(
         WedgeBrake(),
@@ -116,13 +116,13 @@ def full(par: Par, F_N: float, friction: Friction = "removed", speed: float = 0.
     par, F_N, speed
         As in `point`.
     friction
-        As in `linearize`; the pads slide on the turning disc in any case.
+        As in `linearize`; the pads always slide on the turning disc.
 
     Returns
     -------
     LinearModel
         Inputs: both current demands; outputs: normal force, travels, braking moment, and the
-        moment that the sensor shows.
+        moment by the sensor.
     """
     at = point(par, F_N, speed)
     kinds: dict[str, Friction] = dict.fromkeys(WedgeBrake.frictions, friction)
@@ -141,14 +141,14 @@ def full(par: Par, F_N: float, friction: Friction = "removed", speed: float = 0.
 
 
 def mechanical(whole: LinearModel, *, corrected: bool = False) -> LinearModel:
-    r"""Return rotors and wedge, the currents at their demands.
+    r"""Return rotors and wedge, with the currents equal to their demands.
 
     Parameters
     ----------
     whole
         From `full`.
     corrected
-        Whether the drives' first lag behind the rotors counts: the integral part has to follow
+        Whether to include the drives' first lag behind the rotors. The integral part has to follow
         the back-EMF, which acts like an inertia :math:`K_T^2/(V_{dc} k_i)` of each rotor.
 
     Returns
@@ -190,7 +190,7 @@ def rigid(mechanical: LinearModel, par: Par) -> LinearModel:
         1.0,
         par.wedge.M_W,
     ]
-    # Travel and velocity are projected apart: a length has no mass.
+    # Travel and velocity are projected separately: a length has no mass.
     split = np.zeros((2, 6))
     for row, columns in ((0, [0, 2, 4]), (1, [1, 3, 5])):
         split[row, columns] = T[columns, row] * np.array(masses)[columns]
@@ -208,7 +208,7 @@ def rigid(mechanical: LinearModel, par: Par) -> LinearModel:
 
 
 def rigid_rate(par: Par) -> complex:
-    """Return the closed form of the rigid model's rate [1/s]: real above the neutral point."""
+    """Return the closed form of the rigid model's growth rate [1/s]: real above neutral."""
     tan, k = wedge.slope(par.wedge), roller_screw.slope(par.screw)
     M = par.wedge.M_W + (par.motor_1.J_M + par.motor_2.J_M) / k**2
     square = par.caliper.K_cal * tan * (par.wedge.mu_B - tan) / M
@@ -247,7 +247,7 @@ def whole(par: ParameterSet, at: PlantPoint) -> LinearModel:
 
 
 def mechanical_model(par: ParameterSet, at: PlantPoint) -> LinearModel:
-    """Return six states, with the inertia that the drives seem to add to the rotors."""
+    """Return the model of six states, with the drives' apparent inertia on the rotors."""
     return mechanical(whole(par, at), corrected=True)
 
 
@@ -257,7 +257,7 @@ def with_its_outputs(par: ParameterSet, at: PlantPoint) -> LinearModel:
 
 
 def rigid_model(par: ParameterSet, at: PlantPoint) -> LinearModel:
-    """Return two states: travel and velocity of the wedge; both motors are driven as one."""
+    """Return the model of two states, travel and velocity of the wedge; both motors act as one."""
     body = rigid(mechanical(whole(par, at)), cast(WedgeParameters, par))
     return body.together(INPUTS)
 
@@ -278,7 +278,7 @@ WHOLE = Plant(
 MECHANICAL = Plant(
     name="wedge-mechanical",
     assembly="wedge-brake",
-    summary="rotors and wedge alone: drives quasi-static, with the inertia they seem to add",
+    summary="rotors and wedge alone: quasi-static drives with their apparent inertia",
     at=_AT,
     model=mechanical_model,
     band=150.0,

@@ -1,7 +1,7 @@
 """Residuals by which the wedge brake's real-time computer can detect a failure.
 
-They count while the demanded moment is steady: in a healthy brake, too, all of them are large while
-a gap is crossed or a ramp is followed.
+They count only while the demanded moment is steady. Even in a healthy brake, all of them are large
+during gap crossing and ramps.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ from bywire.core.typing import Array
 
 NAME = WedgeBrake.name
 Signals = Mapping[str, Array]
-_STEADY = 0.1  # s after which a step of the demand is over
-_AVERAGE = 10e-3  # s, over which contacts and free-play are averaged
+_STEADY = 0.1  # s: length of the transient after a step of the demand
+_AVERAGE = 10e-3  # s: averaging window for contacts and free-play
 _TURN = 0.1  # s, about a turn of the disc, whose run-out is in the moment
-_IN_MOMENT = 0.2  # s after which the build-up of a moment is over
+_IN_MOMENT = 0.2  # s: length of a moment's build-up
 
 
 def _steady(signals: Signals, dt: float, values: Array) -> Array:
@@ -57,14 +57,14 @@ def _in_moment(signals: Signals, dt: float, values: Array) -> Array:
 
 
 def _stiffness(signals: Signals, par: Any, dt: float) -> Array:
-    """Return the measured moment minus that of the angle beyond contact, by the assumed slope."""
+    """Return the measured moment minus the moment from angle and assumed slope."""
     expected = par.control.moment.slope_hat * (np.abs(signals["theta_ref"]) - signals["theta_c"])
     off = mean_of_the_last(signals["M_meas"] - expected, round(_TURN / dt))
     return _in_moment(signals, dt, np.abs(off))
 
 
 def _still(signals: Signals, par: Any, dt: float) -> Array:
-    """Return the negative ripple of the moment over a turn: zero where the sensor is stuck."""
+    """Return the negative ripple of the moment over a turn: zero if the sensor is stuck."""
     rows, M = round(_TURN / dt), signals["M_meas"]
     return _in_moment(signals, dt, least_of_the_last(M, rows) - largest_of_the_last(M, rows))
 
@@ -81,7 +81,7 @@ RESIDUALS = (
     ),
     Residual(
         "moment-angle",
-        "measured moment and that of the angle",
+        "measured moment and moment from the angle",
         NAME,
         "N*m",
         ("M_meas", "theta_ref", "theta_c", "mode"),

@@ -31,7 +31,7 @@ Count = Annotated[int, Unit("1", 11.0), Field(ge=3, le=101)]
 
 
 _PHASES = tuple(0.5 * math.pi * k for k in range(4))
-"""angles of the disc [rad] at which a run begins"""
+"""angles of the disc [rad] at which the runs start"""
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class Demand:
     moment
         Step of the demand [N m].
     t_90
-        Time [s] in which the sensor must show 90 % of it, at every friction coefficient.
+        Time [s] within which the sensor must show 90 % of it, at every friction coefficient.
     t_hold, t_release
         Lengths [s] of the demand and of the release after it.
     mu_B
@@ -51,10 +51,10 @@ class Demand:
     known
         Whether the moment control knows the coefficient, so that its crossover is unchanged.
     enforced
-        Whether the speed of the reference enforces the time; otherwise the pads' closing speed is
-        that of the given brake.
+        Whether the speed of the reference enforces the time; otherwise the pads close as fast as
+        with the given brake.
     whole
-        Whether the power of the release counts too, or that of build-up and hold alone.
+        Whether the power of the release also counts, or only that of build-up and hold.
     phases
         Angles of the disc [rad] at which the runs begin.
     """
@@ -74,16 +74,16 @@ class Demand:
 class Answer:
     """Response of a design, per friction coefficient, shape (cases,); the worst of all phases.
 
-    The phase of the disc's run-out at the stop is chance: the study tries several.
+    The phase of the disc's run-out at the stop is random: the study tries several.
 
     Parameters
     ----------
     closing_speed
         Largest speed at which the reference closes the pads [m/s], the same for all cases.
     t_90
-        Time to 90 % of the demand [s]; NaN where it is not reached.
+        Time to 90 % of the demand [s]; NaN if not reached.
     filtered, instantaneous
-        Largest power at the drives' input [W], with and without the rig's filter, where it counts.
+        Largest counted power at the drives' input [W], with and without the rig's filter.
     release
         Largest power during the release [W], with the rig's filter.
     current
@@ -122,7 +122,7 @@ class Answer:
 Efficiency = Literal["friction-angle", "as-given"]
 """constant property of the screw over the lead: the friction angle, or the efficiency"""
 _SPEEDS = ("omega_gap", "a_gap", "omega_creep", "rate_max")
-"""parameters of the moment control that set how fast the reference moves"""
+"""parameters of the moment control that set the speed of the reference"""
 _SIGNALS = (
     "y_M",
     "P_in",
@@ -135,10 +135,10 @@ _SIGNALS = (
     "E_copper",
     "E_shaft",
 )
-_FASTEST = 8.0  # largest closing speed of the search, over the least
+_FASTEST = 8.0  # largest closing speed of the search, relative to the smallest
 _ROUNDS, _TRIED = 2, 8  # rounds, and speeds tried in each between too slow and fast enough
 _SETTLE, _RECORD, _STEP = 0.05, 2e-4, 20e-6
-_LAST = 0.8  # share of the demand's time after which its end begins
+_LAST = 0.8  # share of the demand's length at which its final part begins
 _TINY = 1e-9
 
 
@@ -156,7 +156,7 @@ def redesigned(
 ) -> WedgeParameters:
     """Return the brake with another wedge slope and screw lead [m].
 
-    The pads move as before for the same time: the speeds of the reference and the travel of the
+    The motion of the pads over time is unchanged: the speeds of the reference and the travel of the
     end stops change with the ratio of pad to shaft travel, and the controller knows the design.
     The screw's efficiency follows the lead, see `efficiencies`, or is ``"as-given"``.
     """
@@ -187,8 +187,8 @@ def _efficiencies(par: WedgeParameters, lead: float) -> dict[str, float]:
         1/\eta_f - 1 = \tan(\lambda + \rho) / \tan\lambda - 1 \approx \rho / \lambda, \quad
         1 - \eta_b = 1 - \tan(\lambda - \rho) / \tan\lambda \approx \rho / \lambda
 
-    so that both losses fall with 1/lead: the friction torque by the axial force is constant. A
-    self-locking screw, of a small lead, has :math:`\eta_b = 0`.
+    so that both losses are proportional to 1/lead: the friction torque from the axial force is
+    constant. A self-locking screw, with a small lead, has :math:`\eta_b = 0`.
     """
     ratio = par.screw.lead / lead
     eta_f = 1.0 / (1.0 + (1.0 / par.screw.eta_f - 1.0) * ratio)
@@ -200,8 +200,8 @@ def answer(par: WedgeParameters, demand: Demand) -> Answer:
     """Return a brake's response at the smallest closing speed that is fast enough.
 
     The speeds of the reference have a common factor. With ``demand.enforced`` it is the smallest
-    factor with which the slowest case meets the demanded time, within 1 %. If no factor does, it
-    is the one that comes closest. Otherwise it is 1.
+    factor with which the slowest case meets the demanded time, within 1 %. If none does, it is the
+    closest factor. Without ``demand.enforced`` it is 1.
     """
     controlled = par.replace({"command.mode": "moment"})
     if not demand.enforced:

@@ -1,6 +1,6 @@
-"""Moments and powers that Roberts et al. (2003) state for their Figs. 7 to 9.
+"""Moments and powers stated by Roberts et al. (2003) for their Figs. 7 to 9.
 
-Moments that are held, reached or followed have a band: the tolerance of the comparison.
+Held, reached and tracked moments have a band: the tolerance of the comparison.
 """
 
 from __future__ import annotations

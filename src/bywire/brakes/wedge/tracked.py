@@ -97,7 +97,7 @@ RELATIONS: tuple[Relation, ...] = (
         {"y_M": "N*m", "F_M": "N"},
         _from_actuation_force,
         lambda par: np.array([par.wedge.mu_B]),
-        "wedge at rest without friction of its own. That friction biases the estimate by up to its "
+        "wedge at rest without internal friction. Such friction biases the estimate by up to its "
         "ratio to the normal force, in opposite directions while applying and releasing",
     ),
     Relation(
@@ -111,4 +111,4 @@ RELATIONS: tuple[Relation, ...] = (
         "caliper as a spring; the disc's run-out counts as noise",
     ),
 )
-"""relations by preference: the first whose signals are measured is taken"""
+"""relations in order of preference: bywire uses the first whose signals are measured"""

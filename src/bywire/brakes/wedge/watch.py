@@ -1,4 +1,4 @@
-"""Warnings about a recording of the wedge brake: stops, limits, screws that hold."""
+"""Warnings about a recording of the wedge brake: stops, limits, self-locking screws."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from bywire.core.parameters import ParameterSet
 Rows = NDArray[np.bool_]
 
 _REACHED = 0.95  # of the demanded moment
-_LONG = 0.05  # time [s] on the current limit after which a moment counts as out of reach
-_SWINGS = 10  # reversals on the current limit, each within _LONG of the last, that a step never has
+_LONG = 0.05  # time [s] at the current limit after which a moment counts as out of reach
+_SWINGS = 10  # reversals between current limits, at most _LONG apart; a step never has so many
 
 
 def warnings_of(recording: xr.Dataset, par: ParameterSet) -> list[str]:
@@ -25,7 +25,7 @@ def warnings_of(recording: xr.Dataset, par: ParameterSet) -> list[str]:
     if not {"F_end", "M_set", "i_1_ref", "i_2_ref"} <= set(recording):
         return []
     warnings = _end_stop(recording)
-    if values["command.mode"] == "moment":  # elsewhere the demanded currents are the test's own
+    if values["command.mode"] == "moment":  # in other modes the test demands the currents
         warnings += _out_of_reach(recording, values) or _not_reached(recording, values)
         warnings += _limits(recording, values)
     return warnings + _holding_screw(values)
@@ -60,7 +60,7 @@ def _limited(recording: xr.Dataset, values: Mapping[str, Any]) -> Rows:
 
 
 def _out_of_reach(recording: xr.Dataset, values: Mapping[str, Any]) -> list[str]:
-    """Warn that the current limit keeps a moment out of reach as long as it is demanded."""
+    """Warn that the current limit keeps the demanded moment out of reach."""
     begin, end = _longest(_short_of(recording, values) & _limited(recording, values))
     t, demand = recording["time"].values, recording["M_set"].values
     demanded = float(demand[begin : end + 1].max())
@@ -76,7 +76,7 @@ def _out_of_reach(recording: xr.Dataset, values: Mapping[str, Any]) -> list[str]
 
 
 def _not_reached(recording: xr.Dataset, values: Mapping[str, Any]) -> list[str]:
-    """Warn that the moment never reached the largest demand, whatever the cause."""
+    """Warn that the moment never reached the largest demand, for any reason."""
     demanded = float(recording["M_set"].values.max())
     most = float(np.abs(recording["M_B"].values).max())
     sparse = np.diff(recording["time"].values).max(initial=0.0) > _LONG  # may miss the peak
@@ -87,12 +87,12 @@ def _not_reached(recording: xr.Dataset, values: Mapping[str, Any]) -> list[str]:
     if demanded <= M_on:
         text += f", as the brake stays parked up to control.moment.M_on = {M_on:.4g} N*m"
     elif speed < values["control.moment.Omega_still"]:
-        text += ", as the disc stands"
+        text += ", as the disc is at rest"
     return [text]
 
 
 def _limits(recording: xr.Dataset, values: Mapping[str, Any]) -> list[str]:
-    """Warn that the current limit was reached in passing, or that currents swing between limits."""
+    """Warn about a briefly reached current limit, or currents that swing between limits."""
     limited, limit = _limited(recording, values), _limit(values)
     if not limited.any() or _out_of_reach(recording, values):
         return []
@@ -143,6 +143,6 @@ def _holding_screw(values: Mapping[str, Any]) -> list[str]:
     if values["screw.law"] != "load" or values["screw.eta_b"] != 0.0:
         return []
     return [
-        "screw.eta_b = 0: no load drives these screws back, so that the brake keeps its moment "
+        "screw.eta_b = 0: no load drives these screws back, so the brake keeps its moment "
         "when the power goes off"
     ]

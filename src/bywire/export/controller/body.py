@@ -1,4 +1,4 @@
-"""The body of a C function while it is being written: variables, statements, what is live."""
+"""Body of a C function under construction: variables, statements, liveness."""
 
 from __future__ import annotations
 
@@ -35,11 +35,11 @@ class Statement:
     Parameters
     ----------
     target
-        None (an empty text) where a function is called for what it changes alone.
+        None (an empty text) for a function that is called only for its side effects.
     changes
-        Memory that the function called in ``value`` changes in its place.
+        Memory that the function called in ``value`` changes in place.
     is_pointer
-        Whether the target is a pointer to what has the member.
+        Whether the target is a pointer to the owner of the member.
     """
 
     target: str
@@ -52,7 +52,7 @@ class Statement:
 
 
 def live(statements: list[Statement], result: Uses) -> list[Statement]:
-    """Return the statements that the result needs."""
+    """Return the statements that affect the result."""
     needed, kept = _locals(result), []
     for statement in reversed(statements):
         if statement.target not in needed:
@@ -80,11 +80,11 @@ class Body:
     Parameters
     ----------
     stores
-        How often every Python variable is assigned.
+        Number of assignments to every Python variable.
     memory
-        Which versions of memory there are, and which places keep theirs.
+        Versions of the memory, and the variables that keep them.
     fixed
-        Arguments that parameters alone decide: shapes of parameter sets, None of numbers.
+        Arguments that depend only on parameters: shapes of parameter sets, None for numbers.
     """
 
     structs: Structs
@@ -98,7 +98,7 @@ class Body:
     fixed: dict[str, Shape | None] = field(default_factory=dict)
 
     def fresh(self, hint: str) -> str:
-        """Return a C name that no variable has yet."""
+        """Return an unused C name."""
         name = unique(c_name(hint), self.names)
         self.names.add(name)
         return name
@@ -124,12 +124,12 @@ class Body:
             self.memory.changed(place)
 
     def is_stable(self, expr: Expr) -> bool:
-        """Return whether a text means the same further down: it reads nothing that changes."""
+        """Return whether a text has the same value further down: it reads nothing that changes."""
         changing = {use[1] for use in expr.uses if use[0] == "local"} & self.moving
         return expr.is_path and not changing and not self.memory.versions_in(expr.uses)
 
     def is_steady(self, value: Any) -> bool:
-        """Return whether parameters alone decide a number, or it is known."""
+        """Return whether a number depends only on parameters, or is known."""
         if isinstance(value, Group):
             return bool(value.origin) and value.origin[0] in self.fixed
         if isinstance(value, Known):
@@ -140,13 +140,13 @@ class Body:
         return is_exact(value.uses) and places <= self.fixed.keys()
 
     def derived(self, value: Expr, hint: str = "") -> Expr:
-        """Return a number that parameters alone decide as one that is computed with them."""
+        """Return a number that depends only on parameters as a derived parameter."""
         groups = [
             n for n, shape in self.fixed.items() if shape is not None and ("local", n) in value.uses
         ]
         is_plain = value.is_path or Expr(value.text.removeprefix("-")).is_path
         if self.structs.precision.name == "single" and not hint:
-            # There a sum or a product takes one instruction, as reading it would.
+            # Then a sum or a product takes one instruction, like reading it.
             is_plain |= "/" not in value.text and not any(u[0] == "own" for u in value.uses)
         refused = (self.memory.function, value.text) in self.structs.derivations.refused
         if not groups or is_plain or refused or not self.is_steady(value):
@@ -156,13 +156,13 @@ class Body:
         return self.structs.derive(self.memory.function, groups[0], shape, value, hint)
 
     def operands(self, *values: Expr) -> list[Expr]:
-        """Return operands of which some change: those that parameters decide are derived."""
+        """Return operands of which some change; derive those that depend only on parameters."""
         if all(map(self.is_steady, values)):
             return list(values)
         return [self.derived(each) for each in values]
 
     def settled(self, value: Any, hint: str) -> Any:
-        """Return a value that means the same further down; what has to be kept gets a variable."""
+        """Return a value that stays the same further down, in a variable if necessary."""
         value = lifted(value)
         if isinstance(value, Expr):
             return value if self.is_stable(value) else self.variable(hint, value)
@@ -186,7 +186,7 @@ class Body:
         return {name: self.settled(v, f"{hint}_{name}") for name, v in items.items()}
 
     def variable(self, hint: str, value: Any, name: str = "") -> Any:
-        """Return a value that was put into a variable, a new one unless a name is given."""
+        """Return a value in a variable, a new one unless a name is given."""
         if isinstance(value, Update) and self.structs.is_memory(value):
             return self.changed_memory(value)
         target = name or self.fresh(hint)
@@ -211,7 +211,7 @@ class Body:
         return here
 
     def changed_memory(self, value: Update) -> Record:
-        """Return the memory with some fields replaced: in its place, unless that is read later."""
+        """Return the memory with some fields replaced: in place, unless they are read later."""
         place = self.owned(value.record)
         self.update(place, value.items)
         self.memory.changed(place.expr.text)
@@ -222,7 +222,7 @@ class Body:
         return replace(record.expr, text=f"{'' if record.pointer else '&'}{record.expr.text}")
 
     def owned(self, record: Record) -> Record:
-        """Return where memory can be changed: a copy of it where its values are read later."""
+        """Return where to change the memory: in a copy if its values are read later."""
         if self.memory.stays(record.expr.text):
             return record
         copied: Record = self.variable(f"{record.expr.text}_new", record)
@@ -237,7 +237,7 @@ class Body:
             if struct.is_memory or self.structs.keeps(struct, name)
         }
         target = record.expr.text
-        # All are computed before the first one is set.
+        # All are computed before the first assignment.
         values = {name: self.rvalue(lifted(v)) for name, v in kept.items()}
         earlier: set[Any] = set()
         for name, value in values.items():

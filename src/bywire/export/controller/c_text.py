@@ -1,4 +1,4 @@
-"""Text of C: names, numbers, comments and lines of a readable length."""
+"""Text of C: names, numbers, comments, and lines of a readable length."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _RESERVED = frozenset(_WORDS.split()) | frozenset(_CXX_WORDS.split())
 _LONGEST_NAME = 60
 BEGIN_C = '#ifdef __cplusplus\nextern "C" {\n#endif'
 END_C = "#ifdef __cplusplus\n}\n#endif"
-"""what declarations of a header stand between, so that programs in C++ link with them"""
+"""begin of the declarations in a header, so that programs in C++ link with them"""
 
 
 @dataclass(frozen=True)
@@ -38,11 +38,11 @@ class Precision:
     Parameters
     ----------
     name
-        What the user calls it.
+        Name for the user.
     real
         C type.
     suffix
-        What functions of the library and literals end with.
+        Suffix of library functions and literals.
     """
 
     name: str
@@ -50,12 +50,12 @@ class Precision:
     suffix: str
 
     def literal(self, value: float) -> str:
-        """Return the shortest literal that is read back as the value.
+        """Return the shortest literal for exactly this value.
 
         Raises
         ------
         ModelError
-            Where the value is none of this type.
+            When the value does not exist in this type.
         """
         number = float(value)
         if self.suffix and number != 0.0 and not 2.0**-126 <= abs(number) < 2.0**128:
@@ -83,7 +83,7 @@ def c_name(text: str) -> str:
 
 
 def checked_name(name: str) -> str:
-    """Return the name that a user chose for an export.
+    """Return the user's name for an export.
 
     Raises
     ------
@@ -110,7 +110,7 @@ def checked_name(name: str) -> str:
 
 
 def unique(name: str, taken: Container[str]) -> str:
-    """Return the name, with a number behind it where it is taken."""
+    """Return the name, with a number appended if it is taken."""
     candidate, number = name, 2
     while candidate in taken:
         candidate, number = f"{name}_{number}", number + 1
@@ -118,7 +118,7 @@ def unique(name: str, taken: Container[str]) -> str:
 
 
 def in_comment(text: str) -> str:
-    """Return a text that a comment can hold."""
+    """Return a text that is safe in a comment."""
     return text.replace("*/", "* /").replace("/*", "/ *").replace("??", "? ?").rstrip("\\")
 
 
@@ -132,7 +132,7 @@ def comment(lines: list[str], indent: str = "") -> str:
 
 
 def wrapped(line: str, indent: str = "") -> str:
-    """Return a statement on lines of a readable length, broken behind commas where it can be."""
+    """Return a statement on lines of a readable length, preferably broken after commas."""
     lines, rest, lead = [], line, indent
     while len(lead) + len(rest) > WIDTH:
         room = WIDTH - len(lead)

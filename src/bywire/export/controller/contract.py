@@ -1,7 +1,7 @@
-"""What a step of an exported ECU takes and gives: inputs it accepts, and commands within limits.
+"""Contract of a step of an exported ECU: valid inputs, and commands within limits.
 
-The step checks its inputs before the tick, its memory and its commands behind it. The laws
-themselves stay as their Python is.
+The step checks its inputs before the tick, and its memory and its commands after it. The laws
+themselves are translated unchanged.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ LARGEST = 1e15
 """magnitude below which inputs, states and commands must lie, in their SI units: squares and
 products of such numbers stay numbers, in single precision too"""
 INPUT, RESULT = 1, 2
-"""what the status of a step says: an input was refused; the memory began anew"""
+"""status of a step: an input is not valid; the memory was reset"""
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class CheckedInput:
     Parameters
     ----------
     low, high
-        Admissible ends; infinite where the field declares none. `LARGEST` holds too.
+        Valid ends; infinite if the field declares none. `LARGEST` also applies.
     """
 
     kind: str
@@ -45,7 +45,7 @@ class CheckedInput:
     high: float
 
     def accepts(self, value: float) -> bool:
-        """Return whether a step takes a value."""
+        """Return whether a step accepts a value."""
         return abs(value) < LARGEST and self.low <= value <= self.high
 
 
@@ -60,8 +60,8 @@ class Command:
     limit
         The limit in C.
     is_input
-        Whether the limit is a stimulus, which the command never exceeds; else it is a parameter,
-        which its magnitude never exceeds.
+        Whether the limit is a stimulus, which the command never exceeds; otherwise it is a
+        parameter, which the command's magnitude never exceeds.
     """
 
     field: str
@@ -83,7 +83,7 @@ def checked_inputs(model: Model, structs: Structs, uses: Iterable[Use]) -> list[
 
 
 def commands(model: Model, renewed: Iterable[str], structs: Structs, shape: Shape) -> list[Command]:
-    """Return the commands among the fields that a task renews, with their limits.
+    """Return the commands among the fields that a task updates, with their limits.
 
     Raises
     ------
@@ -113,7 +113,7 @@ def commands(model: Model, renewed: Iterable[str], structs: Structs, shape: Shap
 
 
 def _parameter(structs: Structs, shape: Shape, dotted: str) -> Expr | None:
-    """Return a parameter in C, behind the pointer to all of them."""
+    """Return a parameter in C, after the pointer to all of them."""
     group = Group(shape, Expr("par", uses=frozenset({("local", "par")})), pointer=True)
     text, uses = "par", set(group.expr.uses)
     *groups, last = dotted.split(".")
@@ -129,14 +129,14 @@ def _parameter(structs: Structs, shape: Shape, dotted: str) -> Expr | None:
 
 @dataclass(frozen=True)
 class Held:
-    """What a task does with the memory.
+    """Access of a task to the memory.
 
     Parameters
     ----------
     renewed
-        Fields that it does not leave as they are, in the order of the memory.
+        Updated fields, in the order of the memory.
     read
-        Fields whose value before the tick something depends on.
+        Fields whose value before the tick is used.
     """
 
     renewed: tuple[str, ...]
@@ -144,7 +144,7 @@ class Held:
 
 
 def held_by(model: Model, par: ParameterSet, task: Task) -> Held:
-    """Return what a task does with the memory, by a tick on symbols."""
+    """Return the access of a task to the memory, from a tick on symbols."""
     leaves, fields = tuple(par.leaves()), model.Memory._fields
     symbols = dict(zip(leaves, scalars(SX.sym("p", len(leaves))), strict=True))
     x, m, u = (

@@ -1,7 +1,7 @@
-"""What follows from parameters alone: computed where these change, not in every tick.
+"""Derived parameters: computed when parameters change, instead of in every tick.
 
-Such numbers become members of the parameter set that they are read from, beside its parameters: a
-law of two wheels has them for each. ``NAME_ecu_derive`` renews them; `values` are those of export.
+Such numbers become members of their parameter set, beside its parameters: a law for two wheels has
+them for each wheel. ``NAME_ecu_derive`` updates them; `values` are those of the export.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from bywire.export.controller.c_text import c_name, unique
 from bywire.export.controller.values import Expr, Use, Uses
 
 STEADY = frozenset({"local", "field", "own", "library", "constant"})
-"""kinds of needs that what follows from parameters may have; calls of laws are none"""
+"""kinds of dependencies that derived parameters may have; calls of laws are not among them"""
 _EXACT = frozenset({"fabs", "sqrt", "fabsf", "sqrtf"})
 _NAME = re.compile(r"(?<![\w.>])[A-Za-z_]\w*(->)?")
 _NUMBER = re.compile(r"(?<![\w.])(\d+\.\d*(?:e[-+]?\d+)?|\d+e[-+]?\d+)f?")
@@ -51,12 +51,12 @@ _ARITHMETIC: Mapping[type[ast.operator], Callable[[Any, Any], Any]] = {
 
 @dataclass(frozen=True)
 class Term:
-    """A number that follows from parameters, in the words of the function that reads it.
+    """A derived number, in the terms of the function that reads it.
 
     Parameters
     ----------
     holder
-        The function's argument that has it as a member.
+        The function's argument with this member.
     struct, member
         Structure and member.
     """
@@ -84,12 +84,12 @@ class Derived:
 
 @dataclass
 class Derivations:
-    """All such terms of a translation, and what functions are called with.
+    """All derived terms of a translation, and the arguments of its functions.
 
     Parameters
     ----------
     refused
-        Function and text of what would be two numbers in one place; what is found here is added.
+        Function and text of terms with two values for one member; this translation adds to them.
     """
 
     refused: set[tuple[str, str]] = field(default_factory=set)
@@ -99,7 +99,7 @@ class Derivations:
     def member(
         self, function: str, holder: str, struct: str, expr: Expr, hint: str, taken: Iterable[str]
     ) -> str:
-        """Return the name of the member that holds a term, a new one where there is none."""
+        """Return the name of the member for a term, a new one if there is none."""
         for each in self.terms:
             if (each.function, each.holder, each.expr.text) == (function, holder, expr.text):
                 return each.member
@@ -108,11 +108,11 @@ class Derivations:
         return name
 
     def called(self, function: str, caller: str, arguments: Mapping[str, Any]) -> None:
-        """Note a call."""
+        """Record a call."""
         self.calls.setdefault(function, []).append((caller, arguments))
 
     def _roots(self, function: str) -> Iterator[tuple[dict[str, str], Uses]]:
-        """Yield what arguments are from the root of all parameters, call by call."""
+        """Yield the arguments from the root of all parameters, call by call."""
         if function not in self.calls:
             yield {"par": "par"}, frozenset()
             return
@@ -126,7 +126,7 @@ class Derivations:
                 yield inner, uses
 
     def derived(self, uses: frozenset[Use]) -> list[Derived]:
-        """Return what is to be computed for needs, those first that others read."""
+        """Return the terms to compute, in the order of their dependencies."""
         wanted, needs = [], set(uses)
         for term in reversed(self.terms):
             if ("field", term.struct, term.member) in needs:
@@ -144,12 +144,12 @@ class Derivations:
 
 
 def is_exact(uses: Iterable[Use]) -> bool:
-    """Return whether an expression is the same number wherever it is computed."""
+    """Return whether an expression has the same value wherever it is computed."""
     return all(u[0] in STEADY and (u[0] != "library" or u[1] in _EXACT) for u in uses)
 
 
 def rooted(text: str, roots: Mapping[str, str]) -> str:
-    """Return a text with the arguments of a function replaced by what they are."""
+    """Return a text with the arguments of a function replaced by their values."""
 
     def replaced(found: re.Match[str]) -> str:
         name, arrow = found[0].removesuffix("->"), found[1]
@@ -163,7 +163,7 @@ def rooted(text: str, roots: Mapping[str, str]) -> str:
 
 
 def worded(text: str) -> str:
-    """Return a name for an expression that has none.
+    """Return a name for an expression without one.
 
     Examples
     --------
@@ -184,7 +184,7 @@ def values(
     constants: Mapping[str, float],
     number: Callable[[float], Any],
 ) -> dict[str, Any]:
-    """Return the numbers of a parameter set by their places, as Python computes them."""
+    """Return the numbers of a parameter set by their place, as Python computes them."""
     made: dict[str, Any] = {}
     names: dict[str, Any] = {name: number(value) for name, value in constants.items()}
     names["par"] = _Place(par, "", made, number)
@@ -214,7 +214,7 @@ def values(
 
 @dataclass(frozen=True)
 class _Place:
-    """A parameter set as C knows it: names of C, and what was derived."""
+    """A parameter set in C: names in C, and derived numbers."""
 
     group: Any
     path: str

@@ -1,6 +1,6 @@
 """Elementary functions of an exported ECU as C: the operations of ``core.elementary``, one by one.
 
-No function of the C library is called, so that every target has Python's bits.
+No function of the C library is called, so that every target gives the same bits as Python.
 """
 
 from __future__ import annotations
@@ -16,16 +16,16 @@ from bywire.export.controller.c_text import Precision
 from bywire.export.controller.contract import LARGEST
 
 MAGNITUDE = frozenset({"whole", "sine", "cosine"})
-"""functions that take a magnitude"""
+"""functions that return a magnitude"""
 _MAGNITUDE = {"double": "fabs", "float": "fabsf"}
 _WHOLE = {"double": ((2.0**31, "int32_t"), (2.0**52, "int64_t")), "single": ((2.0**23, "int32_t"),)}
-"""up to which magnitude an integer takes what is not whole; 64 bits take a processor without a unit
+"""largest magnitude rounded by integers; 64 bits take a processor without an FPU
 for doubles four times as long as 32"""
 Literal = Callable[[float], str]
 
 
 def elementary(wanted: Collection[str], precision: Precision) -> list[str]:
-    """Return the C of functions by their names in C, those first that others call."""
+    """Return the C code of functions by their names in C, in the order of their calls."""
     number = double if precision.name == "double" else single
     real, lit = precision.real, precision.literal
     parts: list[str] = []
@@ -50,10 +50,10 @@ def elementary(wanted: Collection[str], precision: Precision) -> list[str]:
 
 
 def contract_functions(precision: Precision, has_limits: bool) -> list[str]:
-    """Return the C of the checks around a step; they look at digits, without arithmetic.
+    """Return the C code of the checks around a step; they examine digits, without arithmetic.
 
-    Infinities and what is no number stay themselves under fast mathematics, and a processor
-    without a unit for doubles takes a few instructions.
+    Infinities and NaN are preserved under fast math, and a processor without an FPU for doubles
+    needs only a few instructions.
     """
     real, is_double = precision.real, precision.name == "double"
     integer, bits = ("uint64_t", 64) if is_double else ("uint32_t", 32)
@@ -65,7 +65,7 @@ def contract_functions(precision: Precision, has_limits: bool) -> list[str]:
     above = 1 << (bits - 1)  # the sign
     infinite = f"0x{_digits(math.inf, is_double):X}u"
     parts = [
-        f"""/* Return the upper digits of a magnitude; those of infinity are above all numbers'. */
+        f"""/* Return the upper digits of a magnitude; those of infinity are larger. */
 static inline uint32_t magnitude({real} x)
 {{
     {integer} bits;
@@ -74,7 +74,7 @@ static inline uint32_t magnitude({real} x)
     return {upper};
 }}
 
-/* Return whether x is a number below 1e15 in magnitude, as inputs and results have to be. */
+/* Return whether x is a valid input or result: a number below 1e15 in magnitude. */
 static inline bool is_usual({real} x)
 {{
     return magnitude(x) < {magnitude(LARGEST)};
@@ -82,8 +82,8 @@ static inline bool is_usual({real} x)
     ]
     if has_limits:
         parts.append(f"""/*
- * Return a command within plus and minus its limit; a limit that is negative, or no number, leaves
- * nothing of it.
+ * Return a command limited to plus and minus its limit; a limit that is negative or NaN
+ * counts as 0.
  */
 static inline {real} within({real} command, {real} limit)
 {{
@@ -107,12 +107,12 @@ static inline {real} within({real} command, {real} limit)
 
 
 def _digits(value: float, is_double: bool) -> int:
-    """Return the digits of a number as a whole number."""
+    """Return the digits of a number as an integer."""
     return int.from_bytes(struct.pack(">d" if is_double else ">f", value), "big")
 
 
 def _nested(names: Sequence[float], variable: str, lit: Literal) -> str:
-    """Return a polynomial as Horner has it, c0 + x * (c1 + x * ...)."""
+    """Return a polynomial in Horner's form, c0 + x * (c1 + x * ...)."""
     *first, last = map(lit, names)
     text = "".join(f"{each} + {variable} * (" for each in first[:-1])
     return f"{text}{first[-1]} + {variable} * {last}{')' * (len(first) - 1)}"
@@ -206,7 +206,7 @@ def _exponential(precision: Precision, lit: Literal) -> str:
 """
         result = "scale * a + ((scale * r4) * b + (scale * r8) * c)"
     integer, bias, shift = scale
-    return f"""/* Return e to the power of x, which counts as within {low} and {high}. */
+    return f"""/* Return e to the power of x, limited to {low} and {high}. */
 static {real} exponential({real} x)
 {{
     const {real} least = (x > {low}) ? x : {low};
@@ -260,7 +260,7 @@ static double log_parts(double a, double *low)
     return high;
 }}"""
 
-_LOGARITHM = """/* Return the natural logarithm of a; what is below 1e-300 counts as that. */
+_LOGARITHM = """/* Return the natural logarithm of a; values below 1e-300 count as 1e-300. */
 static double logarithm(double a)
 {
     double low;

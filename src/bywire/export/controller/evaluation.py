@@ -1,4 +1,4 @@
-"""Expressions of Python, evaluated on known objects and on C text: operators, members, calls."""
+"""Evaluation of Python expressions on known objects and C text: operators, members, calls."""
 
 from __future__ import annotations
 
@@ -52,28 +52,28 @@ class Functions(Protocol):
     """All functions of an export; see `Translation`."""
 
     def constant(self, module: str, name: str, found: Any) -> Known:
-        """Return a module's object; a number of its own is called by its name in C."""
+        """Return a module's object; a number has the name of its constant in C."""
         ...
 
     def call(self, at: Context, node: ast.AST, function: Any, given: list[Any], named: Any) -> Any:
-        """Return what a function gives."""
+        """Return the result of a function."""
         ...
 
     def inlined(
         self, at: Context, node: ast.AST, closure: Closure, given: list[Any], named: Any
     ) -> Any:
-        """Return what an inner function gives, written out in its caller."""
+        """Return the result of an inner function, inlined in its caller."""
         ...
 
 
 class Context(Protocol):
-    """Who evaluates an expression; see `Evaluator`."""
+    """Evaluator of expressions; see `Evaluator`."""
 
     translation: Functions
     body: Body
 
     def refuse(self, node: ast.AST, what: str) -> ModelError:
-        """Return the error for what C does not get."""
+        """Return the error for a construct that cannot be translated to C."""
         ...
 
     def number(self, node: ast.AST, value: Any) -> Expr:
@@ -81,11 +81,11 @@ class Context(Protocol):
         ...
 
     def known(self, node: ast.AST, value: Any, why: str) -> Any:
-        """Return the object of a value that export has to know."""
+        """Return the object of a value that must be known at export."""
         ...
 
     def sequence(self, node: ast.AST, value: Any) -> tuple[Any, ...]:
-        """Return the values of a tuple and its like."""
+        """Return the values of a tuple or similar."""
         ...
 
 
@@ -200,7 +200,7 @@ _COMPARED: dict[type[Any], tuple[str, Callable[[Any, Any], Any]]] = {
 
 
 def _unary(at: Context, node: ast.UnaryOp, value: Any) -> Any:
-    """Return what an operator gives of one value."""
+    """Return the result of a unary operator."""
     if isinstance(value, Known):
         return Known(_SIGNS[type(node.op)](value.value))
     expr = at.number(node, value)
@@ -212,7 +212,7 @@ def _unary(at: Context, node: ast.UnaryOp, value: Any) -> Any:
 
 
 def binary(at: Context, node: ast.BinOp, left: Any, right: Any) -> Any:
-    """Return what an operator gives of two values."""
+    """Return the result of a binary operator."""
     left, right = lifted(left), lifted(right)
     kind = type(node.op)
     if isinstance(left, Known) and isinstance(right, Known) and kind in _KNOWN:
@@ -253,7 +253,7 @@ def compared(at: Context, node: ast.Compare, left: Any, right: Any) -> Any:
 
 
 def _equal(at: Context, node: ast.AST, left: Any, right: Any, sign: str) -> Expr:
-    """Return a comparison of floats for equality, in words that compilers do not warn of."""
+    """Return a comparison of floats for equality without compiler warnings."""
     a, b = (at.body.settled(at.number(node, v), "compared") for v in (left, right))
     both = f"({a.at(SUM)} <= {b.at(SUM)}) && ({a.at(SUM)} >= {b.at(SUM)})"
     uses = a.uses | b.uses
@@ -263,7 +263,7 @@ def _equal(at: Context, node: ast.AST, left: Any, right: Any, sign: str) -> Expr
 
 
 def _connected(at: Context, node: ast.BoolOp, values: Iterable[Any]) -> Any:
-    """Return "and" or "or" of values, of which those behind a known end are not evaluated."""
+    """Return "and" or "or" of values; those after a known result are not evaluated."""
     is_and = isinstance(node.op, ast.And)
     parts: list[Expr] = []
     value: Any = Known(is_and)
@@ -285,7 +285,7 @@ def _connected(at: Context, node: ast.BoolOp, values: Iterable[Any]) -> Any:
 
 
 def chosen(at: Context, node: ast.AST, condition: Any, then: Any, otherwise: Any) -> Any:
-    """Return what ``ops.where`` gives."""
+    """Return the result of ``ops.where``."""
     if isinstance(condition, Known):
         return then if condition.value else otherwise
     test = at.number(node, condition)
@@ -307,13 +307,13 @@ _OURS: dict[Any, str] = {
 }
 _OURS_IN_DOUBLE: dict[Any, str] = {**_OURS, ops.log: "logarithm", ops.power: "power_of"}
 _EXTREMES = {ops.fmin: "smaller", ops.fmax: "larger"}
-"""functions of core.ops that stand at the top of the C"""
+"""functions of core.ops that are defined at the top of the C file"""
 
 _Named = dict[str, Any]
 
 
 def called(at: Context, node: ast.Call, function: Any, given: list[Any], named: _Named) -> Any:
-    """Return what a call gives."""
+    """Return the result of a call."""
     if isinstance(function, Method):
         return _method(at, node, function, given, named)
     if isinstance(function, Closure):
@@ -347,7 +347,7 @@ def called(at: Context, node: ast.Call, function: Any, given: list[Any], named: 
 
 
 def _elementary(at: Context, node: ast.AST, function: Any, given: list[Any]) -> Any:
-    """Return a function of core.ops of numbers."""
+    """Return a function of core.ops applied to numbers."""
     if all(isinstance(each, Known) for each in given):
         return Known(function(*(each.value for each in given)))
     arguments = at.body.operands(*(at.body.as_number(at.number(node, v)) for v in given))
@@ -367,7 +367,7 @@ def _elementary(at: Context, node: ast.AST, function: Any, given: list[Any]) -> 
 
 
 def _ours(at: Context) -> dict[Any, str]:
-    """Return the functions that exports bring themselves."""
+    """Return the functions that exports define themselves."""
     return _OURS_IN_DOUBLE if at.body.structs.precision.name == "double" else _OURS
 
 
@@ -514,14 +514,14 @@ _BUILTINS: dict[Any, Callable[..., Any]] = {
 
 @dataclass
 class Evaluator:
-    """Evaluates the expressions of a function.
+    """Evaluator of the expressions of a function.
 
     Parameters
     ----------
     file
-        Where it is written, for what cannot be translated.
+        Its source file, for error messages.
     module
-        Names of the function's module.
+        Names in the function's module.
     scope
         Values of its variables.
     """
@@ -533,7 +533,7 @@ class Evaluator:
     scope: dict[str, Any] = field(default_factory=dict)
 
     def refuse(self, node: ast.AST, what: str) -> ModelError:
-        """Return the error for an expression or a statement that C does not get."""
+        """Return the error for an expression or a statement that cannot be translated to C."""
         line = getattr(node, "lineno", 0)
         shown = ast.unparse(node).splitlines()[0][:60]
         return ModelError(
@@ -541,13 +541,13 @@ class Evaluator:
         )
 
     def value(self, node: ast.expr) -> Any:
-        """Return what an expression is."""
+        """Return the value of an expression."""
         rule = getattr(self, f"_{type(node).__name__.lower()}", None)
         if rule is None:
             raise self.refuse(node, f"{type(node).__name__} is not translated")
         try:
             return rule(node)
-        except (ArithmeticError, LookupError) as error:  # as Python would have it at run time
+        except (ArithmeticError, LookupError) as error:  # as Python would raise it at run time
             raise self.refuse(node, str(error)) from None
 
     def number(self, node: ast.AST, value: Any) -> Expr:
@@ -560,7 +560,7 @@ class Evaluator:
         raise self.refuse(node, "this must be a number")
 
     def known(self, node: ast.AST, value: Any, why: str) -> Any:
-        """Return the object of a value that export has to know."""
+        """Return the object of a value that must be known at export."""
         if isinstance(value, Known):
             return value.value
         raise self.refuse(node, why)
@@ -644,7 +644,7 @@ class Evaluator:
         return self.value(node.body if self.truth(node.test) else node.orelse)
 
     def truth(self, node: ast.expr) -> bool:
-        """Return whether a structural condition holds."""
+        """Return whether a structural condition is true."""
         value = self.value(node)
         if isinstance(value, (Items, Table)):
             return bool(value.values if isinstance(value, Items) else value.items)
@@ -691,7 +691,7 @@ class Evaluator:
                 yield from self._comprehended(rest)
 
     def bind(self, target: ast.expr, value: Any) -> None:
-        """Let loop variables stand for values, without variables of C."""
+        """Bind loop variables to values, without variables in C."""
         if isinstance(target, ast.Name):
             self.scope[target.id] = self.body.settled(value, target.id)
             return

@@ -38,13 +38,13 @@ def files(
     Parameters
     ----------
     memory
-        With which the bench begins.
+        Initial memory of the bench.
     cited
         Values of the parameter set with their provenance.
     every
         Test vectors of the tasks.
     bus
-        Whether measurements are described for a CAN bus, too.
+        Whether to describe measurements for a CAN bus, too.
     """
     name = program.name
     made = {
@@ -74,7 +74,7 @@ def files(
 
 
 def readme(program: Program, files: Iterable[str], count: int) -> str:
-    """Return what a reader of the files has to know."""
+    """Return the README of the exported files."""
     name, real = program.name, program.precision.real
     size = 4 if program.precision.name == "single" else 8
     memory = sum(max(m.length, 1) for m in program.members(program.model.Memory))
@@ -82,22 +82,22 @@ def readme(program: Program, files: Iterable[str], count: int) -> str:
     tasks = [f"    {step.name}: every {step.task.period:.9g} s" for step in program.steps]
     said = [
         f"The ECU of {program.model.name} in C99, {program.precision.name} precision: it was "
-        "translated from the Python of the laws, and is what the bench runs, operation by "
-        "operation. Choices of equations are those of the bench; its numbers are parameters.",
-        f"Call {name}_ecu_init once, then every task at its period, tasks that are due together "
+        "translated from the Python of the laws and equals what the bench runs, operation by "
+        "operation. Choices of equations are fixed as in the bench; its numbers are parameters.",
+        f"Call {name}_ecu_init once, then every task at its period; call tasks due together "
         "in this order:",
         *tasks,
         _derived(program),
         f"Memory ({memory} numbers of {size} bytes and a status for each task) belongs to the "
         f"caller. Parameters ({values} numbers) are constants in {name}_parameters.c. Nothing is "
-        "allocated, nothing calls itself, and there is no state beside the memory.",
+        "allocated, no function is recursive, and the memory contains all states.",
         *_instance(program),
         *_contract(program),
-        f"Everything that a header shows begins with {name}_, and headers serve C++ too: ECUs of "
-        "other names, and this one in the other precision under another name, link into one "
-        "program.",
+        f"All names in the headers begin with {name}_, and the headers also work in C++: ECUs with "
+        "other names link into one program, for instance this ECU in both precisions under two "
+        "names.",
         _plant(program),
-        f"Compile with {' '.join(FLAGS)} or the like: fast mathematics and fused products change "
+        f"Compile with {' '.join(FLAGS)} or similar flags: fast math and fused multiply-add change "
         "the last digits. 'make check' compares the compiled ECU with "
         f"{count} vectors of each task, which Python computed.",
         _exactness(program, real),
@@ -114,7 +114,7 @@ def readme(program: Program, files: Iterable[str], count: int) -> str:
 
 
 def _contract(program: Program) -> list[str]:
-    """Return what a step makes of inputs, memory and parameters, whatever they are."""
+    """Return the contract of a step for arbitrary inputs, memory and parameters."""
     name, upper = program.name, program.name.upper()
     ranges = [
         f"    {each.kind}->{c_name(each.field)}: {_range(each)}"
@@ -127,12 +127,12 @@ def _contract(program: Program) -> list[str]:
         f"{LARGEST:g} in magnitude, in its SI unit"
         + (", and within its range:" if ranges else "."),
         *(["\n".join(ranges)] if ranges else []),
-        "If an input is refused (NaN, infinity, out of range), the step computes nothing. The "
-        f"memory stays as it was, with the last commands, and memory->status_TASK becomes "
-        f"{upper}_STATUS_INPUT ({INPUT}). The next step with valid inputs goes on from there. How "
-        "long commands may be held, and what replaces them, is the caller's decision.",
-        "Results. If a state or a command is no number below that magnitude after a tick, because "
-        "of a wrong parameter or a corrupted memory, the memory begins anew as after "
+        "If an input is not valid (NaN, infinity, out of range), the step computes nothing. The "
+        f"memory keeps its values, including the last commands, and memory->status_TASK becomes "
+        f"{upper}_STATUS_INPUT ({INPUT}). The next step with valid inputs continues from there. "
+        "The caller decides how long to hold commands, and what replaces them.",
+        "Results. If a state or a command is not a number below that magnitude after a tick, due "
+        "to a wrong parameter or corrupted memory, the step resets the memory as in "
         f"{name}_ecu_init, and the status becomes {upper}_STATUS_RESULT ({RESULT}). Otherwise the "
         "status is 0.",
     ]
@@ -144,15 +144,15 @@ def _contract(program: Program) -> list[str]:
     ]
     if limits:
         said += [
-            "Commands. Whatever inputs, memory and parameters are, these commands stay within "
-            "their limits; a limit that is negative or no number counts as 0:",
+            "Commands. For any inputs, memory and parameters, these commands stay within "
+            "their limits. A limit that is negative or NaN counts as 0:",
             "\n".join(limits),
         ]
     said.append(
         "Parameters. A step does not check them. "
         + (
-            f"{name}_instance_apply takes calibrated parameters over only if all of them are "
-            "within the ranges of the A2L; that some belong together is not checked."
+            f"{name}_instance_apply accepts calibrated parameters only if all of them are "
+            "within the ranges of the A2L file. It does not check relations between parameters."
             if program.parameters()
             else ""
         )
@@ -178,12 +178,12 @@ def _range(each: CheckedInput) -> str:
 def _instance(program: Program) -> list[str]:
     name = program.name
     if not program.parameters():
-        return [f"{name}_instance.c holds {name}_memory, to which {name}.a2l links."]
+        return [f"{name}_instance.c contains {name}_memory, to which {name}.a2l links."]
     return [
-        f"{name}_instance.c is optional. It holds {name}_memory, and parameters in RAM: a "
-        f"calibration tool changes {name}_calibration, to which {name}.a2l links, and steps are "
-        f"given {name}_active. Call {name}_instance_init in place of {name}_ecu_init, and "
-        f"{name}_instance_apply between two steps to take over what was calibrated."
+        f"{name}_instance.c is optional. It contains {name}_memory, and parameters in RAM: a "
+        f"calibration tool changes {name}_calibration, to which {name}.a2l links, and the steps "
+        f"use {name}_active. Call {name}_instance_init instead of {name}_ecu_init, and "
+        f"{name}_instance_apply between two steps to apply the calibration."
     ]
 
 
@@ -191,8 +191,8 @@ def _derived(program: Program) -> str:
     if not program.derived:
         return ""
     return (
-        "Beside the parameters stands what follows from them alone. Where parameters are changed "
-        f"in place, call {program.name}_ecu_derive before the next step."
+        "The parameter structure also contains values derived from the parameters. After changing "
+        f"parameters in place, call {program.name}_ecu_derive before the next step."
     )
 
 
@@ -201,19 +201,19 @@ def _plant(program: Program) -> str:
     if not names:
         return ""
     return (
-        f"{program.name}_io.c holds what is the plant's side of the ticks ({', '.join(names)}): "
-        "sensors and converters as the bench simulates them, and limits of the power stage. On "
+        f"{program.name}_io.c contains the plant's side of the ticks ({', '.join(names)}): "
+        "sensors and converters as simulated by the bench, and limits of the power stage. On "
         "a target the hardware takes its place."
     )
 
 
 def _exactness(program: Program, real: str) -> str:
     free = program.inexact
-    said = "Of the C library it calls " + (", ".join(program.libraries) or "nothing") + ". "
+    said = "Calls of the C library: " + (", ".join(program.libraries) or "none") + ". "
     if free:
         return said + (
-            f"The last digit of {', '.join(free)} differs between libraries: results are equal to "
-            "Python's in every bit where both use one library, and within rounding elsewhere."
+            f"The last digit of {', '.join(free)} differs between libraries: results equal "
+            "Python's in every bit if both use the same library, otherwise within rounding."
         )
     return said + (
         f"With IEEE 754 arithmetic of {real} all results are equal to Python's in every bit, on "

@@ -1,4 +1,4 @@
-"""Functions of C: what they take, what they give back, which one serves a call, and how."""
+"""Functions in C: arguments, results, selection for a call, and the call itself."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Argument:
 
 
 def kind_of(value: Any, structs: Structs) -> Any:
-    """Return what of an argument decides which C function serves."""
+    """Return the part of an argument that selects the C function."""
     value = lifted(value)
     if isinstance(value, Expr):
         return "truth" if value.truth else "number"
@@ -74,7 +74,7 @@ def _hashable(value: Any) -> Any:
 
 
 def received(value: Any, name: str, body: Body) -> Iterator[tuple[Any, Argument | None]]:
-    """Yield what an argument is within the function, then its arguments in C."""
+    """Yield the form of an argument within the function, then its arguments in C."""
     value, structs = lifted(value), body.structs
     if isinstance(value, Known) and not isinstance(value.value, float):
         yield value, None
@@ -118,12 +118,12 @@ def received(value: Any, name: str, body: Body) -> Iterator[tuple[Any, Argument 
 
 
 def stays_there(value: Any, structs: Structs) -> bool:
-    """Return whether a NamedTuple is handed on as a pointer to what nobody changes: inputs."""
+    """Return whether a NamedTuple is passed as a pointer to constant data: inputs."""
     return isinstance(value, Record) and value.pointer and not structs.is_memory(value)
 
 
 def passed(value: Any, body: Body) -> Iterator[Expr | Record]:
-    """Yield the C arguments of a value, in the order of `received`; memory as it is."""
+    """Yield the C arguments of a value, in the order of `received`; memory unchanged."""
     value = lifted(value)
     if isinstance(value, Known) and not isinstance(value.value, float):
         return
@@ -155,18 +155,18 @@ class CFunction:
     Parameters
     ----------
     result
-        C type; empty where all that it gives is known at export, and nothing is called; ``void``
-        where it changes memory and gives nothing else.
+        C type; empty if the result is known at export, and nothing is called; ``void`` if it
+        changes memory and has no other result.
     value
-        What it returns, in its own variables.
+        Its result, in its own variables.
     members
-        Fields of the structure in which it returns several values, by their place in ``value``.
+        Fields of the structure for several results, by their place in ``value``.
     arguments
-        What it reads.
+        Arguments that it reads.
     all_arguments
-        Names of what a call passes, read or not.
+        Names of all arguments of a call, read or not.
     changes
-        Arguments that are memory and are changed in their place.
+        Memory arguments that are changed in place.
     """
 
     name: str
@@ -186,7 +186,7 @@ class CFunction:
 
     @property
     def uses(self) -> frozenset[Use]:
-        """All that its statements need."""
+        """All dependencies of its statements."""
         every = [each.value.uses for each in self.statements]
         if self.returned is not None:
             every.append(self.returned.uses)
@@ -194,7 +194,7 @@ class CFunction:
 
 
 def finish(made: CFunction, body: Body, value: Any, node: ast.AST) -> None:
-    """Let a function return a value: directly, in a structure, or not at all where it is known."""
+    """Let a function return a value: directly, in a structure, or not at all if it is known."""
     value = lifted(value)
     if isinstance(value, Update):
         value = _changed(value, body)
@@ -220,7 +220,7 @@ def finish(made: CFunction, body: Body, value: Any, node: ast.AST) -> None:
 
 
 def _left_there(made: CFunction, body: Body, value: Any) -> Any:
-    """Return a function's value with memory that it was given, and gives back, by its argument."""
+    """Return a function's value, with returned memory replaced by the original argument."""
     memories = [a.name for a in made.arguments if a.name in body.memory.versions]
     if not memories:
         return value
@@ -229,7 +229,7 @@ def _left_there(made: CFunction, body: Body, value: Any) -> Any:
     def walked(value: Any) -> Any:
         value = lifted(value)
         if isinstance(value, Items):
-            # What reads the memory is computed before that is changed.
+            # Expressions that read the memory are computed before it is changed.
             each = [
                 v if body.structs.is_memory(v) else body.settled(v, "kept") for v in value.values
             ]
@@ -254,7 +254,7 @@ def _left_there(made: CFunction, body: Body, value: Any) -> Any:
 
 
 def _changed(value: Update, body: Body) -> Any:
-    """Return a replaced NamedTuple in its own variable where that is the function's."""
+    """Return a replaced NamedTuple in its own variable if that belongs to the function."""
     name = value.record.expr.text
     if body.structs.is_memory(value):
         return body.changed_memory(value)
@@ -296,7 +296,7 @@ def _several(made: CFunction, body: Body, value: Items | Table, node: ast.AST) -
 
 
 def _leaves(value: Any, place: tuple[Any, ...]) -> Iterator[tuple[tuple[Any, ...], Any]]:
-    """Yield what of a result is not known at export, by its place."""
+    """Yield the parts of a result that are not known at export, by their place."""
     value = lifted(value)
     if isinstance(value, Items):
         for k, each in enumerate(value.values):
@@ -309,7 +309,7 @@ def _leaves(value: Any, place: tuple[Any, ...]) -> Iterator[tuple[tuple[Any, ...
 
 
 def _member_names(value: Any, node: ast.AST) -> dict[Any, str]:
-    """Return what the values of a result are called, by the words that they are returned in."""
+    """Return names for the values of a result, from its return expression."""
     if isinstance(value, Table):
         return {name: str(name) for name in value.items}
     names: dict[Any, str] = {}
@@ -324,7 +324,7 @@ def _member_names(value: Any, node: ast.AST) -> dict[Any, str]:
 
 
 def given_back(made: CFunction, structs: Structs, result: Expr) -> Any:
-    """Return what a function with a structure gave back, which stands in a variable."""
+    """Return the results of a function with a structure, which is in a variable."""
 
     def rebuilt(value: Any, place: tuple[Any, ...]) -> Any:
         value = lifted(value)
@@ -343,7 +343,7 @@ def given_back(made: CFunction, structs: Structs, result: Expr) -> Any:
 
 
 def as_value(value: Any, expr: Expr) -> Any:
-    """Return a C expression as the kind of value that it stands for."""
+    """Return a C expression as its kind of value."""
     if isinstance(value, (Record, Built)):
         return Record(value.cls, expr)
     if isinstance(value, (Group, BuiltGroup)):

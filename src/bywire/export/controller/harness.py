@@ -1,4 +1,4 @@
-"""C programs that test the compiled ECU: by vectors, refused inputs, numbers of any bits."""
+"""C programs that test the compiled ECU: test vectors, invalid inputs, arbitrary bits."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from bywire.export.controller.render import parameter_values
 from bywire.export.controller.vectors import Vectors
 
 _BASES, _WILD = 8, 400
-"""vectors of a task from which inputs are refused; draws of all bits"""
+"""vectors of a task that are tried with invalid inputs; draws of arbitrary bits"""
 
 
 def trespassing(program: Program, every: Sequence[Vectors]) -> list[str]:
@@ -31,7 +31,7 @@ def prepared(program: Program, vectors: Vectors) -> list[str]:
     name, task = program.name, c_name(vectors.step.task.name)
     types = {"x": f"{name}_Plant", "u": f"{name}_Stimulus", "memory": f"{name}_Memory"}
     wanted = [short for _, short in vectors.step.arguments]
-    # A structure of which a task reads nothing is given its zeros.
+    # A structure that a task does not read gets zeros.
     lines = [f"{types[kind]} {kind} = {{0}};" for kind in ("x", "u", "memory") if kind in wanted]
     for at, (kind, field) in enumerate(vectors.names):
         if kind in wanted:
@@ -43,25 +43,25 @@ def prepared(program: Program, vectors: Vectors) -> list[str]:
 
 
 def stepped(vectors: Vectors) -> str:
-    """Return the call of a task on what ``prepared`` set up."""
+    """Return the call of a task on the variables of ``prepared``."""
     wanted = [short for _, short in vectors.step.arguments]
     arguments = ", ".join(each if each == "par" else f"&{each}" for each in wanted)
     return f"{vectors.step.name}({arguments});"
 
 
 def _left(program: Program) -> str:
-    """Return the function that compares memory before and behind a refused step."""
+    """Return the function that compares memory before and after a rejected step."""
     fields = [c_name(each.name) for each in program.members(program.model.Memory)]
     same = [f"is_same(a->{each}, b->{each})" for each in fields] or ["1"]
     return (
-        f"/* Return whether two memories hold the same numbers. */\n"
+        f"/* Return whether two memories contain the same numbers. */\n"
         f"static int is_left(const {program.name}_Memory *a, const {program.name}_Memory *b)\n"
         "{\n    return " + "\n            && ".join(same) + ";\n}"
     )
 
 
 def _drawn(program: Program) -> str:
-    """Return the functions that draw numbers of any bits, many of them at ends of their ranges."""
+    """Return the functions that draw arbitrary bits, often at the ends of their ranges."""
     real = program.precision.real
     return f"""static const {real} special[] = {{
     ({real})NAN, ({real})INFINITY, -({real})INFINITY, {_limits(program)}
@@ -98,7 +98,7 @@ def _limits(program: Program) -> str:
 
 
 def _refused(program: Program, each: CheckedInput) -> list[str]:
-    """Return values that a step has to refuse."""
+    """Return values that a step must reject."""
     real, literal = program.precision.real, program.precision.literal
     kind = np.float32 if real == "float" else np.float64
     values = [
@@ -111,7 +111,7 @@ def _refused(program: Program, each: CheckedInput) -> list[str]:
     for end, away in ((each.low, -math.inf), (each.high, math.inf)):
         if math.isfinite(end):
             beyond = float(np.nextafter(kind(end), kind(away)))
-            # The number next to 0 is below those that compilers keep; take a usual one.
+            # The number next to 0 is subnormal, which compilers may flush: use a normal one.
             values.append(literal(beyond if abs(beyond) > 1e-30 else math.copysign(1e-6, away)))
     return values
 
@@ -125,7 +125,7 @@ def _breaches(program: Program, vectors: Vectors) -> str:
 
 
 def _refusing(program: Program, vectors: Vectors) -> list[str]:
-    """Return the trial of inputs to refuse: the memory stays as the step before left it."""
+    """Return the trial of invalid inputs: the memory stays as the previous step left it."""
     name, step, task = program.name, vectors.step, c_name(vectors.step.task.name)
     status, refused = f"memory.{step.status}", f"{name.upper()}_STATUS_INPUT"
     lines = ["", f"    for (int k = 0; k < VECTORS_{task}; k += 1 + VECTORS_{task} / {_BASES}) {{"]
@@ -154,7 +154,7 @@ def _refusing(program: Program, vectors: Vectors) -> list[str]:
 
 
 def _wild(program: Program, vectors: Vectors) -> list[str]:
-    """Return the trial of numbers of any bits: memory stays numbers, and commands within limits."""
+    """Return the trial of arbitrary bits: memory stays finite, and commands within limits."""
     name, step, model = program.name, vectors.step, program.model
     short = [each for _, each in step.arguments]
     types = {"x": model.State, "u": model.Stimulus, "memory": model.Memory}
@@ -217,11 +217,11 @@ WARNINGS = (
     "-Wpedantic",
 )
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off")
-"""without -ffast-math and its like, and without fused products: else the last digits differ"""
+"""without -ffast-math and fused multiply-add, which would change the last digits"""
 SMALL_FLAGS = ("-std=c99", "-Os", "-ffp-contract=off", "-fno-math-errno")
-"""for targets whose memory is small; square roots are instructions, without the library's errno"""
+"""for targets with little memory; square roots are instructions, without the library's errno"""
 TOLERANCE = 1e-5
-"""of single precision where functions of the C library are called, whose last digit is free"""
+"""tolerance in single precision for functions of the C library, whose last digit may differ"""
 
 
 def vector_header(program: Program, every: Sequence[Vectors]) -> str:
@@ -229,7 +229,7 @@ def vector_header(program: Program, every: Sequence[Vectors]) -> str:
     name, real = program.name, program.precision.real
     guard = f"{name.upper()}_TEST_VECTORS_H"
     parts = [
-        comment(["What the Python of the laws makes of inputs that reach every limit."]),
+        comment(["Results of the Python laws for inputs that reach every limit."]),
         f"#ifndef {guard}\n#define {guard}",
     ]
     literal = program.precision.literal
@@ -281,7 +281,7 @@ def harness(program: Program, every: Sequence[Vectors]) -> str:
 
 
 def _derived(program: Program, every: Sequence[Vectors]) -> list[str]:
-    """Return the function that compares what follows from parameters with Python's numbers."""
+    """Return the function that compares derived parameters with Python's numbers."""
     if not program.derived:
         return []
     name = program.name
@@ -299,14 +299,14 @@ def _derived(program: Program, every: Sequence[Vectors]) -> list[str]:
 
 
 def comparison(program: Program, every: Sequence[Vectors], what: str, include: str) -> list[str]:
-    """Return what a harness begins with: a function per task that compares it with its vectors.
+    """Return the beginning of a harness: a function per task that compares it with its vectors.
 
     Parameters
     ----------
     what
         Comment at the top.
     include
-        What it says its results with.
+        Header for its output.
     """
     name = program.name
     return [
@@ -374,7 +374,7 @@ def makefile(program: Program, has_io: bool) -> str:
     objects = " ".join(f"{name}_{part}.o" for part in parts)
     library = " -lm" if program.libraries else ""
     return (
-        "# Any compiler of C99 serves; without fused products and fast mathematics.\n"
+        "# Any C99 compiler will do, without fused multiply-add and fast math.\n"
         "CC = gcc\n"
         f"CFLAGS = {' '.join(FLAGS)} {' '.join(WARNINGS)}\n"
         f"OBJECTS = {objects}\n\n"

@@ -1,4 +1,4 @@
-"""An ECU as a program in C: its tasks, and all functions and structures that they need."""
+"""An ECU as a program in C: its tasks, with all functions and structures that they need."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ from bywire.export.controller.values import (
 )
 
 _ROOMS = frozenset({"plant", "plants", "elements"})
-"""folders whose functions are the plant's: converters, sensors, limits of the bridge"""
+"""folders with functions of the plant: converters, sensors, limits of the bridge"""
 OPS = "bywire.core.ops"
 """module of the elementary functions"""
 _MOST = 30
@@ -49,17 +49,17 @@ _MOST = 30
 
 @dataclass(frozen=True)
 class Step:
-    """One task: the arguments that it reads, its statements, and the memory where that is new.
+    """One task: its arguments, its statements, and the resulting memory.
 
     Parameters
     ----------
     inputs
-        What it checks before it computes.
+        Inputs that it checks before the computation.
     commands
-        What it keeps within limits behind that.
+        Commands that it limits afterwards.
     kept
-        Fields of the memory that it renews and that must be numbers: commands, and those whose
-        value a later tick depends on.
+        Fields of the memory that it updates and that must be finite: commands, and fields whose
+        value a later tick uses.
     """
 
     task: Task
@@ -73,12 +73,12 @@ class Step:
 
     @property
     def status(self) -> str:
-        """Field of the memory that says how its last call went."""
+        """Field of the memory with the status of its last call."""
         return f"status_{c_name(self.task.name)}"
 
     @property
     def uses(self) -> frozenset[Use]:
-        """All that it needs."""
+        """All its dependencies."""
         every = [each.value.uses for each in self.statements]
         every += [each.limit.uses for each in self.commands]
         return frozenset().union(*every, *([self.result.uses] if self.result else []))
@@ -91,11 +91,11 @@ class Program:
     Parameters
     ----------
     name
-        What its files and functions begin with.
+        Prefix of its files and functions.
     functions
-        Laws and the plant's side, those first that others call.
+        Laws and the plant's side, in the order of their calls.
     derived
-        What follows from parameters alone and is kept beside them.
+        Derived parameters, which are stored beside the others.
     """
 
     name: str
@@ -111,11 +111,11 @@ class Program:
 
     @property
     def plant_functions(self) -> list[CFunction]:
-        """Functions of the plant's side of the ticks, which a header shows."""
+        """Functions of the plant's side of the ticks, declared in a header."""
         return [each for each in self.functions if each.is_plant and each.module != OPS]
 
     def shown(self) -> list[Struct]:
-        """Return the structures of the plant's side that the header of the ECU does not show."""
+        """Return the structures of the plant's side that are not in the ECU's header."""
         names: set[str] = set()
         for each in self.plant_functions:
             names |= {a.declaration.removeprefix("const ").split()[0] for a in each.arguments}
@@ -133,17 +133,17 @@ class Program:
 
     @property
     def libraries(self) -> tuple[str, ...]:
-        """Functions of the C library that are called."""
+        """Called functions of the C library."""
         return tuple(sorted({use[1] for use in self.uses if use[0] == "library"}))
 
     @property
     def inexact(self) -> tuple[str, ...]:
-        """Functions of the C library among these whose last digit is the library's."""
+        """Called functions of the C library with a library-dependent last digit."""
         exact = {"fabs", "sqrt", "fabsf", "sqrtf"}
         return tuple(each for each in self.libraries if each not in exact)
 
     def members(self, cls: type[Any]) -> list[Member]:
-        """Return the fields of memory, plant or stimulus that C has."""
+        """Return the fields of memory, plant or stimulus that exist in C."""
         if cls not in self.structs.known:
             return []
         return self.structs.kept(self.structs.of_tuple(cls))
@@ -161,11 +161,11 @@ class Program:
         return shape_of(self.par)
 
     def parameters(self) -> list[tuple[str, Member]]:
-        """Return what of the parameters is read, by dotted name."""
+        """Return the parameters that are read, by dotted name."""
         return [each for each in self.held() if not each[1].is_derived]
 
     def held(self) -> list[tuple[str, Member]]:
-        """Return what stands in the structure of the parameters, derived numbers too."""
+        """Return the members of the parameter structure, including derived numbers."""
         return list(self._leaves(self.shape, ""))
 
     def _leaves(self, shape: Shape, prefix: str) -> Any:
@@ -184,15 +184,15 @@ def program(model: Model, par: ParameterSet, precision: str = "double", name: st
     Parameters
     ----------
     name
-        What its files and symbols begin with; that of the model by default.
+        Prefix of its files and symbols; by default that of the model.
 
     Raises
     ------
     ParameterError
-        When a name is no identifier of C.
+        When a name is not an identifier of C.
     ModelError
-        With file, line and operation of what cannot be translated; for a model that holds another
-        one with an ECU of its own.
+        With file, line and operation of a construct that cannot be translated; for a model that
+        contains another model with its own ECU.
     """
     for sub in getattr(model, "subs", {}).values():
         if any(sub.tasks(par)):
@@ -221,11 +221,11 @@ def program(model: Model, par: ParameterSet, precision: str = "double", name: st
         }
         is_settled = fields == used and (len(copied), len(refused), shared) == before
         used = fields
-        if held is None:  # only now, so that the translation tells what it cannot translate
+        if held is None:  # only now, so that the translation reports its errors first
             held = {task.name: held_by(model, par, task) for task in model.tasks(par)}
         elif is_settled:
             return made
-    raise ModelError(f"{model.name}: what its ECU reads does not settle")  # pragma: no cover
+    raise ModelError(f"{model.name}: its set of read fields does not settle")  # pragma: no cover
 
 
 def _translated(
@@ -293,7 +293,7 @@ def _translated(
 
 
 def _needed(uses: frozenset[Use], by_name: Mapping[str, CFunction]) -> set[Use]:
-    """Return what a text needs, and the functions that it calls."""
+    """Return the dependencies of a text, and the functions that it calls."""
     found: set[Use] = set()
     waiting = [uses]
     while waiting:
@@ -319,7 +319,7 @@ def _step(
     taken: set[str],
     held: Mapping[str, Held],
 ) -> Step:
-    """Return the step of a task: its tick, called on what stands behind pointers."""
+    """Return the step of a task: its tick, called with the targets of pointers."""
     structs = made.structs
     step = unique(f"{name}_ecu_step_{c_name(task.name)}", taken)
     body = Body(structs, Counter(), Memories(step, made.copied))

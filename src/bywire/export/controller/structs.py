@@ -1,4 +1,4 @@
-"""Structures of C for NamedTuples, parameter sets and several results; what values are in them."""
+"""C structures for NamedTuples, parameter sets and several results, with their values."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ from bywire.export.controller.values import (
 class Member:
     """A field of a structure: its name in Python, its type, its length as an array, its meaning.
 
-    ``is_derived``: whether it follows from parameters and is none.
+    ``is_derived``: whether it is derived from parameters.
     """
 
     name: str
@@ -49,7 +49,7 @@ class Member:
 
     @property
     def declaration(self) -> str:
-        """Its line in the structure, without the meaning."""
+        """Its line in the structure, without the comment."""
         return f"{self.ctype} {c_name(self.name)}{f'[{self.length}]' if self.length else ''};"
 
 
@@ -71,15 +71,15 @@ class Structs:
     Parameters
     ----------
     used
-        What was read of them the last time that all was translated; None where nothing is known.
+        Fields that the previous translation read; None if unknown.
     public
-        Names of structures that the header shows, by class.
+        Names of structures in the header, by class.
     memory
-        The class whose fields are all kept that are written.
+        The class whose written fields are all kept.
     prefix
-        What names of structures in headers begin with: all parameter sets, and those of ``shared``.
+        Prefix of the names of structures in headers: all parameter sets, and those of ``shared``.
     shared
-        Further classes whose structures a header shows.
+        Further classes whose structures are in a header.
     """
 
     precision: Precision
@@ -103,13 +103,13 @@ class Structs:
         return self.known[cls]
 
     def is_memory(self, value: Any) -> bool:
-        """Return whether a value is the memory, which stays in its place and is changed there."""
+        """Return whether a value is the memory, which is changed in place."""
         if hasattr(value, "record"):
             value = value.record
         return getattr(value, "cls", None) is self.memory
 
     def known_tuple(self, ctype: str) -> type[Any] | None:
-        """Return the NamedTuple class behind a C type; None where it is a number's."""
+        """Return the NamedTuple class of a C type; None for that of a number."""
         for cls, struct in self.known.items():
             if struct.name == ctype and is_named_tuple(cls):
                 return cls  # type: ignore[no-any-return]
@@ -135,7 +135,7 @@ class Structs:
         return self.known[lengths]
 
     def of_result(self, function: str, members: Mapping[str, str]) -> Struct:
-        """Return the structure in which a function gives several values back, by their types."""
+        """Return the structure of a function with several results, by their types."""
         made = {name: Member(name, ctype) for name, ctype in members.items()}
         name = unique(f"{function}_Result", self.names)
         self.names.add(name)
@@ -143,7 +143,7 @@ class Structs:
         return self.known["result", name]
 
     def derive(self, function: str, holder: str, shape: Shape, expr: Expr, hint: str) -> Expr:
-        """Return a number that follows from parameters as a member of their set."""
+        """Return a derived number as a member of its parameter set."""
         struct = self.of_group(shape)
         taken = struct.members
         name = self.derivations.member(function, holder, struct.name, expr, hint, taken)
@@ -153,7 +153,7 @@ class Structs:
         return Expr(f"{holder}->{name}", uses=uses)
 
     def keeps(self, struct: Struct, name: str) -> bool:
-        """Return whether anybody reads a field."""
+        """Return whether any code reads a field."""
         return self.used is None or ("field", struct.name, name) in self.used
 
     def kept(self, struct: Struct) -> list[Member]:
@@ -161,7 +161,7 @@ class Structs:
         return [each for name, each in struct.members.items() if self.keeps(struct, name)]
 
     def ordered(self) -> list[Struct]:
-        """Return the structures that have fields, those first that others hold."""
+        """Return the structures with fields, in the order of their dependencies."""
         by_name = {each.name: each for each in self.known.values()}
         done: dict[str, Struct] = {}
 
@@ -209,7 +209,7 @@ def _doc(cls: type[Any]) -> str:
 
 
 def _lengths(shape: Shape) -> Any:
-    """Return what tells structures of a parameter class apart: lengths of tables."""
+    """Return the difference between structures of a parameter class: lengths of tables."""
     return (
         shape.cls,
         tuple(
@@ -220,7 +220,7 @@ def _lengths(shape: Shape) -> Any:
     )
 
 
-# --- What values are in C: literals of known numbers, types, structures of parameter sets
+# --- Values in C: literals of known numbers, types, structures of parameter sets
 
 
 def is_number(value: Any) -> bool:
@@ -242,7 +242,7 @@ def literal(value: Known, structs: Structs) -> Expr:
 
 
 def built_shape(value: BuiltGroup) -> Shape:
-    """Return the structure of a parameter set that is made of values."""
+    """Return the structure of a parameter set constructed from values."""
     fields: list[tuple[str, Any]] = []
     for name, each in value.items.items():
         if isinstance(each, Group):
@@ -252,7 +252,7 @@ def built_shape(value: BuiltGroup) -> Shape:
         elif isinstance(each, Expr) or is_number(each):
             fields.append((name, Number()))
         elif isinstance(each, Array):
-            raise TypeError("a parameter set with a table cannot be made anew")
+            raise TypeError("a parameter set with a table cannot be constructed again")
         elif hasattr(type(each.value), "model_fields"):
             fields.append((name, shape_of(each.value)))
         else:

@@ -16,11 +16,11 @@ from bywire.export.controller.program import Program
 from bywire.export.controller.render import c_path
 
 _FAR = 1e32
-"""limit of what has none: some tools refuse infinity"""
+"""limit where there is none: some tools reject infinity"""
 
 
 def a2l(program: Program) -> str:
-    """Return the description; addresses are zero, and found by symbol links in the linked file.
+    """Return the A2L description; symbol links replace addresses, which are zero.
 
     The links lead to the memory and the parameters of ``NAME_instance.c``, which are in RAM.
     """
@@ -96,17 +96,17 @@ def instance_header(program: Program) -> str:
         parts += [
             f"{comment(['Parameters that a calibration tool changes.'])}\n"
             f"extern {name}_Parameters {name}_calibration;",
-            f"{comment(['Parameters for the steps, taken over from those.'])}\n"
+            f"{comment(['Parameters for the steps, copied from the calibration.'])}\n"
             f"extern {name}_Parameters {name}_active;",
         ]
     parts.append(
-        f"{comment(['Set memory and parameters as the bench has them.'])}\n"
+        f"{comment(['Set memory and parameters to the values of the bench.'])}\n"
         f"void {name}_instance_init(void);"
     )
     if program.parameters():
         said = [
-            "Take over what was calibrated, and return how many of its numbers are outside their",
-            "ranges or no numbers. Where there is one, nothing is taken over.",
+            "Apply the calibration, and return how many of its numbers are out of range or NaN.",
+            "If there is one, the steps keep their parameters.",
         ]
         parts.append(f"{comment(said)}\nuint32_t {name}_instance_apply(void);")
     return "\n\n".join([*parts, END_C, "#endif"]) + "\n"
@@ -119,7 +119,7 @@ def instance_source(program: Program) -> str:
         comment(
             [
                 f"An instance of the ECU of {program.model.name}; leave this file out if memory",
-                "and parameters have a place of their own in your program.",
+                "and parameters are elsewhere in your program.",
             ]
         ),
         f'#include "{name}_instance.h"',
@@ -155,7 +155,7 @@ def _outside(program: Program) -> str:
             place = f"par->{c_path(dotted)}{f'[{k}]' if member.length else ''}"
             checks = " && ".join(_within(program, place, leaves[dotted]))
             lines.append(wrapped(f"count += ({checks}) ? 0u : 1u;", "    "))
-    said = "Return how many parameters are outside their ranges, or no numbers."
+    said = "Return how many parameters are out of range or NaN."
     return "\n".join(
         [
             comment([said]),
@@ -171,7 +171,7 @@ def _outside(program: Program) -> str:
 
 
 def _within(program: Program, place: str, leaf: Leaf) -> list[str]:
-    """Return the conditions of a parameter's range; an end that is far away is the last number."""
+    """Return the conditions of a parameter's range; a distant end is the last number."""
     kind = np.float32 if program.precision.name == "single" else np.float64
     last = float(np.finfo(kind).max)
     low = f">{'' if leaf.low_open else '='}", leaf.low
@@ -185,17 +185,17 @@ def _within(program: Program, place: str, leaf: Leaf) -> list[str]:
 
 
 # --- CAN
-# Every field of the memory is a signal of 16 bits with a sign, four to a message of 8 bytes, and
-# so is the status of every step. The lowest count says that there is no value.
+# Every field of the memory is a signed signal of 16 bits, four per message of 8 bytes, and so is
+# the status of every step. The lowest count means "not available".
 
 FIRST = 0x100
 """identifier of the first message"""
 CYCLE = 10
 """interval between messages [ms]"""
 NOT_AVAILABLE = -32768
-"""count of a value that is no number, or infinite: outside the range of every signal"""
+"""count of a NaN or infinite value: outside the range of every signal"""
 _MOST, _IN_A_MESSAGE, _LONGEST = 32767, 4, 32
-_ROOM = 10.0  # full scale over the usual magnitude of a signal, at least
+_ROOM = 10.0  # least ratio of full scale to the usual magnitude of a signal
 
 
 @dataclass(frozen=True)
@@ -209,7 +209,7 @@ class CanSignal:
 
     @property
     def name(self) -> str:
-        """What the bus calls it."""
+        """Name on the bus."""
         return c_name(self.field)[:_LONGEST]
 
 
@@ -236,7 +236,7 @@ def _factor(nominal: float) -> float:
 
 
 def dbc(program: Program) -> str:
-    """Return the description of the messages."""
+    """Return the DBC description of the messages."""
     name = c_name(program.name)
     every = list(enumerate(messages(program), FIRST))
     lines = ['VERSION ""', "", "NS_ :", "", "BS_:", "", "BU_: ECU"]
@@ -274,7 +274,7 @@ def _message(name: str, number: int) -> str:
 
 
 def _dbc_text(text: str) -> str:
-    """Return a text for quotation marks, in the characters that every reader of DBC has."""
+    """Return a text for quotation marks, in characters that every DBC reader accepts."""
     plain = text.encode("ascii", "replace").decode()
     return plain.replace("\\", "/").replace('"', "'")
 
@@ -284,8 +284,8 @@ def can_header(program: Program) -> str:
     name, count = program.name, len(messages(program))
     guard = f"{name.upper()}_CAN_H"
     fill = [
-        "Fill a message, counted from 0. A value beyond full scale stays at it; one that",
-        f"is no number, or infinite, becomes the count {NOT_AVAILABLE}: not available.",
+        "Fill a message, counted from 0. A value beyond full scale saturates; one that",
+        f"is NaN or infinite becomes the count {NOT_AVAILABLE}: not available.",
     ]
     return (
         "\n\n".join(
@@ -328,7 +328,7 @@ def can_source(program: Program) -> str:
 
 #include "{name}_can.h"
 
-/* Return the counts of a value, to the nearest one; of none, that which says so. */
+/* Return the counts of a value, rounded; of NaN, the count for \"not available\". */
 static int32_t counts({real} value, {real} factor)
 {{
     const {real} wanted = value / factor;

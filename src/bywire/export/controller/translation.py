@@ -58,7 +58,7 @@ def _text(name: str) -> str:
 
 @cache
 def _functions(name: str) -> Mapping[int, Sequence[Function]]:
-    """Return the functions of a file by the line that their code begins at."""
+    """Return the functions of a file by the first line of their code."""
     found: dict[int, list[Function]] = {}
     for node in ast.walk(ast.parse(_text(name))):
         if isinstance(node, ast.FunctionDef):
@@ -75,7 +75,7 @@ def node_of(function: types.FunctionType) -> Function:
     Raises
     ------
     ModelError
-        Where its source is not there, or two functions stand on its line.
+        When its source is missing, or two functions are on its line.
     """
     code = function.__code__
     try:
@@ -114,7 +114,7 @@ def notes_above(file: str, line: int) -> list[str]:
 
 
 def description(function: types.FunctionType) -> list[str]:
-    """Return what a function does: first line, equations and references of its docstring."""
+    """Return a function's description: first line, equations, references of its docstring."""
     lines = inspect.cleandoc(function.__doc__ or "").splitlines()
     said, part = lines[:1], ""
     for line in lines[1:]:
@@ -131,7 +131,7 @@ def description(function: types.FunctionType) -> list[str]:
 
 
 def stores(node: ast.AST) -> Counter[str]:
-    """Return how often every variable is assigned; what is assigned in a loop counts twice."""
+    """Return the number of assignments to every variable; those in a loop count twice."""
     counted: Counter[str] = Counter()
     weights: dict[ast.AST, int] = {node: 1}
     for each in ast.walk(node):
@@ -149,7 +149,7 @@ def stores(node: ast.AST) -> Counter[str]:
 
 
 def closure_of(function: types.FunctionType) -> dict[str, Any]:
-    """Return what a function sees of the functions around it."""
+    """Return the variables of enclosing functions that a function uses."""
     cells = function.__closure__ or ()
     return {
         name: cell.cell_contents
@@ -162,17 +162,17 @@ def closure_of(function: types.FunctionType) -> dict[str, Any]:
 
 @dataclass
 class Returned:
-    """What a function returned, and the expression that says so."""
+    """The value that a function returned, and its expression."""
 
     value: Any
     node: ast.AST
 
 
 class Executor(Evaluator):
-    """Runs the statements of a function once, for its structure."""
+    """Executes the statements of a function once, for its structure."""
 
     def run(self, statements: list[ast.stmt]) -> Returned | None:
-        """Return what the statements return; None where they go on."""
+        """Return the returned value; None if the function continues."""
         for statement in statements:
             rule = getattr(self, f"_do_{type(statement).__name__.lower()}", None)
             if rule is None:
@@ -249,7 +249,7 @@ class Executor(Evaluator):
             self._assign(each, entry)
 
     def named(self, name: str, value: Any) -> Any:
-        """Return a value under the name of a Python variable, put into one of C where it runs."""
+        """Return a value under the name of a Python variable, in a C variable if not known."""
         value = lifted(value)
         body = self.body
         if isinstance(value, Expr):
@@ -273,7 +273,7 @@ class Executor(Evaluator):
         return self._variable(name, value)
 
     def _is_own(self, name: str, record: Record) -> bool:
-        """Return whether a NamedTuple stands in the variable of this name already."""
+        """Return whether a NamedTuple is already in the variable of this name."""
         own = self.scope.get(name)
         return isinstance(own, Record) and own.expr.text == record.expr.text and not own.pointer
 
@@ -310,7 +310,7 @@ def _uses(value: Any) -> frozenset[Any]:
 # --- Functions: each law once for every structure in which it is called
 
 DEEP = 40
-"""calls within calls beyond which a law counts as recursive"""
+"""depth of calls above which a law counts as recursive"""
 
 
 @dataclass
@@ -322,7 +322,7 @@ class Translation:
     is_plant
         ``is_plant(function, arguments)``: whether a function belongs to the plant's side.
     prefix
-        What names of functions in headers begin with.
+        Prefix of the names of functions in headers.
     """
 
     structs: Structs
@@ -336,7 +336,7 @@ class Translation:
     depth: int = 0
 
     def constant(self, module: str, name: str, value: Any) -> Known:
-        """Return a module's object; a number of its own is called by its name in C."""
+        """Return a module's object; a number has the name of its constant in C."""
         if isinstance(value, float) and module != "math" and name.strip("_").isupper():
             called = c_name(f"{module.rpartition('.')[2]}_{name.strip('_')}").upper()
             if self.constants.setdefault(called, value) == value:
@@ -344,7 +344,7 @@ class Translation:
         return Known(value)
 
     def call(self, at: Context, node: ast.AST, function: Any, given: list[Any], named: Any) -> Any:
-        """Return what a function gives, called in C where it is not known at export."""
+        """Return the result of a function, called in C if it is not known at export."""
         function = inspect.unwrap(function)
         if not isinstance(function, types.FunctionType):
             raise at.refuse(node, f"{function!r} is not translated")
@@ -391,7 +391,7 @@ class Translation:
     def _called(
         self, at: Context, made: CFunction, arguments: Mapping[str, Any]
     ) -> tuple[Expr, dict[str, Record]]:
-        """Return the call, and the memory that it is given by the names of its arguments."""
+        """Return the call, and its memory arguments by name."""
         wanted = {each.name for each in made.arguments}
         every = [e for value in arguments.values() for e in passed(value, at.body)]
         given = dict(zip(made.all_arguments, every, strict=True))
@@ -414,7 +414,7 @@ class Translation:
         self, function: types.FunctionType, arguments: Mapping[str, Any], caller: Body
     ) -> CFunction:
         """Return the C function of a Python function for arguments of a kind."""
-        # Of elementary functions one serves, whatever decides their arguments.
+        # An elementary function has a single version, for all kinds of arguments.
         is_law = function.__module__ != ops.__name__
         steady = tuple(is_law and caller.is_steady(each) for each in arguments.values())
         closure = closure_of(function)
@@ -481,7 +481,7 @@ class Translation:
     def inlined(
         self, at: Context, node: ast.AST, closure: Closure, given: list[Any], named: Any
     ) -> Any:
-        """Return what a function gives that is defined within the caller, written out there."""
+        """Return the result of a function that is defined within the caller, inlined there."""
         names = [each.arg for each in closure.node.args.args]
         values = {**dict(zip(names, given, strict=False)), **named}
         if set(values) != set(names):
@@ -503,7 +503,7 @@ def _rooted(
     arguments: Mapping[str, Any],
     memories: Mapping[str, Record],
 ) -> Any:
-    """Return a function's result in its caller's words: what it was given is the caller's."""
+    """Return a function's result in its caller's terms: its arguments are the caller's."""
     value = lifted(value)
     if isinstance(value, Given):
         given = memories[value.argument]

@@ -1,4 +1,4 @@
-"""What the translator knows of a Python value: a Python object, C text, or a structure of both."""
+"""Values in the translation of Python: Python objects, C text, or structures of both."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 Use = tuple[Any, ...]
-"""what a C text needs: ("local", name), ("field", struct, name), ("call", function), ..."""
+"""dependencies of a C text: ("local", name), ("field", struct, name), ("call", function), ..."""
 Uses = frozenset[Use]
 
 PRIMARY, UNARY, PRODUCT, SUM, COMPARED, BOTH, EITHER, CHOICE = 16, 14, 13, 12, 10, 5, 4, 3
@@ -25,9 +25,9 @@ class Expr:
     text
         C expression.
     level
-        How tightly its last operator binds.
+        Precedence of its last operator.
     uses
-        What it needs.
+        Its dependencies.
     truth
         Whether it is a truth value.
     """
@@ -43,13 +43,13 @@ class Expr:
 
     @property
     def is_path(self) -> bool:
-        """Whether it is but a name, a field of one, or a literal."""
+        """Whether it is only a name, a field of one, or a literal."""
         return _PATH.fullmatch(self.text) is not None
 
 
 @dataclass(frozen=True)
 class Known:
-    """A Python object that export knows; ``name`` is the constant of a module that it is."""
+    """A Python object known at export; ``name`` is that of the module's constant, if it is one."""
 
     value: Any
     name: str = ""
@@ -57,7 +57,7 @@ class Known:
 
 @dataclass(frozen=True)
 class Record:
-    """A NamedTuple that stands in a C variable or is a call's result."""
+    """A NamedTuple in a C variable, or the result of a call."""
 
     cls: type[Any]
     expr: Expr
@@ -66,7 +66,7 @@ class Record:
 
 @dataclass(frozen=True)
 class Built:
-    """A NamedTuple that is made here, of values by field."""
+    """A NamedTuple constructed here from values by field."""
 
     cls: type[Any]
     items: Mapping[str, Any]
@@ -82,7 +82,7 @@ class Update:
 
 @dataclass(frozen=True)
 class Given:
-    """The memory that a function was given, as it leaves it: by the name of its argument in C."""
+    """The memory argument of a function in its final state: by the argument's name in C."""
 
     argument: str
 
@@ -143,7 +143,7 @@ class Shape:
 
 @dataclass(frozen=True)
 class Group:
-    """A parameter set that stands in C.
+    """A parameter set in C.
 
     Parameters
     ----------
@@ -152,8 +152,7 @@ class Group:
     pointer
         Whether the place is a pointer to it.
     origin
-        Argument of the function that it belongs to, and the way from there; none where it is a
-        variable.
+        The function's argument that contains it, and the path from there; None for a variable.
     """
 
     shape: Shape
@@ -164,7 +163,7 @@ class Group:
 
 @dataclass(frozen=True)
 class BuiltGroup:
-    """A parameter set that is made here."""
+    """A parameter set constructed here."""
 
     cls: type[Any]
     items: Mapping[str, Any]
@@ -180,14 +179,14 @@ class Method:
 
 @dataclass(frozen=True)
 class Closure:
-    """A function defined within a function: it is written out where it is called.
+    """A function defined within a function: it is inlined where it is called.
 
     Parameters
     ----------
     scope
         Variables around it.
     file, module
-        Where it is written, and the names that it finds there.
+        Its source file, and the names in its module.
     """
 
     node: ast.FunctionDef | ast.Lambda
@@ -242,15 +241,15 @@ def lifted(value: Any) -> Any:
 # --- Memory that is changed in its place, where the laws return it as a new value
 
 Site = tuple[str, int]
-"""a change of memory: the C function in which it stands, and the how manieth it is there"""
+"""a change of memory: the C function that contains it, and its number there"""
 
 
 @dataclass
 class Memories:
-    """Versions of the memory in a C function, by the place in which it stands.
+    """Versions of the memory in a C function, by its place.
 
-    Python keeps a memory's old values beside the new ones; in C they are gone. What reads a version
-    that is gone tells which change came too early: the next translation lets that change begin
+    Python keeps old values of a memory; in C they are overwritten. When code reads an overwritten
+    version, the change that came too early is recorded: the next translation lets this change begin
     with a copy.
 
     Parameters
@@ -258,7 +257,7 @@ class Memories:
     function
         Name of the C function.
     copied
-        Changes that begin with a copy; what is found here is added.
+        Changes that begin with a copy; this translation adds to them.
     """
 
     function: str = ""
@@ -268,13 +267,13 @@ class Memories:
     changes: int = 0
 
     def at(self, cls: type[Any], place: str, pointer: bool) -> Record:
-        """Return the memory as it stands in a place now."""
+        """Return the current version of the memory in a place."""
         version = self.versions.setdefault(place, 0)
         uses = frozenset({("local", place), ("version", place, version)})
         return Record(cls, Expr(place, uses=uses), pointer)
 
     def stays(self, place: str) -> bool:
-        """Return whether the next change of a place is made there, without a copy before it."""
+        """Return whether the next change of a place is made in place, without a copy before it."""
         self.changes += 1
         site = (self.function, self.changes)
         if site in self.copied:
@@ -287,22 +286,22 @@ class Memories:
         self.versions[place] += 1
 
     def versions_in(self, uses: Iterable[Use]) -> list[Use]:
-        """Return what of a text's needs are versions of memory."""
+        """Return the versions of memory among a text's dependencies."""
         return [use for use in uses if use[0] == "version"]
 
     def read(self, uses: Iterable[Use]) -> None:
-        """Let every version stay that a text reads."""
+        """Keep every version that a text reads."""
         for _, place, version in self.versions_in(uses):
             if self.versions[place] != version:
                 self.copied.add(self.ended[place, version])
 
     def is_now(self, record: Record) -> bool:
-        """Return whether a memory is what stands in its place now."""
+        """Return whether a memory is the current version of its place."""
         self.read(record.expr.uses)
         place = record.expr.text
         return ("version", place, self.versions[place]) in record.expr.uses
 
     def keep(self, place: str) -> None:
-        """Let a place stay as it was at first."""
+        """Keep the first version of a place."""
         if self.versions[place]:
             self.copied.add(self.ended[place, 0])

@@ -1,10 +1,10 @@
-"""Test vectors: what the Python of a task makes of inputs that reach every limit and border.
+"""Test vectors: results of a task in Python for inputs at every limit and border.
 
-Random inputs hardly ever meet a limit to the last digit, where ``<`` and ``<=`` differ, nor come
-so close to it that another limit shows. A tick is run on numbers that note every comparison that
-they take part in, and how far its sides are apart. One input is changed until a comparison turns;
-in between the place is sought where it does. What lies there is where the search goes on: behind
-a limit that is rarely met stand those that are met nowhere else.
+Random inputs rarely meet a limit to the last digit, where ``<`` and ``<=`` differ, nor come close
+enough to it to reveal another limit. A tick runs on numbers that record every comparison and the
+distance of its sides. One input is changed until a comparison changes its result, and the border in
+between is searched. The search then continues from the border, because behind rare limits there are
+limits that are met nowhere else.
 """
 
 from __future__ import annotations
@@ -28,17 +28,17 @@ from bywire.export.controller.contract import LARGEST
 from bywire.export.controller.program import Program, Step
 
 _Place = tuple[Any, ...]
-"""places in the code that lead to a comparison, innermost first; those of ``core.ops`` as one"""
+"""code locations that lead to a comparison, innermost first; ``core.ops`` counts as one"""
 Margins = dict[_Place, float]
-"""how far the sides of comparisons are apart"""
+"""distances of the sides of comparisons"""
 _LESS = ("__lt__", "__ge__")
 
 _now = threading.local()
-"""``margins``: of the tick that this thread is in"""
+"""``margins``: those of the current tick of this thread"""
 
 
 class Traced(float):
-    """A float that notes what it is compared with; what is computed of it does so, too."""
+    """A float that records its comparisons, as do all results computed from it."""
 
     __slots__ = ()
     __hash__ = float.__hash__
@@ -49,7 +49,7 @@ def _comparing(name: str) -> Callable[[Traced, Any], Any]:
 
     def compare(self: Traced, other: Any) -> Any:
         if isinstance(other, (float, int)):
-            # Equal sides count with those that are not apart: where the comparison turns.
+            # Equal sides count as one of both results: where the comparison changes.
             apart = float(self) - float(other)
             _now.margins[_place(sys._getframe(1))] = -apart if name in _LESS else apart
         return plain(self, other)
@@ -99,7 +99,7 @@ for _name in (
 
 
 def margins(tick: Callable[..., Any], inputs: tuple[Any, Any, Any], par: Any) -> Margins:
-    """Return how far the sides of every comparison of a tick are apart; none where it fails.
+    """Return the distance of the sides of every comparison of a tick; empty if the tick fails.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def margins(tick: Callable[..., Any], inputs: tuple[Any, Any, Any], par: Any) ->
 
 
 _BEGIN = margins.__code__
-"""above it there is no law any more"""
+"""outermost place of a law: calls above it are not part of the law"""
 
 
 # --- Where a comparison turns while an input of a tick changes
@@ -138,7 +138,7 @@ def _value_of(inputs: Inputs, field: _Field) -> float:
 
 
 def changed(inputs: Inputs, changes: Iterable[tuple[_Field, float]]) -> Inputs:
-    """Return inputs of which some have other values."""
+    """Return inputs with some values changed."""
     parts = list(inputs)
     for (part, name), value in changes:
         parts[part] = parts[part]._replace(**{name: value})
@@ -147,28 +147,28 @@ def changed(inputs: Inputs, changes: Iterable[tuple[_Field, float]]) -> Inputs:
 
 @dataclass(frozen=True)
 class Border:
-    """Inputs on both sides of where a comparison turns, and whether its sides are equal at one."""
+    """Inputs on both sides of a border of a comparison, and whether its sides are equal at one."""
 
     above: Inputs
     below: Inputs
     is_met: bool
 
     def changed(self, field: _Field, value: float) -> Border:
-        """Return both sides with another input changed, which are taken to be equal at one."""
+        """Return both sides with another input changed, assumed to be equal at one."""
         above, below = (changed(each, [(field, value)]) for each in (self.above, self.below))
         return Border(above, below, is_met=True)
 
 
 @dataclass(frozen=True)
 class Turn:
-    """A comparison of a tick, looked at along one of its inputs.
+    """A comparison of a tick as a function of one input.
 
     Parameters
     ----------
     tick
         ``tick(x, m, u, par) -> memory``.
     place
-        Of the comparison.
+        Place of the comparison.
     field
         The input.
     """
@@ -179,23 +179,23 @@ class Turn:
     field: _Field
 
     def margins(self, inputs: Inputs, value: float) -> Margins:
-        """Return how far the sides of all comparisons are apart, with a value of the input."""
+        """Return the distances of the sides of all comparisons, for a value of the input."""
         return margins(self.tick, changed(inputs, [(self.field, value)]), self.par)
 
     def margin(self, inputs: Inputs, value: float) -> float:
-        """Return how far the sides are apart; NaN where the comparison is not reached."""
+        """Return the distance of the sides; NaN if the comparison is not reached."""
         return self.margins(inputs, value).get(self.place, math.nan)
 
     def border(
         self, inputs: Inputs, first: tuple[float, float], last: tuple[float, float]
     ) -> Border:
-        """Return where the comparison turns between two values with their margins."""
+        """Return the border of the comparison between two values with their margins."""
         ends = _turning_point(lambda value: self.margin(inputs, value), first, last)
         above, below = (changed(inputs, [(self.field, value)]) for value, _ in ends)
         return Border(above, below, ends[1][1] == 0.0)
 
     def is_at(self, border: Border) -> bool:
-        """Return whether the comparison turns there, as the border says."""
+        """Return whether the comparison changes at the border."""
         above, below = (
             margins(self.tick, each, self.par).get(self.place, 0.0)
             for each in (border.above, border.below)
@@ -203,7 +203,7 @@ class Turn:
         return above > 0.0 >= below and (below == 0.0 or not border.is_met)
 
     def is_seen(self, border: Border) -> bool:
-        """Return whether the memory jumps between two inputs next to each other."""
+        """Return whether the memory jumps between two adjacent inputs."""
         try:
             with np.errstate(all="ignore"):
                 first, last = (
@@ -217,19 +217,19 @@ class Turn:
 def _turning_point(
     margin: Callable[[float], float], first: tuple[float, float], last: tuple[float, float]
 ) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return two numbers as close to each other as can be, between which a margin turns.
+    """Return two adjacent numbers between which a margin changes its sign.
 
     Parameters
     ----------
     margin
-        Of a number; NaN where the comparison is not reached.
+        Margin of a number; NaN if the comparison is not reached.
     first, last
         Numbers and their margins, of which one is above zero.
 
     Returns
     -------
     tuple
-        The number above with its margin, and the one that is not.
+        The number above with its margin, and the other one.
     """
     above, below = (first, last) if first[1] > 0.0 else (last, first)
     for step in range(_STEPS):
@@ -251,7 +251,7 @@ def _turning_point(
 def _guessed(
     above: tuple[float, float], below: tuple[float, float], middle: float, is_beyond: bool
 ) -> float:
-    """Return where a straight line turns, or a number just beyond the end that is closer to it."""
+    """Return the zero of a straight line, or a number just beyond the end that is closer to it."""
     (a, at_a), (b, at_b) = above, below
     guess = b - at_b * (a - b) / (at_a - at_b)
     if is_beyond or at_b == 0.0:
@@ -277,7 +277,7 @@ _LATEST = 200
 
 
 class Borders:
-    """Seeks inputs of a task next to where its comparisons turn.
+    """Search for inputs of a task next to the borders of its comparisons.
 
     Parameters
     ----------
@@ -300,14 +300,14 @@ class Borders:
         self.sides: dict[_Place, list[_Field]] = {}
 
     def near(self, rows: Sequence[tuple[Inputs, Any]], wanted: int) -> Iterator[tuple[Inputs, int]]:
-        """Yield inputs on both sides of borders, and which of the rows they come from.
+        """Yield inputs on both sides of borders, and the rows that they come from.
 
         Parameters
         ----------
         rows
-            Inputs and parameters from which the search begins.
+            Initial inputs and parameters of the search.
         wanted
-            Inputs, about; comparisons that were met rarely come first.
+            Approximate number of inputs; rarely met comparisons come first.
         """
         self.rows = [inputs for inputs, _ in rows]
         self.reached = [(inputs, at) for at, inputs in enumerate(self.rows)]
@@ -329,14 +329,14 @@ class Borders:
         return int(self.rng.integers(count))
 
     def _another(self, inputs: Inputs, field: _Field) -> float:
-        """Return another value of an input: that of other inputs, none, or its own changed."""
+        """Return another value of an input: that of another input, zero, or its own changed."""
         others = self.rows[self._any(len(self.rows))]
         before = _value_of(inputs, field)
         values = (_value_of(others, field), 0.0, -before, 3.0 * before)
         return values[max(int(self.rng.integers(-3, 4)), 0)]
 
     def _turned(self, inputs: Inputs, par: Any) -> Iterator[Border]:
-        """Yield borders of the rarest comparisons that turn where an input gets another value."""
+        """Yield borders of the rarest comparisons that change with another value of an input."""
         along = Turn(self.tick, par, (), self.fields[self._any(len(self.fields))])
         at, to = _value_of(inputs, along.field), self._another(inputs, along.field)
         here, there = (along.margins(inputs, value) for value in (at, to))
@@ -363,7 +363,7 @@ class Borders:
         return shown is not None or self.unseen[law] <= _UNSEEN
 
     def _aimed(self, first: tuple[float, Margins], last: tuple[float, Margins]) -> Iterator[float]:
-        """Yield a value beyond which the rarest comparison turns that the input has a say in."""
+        """Yield a value at which the rarest comparison that depends on the input changes."""
         (at, here), (to, there) = first, last
         for place in sorted(here.keys() & there.keys(), key=self._rank):
             moves = there[place] - here[place]
@@ -375,14 +375,14 @@ class Borders:
                 return
 
     def _rank(self, place: _Place) -> tuple[float, _Place]:
-        """Return how well a comparison is known already."""
+        """Return how often a comparison has been met already."""
         law = place[:_LAW]
         return self.met[law] + self.shown[law] / 3 + self.unseen[law] / 10, place
 
     def _met(self, turn: Turn, border: Border) -> Border:
-        """Return a border with its sides equal, if it can be had by the last digits of inputs.
+        """Return a border with its sides equal, if the last digits of inputs allow it.
 
-        The numbers that one input can be may make a side jump over the other.
+        The resolution of one input may make a side jump over the other.
         """
         law = turn.place[:_LAW]
         if not border.is_met and self.met[law] < _MET:
@@ -402,7 +402,7 @@ class Borders:
                     yield nudged
 
     def _sides(self, turn: Turn, inputs: Inputs) -> Iterator[_Field]:
-        """Yield inputs that have a say in a comparison."""
+        """Yield inputs that affect a comparison."""
         before = margins(self.tick, inputs, turn.par).get(turn.place)
         for field in self.fields:
             value = _value_of(inputs, field) * (1.0 + _SMALL) + _SMALL
@@ -411,9 +411,9 @@ class Borders:
                 yield field
 
     def _elsewhere(self, turn: Turn, border: Border) -> Border | None:
-        """Return a border of the same comparison that shows, with other inputs changed, if any."""
+        """Return a border of the same comparison with a visible effect, if there is one."""
         above, below = (_value_of(each, turn.field) for each in (border.above, border.below))
-        for count in range(_CONTEXTS):  # the same place: what follows from it may be hidden
+        for count in range(_CONTEXTS):  # at the same place: its effect may be hidden
             inputs = border.above
             if count % 2:
                 inputs = self.reached[self._any(len(self.reached))][0]
@@ -423,7 +423,7 @@ class Borders:
             if turn.is_seen(moved) and turn.is_at(moved):
                 return moved
         apart = 1e-3 * (2.0 * abs(above) + 1e-3)
-        for _ in range(_NEAR_BY):  # where other inputs have a say in the comparison
+        for _ in range(_NEAR_BY):  # where other inputs affect the comparison
             inputs = changed(border.above, self._changes(border.above, turn.field))
             first, last = ((v, turn.margin(inputs, v)) for v in (above - apart, above + apart))
             if (first[1] > 0.0) != (last[1] > 0.0) and math.isfinite(first[1] - last[1]):
@@ -443,14 +443,14 @@ class Borders:
 # --- Vectors
 
 WILD, CALM, RELATED = tuple(range(10)), (9,) * 20 + tuple(range(10)), (9,) * 5 + (6, 6, 5)
-"""kinds of draws: anything, hardly anything unusual, and much that is equal or at a limit"""
+"""kinds of draws: arbitrary, mostly usual, and often equal or at a limit"""
 _DRIFTS = -5.0, -1.5
 """tenths of the usual size, as powers, by which signals drift in a tick"""
 _LEVELS = (0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, -1.0)
 
 
 class Draw:
-    """Draws signals: of their usual size, far beyond it, at limits, equal to each other."""
+    """Random signals: of their usual size, far beyond it, at limits, equal to each other."""
 
     def __init__(self, program: Program, rng: np.random.Generator, number: Callable[[float], Any]):
         self.rng, self.number = rng, number
@@ -464,7 +464,7 @@ class Draw:
                 self.limits.setdefault(units[group].unit.symbol, []).append(value)
 
     def value(self, signal: Signal, others: list[float]) -> float:
-        """Return a value of a signal; ``others``: those of its unit that are drawn already."""
+        """Return a value of a signal; ``others``: earlier values of its unit."""
         rng, nominal = self.rng, signal.nominal
         kind = int(rng.choice(self.kinds))
         if kind == 5 and signal.unit in self.limits:
@@ -481,9 +481,9 @@ class Draw:
         return 0.0 if kind == 8 else nominal * float(rng.uniform(0.0, 1.0))
 
     def tuple(self, cls: Any, used: set[str], pool: dict[str, list[float]]) -> Any:
-        """Return signals of a NamedTuple; those that nobody reads have their usual size.
+        """Return signals of a NamedTuple; unused ones have their usual size.
 
-        ``pool``: values by unit that stand beside them, and to which these are added.
+        ``pool``: earlier values by unit, to which these are added.
         """
         values: list[Any] = []
         for name, signal in signals_of(cls).items():
@@ -514,7 +514,7 @@ class Draw:
         )
 
     def drift(self, cls: Any, used: set[str]) -> dict[str, float]:
-        """Return how far the signals of a NamedTuple move in a tick: some hardly, some at once."""
+        """Return the change of the signals of a NamedTuple per tick: some slow, some immediate."""
         return {
             name: signal.nominal * float(10.0 ** self.rng.uniform(*_DRIFTS) * self.rng.normal())
             for name, signal in signals_of(cls).items()
@@ -522,7 +522,7 @@ class Draw:
         }
 
     def drifted(self, values: Any, drift: Mapping[str, float]) -> Any:
-        """Return signals a tick later."""
+        """Return signals one tick later."""
         return values._replace(
             **{name: self.number(getattr(values, name) + step) for name, step in drift.items()}
         )
@@ -550,25 +550,25 @@ class Draw:
 # --- Vectors
 
 _BORDERING = 3
-"""of so many vectors one is next to where a comparison turns"""
+"""one of this many vectors is next to a border"""
 _MOST_AT_BORDERS = 400
 _SEGMENT = 40
-"""ticks after which a trajectory starts anew"""
+"""length of a trajectory in ticks"""
 _TRIES = 50
 _KINDS = ("random", "jumping", "smooth")
-"""stretches of vectors, in turns: each drawn anew, few inputs changed at once, all of them drifting
-as those of a plant do, which is where derivatives have their usual size"""
+"""kinds of consecutive vectors, in turn: independent, with few changes, and with all inputs
+drifting like those of a plant, so that derivatives have their usual size"""
 
 
 @dataclass(frozen=True)
 class Vectors:
-    """Inputs of a task and what it makes of them.
+    """Inputs of a task and its results.
 
     Parameters
     ----------
     given, after
         Shape (vectors, fields): plant, stimulus and memory in the order of ``names``; the memory
-        behind the tick.
+        after the tick.
     names
         Kind (``x``, ``u``, ``memory``) and field of every column of ``given``.
     kept
@@ -592,16 +592,16 @@ _Row = tuple[Any, Any, Any, Any, int]
 def vectors(program: Program, memory: Any, count: int, seed: int = 0) -> list[Vectors]:
     """Return test vectors of every task: random ones, trajectories, and borders of comparisons.
 
-    Every other stretch goes with other parameters: those of the bench may switch terms off.
+    Every other sequence has other parameters, because those of the bench may switch terms off.
 
     Parameters
     ----------
     memory
-        With which trajectories begin.
+        Initial memory of trajectories.
     count
         Vectors of each task.
     seed
-        Of what is drawn.
+        Seed of the random numbers.
     """
     number: Callable[[float], Any] = np.float32 if program.precision.name == "single" else float
     draw = Draw(program, np.random.default_rng(seed), number)
@@ -627,7 +627,7 @@ def vectors(program: Program, memory: Any, count: int, seed: int = 0) -> list[Ve
 
 
 def _filled(rows: dict[str, list[_Row]], drawn: Iterator[tuple[str, _Row]], count: int) -> None:
-    """Let every task have so many rows."""
+    """Give every task this number of rows."""
     while any(len(each) < count for each in rows.values()):
         name, row = next(drawn, ("", None))
         if row is None:
@@ -644,7 +644,7 @@ def _drawn(
     used: Mapping[Any, set[str]],
     count: int,
 ) -> Iterator[tuple[str, _Row]]:
-    """Yield tasks and what they make of random inputs and, in turns, of trajectories."""
+    """Yield tasks and their results for random inputs and, in turn, trajectories."""
     model, number = program.model, draw.number
     start = type(memory)(*map(number, memory))
     for stretch in range(_TRIES * count):
@@ -678,7 +678,7 @@ def _drawn(
 def _at_rest(
     program: Program, x: Any, u: Any, m: Any, par: ParameterSet, number: Callable[[float], Any]
 ) -> Any:
-    """Return the memory behind ticks with unchanged inputs: filters have come to rest."""
+    """Return the memory after ticks with constant inputs, when filters are at rest."""
     for _ in range(_SEGMENT):
         for step in program.steps:
             after = _ticked(step, x, m, u, par, number)
@@ -696,7 +696,7 @@ def _at_borders(
     count: int,
     draw: Draw,
 ) -> Iterator[_Row]:
-    """Yield vectors next to borders of comparisons, that Python computes."""
+    """Yield vectors next to borders of comparisons, with Python's results."""
     given = 0
     plain = [each.with_leaves({n: float(v) for n, v in each.leaves().items()}) for each in sets]
     begins = [
@@ -711,7 +711,7 @@ def _at_borders(
 
 
 def _inside(values: Any, number: Callable[[float], Any]) -> Any:
-    """Return signals within their admissible ranges, which a step asks for."""
+    """Return signals within their valid ranges, which a step requires."""
     cls: Any = type(values)
     return values._replace(
         **{
@@ -736,7 +736,7 @@ def _nominal(cls: Any, number: Callable[[float], Any]) -> Any:
 def _ticked(
     step: Step, x: Any, m: Any, u: Any, par: ParameterSet, number: Callable[[float], Any]
 ) -> Any:
-    """Return the memory behind a tick; None where Python, or a step, refuses to compute it."""
+    """Return the memory after a tick; None if Python, or a step, rejects its inputs."""
     if not (_is_accepted(x) and _is_accepted(u)):
         return None
     try:
@@ -745,7 +745,7 @@ def _ticked(
         values = [float(each) for each in after]
     except (ArithmeticError, ValueError):
         return None
-    if not all(abs(each) <= 1e30 for each in values):  # nor is what is no number
+    if not all(abs(each) <= 1e30 for each in values):  # NaN fails this, too
         return None
     if any(abs(float(getattr(after, name))) >= LARGEST for name in step.kept):
         return None

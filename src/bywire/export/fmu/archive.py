@@ -1,7 +1,7 @@
 """An FMU: description, binaries, sources, documentation and a reference run in one archive.
 
-The kernel may take all numbers as finite, which would delete the checks of what a client gives:
-both are compiled apart.
+The kernel may assume finite numbers, which would delete the checks of a client's values: so both
+are compiled separately.
 """
 
 from __future__ import annotations
@@ -53,16 +53,16 @@ _LANGUAGE = ("-std=c11", "-fvisibility=hidden")
 
 @dataclass(frozen=True)
 class Platform:
-    """A system that binaries are made for.
+    """A system for binaries.
 
     Parameters
     ----------
     folder_2, folder_3
-        Where they stand in an FMU of version 2.0 and of 3.0.
+        Their folders in an FMU of version 2.0 and of 3.0.
     suffix
-        Ending of their file.
+        Ending of the file name.
     triple
-        How the compiler of the extra ``compiler`` calls it.
+        Name of the system for the compiler of the extra ``compiler``.
     """
 
     folder_2: str
@@ -81,7 +81,7 @@ PLATFORMS: Mapping[str, Platform] = {
 
 
 def this_platform() -> str:
-    """Return the name of the system that this is, of ``PLATFORMS``."""
+    """Return the name of this system in ``PLATFORMS``."""
     is_arm = platform.machine().lower() in ("aarch64", "arm64")
     if sys.platform == "win32":
         return "win64"
@@ -98,16 +98,16 @@ def compiled(sources: Path, kernel: str, functions: str, target: str, library: P
     sources
         Their folder.
     kernel, functions
-        File of the kernel, and that of the functions of the interface.
+        File of the kernel, and file of the interface's functions.
     target
         Name of the system, one of ``PLATFORMS``.
     library
-        Where to.
+        Path of the library.
 
     Returns
     -------
     str
-        What the compiler is.
+        Label of the compiler.
 
     Raises
     ------
@@ -139,20 +139,21 @@ def _libraries(target: str) -> list[str]:
 
 
 def _compiler_for(target: str) -> tuple[Compiler, tuple[str, ...]]:
-    """Return a compiler and what tells it for which system."""
+    """Return a compiler, and its arguments for the system."""
     if target == this_platform():
         compiler = find_compiler()
         if compiler is None:
             raise CompilerError(
                 "an FMU contains a compiled model, but there is no C compiler: install one, or the "
-                "extra bywire[compiler]"
+                "extra bywire[compiler] (in your clone: pip install -e '.[compiler]')"
             )
         return compiler, ()
     command = bundled_compiler()
     if command is None:
         raise CompilerError(
             f"target {target}: this system's compiler only compiles for {this_platform()}; install "
-            "the extra bywire[compiler], which compiles for all",
+            "the extra bywire[compiler], which compiles for all systems "
+            "(in your clone: pip install -e '.[compiler]')",
             name="target",
             value=target,
             valid=this_platform(),
@@ -188,19 +189,19 @@ class Unit:
     Parameters
     ----------
     made
-        The run that it is of.
+        The exported run.
     faces
         Its variables.
     version
-        Of the interface: 2 or 3.
+        Version of the interface: 2 or 3.
     functions
         File of the interface's functions.
     identifier
         Name of its binaries.
     token
-        What tells it from others.
+        Unique identifier.
     begins_anywhere
-        Whether it begins at rest with changed parameters too.
+        Whether it also begins at rest with changed parameters.
     files
         Texts of its sources by name.
     """
@@ -231,7 +232,7 @@ class Unit:
 
 
 def unit_of(made: Exported, part: Part, version: int, kind: Kind = "co-simulation") -> Unit:
-    """Return the FMU of a part of an exported run; by model exchange that of its plant."""
+    """Return the FMU of a part of an exported run; for model exchange that of its plant."""
     start, reads = start_source(made)
     modes: dict[str, object] = {}
     if kind == "model-exchange":
@@ -322,34 +323,34 @@ def _add(archive: zipfile.ZipFile, name: str, content: bytes) -> None:
     archive.writestr(entry, content)
 
 
-# --- The page inside an FMU: what it is, how it steps, what it takes and gives
+# --- The page inside an FMU: content, stepping, inputs and outputs
 
 _STEPS = {
-    2: "A step first does the ticks of the ECU that are due at its beginning, with the inputs as "
-    "they were set, then the substeps. Between steps a client gets the state right before the "
-    "ticks that are due then (left limits): what the ECU holds is that of its last tick.",
-    3: "Without event mode, a step first does the ticks of the ECU that are due at its beginning, "
-    "with the inputs as they were set, then the substeps; between steps a client gets the state "
-    "right before the ticks that are due then. With event mode, ticks are done there, when "
-    "their clocks tick, and results after them are those that a bench records.",
+    2: "A step first runs the ticks of the ECU that are due at its beginning, with the inputs as "
+    "they were set, then the substeps. Between steps a client reads the state right before the "
+    "ticks that are due then (left limits), and the memory of the ECU after its last tick.",
+    3: "Without event mode, a step first runs the ticks of the ECU that are due at its beginning, "
+    "with the inputs as they were set, then the substeps; between steps a client reads the state "
+    "right before the ticks that are due then. With event mode, ticks run in events, when "
+    "their clocks tick, and the results after them are those that a bench records.",
 }
 _EXCHANGED = (
     "A client's solver integrates the states. Bodies with dry friction are stuck or slide, states "
-    "with limits are free or at them, contacts press or are open: these modes (mode.*) change in "
-    "event mode alone, where an event indicator has changed its sign or inputs have. What the ECU "
-    "holds are inputs; set them in event mode. Energies and other integrals are not in this unit."
+    "with limits are free or at a limit, contacts are closed or open. These modes (mode.*) change "
+    "only in event mode, if an event indicator has changed its sign or an input has changed. The "
+    "ECU's outputs are inputs; set them in event mode. This FMU omits energies and other integrals."
 )
 
 
 def documentation(made: Exported, faces: Interface, begins_anywhere: bool, version: int) -> str:
-    """Return the page, HTML without anything from elsewhere."""
+    """Return the documentation as a self-contained HTML page."""
     bench, par, schedule = made.bench, made.run.par, made.schedule
     title = escape(f"{bench.name or bench.experiment}: {faces.part}")
     begins = (
-        "Changed parameters begin at rest too."
+        "With changed parameters the run also begins at rest."
         if begins_anywhere
-        else "The start is that of the exported parameters: with others, the brake begins off its "
-        "equilibrium and settles."
+        else "The initial state belongs to the exported parameters: with others, the brake begins "
+        "off its equilibrium and settles."
     )
     tasks = ", ".join(
         f"{task.name} every {shown(task.period, 's')}" for task in made.run.model.tasks(par)
@@ -367,7 +368,7 @@ def documentation(made: Exported, faces: Interface, begins_anywhere: bool, versi
                 ("Internal step", f"{shown(schedule.step, 's')}, fixed"),
                 (
                     "Communication step",
-                    f"whole multiples of {shown(schedule.frame, 's')}; others are refused",
+                    f"integer multiples of {shown(schedule.frame, 's')}; the FMU rejects others",
                 ),
                 ("Tasks", tasks),
             )
@@ -376,11 +377,11 @@ def documentation(made: Exported, faces: Interface, begins_anywhere: bool, versi
     ]
     texts = [
         _EXCHANGED if is_exchanged else _STEPS[version],
-        f"{begins} Values that are no numbers or out of their range are refused, and those before "
-        "stay. Noise of sensors is an input: a standard normal number for each tick, or zero.",
-        "reference.csv, beside this page, is the bench's own run: time, stimulus, and every "
-        "recorded signal after the ticks, in SI units. Warnings that the bench gives of ranges of "
-        "validity are not in this unit.",
+        f"{begins} The FMU rejects values that are NaN or out of range, and keeps the "
+        "previous ones. Sensor noise is an input: a standard normal number for each tick, or zero.",
+        "reference.csv, next to this page, is the bench's own run: time, stimulus, and every "
+        "recorded signal after the ticks, in SI units. This FMU omits the bench's warnings of "
+        "ranges of validity.",
     ]
     rows = [
         (

@@ -24,7 +24,7 @@ _BASES = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
 def _unit_definitions(units: Iterable[str]) -> Element:
     """Return the element ``UnitDefinitions`` of both versions.
 
-    Each with the unit in which bywire shows it, where that is another one.
+    Each has the display unit of bywire, if that is different.
     """
     made = Element("UnitDefinitions")
     for unit in sorted(set(units)):
@@ -66,7 +66,7 @@ def description_2(
     Parameters
     ----------
     identifier
-        Name of the binaries, a name of C.
+        Attributes of both versions.
     token
         The GUID.
     head
@@ -115,7 +115,7 @@ def description_2(
 def _states_of_rates(faces: Interface) -> dict[int, int]:
     """Return the value reference of the state of each derivative, by that of the derivative.
 
-    The states that are integrated stand first in the state vector.
+    The integrated states are first in the state vector.
     """
     states = faces.at("state")
     return {rate: states[k] for k, rate in faces.at("rate").items()}

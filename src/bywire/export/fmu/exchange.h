@@ -1,8 +1,8 @@
 /* A plant between the events of a client's solver: modes, derivatives, event indicators.
  *
  * A modal state carries dry friction or a limit. Its mode is 1 or -1, the direction in which it
- * moves, or 0 while it is stuck: then it is zero, and so is its derivative. Contacts press or are
- * open. Modes change in event mode alone; in between all equations are smooth but for what bends
+ * moves, or 0 while it is stuck: then it is zero, and so is its derivative. Contacts are closed or
+ * open. Modes change only in event mode; in between all equations are smooth except for kinks
  * in the plant's own laws.
  */
 #include <stdint.h>
@@ -16,7 +16,7 @@ void bw_output(const double *p, const double *x, const double *m, const double *
     const double *reaction, double *row);
 
 #define INDICATORS (2 * MODAL + CONTACTS)
-/* What is exactly on an edge is not beyond it: solvers that stop there must not find that nothing
+/* A value exactly on an edge is not beyond it: otherwise solvers that stop there find that nothing
  * has changed. Edges have a width where rounding plays: of a velocity, as a share of its usual
  * magnitude, which a solver errs by when a body breaks away; of an overlap [m], a sum of others. */
 #define EDGE 1e-300
@@ -28,13 +28,13 @@ static const double nominals[] = NOMINALS;
 
 typedef struct {
   double p[PARAMETERS + 1], u[STIMULI + 1], state[STATE], row[ROWS + 1];
-  double time, events; /* events: how often a mode has changed */
+  double time, events; /* events: number of mode changes */
   double origin, stop; /* times of the client at which the run begins, and may end at most [s] */
   double mode[MODAL + 1], closed[CONTACTS + 1], reaction[MODAL + 1];
   double rate[STATES], indicator[INDICATORS + 1];
   int32_t is_set;   /* a value was set since the derivatives were computed */
   int32_t is_stale; /* the rows are older than the derivatives */
-  int32_t is_begun; /* the initial values are there */
+  int32_t is_begun; /* the initial values are set */
 } run;
 
 #include "values.h"
@@ -43,8 +43,8 @@ static double *states(run *r) { return r->state + X_AT; }
 
 static inline double seconds(const run *r) { return r->time; }
 
-/* Derivatives and event indicators; what holds a stuck body is what acts on it, and an indicator
- * turns negative where that leaves the bounds, a body turns, or a contact closes or opens. */
+/* Derivatives and event indicators. A stuck body is held by the load on it, and an indicator
+ * turns negative where the load leaves the bounds, a body reverses, or a contact changes. */
 static void evaluate(run *r) {
   double balance[STATES], mass[STATES], low[MODAL + 1], high[MODAL + 1];
   double pressed[CONTACTS + 1], lack[CONTACTS + 1];
@@ -73,7 +73,7 @@ static void refresh(run *r) {
 }
 
 /* Take the modes that state and inputs ask for; 1 where a state was set to zero or a rate may jump:
- * some clients' solvers begin anew only where states are said to have changed. */
+ * some clients' solvers restart only where states are reported as changed. */
 static int settle(run *r) {
   double balance[STATES], mass[STATES], low[MODAL + 1], high[MODAL + 1];
   double pressed[CONTACTS + 1], lack[CONTACTS + 1], mode[MODAL + 1], closed[CONTACTS + 1];
@@ -82,7 +82,7 @@ static int settle(run *r) {
   memcpy(closed, r->closed, sizeof closed);
   for (int k = 0; k < MODAL; ++k) {
     double *x = &states(r)[modal_states[k]];
-    if (mode[k] * *x > 0.0) continue; /* it goes on as it went */
+    if (mode[k] * *x > 0.0) continue; /* it continues in its direction */
     is_new |= *x != 0.0;
     *x = 0.0;
     r->mode[k] = 0.0;
@@ -125,7 +125,7 @@ static double *place_of(run *r, unsigned k) {
   }
 }
 
-/* What the functions of both versions do; each returns what is wrong, NULL for nothing. */
+/* Common functions of both versions; each returns an error message, NULL for success. */
 static const char *take_states(run *r, const double *x, size_t n) {
   if (n != STATES) return "there are not as many continuous states";
   memcpy(states(r), x, n * sizeof *x);
@@ -159,7 +159,7 @@ static const char *give_nominals(double *x, size_t n) {
   return NULL;
 }
 
-/* The state whose derivative is no number; NULL where there is none. */
+/* The state whose derivative is not a number; NULL where there is none. */
 static const char *unknown_rate(const run *r) {
   for (int k = 0; k < STATES; ++k)
     if (!isfinite(r->rate[k])) return state_names[k];

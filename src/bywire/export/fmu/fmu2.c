@@ -1,7 +1,7 @@
 /* Functional Mock-up Interface 2.0, co-simulation: the functions of an importer, over stepping.h.
  *
- * A step does the ticks that are due at its beginning, with the inputs that were set, then the
- * substeps. What a client gets between steps is the state right before the ticks that are due
+ * A step runs the ticks that are due at its beginning, with the inputs that were set, then the
+ * substeps. Between steps a client reads the state right before the ticks that are due
  * then: the left limit. Signals named sampled.* are those right after the ticks at the beginning
  * of the last step, as a bench records them.
  */

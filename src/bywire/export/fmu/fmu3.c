@@ -1,8 +1,8 @@
 /* Functional Mock-up Interface 3.0, co-simulation: the functions of an importer, over stepping.h.
  *
- * Without event mode a step does the ticks that are due at its beginning, then the substeps, and
+ * Without event mode a step runs the ticks that are due at its beginning, then the substeps, and
  * results are left limits, as in version 2.0. With event mode the ECU's tasks are clocks: the
- * importer activates them when their time has come, and results after that event are those of the
+ * importer activates them at their times, and the results after that event are those of the
  * bench. Value references: those of fmi3.h, then a clock for every task.
  */
 #include "stepping.h"
@@ -88,7 +88,7 @@ API fmi3Status fmi3UpdateDiscreteStates(fmi3Instance c, bool *again, bool *termi
   return fmi3OK;
 }
 
-/* Frames until a task ticks next, now apart; NEVER without tasks. */
+/* Frames until a task ticks next, excluding now; NEVER without tasks. */
 static int64_t until_tick(const run *r) {
   int64_t nearest = NEVER;
   for (int k = 0; k < TASKS; ++k) {

@@ -27,7 +27,7 @@ from bywire.simulation.graph import Graph, Node
 from bywire.simulation.stages import indented, leaf_namer, statements
 
 LEAVES = {"p": "p", "x": "x", "m": "m", "c": "closed", "r": "reaction"}
-"""arguments of the C functions by kind of leaf; integrals are none, they are not computed"""
+"""arguments of the C functions by kind of leaf; without integrals, which are not computed"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +43,7 @@ class Equations:
 
     @cached_property
     def graph(self) -> Graph:
-        """What the other properties put their nodes into."""
+        """Arguments of the other properties' nodes."""
         return Graph()
 
     def _added(self, function: object, kinds: str) -> list[list[Node]]:
@@ -61,29 +61,29 @@ class Equations:
 
     @cached_property
     def closing(self) -> list[Node]:
-        """Whether each contact presses."""
+        """Whether each contact is closed."""
         return self._added(self.continuous.closing, "xp")[0]
 
     @cached_property
     def equations(self) -> list[list[Node]]:
-        """Right-hand sides, factors of derivatives, bounds, and of contacts what presses."""
+        """Right-hand sides, factors of derivatives, bounds, and overlaps of contacts."""
         return self._added(self.continuous.equations, "xmpc")
 
     @cached_property
     def output(self) -> list[Node]:
-        """What is recorded."""
+        """Recorded signals."""
         return self._added(self.continuous.output, "xmpcrq")[0]
 
     @property
     def shown(self) -> list[int]:
-        """Recorded signals that state and inputs decide: no integrals, nothing of the ECU alone."""
+        """Recorded signals that depend on state and inputs: no integrals, no ECU signals."""
         held = leaves_read(self.graph, chain(*self.equations))["m"]
         reads = [leaves_read(self.graph, [node]) for node in self.output]
         return [k for k, each in enumerate(reads) if not each["q"] and each["m"] <= held]
 
     @property
     def counts(self) -> dict[str, object]:
-        """What the functions around the equations must know, by name of its macro."""
+        """Constants for the functions around the equations, by name of their macro."""
         states = list(signals_of(self.made.run.model.State).values())
         names = self.made.run.model.State._fields
         modal = [names.index(name) for name in self.continuous.modal]
@@ -168,7 +168,7 @@ def exchange_interface(equations: Equations, start_reads: frozenset[int]) -> Int
 
 
 def _state_names(equations: Equations, shown: list[int]) -> list[str]:
-    """Return the names of the states; of those that are recorded otherwise, or held, another."""
+    """Return the names of the states; another name if the recorded signal differs or is held."""
     made = equations.made
     recorded = list(made.program.outputs)
     taken = set(made.run.model.Memory._fields)
@@ -191,30 +191,30 @@ def _rates(made: Exported, names: list[str]) -> Iterator[Variable]:
 
 
 def _modes(equations: Equations) -> Iterator[Variable]:
-    """Yield modes, how often they have changed, and what tells that they must."""
+    """Yield modes, the number of their changes, and the event indicators."""
     model = equations.made.run.model
     continuous = equations.continuous
     known = signals_of(model.State)
     for k, name in enumerate(continuous.modal):
-        label = f"{known[name].label}: 0 stuck, else the direction in which it moves"
+        label = f"{known[name].label}: 0 stuck, otherwise its direction of motion"
         yield Variable(f"mode.{name}", "local", "mode", k, "1", label, is_held=True)
     for k in range(continuous.contacts):
-        label = f"contact {k + 1}: 1 where it presses"
+        label = f"contact {k + 1}: 1 while closed"
         yield Variable(f"mode.contact_{k + 1}", "local", "closed", k, "1", label, is_held=True)
-    label = "how often a mode has changed"
+    label = "number of mode changes"
     yield Variable("mode.changes", "local", "events", 0, "1", label, is_held=True)
     at = 0
     for name in continuous.modal:
-        yield _indicator(at, f"{name}.motion", known[name], "until it turns, or meets its limit")
+        yield _indicator(at, f"{name}.motion", known[name], "distance to reversal, or to its limit")
         yield _indicator(
             at + 1,
             f"{name}.hold",
             Signal("1", known[name].label),
-            "what more would hold it where it is stuck",
+            "margin of the force that holds it while stuck",
         )
         at += 2
     for k in range(continuous.contacts):
-        label = "how far it is pressed, or open"
+        label = "compression or gap"
         yield _indicator(at + k, f"contact_{k + 1}", Signal("1", f"contact {k + 1}"), label)
 
 

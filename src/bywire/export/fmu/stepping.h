@@ -16,13 +16,13 @@ typedef struct {
   int64_t frame;       /* frames since the start */
   double origin, stop; /* times of the client at which the run begins, and may end at most [s] */
   int32_t is_set;      /* a value was set since the rows were computed */
-  int32_t is_begun;    /* the initial values are there */
+  int32_t is_begun;    /* the initial values are set */
   int32_t is_done[TASKS + 1], is_active[TASKS + 1]; /* 3.0: tasks that have ticked now, or shall */
 } run;
 
 #include "values.h"
 
-/* Frames between the ticks of every task, and what makes none or all of them tick. */
+/* Frames between the ticks of every task, and the values for which none or all of them tick. */
 static const int64_t task_frames[] = TASK_FRAMES;
 
 /* Advance from one frame to another. With rows, those frames' recorded signals are written, the
@@ -44,8 +44,8 @@ static void kernel(const run *r, double *state, int64_t begin, int64_t end, int 
   bw_run(r->p, STEP, r->u, state, plan, selection, rec);
 }
 
-/* The recorded signals as they stand, before any tick that is due now. Frame 1: zero divides by
- * everything, and would tick. */
+/* The recorded signals now, before any tick that is due. Frame 1: every entry divides zero,
+ * so that all tasks would tick. */
 static void refresh(run *r) {
   double state[STATE];
   if (!r->is_set) return;
@@ -74,7 +74,7 @@ static void advance(run *r, int64_t frames, int has_ticks) {
   refresh(r);
 }
 
-/* Do ticks of some tasks now; every frame is a multiple of 1. */
+/* Run ticks of some tasks now; every frame is a multiple of 1. */
 static inline void tick(run *r, const int *is_active) {
   int64_t ticks[TASKS + 1];
   for (int k = 0; k < TASKS; ++k) ticks[k] = is_active[k] ? 1 : NEVER;

@@ -1,6 +1,6 @@
-/* Values of a run: what it begins with, what a client may set, and what cannot be.
+/* Values of a run: initial values, those that a client may set, and checks.
  *
- * What the model gives stands in model.h: counts, tables of variables, initial values. The file
+ * model.h contains the data of the model: counts, tables of variables, initial values. The file
  * that includes this one defines what a run is, with p, u, state, is_set and is_begun in it, and
  * the three functions declared here.
  */
@@ -12,15 +12,15 @@
 #define MESSAGE 600
 
 static void refresh(run *r);  /* renew what is computed from the values */
-static void started(run *r);  /* take the values as those of the beginning */
+static void started(run *r);  /* use the values as initial values */
 static double *place_of(run *r, unsigned k);
 
-/* Take the initial values of the parameters; 0 where they are no numbers. */
+/* Take the initial values of the parameters; 0 where they are not numbers. */
 static int begin(run *r) {
   double kept[STATE];
   memcpy(kept, r->state, sizeof kept);
   if (memcmp(r->p, p_start, sizeof p_start)) bw_start(r->p, r->state);
-  for (int k = 0; k < STATE; ++k) /* what was set stays: a part's inputs lie in the state */
+  for (int k = 0; k < STATE; ++k) /* set values stay: a part's inputs are in the state */
     if (memcmp(&kept[k], &state_start[k], sizeof(double))) r->state[k] = kept[k];
   for (int k = 0; k < STATE; ++k)
     if (!isfinite(r->state[k])) return 0;
@@ -48,14 +48,14 @@ static const char *timed(run *r, double start, int has_stop, double stop) {
   return NULL;
 }
 
-/* What is to be said of a run that has left the numbers; NULL where it has not. */
+/* The message for a run with values that are not finite; NULL where all are. */
 static const char *lost(const run *r) {
   for (int k = 0; k < STATE; ++k)
     if (!isfinite(r->state[k])) return k < STATES ? state_names[k] : "an integral or the memory";
   return NULL;
 }
 
-/* Set a variable; what is wrong with the value is written to said, else it stays empty. */
+/* Set a variable; a message on an invalid value is written to said, which else stays empty. */
 static void set_value(run *r, unsigned k, double value, int is_running, char *said) {
   const variable *v;
   said[0] = 0;
@@ -77,14 +77,14 @@ static void set_value(run *r, unsigned k, double value, int is_running, char *sa
   }
 }
 
-/* A run put aside. Its bytes are those of its serialized form, for the same library. */
+/* A saved run. Its bytes are those of its serialized form, for the same library. */
 typedef struct {
   char token[sizeof TOKEN];
   int32_t now;
   run r;
 } snapshot;
 
-/* Each of these returns what is wrong; NULL for nothing. */
+/* Each of these returns an error message; NULL for success. */
 static const char *put_aside(const run *r, int now, void **state) {
   snapshot *kept = *state ? *state : calloc(1, sizeof *kept);
   if (!kept) return "there is no memory for the state";

@@ -1,4 +1,4 @@
-// Makes WebAssembly of the formulas that a module carries as a table, see formulas.py.
+// Generates WebAssembly from the formulas that a module contains as a table, see formulas.py.
 
 const OPERATIONS = ("add sub mul neg inv fabs sqrt floor ceil copysign fmax fmin lt le eq ne not "
   + "and or if_else_zero select exp log sin cos pow tan atan tanh").split(" ");
@@ -69,7 +69,7 @@ function readTable(buffer) {
 /** Return the body of the function that computes a formula, in a working memory from `base` on. */
 function bodyOf({ again, results, places }, values, kept, base) {
   const uses = new Uint32Array(values.length), locals = new Int32Array(values.length).fill(-1);
-  const code = [], types = [], held = new Map(); // held: locals of what stands in memory, by place
+  const code = [], types = [], held = new Map(); // held: locals of values in memory, by place
   const isOther = (v) => !values[v].op || kept.has(v); // there is nothing to compute
   const stack = [...results];
   while (stack.length) {
@@ -168,7 +168,7 @@ function bodyOf({ again, results, places }, values, kept, base) {
  * Return the functions of a table.
  *
  * `exported` gives the memory and the elementary functions, `base` is where the working memory
- * begins. A formula takes nothing; a loop takes how many turns are left and returns it when it ends.
+ * begins. A formula takes no argument; a loop takes the number of remaining turns and returns it at its end.
  */
 async function functionsOf(buffer, exported, base) {
   const { values, formulas } = readTable(buffer);

@@ -1,12 +1,12 @@
-/** A number that may be set. */
+/** A parameter that can be set. */
 export interface Parameter {
   name: string; unit: string; start: number; low: number | null; high: number | null;
   range: string; meaning: string;
-  /** Whether this structure's equations read it. */
+  /** Whether the equations of this structure use it. */
   used: boolean;
 }
 export interface Signal { name: string; unit: string; label: string }
-/** What drives the run: values that hold from their times on. */
+/** Stimulus of the run: values from their times on. */
 export interface Stimulus extends Signal { steps: [number, number][]; low?: number; high?: number }
 export interface Description {
   name: string; model: string; duration: number; settle: number; step: number; frame: number;
@@ -22,9 +22,9 @@ export interface Options {
 export interface Recording {
   time: Float64Array;
   signals: Record<string, Float64Array>;
-  /** The same row by row: all signals of an instant, in their order, then those of the next. */
+  /** The signals as a table: one row per time, in their order. */
   table: Float64Array;
-  /** Whether contacts and frictions settled in all substeps, and all values are numbers. */
+  /** Whether contacts and friction converged in all substeps, and all values are numbers. */
   settled: boolean;
 }
 export interface Brake {

@@ -34,7 +34,7 @@ function rowsOf(description, given, count, interval) {
   names.forEach((name, k) => {
     const course = given[name] ?? description.stimulus[k].steps;
     if (ArrayBuffer.isView(course)) {
-      if (course.length < count) throw new RangeError(`${name}: ${count} rows are wanted`);
+      if (course.length < count) throw new RangeError(`${name}: ${count} rows are needed`);
       for (let row = 0; row < count; ++row) rows[row * names.length + k] = course[row];
       return;
     }
@@ -54,11 +54,11 @@ function rowsOf(description, given, count, interval) {
 }
 
 /**
- * Compile a module; the result runs it as often as is wanted.
+ * Compile a module; the result can run it any number of times.
  *
  * `run(parameters, { stimulus, duration })` returns `{ time, signals, table, settled }`: signals by
  * name as Float64Array, row by row those of a bench, or all beside each other as a table of rows.
- * Parameters and stimuli that are left out are the bench's; noise is none unless it is given as rows.
+ * Omitted parameters and stimuli are the bench's; noise is zero unless it is given as rows.
  */
 export async function load(bytes, description) {
   const { exp, log, sin, cos, tan, atan, tanh, pow } = Math;

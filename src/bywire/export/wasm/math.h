@@ -1,4 +1,4 @@
-/* What the kernel takes from a mathematics library, where there is none: single instructions of
+/* Functions of a mathematics library for the kernel, where there is none: single instructions of
  * WebAssembly, and for arguments beyond the kernel's own functions those of the page. */
 #define IN_PAGE(name) __attribute__((import_module("math"), import_name(#name))) double name
 #define HUGE_VAL __builtin_huge_val()

@@ -1,9 +1,9 @@
 """The files of an exported run: module, description, loader, types; formulas as a table.
 
-Instructions of straight-line code name their operands by number, in which little repeats. In the
-table what is read once has no number: operations stand behind their operands and take them from a
-stack. Of most others it says how many named values ago they were computed: small numbers, which
-deflate well. All formulas share one table, and each computes of it what its results need.
+Instructions of straight-line code name their operands by number, with little repetition. In the
+table, values that are read once have no number: operations follow their operands and take them from
+a stack. Most other operands are stored as the distance to a named value: small numbers, which
+compress well. All formulas share one table, and each computes only what its results need.
 """
 
 from __future__ import annotations
@@ -75,9 +75,9 @@ OPERATIONS = (
 )
 """In the order of their numbers in the table; the loader has the same."""
 
-_NEAR = 64  # named values back that a byte of an operand reaches; 0 is none, above it are others
+_NEAR = 64  # largest distance to a named value in one byte; 0 is none, larger ones are others
 _MOST = 0xFFFF  # lengths and names have two bytes
-_EITHER = frozenset({"add", "mul", "eq", "ne", "and", "or"})  # operands may change places
+_EITHER = frozenset({"add", "mul", "eq", "ne", "and", "or"})  # commutative operations
 
 _Places = Mapping[tuple[str, int], int]
 _Value = tuple[Any, ...]
@@ -93,8 +93,8 @@ class Formula:
     graph, results
         Expressions, and pairs of place in the working memory and node.
     again
-        Zero, or in a loop how many results behind the first, which ends it, begin its next turn;
-        those behind them are added up.
+        Zero, or in a loop the number of results after the first, which ends the loop, that begin
+        its next turn; those after them are summed up.
     """
 
     graph: Graph
@@ -104,7 +104,7 @@ class Formula:
 
 @dataclass
 class _Table:
-    """What is written of expressions: tokens, and operands by name with how many there were."""
+    """Written form of expressions: tokens, and operands with the number of earlier names."""
 
     names: dict[_Value, int]
     tokens: list[_Token] = field(default_factory=list)
@@ -142,7 +142,7 @@ def _operands(graph: Graph, node: Node, names: Mapping[_Value, int]) -> list[Nod
 
 
 def _value(graph: Graph, node: Node) -> _Value:
-    """Return what tells a value from those of other graphs: inputs and constants are shared."""
+    """Return the identity of a value among several graphs: inputs and constants are shared."""
     operation = graph.nodes[node]
     is_leaf = operation.op in ("leaf", "const")
     return (operation.op, *operation.args) if is_leaf else (id(graph), node)
@@ -151,17 +151,17 @@ def _value(graph: Graph, node: Node) -> _Value:
 def table(formulas: Sequence[Formula], places: _Places) -> bytes:
     """Return the table of some formulas.
 
-    What the first of them computes the others read where that wrote it.
+    The results of the first formula are inputs of the others.
 
     Parameters
     ----------
     places
-        Where inputs stand in the working memory, by kind and index.
+        Places of inputs in the working memory, by kind and index.
 
     Raises
     ------
     CompilerError
-        When there are more than the table can name.
+        When there are more values than the table can name.
     """
     orders = [needed(f.graph, [n for _, n in f.results], lambda _: False) for f in formulas]
     uses, graphs = _uses(formulas, orders)
@@ -207,12 +207,12 @@ def _uses(
 
 
 def _steps(numbers: Sequence[int]) -> list[int]:
-    """Return the differences of numbers, which repeat where these go on in steps."""
+    """Return the differences of numbers, which are constant for regular steps."""
     return [(b - a) & 0xFFFF for a, b in zip([0, *numbers], numbers, strict=False)]
 
 
 def _packed(made: _Table, leaves: int, numbers: list[int], constants: Sequence[float]) -> bytes:
-    """Return lengths and planes: bytes that are alike stand together."""
+    """Return lengths and planes: similar bytes are stored together."""
     kinds = [kind for kind, _ in Counter(made.tokens).most_common()]
     count = max(len(made.tokens), len(made.operands), len(numbers) + len(made.operands))
     if count > _MOST or len(kinds) > 255:
@@ -257,7 +257,7 @@ def _number(kind: _Token) -> int:
 
 
 def _with_section(module: bytes, name: str, content: bytes) -> bytes:
-    """Return a module of WebAssembly with a section that engines leave alone."""
+    """Return a module of WebAssembly with a section that engines ignore."""
     title = name.encode()
     body = bytes([len(title)]) + title + content
     length, left = bytearray(), len(body)
@@ -274,7 +274,7 @@ _OWN = OPERATIONS[OPERATIONS.index("exp") : OPERATIONS.index("pow") + 1]  # func
 
 @dataclass(frozen=True)
 class RunFormulas:
-    """The table of a run, and the C text that tells how it is laid out."""
+    """The table of a run, and the C text of its layout."""
 
     table: bytes
     header: str
@@ -351,11 +351,11 @@ def _run_formulas(made: Exported) -> RunFormulas:
 
 
 def _integrals(stages: Stages) -> list[Node]:
-    """Return the integrals after a frame, in which coefficients do not change."""
+    """Return the integrals after a frame with constant coefficients."""
     graph, nodes = stages.graph, []
     for k, pairs in enumerate(stages.quadrature.combinations):
         total = None
-        for coefficient, product in pairs:  # as they stand: the order is that of the bench's kernel
+        for coefficient, product in pairs:  # the order is that of the bench's kernel
             part = graph.intern(Operation("mul", (coefficient, graph.leaf("s", product))))
             total = part if total is None else graph.intern(Operation("add", (total, part)))
         q = graph.leaf("q", k)
@@ -364,7 +364,7 @@ def _integrals(stages: Stages) -> list[Node]:
 
 
 def _kept(stages: Stages, roots: Sequence[Node]) -> list[Node]:
-    """Return what follows from parameters and step alone and is read beside other things."""
+    """Return the values derived from parameters and step that other expressions read."""
     graph, level = stages.graph, stages.level()
     order = needed(graph, roots, lambda _: False)
     readers = [node for node in order if level[node] or graph.is_boolean(node)]
@@ -394,7 +394,7 @@ static const double state_start[] = {braced(map(number, made.vector))};
 
 
 def _lent(op: str) -> str:
-    """Return the C text that lends an elementary function to formulas."""
+    """Return the C text that exports an elementary function to formulas."""
     given, taken = ("double a, double b", "a, b") if op == "pow" else ("double a", "a")
     return f"PAGE({op}) double lent_{op}({given}) {{ return bw_{op}({taken}); }}\n"
 
@@ -425,7 +425,7 @@ def module_files(
 ) -> dict[str, bytes]:
     """Return the files of an exported run by their names.
 
-    ``further``: C that goes into the module, by the name of the function that it exports.
+    ``further``: C functions for the module, by the name under which it exports them.
 
     Raises
     ------
@@ -444,19 +444,19 @@ def module_files(
 
 
 def _module(made: Exported, further: Mapping[str, str]) -> bytes:
-    """Return the module: what is the same for every bench in code, its formulas as a table."""
+    """Return the module: common code for every bench, with its formulas as a table."""
     formulas = _run_formulas(made)
     headers = {"runtime.h": SCALAR, "layout.h": formulas.header, "cut.h": CUT}
     return _with_section(_compiled(headers, further), "formulas", formulas.table)
 
 
 def _compiled(headers: Mapping[str, str], further: Mapping[str, str]) -> bytes:
-    """Return what is compiled of a module."""
+    """Return the compiled part of a module."""
     compiler = bundled_compiler()
     if compiler is None:
         raise CompilerError(
-            "WebAssembly is compiled by the extra bywire[compiler], which is not installed: "
-            "pip install 'bywire[compiler]'"
+            "WebAssembly needs the extra bywire[compiler], which is not installed: in your clone: "
+            "pip install -e '.[compiler]'"
         )
     with scratch_folder(process_folder()) as folder:
         for name in ("math.h", "string.h", "page.c"):
@@ -483,7 +483,7 @@ def _compiled(headers: Mapping[str, str], further: Mapping[str, str]) -> bytes:
 def _description(
     made: Exported, name: str, begins_anywhere: bool, faces: Interface
 ) -> dict[str, Any]:
-    """Return what the loader, and who uses it, must know of a run."""
+    """Return the description of a run for the loader and its users."""
     schedule, par = made.schedule, made.run.par
     count = made.program.sizes.parameters  # all: the loader fills the kernel's whole vector
     used = {each.name for each in faces.of("parameter")}
@@ -522,7 +522,7 @@ def _description(
 
 
 def _stimuli(made: Exported) -> list[dict[str, Any]]:
-    """Return what drives the bench, as steps: values that hold from their times on, no noise."""
+    """Return the stimulus of the bench as steps: values from their times on, without noise."""
     rows = sampled_stimulus(made.run, made.schedule)
     times = made.schedule.stimulus_times
     ranges = ranges_of(made.run.model.Stimulus)

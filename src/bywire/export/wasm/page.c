@@ -1,5 +1,5 @@
 /* A run in a page. Its formulas are functions that the loader makes, in the table behind NONE; they
- * read and write the working memory: state, parameters and what they hand on. What is long lies
+ * read and write the working memory: state, parameters and what they hand on. Long arrays lie
  * behind __heap_base. */
 #include <stdint.h>
 
@@ -18,7 +18,7 @@ PAGE(room) void *room(void) { return &__heap_base; }
 
 static void compute(int formula) { ((void (*)(void))(intptr_t)formula)(); }
 
-/* What follows from parameters and from the length of a substep, where that is another. */
+/* Values derived from the parameters and from the length of a substep. */
 static void keep(double h) {
   if (area[H_AT] == h) return;
   area[H_AT] = h;
@@ -48,7 +48,7 @@ static void exact_pass(const double *c, double h, const double *m, const double 
 
 #include "cut.h"
 
-/* A substep that is repeated, or cut. */
+/* A repeated or shortened substep. */
 static void repeat(void) {
   double x[NX], d[NX], o[RESULTS];
   cuts made;
@@ -73,7 +73,7 @@ PAGE(begin) void begin(int is_changed) {
  * frames all signals, in the last frame too where it is asked for. */
 PAGE(advance) void advance(const double *u, int32_t held, int32_t first, int32_t end, int32_t last,
     int32_t every, double *rec) {
-  area[H_AT] = 0.0; /* parameters may be others than before */
+  area[H_AT] = 0.0; /* parameters may have changed */
   keep(STEP);
   for (int32_t f = first; f < end + last; ++f) {
     memcpy(area + U_AT, u + f / held * STIMULI, STIMULI * sizeof(double));

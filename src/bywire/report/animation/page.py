@@ -1,4 +1,4 @@
-"""The file that plays a scene: drawing, numbers and player inside, nothing else is loaded."""
+"""Self-contained file that plays a scene: drawing, numbers and player."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ def scene_page(scene: Scene, title: str, summary: str) -> str:
     Parameters
     ----------
     scene
-        What is shown.
+        The scene.
     title, summary
-        Its heading and what is said below, as plain text.
+        Its heading and the line below it, as plain text.
     """
     folder = files(__package__)
     script, style = (folder.joinpath(name).read_text() for name in ("player.js", "player.css"))

@@ -1,4 +1,4 @@
-"""What moves in an animation: drawing, parts that move in it, and dials."""
+"""Content of an animation: drawing, moving parts, and dials."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Frames = Array | float
 
 @dataclass(frozen=True)
 class Move:
-    """How a part of the drawing moves, over the frames or all along.
+    """Motion of a part of the drawing: over the frames, or constant.
 
     Parameters
     ----------
@@ -42,13 +42,13 @@ class Dial:
     Parameters
     ----------
     label, unit
-        What it shows, and in which unit.
+        Label, and unit of the values.
     values
-        Over the frames, in that unit, shape (frames,).
+        Values at the frames, in that unit, shape (frames,).
     full
         Value at which the bar is full.
     color
-        Of the bar, as in CSS.
+        Color of the bar, as in CSS.
     """
 
     label: str
@@ -65,13 +65,13 @@ class Scene:
     Parameters
     ----------
     time
-        Of the frames [s], shape (frames,), evenly spaced.
+        Times of the frames [s], shape (frames,), evenly spaced.
     width, height
-        Of the drawing, in its own units.
+        Size of the drawing, in its own units.
     drawing
-        SVG markup; parts that move are groups whose ``id`` stands in ``moves``.
+        SVG markup; moving parts are groups whose ``id`` is a key of ``moves``.
     moves
-        How these move.
+        Motion of each of these parts.
     dials
         Bars below the drawing.
     """
@@ -86,14 +86,14 @@ class Scene:
 
 @dataclass(frozen=True)
 class SceneKind:
-    """How runs of an assembly are shown.
+    """Animation of the runs of an assembly.
 
     Parameters
     ----------
     name
         The assembly.
     place
-        Signal without which a recording cannot be shown: where the vehicle is.
+        Required signal of a recording: the position of the vehicle.
     draw
         ``draw(recording)``: its scene.
     """
@@ -114,4 +114,4 @@ def over_frames(run: xr.Dataset, name: str, frames: Array) -> Any:
 
 
 SCENES = Kind("animation", ("animations",), instances(SceneKind), declared="a SceneKind")
-"""how runs of assemblies are shown, by the assembly's name"""
+"""animations of runs, by the assembly's name"""

@@ -1,1 +1,1 @@
-"""A bench in a page: the run itself as WebAssembly, parameters to move, curves."""
+"""Live page of a bench: the run as WebAssembly, parameters with sliders, curves."""

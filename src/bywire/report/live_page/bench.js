@@ -3,16 +3,16 @@
 const read = (id) => JSON.parse(document.getElementById(id).textContent);
 const bench = read("bench");
 const { description, digest, panels, chosen, judged, loops } = bench;
-const REST = 150; // ms without a move, after which loops and what is out of sight follow: sliders come first
-let longest = 20000; // ms that a run may take: then it is given up, and its worker with it
+const REST = 150; // ms without a move, after which loops and hidden panels are updated: sliders come first
+let longest = 20000; // ms that a run may take: then its worker is stopped
 const parameters = description.parameters.filter(({ used }) => used);
 const values = Object.fromEntries(parameters.map(({ name, start }) => [name, start]));
 const kept = [];
 const place = (id) => document.getElementById(id);
-const faults = new Map(); // what is wrong now, by where: a field, the link, the run
+const faults = new Map(); // current faults by place: a field, the link, the run
 let run = null, busy = false, wanted = null, resting = 0, slow = 0, late = 0, moved = 0, worker = null;
 
-/** Say what is wrong, or that nothing is any more, somewhere; the latest fault is shown. */
+/** Set or clear the fault of a place; the page shows the latest one. */
 function complain(text, where = "") {
   faults.delete(where);
   if (text) faults.set(where, text);
@@ -22,7 +22,7 @@ function complain(text, where = "") {
   outdate();
 }
 
-/** Mark results that are not those of what stands in the fields. */
+/** Mark results that do not belong to the values in the fields. */
 function outdate(isLate = false) {
   const isInvalid = [...faults.keys()].some((where) => where.startsWith("field "));
   place("shown").classList.toggle("stale", isInvalid || isLate);
@@ -30,7 +30,7 @@ function outdate(isLate = false) {
   place("reset").disabled = !isInvalid && Object.keys(changes()).length === 0;
 }
 
-/** Take away the results where there are none of these values. */
+/** Hide the results: the current values have none. */
 function fail(error) {
   run = null;
   place("shown").hidden = true;
@@ -49,10 +49,10 @@ function describe() {
       const parameter = parameters.find((each) => each.name === name);
       return `${name} = ${digits(shownOf(value, parameter))} ${parameter.shownUnit}`.trim();
     }).join(", ")}`
-    : "as in the bench";
+    : "bench values";
   outdate();
   clearTimeout(moved);
-  moved = setTimeout(address, REST); // browsers refuse more than some ten of these a second
+  moved = setTimeout(address, REST); // browsers reject more than about ten of these per second
 }
 
 function address() {
@@ -61,7 +61,7 @@ function address() {
   history.replaceState(null, "", isChanged ? `#${linkOf(digest, made)}` : location.pathname + location.search);
 }
 
-/* Key figures beside those of the runs that were kept, and whether they are as required. */
+/* Key figures of the run, judged by their limits. */
 function judge() {
   place("figures").hidden = !judged;
   place("unjudged").hidden = Boolean(judged);
@@ -72,7 +72,7 @@ function judge() {
   place("stated").hidden = !isStated;
   place("figures").tBodies[0].replaceChildren(...judged.figures.map((figure) => {
     const computed = followed.length && following.includes(figure.name)
-      ? { value: NaN, reason: `an option follows ${followed}: save the bench file and run it`, open: true }
+      ? { value: NaN, reason: `an option depends on ${followed}: save the bench file and run it`, open: true }
       : run.figures[figure.name];
     const value = computed.reason ? element("td", { class: "number", title: computed.reason }, "–")
       : element("td", { class: "number" }, readable(shownOf(computed.value, figure), figure.unit));
@@ -88,7 +88,7 @@ function judge() {
   }));
 }
 
-/* One run at a time: what was asked for meanwhile replaces what waited. */
+/* One run at a time: a new request replaces the one that waits. */
 function ask() {
   wanted = { ...values };
   clearTimeout(resting);
@@ -98,7 +98,7 @@ function ask() {
     place("work").textContent = "running …";
     outdate(true);
   }, REST);
-  place("loops").classList.add("stale"); // they follow when the sliders rest
+  place("loops").classList.add("stale"); // they are updated when the sliders rest
   late = setTimeout(giveUp, longest);
   worker.postMessage({ values: wanted });
   wanted = null;
@@ -122,36 +122,36 @@ function show({ time, table, figures, settled }) {
   complain("", "run");
   place("shown").hidden = false;
   run = { time, signals: columnsOf(table, time, description.signals.map(({ name }) => name)), figures };
-  place("work").textContent = settled ? "" : "contacts or frictions did not settle in some step";
+  place("work").textContent = settled ? "" : "contacts or friction did not converge in some steps";
   place("keep").disabled = place("csv").disabled = false;
   judge();
   plots.draw(run, kept, values);
   if (loops.length) resting = setTimeout(() => worker.postMessage({ isAboutLoops: true }), REST);
 }
 
-/* A figure that cannot be drawn fails a moment after it was asked for: nothing of it may stay. */
+/* A figure that cannot be drawn fails a moment after the request: remove all of it. */
 addEventListener("error", (event) => {
   event.preventDefault();
-  [plots, ...views].forEach((each) => each.forget()); // half of a figure may stand
+  [plots, ...views].forEach((each) => each.forget()); // half of a figure may be drawn
   fail("the results with these values cannot be drawn");
 });
 
-/** Give a run up that takes too long. */
+/** Stop a run that takes too long. */
 function giveUp() {
   worker.terminate();
   busy = false;
   clearTimeout(slow);
   begin();
-  fail(`the run with these values takes longer than ${longest / 1000} s and was given up`);
+  fail(`the run with these values took longer than ${longest / 1000} s and was stopped`);
   if (wanted) ask();
 }
 
-/** Start the worker that computes beside the page. */
+/** Start the worker that computes in the background. */
 function begin() {
   const text = `${read("loader")}\n${read("worker")}`;
   worker = new Worker(URL.createObjectURL(new Blob([text], { type: "text/javascript" })));
   worker.addEventListener("message", answered);
-  worker.addEventListener("error", (event) => fail(`the bench does not run: ${event.message}`));
+  worker.addEventListener("error", (event) => fail(`the bench failed to run: ${event.message}`));
   worker.postMessage({ kernel: read("kernel"), given: { description, judged, loops, keep: bench.keep } });
 }
 
@@ -201,7 +201,7 @@ place("toml").addEventListener("click", () =>
 place("link").addEventListener("click", async () => {
   address();
   await navigator.clipboard?.writeText(location.href).catch(() => undefined);
-  place("work").textContent = "the address of this page holds its values";
+  place("work").textContent = "the address of this page contains its values";
 });
 
 function take(link) {
@@ -215,11 +215,11 @@ function take(link) {
   describe();
 }
 
-/* Without this a browser leaves the page for a file that is dropped on it, however large it is. */
+/* Otherwise a browser leaves the page for a file that is dropped on it. */
 addEventListener("dragover", (event) => event.preventDefault());
 addEventListener("drop", (event) => {
   event.preventDefault();
-  complain("the page takes no files: its values are set above, or by its link; bywire run takes bench files");
+  complain("this page cannot open files: set the values above or by a link; to run a bench file, use bywire run");
 });
 
 const rows = parameterPanel(place("parameters"), parameters, bench.units, chosen, changed, complain);
@@ -235,7 +235,7 @@ matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
   again();
 });
 if (typeof WebAssembly === "undefined" || typeof Worker === "undefined") {
-  complain("this browser runs no WebAssembly in workers, by which the bench is computed: take a current one");
+  complain("this browser cannot run WebAssembly in workers, which compute the bench: use a current browser");
 } else {
   begin();
   take(location.hash.slice(1));

@@ -1,11 +1,11 @@
 /* Bode diagrams of the bench's loops with their margins, drawn when the sliders rest. */
 
-const LEAST = { decibel: -80, phase: -450 }; // below, nothing is decided
+const LEAST = { decibel: -80, phase: -450 }; // below, no margin is read
 
 /** Return the margins in words, or why there are none; `shown`: name, title, unit and factor of each. */
 function marginText({ reason, margins }, shown) {
   if (reason) return reason;
-  if (margins.hasLoop === false) return "no loop with these values: the loop gain is 0 at all frequencies";
+  if (margins.hasLoop === false) return "no closed loop with these values: the loop gain is 0 at all frequencies";
   if (!margins.isStable) return "the loop is unstable with these values";
   return shown.filter(([name]) => !Number.isNaN(margins[name])).map(([name, title, unit, factor]) =>
     `${title} ${margins[name] === Infinity ? "∞" : digits(margins[name] * factor)} ${unit}`.trim()).join(", ");
@@ -30,8 +30,8 @@ function bodeView(place, loop) {
   const text = element("p", { role: "status" });
   const figure = element("figure", { "aria-label": `Bode diagram of the loop ${loop.name}` });
   place.append(element("h3", {}, `Loop ${loop.name}`),
-    element("p", { class: "summary" }, `${loop.summary}; ${loop.isAnalog ? "" : "as it is sampled, "}cut at ${loop.cutName}, ` +
-      `${loop.point}, dry friction left out`), text, figure);
+    element("p", { class: "summary" }, `${loop.summary}; ${loop.isAnalog ? "" : "sampled, "}cut at ${loop.cutName}, ` +
+      `${loop.point}, without dry friction`), text, figure);
   let plots = [], shape = "", now = null;
   const parts = [
     { key: "decibel", label: "gain [dB]", level: 0, mark: markOf(() => now, (m) => m.gainAt, 0, (m) => -20 * Math.log10(m.gain)) },

@@ -1,7 +1,7 @@
-"""The page's text: kernel, scripts and styles inside, and a policy that admits no more.
+"""Text of the live page: kernel, scripts and styles inside, and a strict policy.
 
-Whatever a browser runs or styles stands in the page with its digest in the policy; what is data
-stands as JSON in which no tag can begin.
+Everything that a browser runs or styles is in the page with its digest in the policy; data are JSON
+in which no tag can begin.
 """
 
 from __future__ import annotations
@@ -51,23 +51,23 @@ from bywire.simulation.c_runtime import SCALAR
 if TYPE_CHECKING:
     import xarray as xr
 
-_SHARE = 1e-3  # of a value, by which it is moved to see what follows it
-_TIMES = 101  # at which stimuli are compared
-_SAME = 1e-12  # by which states may differ, of each
+_SHARE = 1e-3  # relative change of a value, to find what depends on it
+_TIMES = 101  # number of times at which stimuli are compared
+_SAME = 1e-12  # largest difference of equal states, relative to each
 
 
 @dataclass(frozen=True)
 class Dependence:
-    """What follows which parameter.
+    """Dependencies on parameters.
 
     Parameters
     ----------
     driving
-        Parameters that change what drives the run, how long it takes, when rows are recorded, or
-        in a way that the page does not know the state in which it begins; those that the
-        experiment sets itself; and nodes of tables, which only together make a table.
+        Parameters that change the stimulus, the duration, or the times of recording; those that
+        change the initial state in a way that the page cannot compute; those that the experiment
+        itself sets; and nodes of tables, which only make sense together.
     judging
-        Parameters that change options by which key figures look at it.
+        Parameters that change options for key figures.
     """
 
     driving: frozenset[str]
@@ -75,14 +75,14 @@ class Dependence:
 
 
 def dependence(bench: Bench, number: int, names: Collection[str]) -> Dependence:
-    """Return what follows the parameters of a bench in one of its runs.
+    """Return what depends on the parameters of a bench in one of its runs.
 
-    Each is moved by a thousandth, up or else down; one that admits neither counts as driving.
+    Each is changed by a thousandth, up or else down; one that allows neither counts as driving.
     """
     case, values = _case(bench, number), bench.par.leaves()
     driving, judging = set(), set()
     for name in names:
-        if name not in values:  # a node, as exports call it: p_table[1]
+        if name not in values:  # a node, in the form of exports: p_table[1]
             driving.add(name)
             continue
         moved, other = _moved(bench, number, name, values[name])
@@ -95,29 +95,29 @@ def dependence(bench: Bench, number: int, names: Collection[str]) -> Dependence:
 
 
 def _is_driven_alike(bench: Bench, case: Case, other: Case) -> bool:
-    """Return whether a page's run with other parameters is driven, and begins, as the bench's."""
+    """Return whether a page's run with other parameters has the bench's stimulus and start."""
     plans = [(c.duration, c.settle, c.keep, c.record) for c in (case, other)]
     is_driven = plans[0] == plans[1] and np.array_equal(_rows(case), _rows(other))
     return is_driven and _begins_alike(bench, case, other)
 
 
 def _case(bench: Bench, number: int) -> Case:
-    """Return a run as it is driven; where that takes other runs before, as its preview says."""
+    """Return a run with its stimulus; if that needs earlier runs, with that of its preview."""
     made = bench.cases_with(bench.par, bench.chosen_options, bench.definition.preview)[number]
     return made.aligned(bench.step, bench.record)
 
 
 def _begins_alike(bench: Bench, case: Case, other: Case) -> bool:
-    """Return whether a run with other parameters begins where the page's does with them."""
+    """Return whether a run with other parameters has the page's initial state."""
     if bench.definition.preview is not None:
-        return True  # where it really begins, other runs say; the page says that it keeps to ours
+        return True  # earlier runs determine the start; the page notes that it keeps its own
     begun = (case.state, case.memory) if case.start is None else case.start(other.par)
     pairs = zip(begun, (other.state, other.memory), strict=True)
     return all(np.allclose(a, b, rtol=_SAME, atol=0.0, equal_nan=True) for a, b in pairs)
 
 
 def _moved(bench: Bench, number: int, name: str, value: float) -> tuple[Bench, Case | None]:
-    """Return the bench with a parameter moved, and its run; None where neither way is admitted."""
+    """Return the bench with a changed parameter, and its run; None if no change is valid."""
     step = _SHARE * (abs(value) or 1.0)
     for other in (value + step, value - step):
         with suppress(BywireError):
@@ -127,7 +127,7 @@ def _moved(bench: Bench, number: int, name: str, value: float) -> tuple[Bench, C
 
 
 def _rows(case: Case) -> Array:
-    """Return the stimulus over the run, what is left out as zero."""
+    """Return the stimulus over the run, with zeros for omitted signals."""
     times = np.linspace(-case.settle, case.duration, _TIMES)
     given = case.stimulus(times)
     names: Sequence[str] = case.model.Stimulus._fields
@@ -138,7 +138,7 @@ def _rows(case: Case) -> Array:
 
 
 def loops_of(made: Exported) -> list[LoopSource]:
-    """Return the loops of a bench in C; those whose point cannot follow parameters are left out."""
+    """Return the loops of a bench in C, without those whose operating point cannot be updated."""
     par = made.run.par
     shown = [
         loop
@@ -149,11 +149,11 @@ def loops_of(made: Exported) -> list[LoopSource]:
     return [source for source in sources if source is not None]
 
 
-_MARGIN_UNITS = {"1": ("", 1.0), "s": ("ms", 1e3)}  # unit and factor, where not as they are
+_MARGIN_UNITS = {"1": ("", 1.0), "s": ("ms", 1e3)}  # unit and factor, if not the default
 
 
 def told(source: LoopSource) -> dict[str, Any]:
-    """Return what the page must know of a loop."""
+    """Return the data of a loop for the page."""
     loop = source.loop
     is_state = loop.cut in source.states
     names = source.states if is_state else source.memory
@@ -175,7 +175,7 @@ def told(source: LoopSource) -> dict[str, Any]:
         "margins": [
             [name, figure.heading, *_MARGIN_UNITS.get(figure.unit, (figure.unit, 1.0))]
             for name, figure in MARGINS.items()
-            if name != "bandwidth"  # which takes the closed loop
+            if name != "bandwidth"  # needs the closed loop
         ],
         "cut": {"isState": is_state, "at": names.index(loop.cut)},
     }
@@ -186,8 +186,8 @@ def told(source: LoopSource) -> dict[str, Any]:
 _SCRIPTS = ("values.js", "controls.js", "curves.js", "bode.js", "bench.js")
 _WORKER = ("unpack.js", "figures.js", "loops.js", "margins.js", "worker.js")
 _NAME = "run"  # of the module, inside the page
-_MARGIN_UNITS = {"1": ("", 1.0), "s": ("ms", 1e3)}  # unit and factor, where not as they are
-# SI unit, exponents of kg, m, s, A, K, rad, and what people write for it.
+_MARGIN_UNITS = {"1": ("", 1.0), "s": ("ms", 1e3)}  # unit and factor, if not the default
+# SI unit, exponents of kg, m, s, A, K, rad, and common spellings of it
 _UNITS = (
     ("1", (0, 0, 0, 0, 0, 0), "%"),
     ("m", (0, 1, 0, 0, 0, 0), "m km dm cm mm um µm nm inch"),
@@ -210,7 +210,7 @@ _UNITS = (
     ("V*s", (1, 2, -2, -1, 0, 0), "Wb"),
     ("A*s", (0, 0, 1, 1, 0, 0), "C"),
 )
-"""units of which a field takes products; `bywire.core.units` says which of them it reads"""
+"""units whose products a field accepts; `bywire.core.units` decides which of them it reads"""
 _SIZES = {
     "deg": math.pi / 180,
     "°": math.pi / 180,
@@ -218,7 +218,7 @@ _SIZES = {
     "rpm": math.pi / 30,
     "psi": 6894.757293168361,
 }
-"""sizes to the last digit, of which a quantity that is read has 15"""
+"""sizes to the last digit; a quantity that is read has 15"""
 _SHIFTED = {
     **dict.fromkeys(("degC", "°C"), (1.0, 273.15)),
     **dict.fromkeys(("degF", "°F"), (5 / 9, 459.67 * 5 / 9)),
@@ -237,13 +237,13 @@ def page_text(
     Parameters
     ----------
     made
-        The run.
+        The exported run.
     panels
-        What is drawn over time, with the traces that the recording has.
+        Panels over time, with the traces of the recording.
     result
-        What the bench itself gave: labels and units of signals, definitions of key figures.
+        Result of the bench itself: labels and units of signals, definitions of key figures.
     chosen
-        Parameters that stand first; none: the bench's own choice.
+        Parameters at the top; none: the bench's own choice.
 
     Raises
     ------
@@ -272,7 +272,7 @@ def page_text(
         "'wasm-unsafe-eval'; "
         f"style-src {admitted(style)}; worker-src blob:; base-uri 'none'; form-action 'none'"
     )
-    # The kernel stands first: among text, what a server compresses takes 1.5 kB more for it.
+    # The kernel comes first: among text, a compressed page would be 1.5 kB larger.
     return Template(_text("page.html")).substitute(
         kernel=_block("kernel", _packed(module[f"{_NAME}.wasm"])),
         policy=policy,
@@ -299,7 +299,7 @@ def _data(
     origins = {row.name: row for row in parameter_rows(bench.par, cited)}
     read = [each["name"] for each in description["parameters"] if each["used"]]
     follow = dependence(bench, made.number, read)
-    used, kept = set[str](), ("name", "unit", "start")  # kept where nobody moves it
+    used, kept = set[str](), ("name", "unit", "start")  # fixed where nobody changes it
     for k, each in enumerate(description["parameters"]):
         if not each["used"] or each["name"] in follow.driving:
             description["parameters"][k] = {"used": False} | {key: each[key] for key in kept}
@@ -324,7 +324,7 @@ def _data(
 
 
 def _settings(made: Exported) -> Mapping[str, Any] | None:
-    """Return the settings of the families that the page judges its run by; None where it cannot."""
+    """Return the settings of the families of key figures on the page; None where it has none."""
     definition = made.bench.definition
     if not isinstance(definition.judge, FamilyJudge) or definition.finish is not None:
         return None
@@ -356,7 +356,7 @@ def _family(name: str, setting: Any, recording: xr.Dataset) -> dict[str, Any]:
 
 
 def _judged(made: Exported, result: Result, followed: Sequence[str]) -> dict[str, Any] | None:
-    """Return how the page judges its run; None where it cannot."""
+    """Return the data by which the page judges its run; None where it cannot."""
     bench, settings = made.bench, _settings(made)
     if settings is None:
         return None
@@ -396,7 +396,7 @@ def _panels(
     used: set[str],
     stated: Sequence[StatedLevel | StatedRange],
 ) -> list[dict[str, Any]]:
-    """Return the panels, what a source states of a signal in the first one that shows it."""
+    """Return the panels, with stated values of a signal in the first panel that shows it."""
     shown, left = [], list(stated)
     for panel, traces in panels:
         names = {trace.variable for trace in traces}
@@ -439,7 +439,7 @@ def _panel(
 
 
 def _shown(symbol: str) -> Mapping[str, float]:
-    """Return factor and offset from an SI unit to the one in which the edges show it."""
+    """Return factor and offset from an SI unit to its display unit."""
     unit = display_unit(symbol)
     offset = float(convert(0.0, symbol, unit))
     return {"factor": float(convert(1.0, symbol, unit)) - offset, "offset": offset}
@@ -447,7 +447,7 @@ def _shown(symbol: str) -> Mapping[str, float]:
 
 @cache
 def _known_units() -> list[tuple[str, float, tuple[int, ...]]]:
-    """Return the units that a field takes, of which it takes products: name, size, exponents."""
+    """Return the units that a field accepts, also in products: name, size, exponents."""
     return [
         (name, _SIZES.get(name, size), powers)
         for symbol, powers, names in _UNITS
@@ -459,7 +459,7 @@ def _known_units() -> list[tuple[str, float, tuple[int, ...]]]:
 
 @cache
 def _read_as(symbol: str) -> dict[str, Any]:
-    """Return how a field of an SI unit reads others: temperatures, and whether radians matter."""
+    """Return the special rules for a field's unit: temperatures, and whether radians matter."""
     shifted = {
         unit: scale
         for unit, scale in _SHIFTED.items()
@@ -471,7 +471,7 @@ def _read_as(symbol: str) -> dict[str, Any]:
 
 
 def _value(text: str, symbol: str) -> float | None:
-    """Return a quantity in SI; None where it is none of this unit."""
+    """Return a quantity in SI; None if it does not have this unit."""
     try:
         return parse(text, symbol, "a unit")
     except InputError:
@@ -484,7 +484,7 @@ def _summary(made: Exported) -> str:
 
 
 def _changes(bench: Bench) -> str:
-    """Return the paragraphs on what the bench itself changes."""
+    """Return the paragraphs on the changes of the bench itself."""
     texts = change_texts(bench_changes(bench))
     return "".join(f'<p class="summary">{escape(_capital(text))}.</p>\n' for text in texts)
 
@@ -515,7 +515,7 @@ def _script(name: str) -> str:
 
 
 def _packed(module: bytes) -> str:
-    """Return a module as text; deflated first, for base 64 hides from a server what repeats."""
+    """Return a module as text; compressed first, as servers cannot compress base 64 well."""
     return base64.b64encode(zlib.compress(module, 9)).decode()
 
 

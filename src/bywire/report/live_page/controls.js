@@ -1,6 +1,6 @@
 /* A field and a slider for every parameter, in groups that open. */
 
-/** Return an element with attributes, and what stands in it. */
+/** Return an element with attributes and contents. */
 function element(tag, attributes = {}, ...inside) {
   const made = document.createElement(tag);
   for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, value);
@@ -8,14 +8,14 @@ function element(tag, attributes = {}, ...inside) {
   return made;
 }
 
-/** Make the row of a parameter; `changed(name, value)` is told of every move, `complain` of every fault of the field. */
+/** Make the row of a parameter; it calls `changed(name, value)` for every move, and `complain` for every fault of the field. */
 function parameterRow(parameter, known, changed, complain) {
   const { name, shownUnit: unit, meaning, range, kind, where } = parameter;
   const slider = sliderOf(parameter), id = `p-${name}`;
   const field = element("input", { type: "text", id, autocomplete: "off",
-    "aria-label": `${name}${unit && ` in ${unit}`}`, title: `admissible: ${range}; a number, or one with its unit` });
-  const back = element("button", { type: "button", title: "as in the bench",
-    "aria-label": `${name} as in the bench` }, "↺");
+    "aria-label": `${name}${unit && ` in ${unit}`}`, title: `valid: ${range}; a number, with or without a unit` });
+  const back = element("button", { type: "button", title: "reset to the bench's value",
+    "aria-label": `reset ${name} to the bench's value` }, "↺");
   const way = slider && element("input", { type: "range", min: 0, max: 1000, step: 1,
     "aria-label": `${name}, slider` });
   const source = [kind, where].filter(Boolean).join(": ");
@@ -51,7 +51,7 @@ function parameterRow(parameter, known, changed, complain) {
   return { row, show };
 }
 
-/** Fill the panel of parameters: those chosen open above, the others by element below. */
+/** Fill the panel of parameters: chosen ones open at the top, the others by element below. */
 function parameterPanel(place, parameters, known, chosen, changed, complain) {
   const rows = new Map(), groups = new Map();
   const above = element("div", { class: "chosen" });

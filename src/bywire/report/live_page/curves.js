@@ -14,7 +14,7 @@ function palette() {
     main: color("main"), second: color("second"), third: color("third"), "set point": color("ink"), kept: color("kept") };
 }
 
-/** Return a signal as it is shown; it is not copied where that is as it is computed. */
+/** Return a signal in its display unit; a signal already in that unit is not copied. */
 const converted = (values, quantity) =>
   quantity.factor === 1 && quantity.offset === 0 ? values : values.map((value) => shownOf(value, quantity));
 
@@ -71,7 +71,7 @@ function numbersOf(panel, run, kept) {
     ...kept.map((each) => column(panel.traces[0], each))];
 }
 
-/** Return what stands below a panel's curves: what a source states, and the limit that they come near. */
+/** Return the levels below a panel's curves: values that a source states, and the limit that the curves approach. */
 function marksOf(panel, largest, values) {
   const at = (value) => shownOf(value, panel), bound = panel.limit && at(values[panel.limit]);
   const limits = panel.limit && largest > NEAR * bound ? [bound, -bound] : [];
@@ -120,7 +120,7 @@ const drawBar = (panel, runNow, colors) => clipped((ctx, { top }, plot) => {
     if (on[k] > 0.5) ctx.fillRect(place(k), top, place(k + 1) - place(k), 5 * devicePixelRatio);
 });
 
-/** Say in a legend what is drawn below the curves. */
+/** Add the levels below the curves to the legend. */
 function named(plot, marks, color) {
   for (const { label, role } of marks) {
     const swatch = element("div", { class: "u-marker" }), name = element("div", { class: "u-label" }, label);

@@ -1,6 +1,6 @@
-/* Key figures of a run, by the C of their families, which stands in the module beside the kernel. */
+/* Key figures of a run, by the C of their families, which the module contains beside the kernel. */
 
-/** Return what a bench records of a run: time from the end of settling on, and what is kept before. */
+/** Return the recorded part of a run: from the end of settling on, plus the time kept before it. */
 function recordingOf({ time, table }, settle, keep) {
   const begin = time.findIndex((t) => t >= settle - keep - 1e-9);
   const since = time.slice(begin).map((t) => Math.round((t - settle) * 1e12) / 1e12);

@@ -131,7 +131,7 @@ function cutOpen({ A, ticks }, { cut, held, every }) {
 const divisor = (a, b) => (b ? divisor(b, a % b) : a);
 const leastCommon = (a, b) => a / divisor(a, b) * b;
 
-/** Return an analog loop's gain: what reads the cut state reads an input; its own decay is no feedback and stays. */
+/** Return an analog loop's gain: readers of the cut state read an input; the state's own decay is not feedback and stays. */
 function analogGain({ A }, { cut: { at }, every, frame }) {
   const B = A.map((row, i) => (i === at ? 0 : row[at]));
   const opened = A.map((row, i) => row.map((value, j) => (j === at && i !== at ? 0 : value)));
@@ -165,7 +165,7 @@ function gainOf(found, loop) {
   return effective(F, G.map(([value]) => value), opened.back.map((value) => -value), common * frame);
 }
 
-/** Return a model with only what its input reaches and its output sees, states of like size. */
+/** Return the reachable and observable part of a model, with balanced states. */
 function effective(A, B, C, period) {
   const spread = (from, next) => {
     const reached = Array.from(from, (value) => value !== 0);
@@ -225,7 +225,7 @@ function responseAt({ A, B, C, period, isAnalog }, frequency) {
 
 /** Return the closed loop's growth in a sample, or as long: the root of a high power's size. */
 function growthOf({ A, B, C, period, isAnalog }) {
-  if (!A.length) return 0; // nothing is fed back
+  if (!A.length) return 0; // no feedback
   const closed = A.map((row, i) => Float64Array.from(row, (value, j) => value - B[i] * C[j]));
   let X = isAnalog ? exponential(closed.map((row) => row.map((value) => value * period))) : closed;
   let total = 0, power = 1;

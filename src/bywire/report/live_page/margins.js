@@ -1,6 +1,6 @@
 /* Margins of a loop gain L, negative feedback not counted; definitions as in bywire.margins. */
 
-const NO_LOOP = 1e-9, LEAST_FACTOR = 1e-9; // loop gains that are none; factors at a pole on the border
+const NO_LOOP = 1e-9, LEAST_FACTOR = 1e-9; // loop gain that counts as zero; least factor, at a pole on the border
 const SLOWEST = 1e-6, SLOW_POINTS = 40; // below the diagram, where the loop gain is real, Hz
 const DEGREE = 180 / Math.PI;
 const wrapped = (angle) => angle - 360 * Math.floor((angle + 180) / 360);
@@ -69,7 +69,7 @@ function gainMargins({ frequency, L }, model) {
     lower_gain: lower?.factor ?? 0, lowerGainAt: lower?.at ?? NaN };
 }
 
-/** Return all margins; only `isStable` where the loop is not. */
+/** Return all margins; of an unstable loop only `isStable`. */
 function marginsOf(model, bode) {
   const isStable = growthOf(model) < 1 + ON_BORDER;
   if (!bode.size.some((size) => size > NO_LOOP)) return { isStable, hasLoop: false };
@@ -92,7 +92,7 @@ function marginsOf(model, bode) {
 function loopAt(exported, loop) {
   const model = modelOf(exported, loop);
   if (model === "corner") return { reason: "the operating point lies on a corner of the model, whose sides have different loop gains: " +
-    `bywire margins ${loop.name} names the operation` };
+    `run bywire margins ${loop.name} to see the operation` };
   if (!model) return { reason: "no operating point with these values: a contact opens or closes there" };
   const bode = bodeOf(model);
   return { frequency: bode.frequency, decibel: bode.size.map((size) => 20 * Math.log10(size)),

@@ -1,4 +1,4 @@
-"""Parameters that stand first in a page of a bench that changes none: its brake's choice."""
+"""Parameters at the top of the live page of an unchanged bench: its brake's choice."""
 
 from __future__ import annotations
 
@@ -10,23 +10,23 @@ from bywire.bench.bench import Bench
 from bywire.core.arguments import checked
 from bywire.core.registry import Kind, instances
 
-_COUNT = 6  # that stand first where no brake chooses
+_COUNT = 6  # at the top if no brake chooses
 
 
 @checked
 @dataclass(frozen=True)
 class Sliders:
-    """Parameters that are worth a slider, for they say most of an assembly.
+    """Parameters with the strongest effect on an assembly, which get sliders.
 
     Parameters
     ----------
     name
-        Of this choice, unlike any other.
+        Name of this choice; it must be unique.
     assemblies
-        Names of the assemblies that it is for.
+        Names of the assemblies that it applies to.
     parameters
-        Their names as ``--set`` takes them, what is moved first at the front. Those without effect
-        in a run (of a law that was not chosen) are left out of its page.
+        Their names in the form of ``--set``, the most important first. A page leaves out parameters
+        without effect in its run, such as those of a law that is not active.
     """
 
     name: str
@@ -35,11 +35,11 @@ class Sliders:
 
 
 SLIDERS = Kind("choice of sliders", ("sliders",), instances(Sliders), declared="a Sliders")
-"""every brake's choice of parameters that stand first in its pages"""
+"""every brake's choice of parameters at the top of its pages"""
 
 
 def first_sliders(bench: Bench, names: Sequence[str]) -> list[str]:
-    """Return the parameters that stand first in a bench's page where nobody chose any.
+    """Return the parameters at the top of a bench's page where nobody chose any.
 
     Parameters
     ----------
@@ -49,8 +49,8 @@ def first_sliders(bench: Bench, names: Sequence[str]) -> list[str]:
     Returns
     -------
     list of str
-        Those that the bench changes; else its brake's choice; else of each part of the model the
-        first, for the first parameters alone may all be of one part.
+        Those that the bench changes; else its brake's choice; else the first of each part of the
+        model, because the first parameters alone may all belong to one part.
     """
     changed = [name for name in bench.overrides if name in names]
     assembly = bench.definition.assembly

@@ -3,7 +3,7 @@
 /** Return the bytes of a module. */
 async function unpacked(text) {
   if (typeof DecompressionStream === "undefined")
-    throw new Error("this browser unpacks no module, by which the bench is computed: take a current one");
+    throw new Error("this browser cannot unpack the module that computes the bench: use a current browser");
   const packed = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
   const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
   return new Response(stream).arrayBuffer();

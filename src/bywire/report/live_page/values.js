@@ -4,7 +4,7 @@
 const shownOf = (value, { factor, offset }) => value * factor + offset;
 const siOf = (value, { factor, offset }) => (value - offset) / factor;
 
-/** Return a number with so many digits as a reader wants. */
+/** Return a number with as many digits as a reader needs. */
 const digits = (value) => String(Number(value.toPrecision(6)));
 
 /** Return a key figure as it is read: four digits, and small times, lengths and large forces in the unit of their size. */
@@ -34,14 +34,14 @@ const valueAt = ({ from, to, byFactors }, share) =>
 const shareOf = ({ from, to, byFactors }, value) => Math.min(1, Math.max(0,
   byFactors ? Math.log(value / from) / Math.log(to / from) : (value - from) / (to - from)));
 
-/** Return why a value cannot be taken, or nothing; `text`: what was typed where it is no number of the unit. */
+/** Return why a value is not valid, or an empty text; `text`: the typed text if it is not a number in the unit. */
 function objection({ name, unit, shownUnit, low, high, range }, value, text = "") {
   const isWithin = typeof value === "number" && Number.isFinite(value)
     && value >= (low ?? -Infinity) && value <= (high ?? Infinity);
   if (isWithin) return "";
   if (Number.isFinite(value)) return `${name} must be ${range}, not ${value}${unit === "1" ? "" : ` ${unit}`}`;
   const typed = text.length > 40 ? `"${text.slice(0, 40)} …"` : text ? `"${text}"` : "empty";
-  return `${name} must be ${range}, not ${typed}: type a number${shownUnit ? ` in ${shownUnit}, or one with its unit` : ""}`;
+  return `${name} must be ${range}, not ${typed}: type a number${shownUnit ? ` in ${shownUnit}, or with a unit` : ""}`;
 }
 
 const RAISED = "⁰¹²³⁴⁵⁶⁷⁸⁹";
@@ -114,21 +114,21 @@ function quantityOf(text, parameter, known) {
 const linkOf = (digest, changes) =>
   new URLSearchParams([["bench", digest], ...Object.entries(changes)]).toString();
 
-/** Return the changes that a link asks for, or throw what is wrong with it. */
+/** Return the changes that a link sets; throw a RangeError for an invalid link. */
 function changesOf(link, digest, parameters) {
   const changes = {};
   if (!link) return changes;
   const asked = new URLSearchParams(link);
   if (asked.get("bench") !== digest)
-    throw new RangeError("the link is of another bench, or of another version of this one: " +
-      "its values are left out");
+    throw new RangeError("this link belongs to another bench or version: " +
+      "the page ignores its values");
   asked.delete("bench");
   for (const [name, text] of asked) {
     const parameter = parameters.find((each) => each.name === name);
-    if (!parameter) throw new RangeError(`the link sets '${name.slice(0, 60)}', which is no parameter here`);
+    if (!parameter) throw new RangeError(`the link sets '${name.slice(0, 60)}', which is not a parameter of this page`);
     const value = text.trim() === "" ? NaN : Number(text);
     const wrong = objection(parameter, value, text.trim());
-    if (wrong) throw new RangeError(`the link is refused: ${wrong}`);
+    if (wrong) throw new RangeError(`the link is not valid: ${wrong}`);
     changes[name] = value;
   }
   return changes;

@@ -1,5 +1,5 @@
 /* Runs and judges the bench beside the page, which stays alive meanwhile; the scripts that it calls stand above. */
-const LOST = "the bench cannot be computed with these values: the run does not stay among finite numbers";
+const LOST = "the bench cannot be computed with these values: a state becomes infinite or is not a number";
 /** Return a loop's response and margins, or why there are none. */
 function loopOf(exported, loop) {
   try {
@@ -8,14 +8,14 @@ function loopOf(exported, loop) {
     return { reason: "this loop cannot be computed with these values" };
   }
 }
-let loaded; // promised with the first message: the next ones may come before it is there
+let loaded; // a promise from the first message: more messages may come before it is fulfilled
 let bench;
 self.onmessage = async ({ data: { kernel, given, values, isAboutLoops } }) => {
   try {
     bench ??= given;
     loaded ??= unpacked(kernel).then((bytes) => load(bytes, bench.description));
     const brake = await loaded;
-    if (isAboutLoops) // with the parameters of the last run, which still stand in the module
+    if (isAboutLoops) // with the parameters of the last run, which are still in the module
       self.postMessage({ loops: bench.loops.map((loop) => loopOf(brake.exports, loop)) });
     if (!values) return;
     const made = brake.run(values), { description, keep, judged } = bench;

@@ -1,1 +1,1 @@
-"""Figures of studies: how figures are spread, what drives them, how sure an estimate is."""
+"""Figures of studies: spread of key figures, their drivers, and convergence of estimates."""

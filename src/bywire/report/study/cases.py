@@ -1,4 +1,4 @@
-"""Figures: each case of a study a point over what drives it, or a line over parallel axes."""
+"""Figures of single cases: points over drivers, or lines over parallel axes."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ from bywire.report.readable_axis import (
 from bywire.report.study.drawn_cases import DrawnCases
 from bywire.report.style import legend_outside
 
-_JITTER = 0.3  # how far points of a choice lie from its place, of the distance of two
-_GOLDEN = 0.5 * (5.0**0.5 - 1.0)  # its multiples are spread evenly, however many there are
-_LONGEST = 24  # characters of a choice that have room
+_JITTER = 0.3  # spread of the points of a choice, as a share of the distance of two
+_GOLDEN = 0.5 * (5.0**0.5 - 1.0)  # its multiples are spread evenly, for any number of them
+_LONGEST = 24  # characters of a choice that fit
 
 
 @dataclass(frozen=True)
@@ -41,12 +41,12 @@ class CaseAxis:
     Parameters
     ----------
     name, unit
-        What it shows, and its SI unit, or ``"%"``.
+        Label, and SI unit, or ``"%"``.
     values
-        Value of each case, shape (cases,), NaN where there is none; of choices the place of each
-        case's among them.
+        Value of each case, shape (cases,), NaN where there is none; for choices the index of each
+        case's choice.
     choices
-        The names of choices, in the order of their places; none of numbers.
+        Names of the choices, in order; empty for numbers.
     """
 
     name: str
@@ -56,22 +56,22 @@ class CaseAxis:
 
     @property
     def label(self) -> str:
-        """What the axis says: names of parameters, which have dots, as they are."""
+        """Label of the axis; names of parameters, which have dots, unchanged."""
         return self.name if "." in self.name else self.name.replace("_", " ")
 
     @property
     def scale(self) -> Scale:
-        """How the values are written."""
+        """Scale of the values."""
         return Scale(1.0, "") if self.choices else scale_of(self.values, self.unit)
 
     @property
     def shown(self) -> Array:
-        """The values as they are written."""
+        """Values in that scale."""
         return self.scale(self.values)
 
     @property
     def apart(self) -> Array:
-        """The values as points show them: those of a choice beside each other, the same always."""
+        """Values of the points; those of a choice are spread, always in the same way."""
         if not self.choices:
             return self.shown
         places = np.arange(self.values.size) * _GOLDEN % 1.0
@@ -79,15 +79,15 @@ class CaseAxis:
 
     @property
     def names(self) -> list[str]:
-        """The choices as they are written at an axis."""
+        """Texts of the choices at an axis."""
         return [style.plain(each, _LONGEST) for each in self.choices]
 
     def entitled(self, gap: str = " ") -> str:
-        """Return the label of the axis; ``gap`` stands between name and unit."""
+        """Return the label of the axis; ``gap`` separates name and unit."""
         return style.plain(self.label, 40) if self.choices else self.scale.label(self.label, gap)
 
     def write_at(self, axis: Axis, room: float) -> None:
-        """Label an abscissa that shows it, about ``room`` long [inch], once its data are drawn."""
+        """Label an abscissa, about ``room`` long [inch], once its data are drawn."""
         if not self.choices:
             few_labels(axis, room)
             return
@@ -105,11 +105,11 @@ def choice_axis(name: str, values: Sequence[str], choices: Sequence[str]) -> Cas
     Parameters
     ----------
     name
-        What is chosen.
+        Name of the choice.
     values
         The choice of each case.
     choices
-        All that there are, in their order.
+        All choices, in order.
     """
     places = {choice: k for k, choice in enumerate(choices)}
     return CaseAxis(name, "", np.array([places[each] for each in values], float), tuple(choices))
@@ -117,8 +117,8 @@ def choice_axis(name: str, values: Sequence[str], choices: Sequence[str]) -> Cas
 
 # --- A key figure over the quantities that drive it
 
-_EDGE = 1.03  # where cases without the figure stand, in heights of a panel
-_MANY_POINTS = 1000  # points from which on they are small and translucent
+_EDGE = 1.03  # position of cases without the figure, in heights of a panel
+_MANY_POINTS = 1000  # number of points from which they are small and translucent
 
 
 def scatter(
@@ -129,12 +129,12 @@ def scatter(
     Parameters
     ----------
     figure_of, drivers
-        The key figure, and what it is drawn over.
+        The key figure, and the quantities on the abscissas.
     limit
-        What is required [the figure's unit]; only named where it lies far off.
+        Limit [the figure's unit]; only written where it is far away.
     cases
-        Which are drawn; those that miss it are crosses, and those without the figure, which miss it
-        too, triangles at the upper edge.
+        Drawn cases; those that miss the limit are crosses, and those without the figure, which also
+        miss it, triangles at the upper edge.
     """
     figure = Figure(figsize=(style.WIDTH, 2.8), layout="constrained", facecolor="white")
     panels = figure.subplots(1, len(drivers), sharey=True, squeeze=False)[0]
@@ -191,7 +191,7 @@ def scatter(
     first.set_ylabel(figure_of.entitled())
     if far:
         low, high = first.get_ylim()
-        room = 0.15 * (high - low)  # for the text, beside the points
+        room = 0.15 * (high - low)  # space for the text, beside the points
         text = limit_text(limit, figure_of.unit, size_of(figure_of.values))
         first.set_ylim(low - (far < 0) * room, high + (far > 0) * room)
         first.text(
@@ -240,8 +240,8 @@ def scatter(
 
 # --- Parallel axes: what varies and what comes of it
 
-_MANY_LINES = 100  # lines from which on they are translucent
-_NONE = 1.3  # where cases are that do not have a figure, in lengths of an axis
+_MANY_LINES = 100  # number of lines from which they are translucent
+_NONE = 1.3  # position of cases without a figure, in lengths of an axis
 _BOX = {"facecolor": "white", "edgecolor": "none", "pad": 0.8}
 
 
@@ -253,13 +253,13 @@ def parallel_coordinates(
     Parameters
     ----------
     axes_of
-        What varies, then key figures; each axis goes from its least to its largest value, and
-        above it stands what does not have one.
+        Varied quantities, then key figures; each axis goes from its least to its largest value,
+        with undefined values above it.
     cases
-        Which are drawn, by whether they meet all requirements.
+        Drawn cases, by whether they meet all requirements.
     limits
-        Limits of the key figures that have one, in their unit: a mark on the axis, or at its end
-        where no case reaches it.
+        Limits of key figures, in their unit: a mark on the axis, or at its end if no case reaches
+        it.
     """
     axes_of = [each for each in axes_of if np.isfinite(each.values).any()]
     figure, (axes,) = style.new_figure(3.4)
@@ -331,7 +331,7 @@ def parallel_coordinates(
 
 
 def _write_values(axes: Axes, place: int, shown: CaseAxis, ends: tuple[float, float]) -> None:
-    """Write the ends of an axis beyond it, and the choices that lie between beside it."""
+    """Write the ends of an axis beyond it, and further choices beside it."""
     low, high = ends
     numbers = {low: f"{low:.3g}", high: f"{high:.3g}"}
     texts = {float(k): name for k, name in enumerate(shown.names)} or numbers
@@ -354,7 +354,7 @@ def _write_values(axes: Axes, place: int, shown: CaseAxis, ends: tuple[float, fl
 
 
 def _draw_lines(axes: Axes, ordinates: Array, color: str, opacity: float) -> None:
-    """Draw a line for each column, all as one artist: an artist each takes three times as long."""
+    """Draw a line for each column as a single artist: separate ones take three times as long."""
     lines = np.stack(np.broadcast_arrays(np.arange(len(ordinates)), ordinates.T), axis=-1)
     axes.add_collection(
         LineCollection(

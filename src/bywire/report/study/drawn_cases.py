@@ -1,4 +1,4 @@
-"""How much of a study a figure draws of many cases and quantities, and how its caption says so."""
+"""Selection of the cases and quantities that a study's figure draws, and its caption."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 POINTS = 4000
-"""points of a scatter that meet the limit, at most: all that miss it are drawn"""
+"""most points of a scatter plot that meet the limit; all that miss it are drawn"""
 LINES = 300
-"""of parallel coordinates that meet all requirements, and that miss one, at most each"""
+"""most lines of parallel coordinates that meet all requirements, and that miss one"""
 
 BARS = 8
-"""quantities in a panel of bars, at most"""
+"""most quantities in a panel of bars"""
 
 
 @dataclass(frozen=True)
@@ -23,11 +23,11 @@ class DrawnCases:
     Parameters
     ----------
     met, missed
-        Rows of the cases that meet what is required, and of the others.
+        Rows of the cases that meet the requirements, and of the others.
     all_met, all_missed
-        How many there are of each.
+        Total number of each.
     lacking
-        Rows of the cases that miss it because they do not have the figure; all are drawn.
+        Rows of the cases without the figure, which therefore miss it; all are drawn.
     """
 
     met: NDArray[np.intp]
@@ -37,9 +37,9 @@ class DrawnCases:
     lacking: NDArray[np.intp] = field(default_factory=lambda: np.empty(0, np.intp))
 
     def caption(self, met: str, missed: str) -> str:
-        """Return how many cases are drawn; empty where all are.
+        """Return the number of drawn cases as text; empty if all are drawn.
 
-        ``met``, ``missed``: what cases of each kind do, for instance ``"meet the limit"``.
+        ``met``, ``missed``: predicates of the two kinds, for instance ``"meet the limit"``.
         """
         kinds = ((self.met.size, self.all_met, met), (self.missed.size, self.all_missed, missed))
         if all(drawn == count for drawn, count, _ in kinds):
@@ -51,7 +51,7 @@ class DrawnCases:
             for drawn, count, text in kinds
             if count
         )
-        return f"Drawn are {said}."
+        return f"The figure shows {said}."
 
 
 def drawn_cases(
@@ -60,17 +60,17 @@ def drawn_cases(
     most_missed: int | None = None,
     known: NDArray[np.bool_] | None = None,
 ) -> DrawnCases:
-    """Return which cases are drawn, evenly out of all where they are too many to be told apart.
+    """Return the drawn cases, evenly out of all where all would be too many to distinguish.
 
     Parameters
     ----------
     met
-        Whether each case meets what is required, shape (cases,).
+        Whether each case meets the requirements, shape (cases,).
     most_met, most_missed
-        How many are drawn at most; by default all that miss it.
+        Largest numbers of drawn cases; by default all that miss.
     known
-        Whether each case has the figure that is drawn, shape (cases,); by default all. Those that
-        do not stand at an edge.
+        Whether each case has the drawn figure, shape (cases,); by default all. Others are drawn at
+        an edge.
     """
     shown = np.ones(met.size, dtype=bool) if known is None else known
     good, bad = np.flatnonzero(met & shown), np.flatnonzero(~met & shown)

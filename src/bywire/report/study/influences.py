@@ -1,4 +1,4 @@
-"""Figures: how what varies moves the key figures: correlations, indices, each quantity alone."""
+"""Figures of the drivers of key figures: correlations, indices, effect of each quantity alone."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from bywire.studies.findings import ChoiceInfluence, Effect
 from bywire.studies.sensitivity import ElementaryEffects, VarianceShares
 from bywire.studies.statistics import Influence
 
-_CORRELATION = 0.24  # height [inch]
+_CORRELATION = 0.24  # height of a bar [inch]
 
 Driving = Influence | ChoiceInfluence
 
@@ -38,8 +38,8 @@ Driving = Influence | ChoiceInfluence
 def influence_bars(influences: Mapping[str, Sequence[Driving]]) -> Figure:
     """Draw the rank correlations of every key figure, by name, the strongest on top.
 
-    Those that cannot be told from none are pale. Choices have their correlation ratio in another
-    color, without a sign or an interval.
+    Insignificant ones are pale. Choices have their correlation ratio in another color, without a
+    sign or an interval.
     """
     shown = {name: list(each)[:BARS] for name, each in influences.items()}
     counts = [max(len(each), 1) for each in shown.values()]
@@ -91,7 +91,7 @@ def _draw_correlations(axes: Axes, each: Sequence[Driving]) -> None:
 Drivers = Sequence[VarianceShares] | Sequence[ElementaryEffects]
 
 _INDEX = 0.34  # height of a quantity [inch]
-_THICK = 0.38  # of one of its two bars, in the distance of quantities
+_THICK = 0.38  # height of one of its two bars, as a share of the distance of quantities
 _LABELS = {VarianceShares: ("total", "first order"), ElementaryEffects: ("mu*", "sigma")}
 
 
@@ -111,7 +111,7 @@ def sensitivity_bars(
     """
     shown: dict[str, Drivers] = {name: each[:BARS] for name, each in drivers.items()}
     counts = [len(each) for each in shown.values()]
-    # Each with an abscissa of its own: effects have the units of their figures.
+    # Each with its own abscissa: effects have the units of their figures.
     figure, panels = style.new_figure(
         0.4 + 0.75 * len(counts) + _INDEX * sum(counts), [c + 0.5 for c in counts], is_shared=False
     )
@@ -131,7 +131,7 @@ def sensitivity_bars(
 
 
 def _draw_indices(axes: Axes, drivers: Drivers, factor: float) -> None:
-    """Draw two bars a quantity: what it is ranked by above, the other index below."""
+    """Draw two bars per quantity: the ranking index above, the other index below."""
     places = np.arange(len(drivers))[::-1]
     upper = factor * np.array(
         [[e.strength.value, e.strength.low, e.strength.high] for e in drivers]
@@ -166,7 +166,7 @@ def _draw_indices(axes: Axes, drivers: Drivers, factor: float) -> None:
 
 
 def _reach(values: Array) -> Array | None:
-    """Return how far intervals reach below and above, shape (2, quantities); None without any."""
+    """Return the lengths of intervals below and above, shape (2, quantities); None without any."""
     below, above = values[:, 0] - values[:, 1], values[:, 2] - values[:, 0]
     return np.array([below, above]) if np.any(above > 0.0) else None
 
@@ -174,11 +174,11 @@ def _reach(values: Array) -> Array | None:
 # --- Each quantity alone: the farthest-moving on top
 
 _SWING = 0.28  # height of a quantity [inch]
-_PANEL = style.WIDTH - 2.5  # about how long an abscissa is [inch]
+_PANEL = style.WIDTH - 2.5  # approximate length of an abscissa [inch]
 _PALE = 0.6  # opacity of the bar of a choice
-_NAME_SIZE = 7.0  # of the name of a choice [points]
-_LONGEST = 24  # characters of it that have room
-_EDGE, _MARK = 0.99, 5.0  # where levels without the figure are marked, and how large [points]
+_NAME_SIZE = 7.0  # size of the name of a choice [points]
+_LONGEST = 24  # characters of the name that fit
+_EDGE, _MARK = 0.99, 5.0  # position and size of marks of levels without the figure [points]
 
 
 def tornado(
@@ -186,19 +186,19 @@ def tornado(
     units: Mapping[str, str],
     limits: Mapping[str, float],
 ) -> Figure:
-    """Draw the swings of every key figure around what the bench itself gives.
+    """Draw the swings of every key figure around its value in the bench itself.
 
-    Choices are neither below nor above: their bars are gray, with the names of the farthest ones at
-    the ends. A triangle at the edge marks quantities that have a level without the figure.
+    Choices have no direction: their bars are gray, with the names of the farthest ones at the ends.
+    A triangle at the edge marks quantities with a level without the figure.
 
     Parameters
     ----------
     effects
-        Key figure -> what each quantity does to it, the largest swing first; at least one.
+        Key figure -> effect of each quantity, the largest swing first; at least one.
     units
         SI unit of every key figure, or ``"%"``.
     limits
-        Limits of the key figures that have one, in their unit; only named where they lie far off.
+        Limits of key figures, in their unit; only written where they are far away.
     """
     shown = {name: each[:BARS] for name, each in effects.items()}
     counts = [len(each) for each in shown.values()]
@@ -252,7 +252,7 @@ def tornado(
 
 
 def _draw_swings(axes: Axes, effects: Sequence[Effect], scale: Scale) -> None:
-    """Draw of each quantity what its lower and its upper end make, from the bench's own figure."""
+    """Draw the effects of the lower and the upper end of each quantity, from the bench's figure."""
     middle = scale(effects[0].nominal)
     for place, effect in zip(range(len(effects))[::-1], effects, strict=True):
         if effect.unit:
@@ -265,7 +265,7 @@ def _draw_swings(axes: Axes, effects: Sequence[Effect], scale: Scale) -> None:
         known = scale(effect.figures[np.isfinite(effect.figures)])
         axes.plot(known, np.full(known.size, place), "|", color=style.BLACK, markersize=6.0)
         ends = scale(np.array([effect.least, effect.largest]))
-        axes.plot(ends, [place, place], color=style.BLACK, linewidth=0.6)  # between levels, too
+        axes.plot(ends, [place, place], color=style.BLACK, linewidth=0.6)  # also between levels
         if effect.lacking:
             axes.plot(
                 _EDGE,
@@ -281,7 +281,7 @@ def _draw_swings(axes: Axes, effects: Sequence[Effect], scale: Scale) -> None:
 
 
 def _draw_choice(axes: Axes, place: int, effect: Effect, scale: Scale) -> None:
-    """Draw how far the farthest choices go to either side, with their names."""
+    """Draw the farthest choices to either side, with their names."""
     middle = scale(effect.nominal)
     if not np.isfinite(effect.figures).any():
         return
@@ -308,7 +308,7 @@ def _name(effect: Effect, level: int) -> str:
 
 
 def _give_room(axes: Axes, effects: Sequence[Effect]) -> None:
-    """Leave room for the names of choices at both ends of an abscissa."""
+    """Leave space for the names of choices at both ends of an abscissa."""
     names = [_name(each, k) for each in effects if not each.unit for k in range(len(each.values))]
     if not names:
         return

@@ -1,4 +1,4 @@
-"""Figures: how key figures are spread over the cases of a study, and how probable values are."""
+"""Figures: spread of key figures over the cases of a study, and probabilities of values."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ from bywire.report.style import legend_outside
 from bywire.studies.statistics import Share
 
 _COLUMNS = 2
-_HEIGHT = 1.5  # of a panel [inch]
+_HEIGHT = 1.5  # height of a panel [inch]
 _ROOM = 2.7  # width of a panel [inch]
-_BINS = 60  # at most
+_BINS = 60  # largest number of bins
 
 
 @dataclass(frozen=True)
@@ -44,9 +44,9 @@ class Spread:
     unit
         SI unit, or ``"%"``.
     nominal
-        What the bench itself gives; NaN where it is not defined.
+        Value in the bench itself; NaN where it is not defined.
     limit
-        Limit that is required; None where there is none.
+        Required limit; None for none.
     """
 
     values: Array
@@ -56,16 +56,16 @@ class Spread:
 
 
 def histograms(spreads: Mapping[str, Spread], has_band: bool = True) -> Figure:
-    """Draw a histogram of every key figure, by name, each in a panel of its own.
+    """Draw a histogram of every key figure, by name, each in its own panel.
 
-    Dashed the bench itself, dotted the limit.
+    The dashed line is the bench itself, the dotted line the limit.
 
     Parameters
     ----------
     spreads
         By name.
     has_band
-        Whether a shaded band holds 90 % of the cases: of those that were drawn.
+        Whether a shaded band contains 90 % of the cases, for randomly drawn ones.
     """
     rows = -(-len(spreads) // _COLUMNS)
     figure = Figure(
@@ -110,10 +110,10 @@ def histograms(spreads: Mapping[str, Spread], has_band: bool = True) -> Figure:
 
 
 def _draw_counts(axes: Axes, values: Array) -> None:
-    """Fill the outline of the counts of values.
+    """Fill the outline of a histogram.
 
-    As a patch, its limits would be sought like those of curves: half as long as to lay out and
-    draw the panel.
+    A patch would make matplotlib search its limits like those of curves, which takes half as long
+    as layout and drawing of the panel.
     """
     counts, edges = np.histogram(values, _bins(values))
     heights = np.concatenate([[0.0], np.repeat(counts, 2), [0.0]])
@@ -126,7 +126,7 @@ def _draw_counts(axes: Axes, values: Array) -> None:
 
 
 def _bins(values: Array) -> int:
-    """Return how many bins show the shape of values and not their scatter."""
+    """Return the number of bins that shows the shape of values instead of their scatter."""
     edges = np.histogram_bin_edges(values, bins="auto") if np.ptp(values) > 0 else values[:2]
     return int(np.clip(edges.size - 1, 1, _BINS))
 
@@ -136,14 +136,14 @@ def _bins(values: Array) -> int:
 
 @dataclass(frozen=True)
 class Curve:
-    """A key figure and the probability that it comes worse.
+    """A key figure and its exceedance probability.
 
     Parameters
     ----------
     name, unit
         The figure, in SI or ``"%"``.
     limit, admitted
-        What it has to keep, and the probability with which it may not.
+        Its limit, and the largest probability of missing it.
     values
         Shape (points,).
     probability, low, high
@@ -161,7 +161,7 @@ class Curve:
 
 
 def exceedance(curves: Sequence[Curve]) -> Figure:
-    """Draw every curve over a logarithmic probability, a panel with an abscissa of its own each."""
+    """Draw every curve over a logarithmic probability, each in a panel with its own abscissa."""
     figure, panels = style.new_figure(0.5 + 2.0 * len(curves), [1.0] * len(curves), is_shared=False)
     look = style.STROKES[Role.LIMIT]
     for axes, each in zip(panels, curves, strict=True):
@@ -193,8 +193,8 @@ def exceedance(curves: Sequence[Curve]) -> Figure:
 
 # --- How the estimate of a probability came about, case by case
 
-_MARGIN = 8.0  # shown at most of an interval, in what the wanted probability leaves to failure
-_LONG = 10.0  # ratio of numbers of cases from which they are drawn by decades
+_MARGIN = 8.0  # largest displayed interval, relative to the admissible probability of failure
+_LONG = 10.0  # ratio of numbers of cases from which their axis is logarithmic
 
 
 def convergence(
@@ -202,16 +202,16 @@ def convergence(
 ) -> Figure:
     """Draw the share of the first cases that meet a requirement, over their number.
 
-    Ordinates reach from what decides, which is close to the wanted probability, to 100 %.
+    Ordinates reach from slightly below the required probability to 100 %.
 
     Parameters
     ----------
     shares
-        Text of a requirement -> the share of ever more cases, with its interval.
+        Text of a requirement -> share of the first cases, with its interval, for growing numbers.
     wanted
-        Probability that it has to be met with; dotted where there is one.
+        Required probability, drawn as a dotted line; None for none.
     first
-        Cases from which on it is drawn: the interval of a few says nothing.
+        Number of cases from which it is drawn: the interval of a few cases is too wide.
     """
     figure, panels = style.new_figure(0.5 + 1.4 * len(shares), [1.0] * len(shares))
     look = style.STROKES[Role.LIMIT]
@@ -229,7 +229,7 @@ def convergence(
             color=style.SHADE,
         )
         if (probability := wanted[text]) is not None:
-            entries["wanted"] = axes.axhline(
+            entries["required"] = axes.axhline(
                 100.0 * probability,
                 color=look.color,
                 linestyle=look.linestyle,
@@ -259,7 +259,7 @@ def convergence(
 
 
 def _lowest(drawn: Sequence[Share], wanted: float | None) -> float:
-    """Return the least probability that is shown."""
+    """Return the least displayed probability."""
     reached = min(s.low for s in drawn)
     if wanted is not None:
         reached = max(min(reached, wanted), 1.0 - _MARGIN * (1.0 - wanted))

@@ -1,4 +1,4 @@
-/* Forms begin jobs, dropped files become measurements, and the list of jobs is kept up to date. */
+/* Forms start jobs, dropped files become measurements, and the list of jobs updates. */
 "use strict";
 
 const place = (id) => document.getElementById(id);
@@ -17,7 +17,7 @@ async function ask(address, method = "GET", body = undefined) {
   try {
     answer = await fetch(address, { method, headers, body: body && JSON.stringify(body) });
   } catch {
-    throw new Error("the server does not answer: was it ended? Start bywire serve again");
+    throw new Error("the server does not answer: if it has ended, start bywire serve again");
   }
   const said = await answer.json().catch(() => ({ error: `status ${answer.status}` }));
   if (!answer.ok) throw Object.assign(new Error(said.error), { field: said.field });
@@ -35,7 +35,7 @@ function valueOf(field) {
   return field.value;
 }
 
-/* What does not fit is said beside its field, which gets the focus; of no field that is seen, on top. */
+/* Show an error at its field, and focus the field; errors without a visible field are at the top. */
 function complainOf(form, { message, field: name }) {
   const field = name && form.querySelector(`:is(input:not([type=hidden]), select, textarea)[name="${CSS.escape(name)}"]`);
   if (!field) return complain(message);
@@ -61,7 +61,7 @@ async function begin(event) {
   const form = event.target, fields = [...form.elements].filter(({ name }) => name);
   if (form.getAttribute("aria-busy") === "true") return;
   const asked = Object.fromEntries(fields.map((field) => [field.name, valueOf(field)]));
-  form.setAttribute("aria-busy", "true"); // a button that is disabled would lose the focus
+  form.setAttribute("aria-busy", "true"); // a disabled button would lose the focus
   fields.forEach(forgive);
   complain("");
   try {
@@ -88,10 +88,10 @@ function sent(file, bar) {
     const request = new XMLHttpRequest();
     request.open("PUT", `/api/measurements/${encodeURIComponent(file.name)}`);
     request.upload.onprogress = ({ loaded, total }) => { bar.value = total ? loaded / total : 0; };
-    request.onerror = () => reject(new Error(`${file.name} was not taken: was the server ended?`));
+    request.onerror = () => reject(new Error(`${file.name} could not be sent: has the server ended?`));
     request.onload = () => {
       let said = {};
-      try { said = JSON.parse(request.responseText); } catch { /* told by the status */ }
+      try { said = JSON.parse(request.responseText); } catch { /* the status is the error */ }
       if (request.status === 201) resolve(said.file);
       else reject(new Error(said.error ?? `status ${request.status}`));
     };
@@ -102,8 +102,8 @@ function sent(file, bar) {
 async function take(drop, file) {
   const most = Number(document.body.dataset.largest), bar = drop.querySelector(".sent");
   if (file.size > most) {
-    complain(`${file.name} has ${Math.ceil(file.size / 1e6)} MB, and ${Math.floor(most / 1e6)} MB are taken: copy `
-      + "it into the folder that is served, or make it smaller with bywire convert");
+    complain(`${file.name} has ${Math.ceil(file.size / 1e6)} MB, but the limit is ${Math.floor(most / 1e6)} MB: copy `
+      + "it into the served folder, or make it smaller with bywire convert");
     return;
   }
   bar.hidden = false;
@@ -111,7 +111,7 @@ async function take(drop, file) {
     const name = await sent(file, bar), select = drop.querySelector("select");
     select.append(element("option", name, { value: name, selected: true }));
     complain("");
-    place("spoken").textContent = `${name} is there`;
+    place("spoken").textContent = `${name} is uploaded`;
   } catch (error) {
     complain(error.message);
   }
@@ -140,7 +140,7 @@ function arm(drop) {
 const isActive = ({ state }) => state === "waiting" || state === "running";
 
 function outcome(job) {
-  if (job.state === "done" && job.holds === false) return "done, and something required does not hold";
+  if (job.state === "done" && job.holds === false) return "done, but not all requirements are met";
   return job.state;
 }
 
@@ -181,7 +181,7 @@ function shown(job) {
 
 async function cancel(job, button) {
   if (button.getAttribute("aria-disabled") === "true") return;
-  button.setAttribute("aria-disabled", "true"); // and not disabled, which would lose the focus
+  button.setAttribute("aria-disabled", "true"); // a disabled button would lose the focus
   try {
     await ask(`/api/jobs/${job.number}/cancel`, "POST", {});
   } catch (error) {
@@ -190,7 +190,7 @@ async function cancel(job, button) {
   await refresh();
 }
 
-/* Whoever is in an item stays there when it is made anew: at what is called the same, or at the item itself. */
+/* Keep the focus when an item is rebuilt: on the element of the same label, or on the item itself. */
 function replace(old, item) {
   const here = old.contains(document.activeElement) && document.activeElement;
   const name = here && here.getAttribute("aria-label");
@@ -220,7 +220,7 @@ function update(job) {
 
 const NS = "http://www.w3.org/2000/svg";
 
-/* Bars of a histogram; what they say stands beside them. */
+/* Bars of a histogram; their text is next to them. */
 function bars({ counts, ends }) {
   const drawn = document.createElementNS(NS, "svg"), most = Math.max(...counts);
   const set = (node, values) => Object.entries(values).forEach(([name, value]) => node.setAttribute(name, value));
@@ -269,7 +269,7 @@ async function refresh() {
   try {
     jobs = (await ask("/api/jobs")).jobs;
     const items = jobs.map(update), list = place("jobs");
-    // One by one: what is moved loses the focus. The latest come first, and the oldest go.
+    // One by one, because a moved item loses the focus. The latest are first, the oldest are removed.
     items.forEach((item, k) => { if (list.children[k] !== item) list.insertBefore(item, list.children[k] ?? null); });
     while (list.children.length > items.length) list.lastElementChild.remove();
     place("no-jobs").hidden = jobs.length > 0;
@@ -282,7 +282,7 @@ async function refresh() {
 
 document.querySelectorAll("form.task").forEach(armForm);
 document.querySelectorAll(".drop").forEach(arm);
-// A file that misses its place must not be opened instead of the page.
+// A file dropped elsewhere must not replace the page.
 for (const kind of ["dragover", "drop"]) addEventListener(kind, (event) => event.preventDefault());
 place("live-case")?.addEventListener("change", ({ target }) => {
   const address = `${target.dataset.address}&case=${encodeURIComponent(target.value)}`;

@@ -1,4 +1,4 @@
-"""Experiments of the brake starter, for ``bywire run``; generic ones need none, see the README."""
+"""Experiments of the brake starter, for ``bywire run``; generic experiments need no code."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ class Options(ParameterSet):
     F_set: Annotated[float, Unit("N", 1e4), Field(gt=0, allow_inf_nan=False)]
     """demanded clamp force"""
     duration: Duration
-    """time for which it is demanded"""
+    """length of the demand"""
     release: Duration
-    """time recorded after it is let go"""
+    """time recorded after the release"""
 
 
 def cases(par: Parameters, options: Options, _: Any) -> tuple[Case, ...]:
-    """Return the one run: from the open caliper to the force, and back."""
+    """Return the single run: from the open caliper to the force, and back."""
 
     def stimulus(t: np.ndarray) -> dict[str, np.ndarray]:
         return {"F_set": np.where((t >= 0.0) & (t < options.duration), options.F_set, 0.0)}
@@ -57,7 +57,7 @@ def cases(par: Parameters, options: Options, _: Any) -> tuple[Case, ...]:
 
 
 def step(options: Options) -> step_response.Setting:
-    """Return the step of the clamp force, judged where it is held."""
+    """Return the step of the clamp force, judged during the hold."""
     window = (0.8 * options.duration, options.duration)
     return step_response.Setting("F", 0.0, 0.0, options.F_set, window)
 

@@ -1,4 +1,4 @@
-"""Control loops of the brake starter, for ``bywire margins``, ``design`` and the like."""
+"""Control loops of the brake starter, for ``bywire margins``, ``design`` and similar commands."""
 
 from __future__ import annotations
 

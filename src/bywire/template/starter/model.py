@@ -1,6 +1,6 @@
-"""The brake starter by parts and wires: what each element feels, written once.
+"""The brake starter by parts and wires: the inputs of each element.
 
-States, masses, balances, stored energy and plain losses follow from the elements.
+States, masses, balances, stored energy and simple losses follow from the elements.
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ from bywire.template.starter.parameters import Parameters
 
 
 class Stimulus(NamedTuple):
-    """What acts from outside."""
+    """External inputs."""
 
     F_set: Annotated[float, Signal("N", "demanded clamp force", 1e4)]
 
 
 class Memory(NamedTuple):
-    """What the controller holds between its ticks."""
+    """Memory of the controller between its ticks."""
 
     v: Annotated[float, Signal("V", "motor voltage", 6.0), Limited("control.v_max")]
     v_i: Annotated[float, Signal("V", "integral part", 1.0)]
@@ -45,7 +45,7 @@ class StarterActuator(Assembly[Parameters, Memory]):
     F = Wire("N", "clamp force", 1e4)
 
     def wire(self, w: Self) -> None:
-        """Say what every part feels, in the order of the physics."""
+        """Connect the parts, in the order of the physics."""
         nut = spindle.output(w.spindle.x, w.spindle.par)
         w.travel = nut.x
         w.caliper.u = caliper_spring.Input(w.travel, nut.v)
@@ -55,12 +55,12 @@ class StarterActuator(Assembly[Parameters, Memory]):
         w.spindle.u = spindle.Input(torque, w.F)
 
     def friction(self, w: Self) -> tuple[Bounds, ...]:
-        """Return the dry friction while turning forward, backward; at rest all between."""
+        """Return the limits of the dry friction; at rest it is anywhere between them."""
         T = spindle.dry_friction(w.spindle.u, w.spindle.par)
         return ((-T, T),)
 
     def power(self, w: Self) -> dict[str, float]:
-        """Return the powers that no part gives."""
+        """Return the powers that do not follow from the parts."""
         return {
             "E_source": w.m.v * w.motor.x.i,
             "E_friction": -w.reaction[0] * w.spindle.x.omega,

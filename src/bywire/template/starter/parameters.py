@@ -9,7 +9,7 @@ from bywire.template.starter.laws import force_control
 
 
 class Parameters(ParameterSet):
-    """Every number has a unit and a range, which are checked."""
+    """All parameters; bywire checks the unit and range of each."""
 
     motor: dc_motor.Parameters
     spindle: spindle.Parameters

@@ -1,4 +1,4 @@
-"""Where the brake starter rests: clamped with a force, held by the motor alone."""
+"""Equilibria of the brake starter: a clamp force that the motor alone holds."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from bywire.template.starter.parameters import Parameters
 
 
 def at_force(F: float, par: Parameters) -> tuple[Any, Memory]:
-    """Return state and memory in equilibrium at a clamp force [N], dry friction left out."""
+    """Return state and memory in equilibrium at a clamp force [N], without dry friction."""
     c = par.caliper
     s = 0.5 * c.x_stiff * (math.sqrt(1.0 + 4.0 * F / (c.k * c.x_stiff)) - 1.0)
     theta = (c.x_gap + s) / par.spindle.r

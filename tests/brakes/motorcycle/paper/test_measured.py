@@ -126,7 +126,7 @@ def test_the_terminal_shows_statements_beside_both_sets_and_what_is_left(page):
     row = next(line for line in brief.splitlines() if line.startswith("table4.medium.K "))
     assert re.search(r"10\.2 bar/A +0\.51 bar/A +7\.[78]\d* bar/A +10\.\d+ bar/A", row)
     assert row.rstrip().endswith(" explained")
-    for text in ("table4.low.overshoot", "unexplained", "95 % interval", "Not told"):
+    for text in ("table4.low.overshoot", "unexplained", "95 % interval", "Not determined"):
         assert text in brief
 
 

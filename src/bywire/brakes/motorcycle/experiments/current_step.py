@@ -25,7 +25,7 @@ class Options(ParameterSet):
 
 
 def cases(par: MotorcycleParameters, options: Options, _: object = None) -> tuple[Case, ...]:
-    """Return the one run: from the retracted piston, past dither and low-pass filter."""
+    """Return the single run: it starts at the retracted piston and bypasses dither and filter."""
     stimulus = step_at_zero("i_set", 0.0, options.i_step)
     return (
         case_from_rest(

@@ -21,7 +21,9 @@ from bywire.data.recursive_filter import low_passed
 WITHOUT, WITH = "without-dither", "with-dither"
 
 PEAK = Figures(p_max=("Pa", "Largest master-cylinder pressure."))
-RATIO = Figures(loop_area_ratio=("1", "Area of the loop with dither over that without."))
+RATIO = Figures(
+    loop_area_ratio=("1", "Area of the loop with dither, relative to the loop without dither.")
+)
 
 
 class Options(ParameterSet):
@@ -34,11 +36,11 @@ class Options(ParameterSet):
     f_filter: Frequency
     """cut-off of the first-order low-pass on the measured current"""
     smoothing: TimeConstant
-    """moving average for the loop's KPIs; one dither period unless given, 0 for the raw signals"""
+    """moving average for the loop's KPIs; default: one dither period; 0: raw signals"""
 
 
 def cases(par: MotorcycleParameters, options: Options, _: object = None) -> tuple[Case, ...]:
-    """Return the two runs, from the retracted piston; closed current loop."""
+    """Return both runs; each starts at the retracted piston, with the current loop closed."""
     shape = ramp.Parameters(
         start=0.0, end=options.i_max, slope=options.slope, t_start=0.0, t_hold=0.0, after="return"
     )

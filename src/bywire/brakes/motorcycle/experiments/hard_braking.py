@@ -25,11 +25,11 @@ class Options(ParameterSet):
     settle: TimeConstant
     """time before the step in which dither and loop settle"""
     smoothing: TimeConstant
-    """moving average for the step's KPIs; one dither period unless given, 0 for the raw pressure"""
+    """moving average for the step's KPIs; default: one dither period; 0: raw pressure"""
 
 
 def cases(par: MotorcycleParameters, options: Options, _: object = None) -> tuple[Case, ...]:
-    """Return the one run."""
+    """Return the single run."""
     stimulus = step_at_zero("p_set", options.p_from, options.p_to)
     return (
         case_from_rest(

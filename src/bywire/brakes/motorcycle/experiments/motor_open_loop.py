@@ -37,23 +37,23 @@ class Options(ParameterSet):
     """The source."""
 
     source: Literal["current", "voltage", "current-loop", "current-direct", "pressure"]
-    """driven quantity: an ideal source, or a demand to the ECU; -direct is without dither"""
+    """driven quantity: an ideal source, or a demand to the ECU; -direct bypasses the dither"""
     add_holding: bool
-    """whether the value that holds p_start is added to the stimulus: current, voltage or p_start"""
+    """add the current, voltage or pressure that holds p_start to the stimulus"""
     p_start: Annotated[float, Unit("Pa", 2e6), Field(ge=0, allow_inf_nan=False)]
-    """pressure from whose equilibrium the run starts"""
+    """pressure of the equilibrium at which the run starts"""
     duration: Duration
     """length of the run"""
     record: Duration
     """recording interval"""
     settle: TimeConstant
-    """time before zero, at the stimulus' first value"""
+    """time before t = 0, at the stimulus' first value"""
 
 
 def cases(
     par: MotorcycleParameters, options: Options, stimulus: Stimulus | None
 ) -> tuple[Case, ...]:
-    """Return the one run."""
+    """Return the single run."""
     if stimulus is None:
         raise ParameterError(
             "motor-open-loop needs a [stimulus] section: kind = step, ramp, sine, chirp, multisine "
@@ -79,12 +79,12 @@ def cases(
 
 
 def finish(recording: xr.Dataset, options: Options) -> xr.Dataset:
-    """Drop the signals that need the ECU, where an ideal source replaces it."""
+    """Drop the signals that need the ECU if an ideal source replaces it."""
     return recording.drop_vars(_SIGNALS) if options.source in _IDEAL else recording
 
 
 def without(options: Options) -> tuple[str, ...]:
-    """Return the KPIs that need the ECU, where an ideal source replaces it."""
+    """Return the KPIs that need the ECU if an ideal source replaces it, otherwise none."""
     return _KPIS if options.source in _IDEAL else ()
 
 

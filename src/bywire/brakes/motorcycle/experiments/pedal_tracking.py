@@ -22,9 +22,9 @@ from bywire.core.units import shown
 from bywire.data.measurement import read_trace, trace_names
 from bywire.plant import pedal
 
-_COLUMNS = {"pressure": "Pa", "force": "N", "pedal": "m"}  # of a trace, the best one first
-# Built-in ride: pedal travel [mm] over time [s], our choice: three pulls of rising haste, a
-# modulated one, and a hold; the map makes 5 to 30 bar of it, the range of Fig. 7b.
+_COLUMNS = {"pressure": "Pa", "force": "N", "pedal": "m"}  # of a trace, in order of preference
+# Built-in ride (our choice): pedal travel [mm] over time [s]. Three increasingly fast pulls, a
+# modulated one, and a hold. The pedal map turns them into 5 to 30 bar, the range of Fig. 7b.
 _TIMES = (0.0, 0.5, 0.9, 1.6, 2.0, 2.5, 2.7, 3.3, 3.6, 4.2, 4.3, 4.8, 5.0, 5.3, 5.6, 5.9, 6.5, 7.5)
 _TRAVELS = (9, 9, 26, 26, 12, 12, 33, 33, 16, 16, 36, 36, 30, 37, 31, 37, 12, 12)
 
@@ -33,17 +33,17 @@ class Options(ParameterSet):
     """The ride."""
 
     trace: str
-    """measurement file with time and pedal, force or pressure; empty for the built-in ride"""
+    """measurement file with time and pedal, force or pressure; empty: built-in ride"""
     trace_map: str
-    """mapping file whose signals are pedal, force or pressure; empty where columns are"""
+    """mapping file that names pedal, force or pressure; empty if the columns have these names"""
     max_gap: TimeConstant
-    """longest gap of the file that is bridged by a straight line"""
+    """longest gap in the file that bywire interpolates linearly"""
     smoothing: TimeConstant
-    """moving average for the tracking KPIs; one dither period unless given, 0 for raw ones"""
+    """moving average for the tracking KPIs; default: one dither period; 0: raw signals"""
 
 
 def cases(par: MotorcycleParameters, options: Options, _: object = None) -> tuple[Case, ...]:
-    """Return the one run; it starts at rest at the first sample's pressure."""
+    """Return the single run; it starts at rest at the first sample's pressure."""
     ride = _ride(par, options)
     t = ride["time"].values - float(ride["time"][0])
     mode: DriveMode = "pressure" if "pressure" in ride else "pedal"
@@ -72,7 +72,7 @@ def judged(options: Options) -> dict[str, Any]:
 
 
 def _ride(par: MotorcycleParameters, options: Options) -> xr.Dataset:
-    """Return the ride with a variable ``force`` [N], or ``pressure`` [Pa] where it has one."""
+    """Return the ride with a variable ``force`` [N], or ``pressure`` [Pa] if it has one."""
     if not options.trace:
         from scipy.interpolate import PchipInterpolator
 
@@ -86,7 +86,7 @@ def _ride(par: MotorcycleParameters, options: Options) -> xr.Dataset:
         if chosen is None:
             raise FileError(
                 f"{options.trace}: none of its columns {quoted(', '.join(names))} is pedal [mm], "
-                "force [N] or pressure [bar]: rename the column that the brake shall follow, or "
+                "force [N] or pressure [bar]: rename the column that the brake should follow, or "
                 "name it in a mapping file, options.trace_map",
                 name="options.trace",
                 value=quoted(", ".join(names)),
@@ -103,7 +103,7 @@ def _ride(par: MotorcycleParameters, options: Options) -> xr.Dataset:
 
 
 def _require_within_stop(ride: xr.Dataset, par: MotorcycleParameters, source: str) -> None:
-    """Refuse a ride that the pedal's stop would cut off."""
+    """Reject a ride that goes beyond the pedal's stop."""
     x_max = par.pedal.x_max
     limits = {"pedal": (x_max, "m"), "force": (pedal.force_at(x_max, par.pedal), "N")}
     for name, (limit, unit) in limits.items():

@@ -18,10 +18,10 @@ from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Pressure, TimeConstant
 
 ENERGIES = Figures(
-    energy_stored=("J", "Stored energy that the release sets free."),
-    energy_returned=("J", "Work that the gear gives back to the motor's shaft, net."),
+    energy_stored=("J", "Stored energy released."),
+    energy_returned=("J", "Net work that the gear returns to the motor shaft."),
     energy_fed_back=("J", "Electrical energy fed back into the battery, from recorded samples."),
-    energy_gear=("J", "Loss of gear and screw; negative where the paper's law gives energy."),
+    energy_gear=("J", "Loss of gear and screw; negative if the paper's law creates energy."),
 )
 
 
@@ -29,11 +29,11 @@ class Options(ParameterSet):
     """The release maneuver."""
 
     p_from: Pressure
-    """pressure that is released"""
+    """pressure at the start of the release"""
     how: Literal["controlled", "current-off"]
     """pressure demand ramped to zero in closed loop, or current demand cut to zero"""
     t_ramp: TimeConstant
-    """time in which the pressure demand falls to zero (how = "controlled")"""
+    """time for the pressure demand to fall to zero (how = "controlled")"""
     p_empty: Pressure
     """caliper pressure below which the brake counts as empty"""
     duration: Duration
@@ -43,10 +43,10 @@ class Options(ParameterSet):
 
 
 def cases(par: MotorcycleParameters, options: Options, _: object = None) -> tuple[Case, ...]:
-    """Return the one run."""
+    """Return the single run."""
     keep = min(options.settle, 0.1)
     if options.how == "current-off":
-        # Without dither: an ECU that has switched its current off does not shake the piston.
+        # No dither: an ECU that has switched its current off does not shake the piston.
         return (
             case_from_rest(
                 "run",

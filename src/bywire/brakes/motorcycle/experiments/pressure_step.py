@@ -20,7 +20,7 @@ class Options(ParameterSet):
     p_start: Pressure
     """pressure before the step"""
     start: Literal["settled", "frictionless"]
-    """whether the pressure under dither settles at p_start, or the equilibrium without friction"""
+    """what p_start is: the settled pressure under dither, or the frictionless equilibrium"""
     i_step: Current
     """height of the step of the current demand"""
     duration: Duration
@@ -28,11 +28,11 @@ class Options(ParameterSet):
     settle: TimeConstant
     """time before the step in which the dithered pressure settles"""
     smoothing: TimeConstant
-    """moving average for the step's KPIs; one dither period unless given, 0 for the raw pressure"""
+    """moving average for the step's KPIs; default: one dither period; 0: raw pressure"""
 
 
 def cases(par: MotorcycleParameters, options: Options, _: object = None) -> tuple[Case, ...]:
-    """Return the one run, open pressure loop, closed current loop."""
+    """Return the single run: open pressure loop, closed current loop."""
     p = options.p_start
     if options.start == "settled" and options.settle > 0:
         p = settled_start(p, par, options.settle)
@@ -40,7 +40,7 @@ def cases(par: MotorcycleParameters, options: Options, _: object = None) -> tupl
 
 
 def preview(par: MotorcycleParameters, options: Options, _: object = None) -> tuple[Case, ...]:
-    """Return the run as if the pressure settled at the equilibrium without friction."""
+    """Return the run as if the pressure settled at the frictionless equilibrium."""
     return _from(options.p_start, par, options)
 
 
@@ -62,12 +62,12 @@ def _from(p: float, par: MotorcycleParameters, options: Options) -> tuple[Case, 
 
 
 def step(options: Options) -> step_response.Setting:
-    """Return the step of the pressure; its levels are those of the response."""
+    """Return the step of the pressure, with its levels taken from the response."""
     return step_response.Setting("p_mc", 0.0, smoothing=options.smoothing)
 
 
 def settings(options: Options) -> dict[str, Any]:
-    """Return the families of key figures of the step."""
+    """Return the step's families of key figures."""
     return {
         "static_gain": static_gain.Setting(
             "p_mc", 0.0, options.i_step, "A", smoothing=options.smoothing

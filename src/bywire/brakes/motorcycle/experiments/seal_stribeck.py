@@ -23,18 +23,19 @@ FIGURES = Figures(
 
 
 class Options(ParameterSet):
-    """Where the curves are drawn."""
+    """Range of the curves."""
 
     pressures: Annotated[Nodes, Unit("Pa", 2e6), Field(min_length=1)]
     """master-cylinder pressures, one curve each"""
     omega_max: Annotated[float, Unit("rad/s", 2.0), Field(gt=0, allow_inf_nan=False)]
-    """largest motor speed, both directions"""
+    """largest motor speed, in both directions"""
 
 
 def static(par: MotorcycleParameters, options: Options) -> dict[str, xr.Dataset]:
-    """Return friction torque over pressure and speed; at rest the breakaway torque of each side.
+    """Return friction torque over pressure and speed.
 
-    The speeds contain -0 and +0: both ends of the interval in which the torque lies at rest.
+    The speeds contain -0 and +0. Their values are the breakaway torques, between which the torque
+    lies at rest.
     """
     side = np.linspace(0.0, options.omega_max, 401)
     speeds = np.concatenate((-side[::-1], side))

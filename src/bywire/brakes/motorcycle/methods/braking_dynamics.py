@@ -41,7 +41,7 @@ from bywire.identification.measured import joined, split
 from bywire.identification.method import Check, Curve, Effort, Identified, Method
 from bywire.simulation.run import Run, simulate
 
-# Curves of the braking dynamics: magnitude, phase and step, measured, modeled, theoretical.
+# Curves of the braking dynamics: magnitude, phase and step; measured, modeled, theoretical.
 
 
 def curves_of(
@@ -56,7 +56,7 @@ def curves_of(
     estimates
         By region.
     par
-        What eq. (15) is computed from.
+        Parameters for eq. (15).
 
     References
     ----------
@@ -115,12 +115,12 @@ def _step_curve(
     return over(("time", t, "s", "time after the step"), columns, "Pa", "pressure")
 
 
-# The experiment of section 5 of Dardanelli et al. (2010), simulated: steps and sines by region.
+# The simulated experiment of Dardanelli et al. (2010), section 5: steps and sines by region.
 
 Demand = Callable[[Array], Array]
 
 REST, STEP, SINES = 1.0, 4.0, 4.0
-"""time before a step, after it, and of every record of a sine [s]"""
+"""time before a step, after it, and length of every sine record [s]"""
 _SETTLE, _SETTLE_SINE = 3.0, 2.0
 _INTERVAL = 1e-3
 
@@ -128,7 +128,7 @@ _INTERVAL = 1e-3
 def demands(
     i_step: float, amplitude: float, frequencies: tuple[float, ...]
 ) -> dict[str, tuple[Demand, float, float]]:
-    """Return changes of the current demand [A] by record, with the times before and after zero."""
+    """Return changes of the current demand [A] by record, with the times before and after t = 0."""
     chosen: dict[str, tuple[Demand, float, float]] = {"step": (partial(_step, i_step), REST, STEP)}
     for f in frequencies:
         chosen[f"{f:g}_Hz"] = (partial(_sine, amplitude, f), 0.0, SINES)
@@ -151,26 +151,26 @@ def of_brake(
     sigma_i: float,
     seed: int,
 ) -> dict[str, xr.Dataset]:
-    """Return measured current and pressure of the whole brake, friction and dither included.
+    """Return measured current and pressure of the whole brake, with friction and dither.
 
-    Both go through the same filter and converter, whose lag therefore cancels between them.
+    Both pass the same filter and converter, so the lag cancels between them.
 
     Parameters
     ----------
     pressures
         Mean pressure [Pa] by region.
     changes
-        What ``demands`` gives.
+        As ``demands`` returns.
     sigma_p, sigma_i
-        Noise ahead of the converter [Pa], [A]: that of the pressure is drawn into the loop, so
-        that the dither, whose amplitude follows the measured pressure, feels it.
+        Noise upstream of the converter [Pa], [A]. The noise of the pressure acts inside the loop,
+        because the dither's amplitude follows the measured pressure.
     seed
-        Of the noise.
+        Seed of the noise.
     """
     span = par.pressure_sensor.p_high - par.pressure_sensor.p_low
     reach = par.current_sensor.i_high - par.current_sensor.i_low
     share_p, share_i = sigma_p / span, sigma_i / reach
-    noisy_par = par.replace({"adc.noise": 1.0})  # the stimulus' noise is scaled, each channel apart
+    noisy_par = par.replace({"adc.noise": 1.0})  # `_scaled` sets the noise of each channel
     jobs: list[tuple[str, Case, int]] = []
     for region, p in pressures.items():
         start = settled_start(p, par, _SETTLE)
@@ -233,7 +233,7 @@ def of_eq22(
     sigma_i: float,
     seed: int,
 ) -> dict[str, xr.Dataset]:
-    """Return the same of a linear brake that is eq. (22) exactly, with dither on its current.
+    """Return current and pressure of a linear brake, exactly eq. (22), dithered by its current.
 
     ``models``: pressure at rest [Pa] and transfer function [Pa/A] by region.
     """
@@ -259,7 +259,7 @@ def of_eq22(
 
 
 def sampled(model: Rational, interval: float) -> tuple[Array, Array]:
-    """Return numerator and denominator for samples between which the input runs straight."""
+    """Return numerator and denominator for an input that is linear between samples."""
     from scipy import signal
 
     num, den, _ = signal.cont2discrete((np.array(model.num), np.array(model.den)), interval, "foh")
@@ -291,13 +291,13 @@ class Options(ParameterSet):
     p_2: Pressure
     """border between medium and high pressure"""
     model: Literal["eq-22", "eq-21"]
-    """with a slow pair of a zero and a pole, in either order, or without"""
+    """with (eq-22) or without (eq-21) a slow pair of a zero and a pole, in either order"""
     fit: Literal["two-step", "joint"]
-    """K, tau_L, T_L by the steps and T1, T2 by the sines, in turn; or all by all records"""
+    """alternate K, tau_L, T_L from steps and T1, T2 from sines, or fit all to all records"""
     turns: Annotated[int, Unit("1", 20), Field(ge=1, le=200)]
-    """turns of the two steps at most; 1 as in the paper"""
+    """largest number of turns of the two steps; the paper takes 1"""
     plant: Literal["brake", "eq-22"]
-    """synthetic: the whole brake with friction, or a linear one that is eq. (22) exactly"""
+    """synthetic: the whole brake with friction, or a linear one, exactly eq. (22)"""
     p_low: Pressure
     """synthetic: mean pressure of the low region"""
     p_medium: Pressure
@@ -331,9 +331,9 @@ def identify(
     ----------
     data
         ``i``: current [A], ``p_mc``: pressure [Pa], both measured through the same filter, whose
-        lag then cancels; dither on, or ``ecu.dither.waveform`` off. Several records: in each
-        region a step of the current from rest (1 s before, 4 s after it), and sines within 1 and
-        15 Hz in steady state, one or several a record. Regions follow from the mean pressure.
+        lag then cancels. Dither is on, or ``ecu.dither.waveform`` is off. Several records: in each
+        region a step of the current from rest (1 s before, 4 s after it), and sines from 1 to
+        15 Hz in steady state, one or several per record. The mean pressure determines the region.
 
     Raises
     ------
@@ -398,13 +398,13 @@ def _described(region: Region) -> str:
     f = region.points.frequencies
     sines = f"sines at {f.size} frequencies, {f[0]:.3g} to {f[-1]:.3g} Hz" if f.size else "no sines"
     return (
-        f"{region.name} pressure, {region.pressure / 1e5:.3g} bar in the mean; step responses: "
+        f"{region.name} pressure, mean {region.pressure / 1e5:.3g} bar; step responses: "
         f"{len(region.steps)}; {sines}"
     )
 
 
 def _figures(region: Region, estimate: Estimate) -> dict[str, tuple[float, str]]:
-    """Return the gain, and the corner frequencies as Table 4 has them."""
+    """Return the gain, and the corner frequencies in the form of Table 4."""
     five = five_of(estimate)
     figures = {f"{region.name}.K": (five["K"], "Pa/A")}
     for name, T in list(five.items())[1:]:
@@ -413,7 +413,7 @@ def _figures(region: Region, estimate: Estimate) -> dict[str, tuple[float, str]]
 
 
 def _checks(region: Region, estimate: Estimate) -> list[Check]:
-    """Return how well eq. (22) describes the records."""
+    """Return the checks of how well eq. (22) describes the records."""
     name = region.name
     five = list(five_of(estimate).values())
     rests = [estimate[label] for label in estimate.names if label.endswith(":p_rest")]
@@ -431,12 +431,12 @@ def _checks(region: Region, estimate: Estimate) -> list[Check]:
             f"{name}.misfit_step",
             error / change,
             limit=_MISFIT_STEP,
-            note="step: rms of computed minus measured over the change",
+            note="step: rms of computed minus measured, over the change",
         ),
         Check(
             f"{name}.step_residual_over_noise",
             float(np.sqrt(np.mean(noise**2))),
-            note="about 1 where nothing but noise is left",
+            note="about 1 if the residual is only noise",
         ),
     ]
     if region.points.frequencies.size:
@@ -447,14 +447,14 @@ def _checks(region: Region, estimate: Estimate) -> list[Check]:
                 f"{name}.misfit_sines",
                 float(np.sqrt(np.mean(size**2))),
                 limit=_MISFIT_SINES,
-                note="sines: rms of relative magnitude and phase [rad], computed minus measured",
+                note="sines: rms error of relative magnitude and phase [rad]",
             )
         )
     return checks
 
 
 def synthetic(par: MotorcycleParameters, options: Options, seed: int) -> xr.Dataset:
-    """Return steps and sines in all three regions, simulated, with the sensors' noise."""
+    """Return simulated steps and sines in all three regions, with sensor noise."""
     pressures = _pressures(options)
     changes = demands(options.i_step, options.amplitude, FREQUENCIES)
     noise = (options.sigma_p, options.sigma_i, seed)
@@ -471,7 +471,7 @@ def _pressures(options: Options) -> dict[str, float]:
 
 
 def truth(par: MotorcycleParameters, options: Options) -> Mapping[str, float]:
-    """Return the true values of the linear synthetic brake; the whole brake has none."""
+    """Return the true values of the linear synthetic brake; raise for the whole brake."""
     if options.plant == "brake":
         raise ParameterError(
             "the whole brake has no true values of eq. (22): set plant = 'eq-22' to compare "

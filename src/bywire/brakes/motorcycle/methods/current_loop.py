@@ -1,7 +1,7 @@
 """Gains of the sampled current PI from steps of the demand (2010, section 3.1, Fig. 3).
 
-Sampling, supply, anti-alias filter and anti-wind-up are as in the parameter set. The converter's
-resolution is left out; its error counts as noise.
+Sampling, supply, anti-alias filter and anti-windup are those of the parameter set. The model
+neglects the converter's resolution; its error counts as noise.
 """
 
 from __future__ import annotations
@@ -26,26 +26,26 @@ class Options(LoopOptions):
     """Unknowns, torque that holds the rotor, and the synthetic experiment."""
 
     T_hold: Torque
-    """torque by which the model's rotor is held: more than the motor has"""
+    """torque that holds the model's rotor: must exceed the motor's torque"""
     p_start: Pressure
     """synthetic: pressure that the stuck piston holds"""
     i_low: Current
-    """synthetic: how far steps go below the holding current, within breakaway"""
+    """synthetic: depth of the steps below the holding current, within breakaway"""
     i_high: Current
-    """synthetic: how far they go above it"""
+    """synthetic: height of the steps above the holding current, within breakaway"""
     sigma_i: Annotated[float, Unit("A", 5e-3), Field(ge=0)]
-    """synthetic: noise of the measured current, ahead of the converter"""
+    """synthetic: noise of the measured current, upstream of the converter"""
 
 
 def held(par: MotorcycleParameters, options: Options) -> MotorcycleParameters:
-    """Return the parameters with the rotor held by the seals."""
+    """Return the parameters with a rotor that the seals hold."""
     return par.replace(
         {"drive.mode": "current-direct", "adc.law": "ideal", "seal.T_pr": options.T_hold}
     )
 
 
 def at_rest(par: MotorcycleParameters) -> tuple[Any, Any]:
-    """Return state and memory in which a record begins: the chamber without pressure."""
+    """Return state and memory at the start of a record: the chamber without pressure."""
     return state_at(0.0, par), memory_at(0.0, par)
 
 
@@ -62,7 +62,7 @@ LOOP = CurrentLoop(
 
 
 def synthetic(par: MotorcycleParameters, options: Options, seed: int) -> xr.Dataset:
-    """Return steps of the demand on the whole brake, the piston stuck, with noise in the loop."""
+    """Return simulated steps of the demand on the whole brake, stuck, with noise in the loop."""
     span = par.current_sensor.i_high - par.current_sensor.i_low
     noisy_par = par.replace({"adc.noise": options.sigma_i / span})
     hold = holding_current(options.p_start, noisy_par)

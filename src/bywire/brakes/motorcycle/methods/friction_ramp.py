@@ -41,7 +41,7 @@ from bywire.identification.unknown import Unknown, parameters_of, scattered
 from bywire.plant import seal_friction
 from bywire.simulation.run import simulate
 
-# Curves that show an identified friction: over the speed with its band, and the ramp once more.
+# Curves of an identified friction: torque over speed with its band, and the replayed ramp.
 
 _SHARE = 1e-6
 
@@ -49,7 +49,7 @@ _SHARE = 1e-6
 def stribeck_band(
     par: seal_friction.Parameters, estimate: Estimate, pressures: Sequence[float], omega: Array
 ) -> xr.Dataset:
-    """Return friction torque over speed at several pressures, with 95 % bands.
+    """Return friction torque over speed with 95 % bands, at several pressures.
 
     ``par``: the identified friction; ``estimate``: estimate of ``seal.*`` parameters;
     ``pressures``: [Pa]; ``omega``: shaft speeds [rad/s], shape (n,).
@@ -57,8 +57,8 @@ def stribeck_band(
     Returns
     -------
     xarray.Dataset
-        ``value``, ``low``, ``high`` [N m] over ``pressure`` and ``omega``; at zero speed NaN,
-        where the friction takes any value between its breakaway torques.
+        ``value``, ``low``, ``high`` [N m] over ``pressure`` and ``omega``. NaN at zero speed,
+        where the friction is anywhere between its breakaway torques.
 
     References
     ----------
@@ -94,7 +94,7 @@ def _torque(par: seal_friction.Parameters, omega: float, p: float) -> float:
 
 
 def replayed(data: xr.Dataset, par: MotorcycleParameters, step: float) -> xr.Dataset:
-    """Return the pressure over the whole ramp, measured and modeled, driven by the current.
+    """Return measured and modeled pressure over the whole ramp, driven by the current.
 
     ``data``: ``i`` [A] and ``p_mc`` [Pa] over ``time`` [s]; ``step``: substep [s].
     """
@@ -118,18 +118,18 @@ def replayed(data: xr.Dataset, par: MotorcycleParameters, step: float) -> xr.Dat
     )
 
 
-# What the slips of a ramp say of the friction: their shapes, and the currents that began them.
+# What the slips of a ramp determine: friction from their shapes, and from their breakaway currents.
 
 _BLOCKS = 250  # at most
 
 
 class Whitening:
-    r"""Makes means of neighboring residuals independent, of size one.
+    r"""Whitening filter: makes means of neighboring residuals independent, with unit variance.
 
     .. math:: \Sigma = \sigma^2 I + P H H^T P \sigma_i^2
 
-    with the answer H of the pressure to every sample of the current, taken from that to a lasting
-    offset as if the slip answered alike at all times; P takes off what a shift in time takes up.
+    H is the pressure's response to every sample of the current. It is derived from the response to
+    a constant offset, as if the slip responded alike at all times. P projects out a shift in time.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ class Whitening:
         A slip of the model.
     sigma, sigma_i
         Noise of a sample of the pressure [Pa], and of the current [A] that drives the slip; 0
-        where none does.
+        if no measured current drives it.
     """
 
     def __init__(self, fitted: Fitted, sigma: float, sigma_i: float) -> None:
@@ -175,10 +175,10 @@ class Whitening:
 
 @dataclass(frozen=True)
 class Noise:
-    """How sure the measurements are.
+    """Noise of the measurements.
 
     ``pressure``, ``current``: standard deviation of a sample's noise [Pa], [A]; ``scatter``:
-    standard deviation of the current that breaks away, from slip to slip [A].
+    standard deviation of the breakaway current from slip to slip [A].
     """
 
     pressure: float
@@ -186,10 +186,10 @@ class Noise:
     scatter: float
 
     def of_breakaway(self, shot: Shot) -> float:
-        """Return the standard deviation of the current [A] measured where a shot begins.
+        """Return the standard deviation of the current [A] measured at the start of a shot.
 
-        Of the end of a line through some noisy samples; of the current's own ripple at rest, since
-        which of its peaks breaks the piston away is chance; and of what else scatters.
+        It has three parts: the error of the end of a line through some noisy samples; the current's
+        ripple at rest, because it is random which peak frees the piston; and other scatter.
         """
         read = 2.0 * self.current / np.sqrt(shot.seen)
         ripple = np.sqrt(max(shot.unrest**2 - self.current**2, 0.0))
@@ -197,16 +197,16 @@ class Noise:
 
 
 class SlipLoss:
-    """Weighted residuals of all slips by friction parameters, the current's zero, and its ripple.
+    """Weighted residuals of all slips over friction parameters, current offset and ripple.
 
     Parameters
     ----------
     shooting, shots, noise
-        The model, the measured slips, and how sure they are.
+        The model, the measured slips, and their noise.
     weighted_at
-        Values at which the weights are taken; the slips are then driven by the measured current,
-        and the Jacobian does not know its noise: an instrument. None for the search: slips that
-        only the ramp drives, quick and with few minima.
+        Values at which the weights are computed. The measured current then drives the slips, and
+        the Jacobian is free of its noise: an instrument. None for the search, in which only the
+        ramp drives the slips: fast, and with few minima.
     """
 
     def __init__(
@@ -224,10 +224,10 @@ class SlipLoss:
             self._whitenings = [Whitening(fitted, noise.pressure, noise.current) for fitted in fits]
 
     def __call__(self, values: Array) -> tuple[Array, Array]:
-        """Return residuals and Jacobian: the slips' shapes, then one row for every beginning.
+        """Return residuals and Jacobian: the slips' shapes, then one row for every breakaway.
 
-        ``values``: friction parameters, reading of the current's sensor without current [A], and by
-        how much the current at its peaks exceeds its mean [A].
+        ``values``: friction parameters, zero offset of the current sensor [A], and excess of the
+        current at its peaks over its mean [A].
         """
         seal, zero, ripple = values[: self._shooting.count], float(values[-2]), float(values[-1])
         driven = zero if self._whitenings is not None else None
@@ -250,33 +250,34 @@ class SlipLoss:
 
 _NAMES = ("T_pr", "f_cfr_p", "f_cfr_n", "k_brk_p", "k_brk_n", "c", "mu_T")
 _ZERO, _RIPPLE = "offset.i", "offset.i_ripple"
-# The search of several starts, coarse in time: first the beginnings of slips, which have few minima
-# once that is held which they hardly tell. The best minimum is then fitted in full.
+# The multistart search has a coarse time step. First it fits the beginnings of slips, which have
+# few minima once the parameters that they hardly determine are fixed. A full fit then refines the
+# best minimum.
 _QUICK_STEP, _BEGINNING, _QUICK_LENGTH = 1e-4, 0.6, 4.0  # s
 _HARDLY_TOLD = ("seal.c", "seal.mu_T")
 _LIMIT_REPLAY, _LIMIT_RESIDUAL, _LIMIT_ZERO, _LIMIT_RIPPLE = 0.1, 1.1, 5.0, 3.0
 
 
 class Options(ParameterSet):
-    """What counts as a slip, and how sure measurements are."""
+    """Definition of a slip, and noise of the measurements."""
 
     least: Pressure
-    """changes of pressure smaller than this are no slips"""
+    """smallest change of pressure that counts as a slip"""
     longest: Duration
-    """how much of a slip is compared"""
+    """longest part of a slip that the fit compares"""
     scatter: Current
-    """standard deviation of the current that breaks the piston away, from slip to slip, beside the
-    noise of its measurement and its ripple"""
+    """standard deviation of the breakaway current from slip to slip, in addition to measurement
+    noise and ripple"""
     zero: Current
-    """standard deviation of the zero of the current's sensor, which all slips share"""
+    """standard deviation of the current sensor's zero offset, which all slips share"""
     ripple: Current
-    """standard deviation of by how much more than its mean the current is where the piston breaks
-    away: it does so at a peak of the current's ripple"""
+    """standard deviation of the current's excess over its mean at breakaway: the piston breaks away
+    at a peak of the current's ripple"""
     sigma_p: Annotated[float, Unit("Pa", 2e3), Field(ge=0)]
     """noise of the pressure in synthetic measurements"""
     sigma_i: Annotated[float, Unit("A", 1e-2), Field(ge=0)]
-    """noise of the current's sensors in synthetic measurements: of the one that is recorded, and
-    of the one that the control acts on"""
+    """noise of the current sensors in synthetic measurements: the recorded one, and the one that
+    the controller uses"""
     step: Duration
     """substep of the slips' runs"""
 
@@ -284,21 +285,21 @@ class Options(ParameterSet):
 def identify(
     data: xr.Dataset, par: MotorcycleParameters, options: Options, effort: Effort
 ) -> Identified:
-    """Return the friction's parameters, T_pr among them.
+    """Return the friction parameters, T_pr included.
 
     Parameters
     ----------
     data
-        ``i``: measured motor current [A]; ``p_mc``: pressure [Pa]. The demand in place of the
-        current biases the estimates: while the shaft turns quickly the current lags behind it.
+        ``i``: measured motor current [A]; ``p_mc``: pressure [Pa]. The current demand, used instead
+        of the current, biases the estimates: the current lags behind it while the shaft turns fast.
     par
-        What is known. Motor and current controller count: with them the current dips, as a slip
-        begins, that breaks away from the ramp; dither is off.
+        Known parameters. Motor and current controller matter: they make the current dip below its
+        ramp as a slip begins. Dither is off.
 
     Raises
     ------
     ParameterError
-        When the record has no slip to learn from, or a pressure that the brake cannot have.
+        When the record has no slip, or a pressure that the brake cannot reach.
 
     References
     ----------
@@ -322,27 +323,27 @@ def identify(
                 "residual_over_noise",
                 best.rms,
                 limit=_LIMIT_RESIDUAL,
-                note="aligned slips: residual over the sensor's noise",
+                note="aligned slips: residual over the sensor noise",
             ),
             Check(
                 "replay_nrmse",
                 nrmse,
                 limit=_LIMIT_REPLAY,
-                note="whole ramp, computed minus measured, over the range",
+                note="whole ramp: rms of computed minus measured, over the range",
             ),
             Check(
                 "zero_over_usual",
                 abs(zero) / options.zero,
                 limit=_LIMIT_ZERO,
-                note="reading of the current's sensor without current, over its usual size: more "
-                "may also be the zero of the pressure's sensor, a unit, or the torque constant",
+                note="zero offset of the current sensor over its usual size; other causes of a "
+                "large value: offset of the pressure sensor, a wrong unit, the torque constant",
             ),
             Check("starts_at_minimum", led.reached / effort.starts),
         ),
         curves=(
             Curve(
                 "ramp",
-                "Pressure on the ramp: measured, and modeled with the estimates.",
+                "Pressure on the ramp: measured, and simulated with the estimates.",
                 whole,
                 "time",
             ),
@@ -358,7 +359,7 @@ def identify(
 def _fitted(
     data: xr.Dataset, par: MotorcycleParameters, options: Options, effort: Effort
 ) -> tuple[Search, Estimate]:
-    """Return where the starts led, and the best minimum fitted in full."""
+    """Return the multistart search, and the full fit from its best minimum."""
     known = {_ZERO: options.zero, _RIPPLE: options.ripple}
     unknowns = (
         *parameters_of(par, [f"seal.{name}" for name in _NAMES]),
@@ -381,8 +382,8 @@ def _fitted(
     best = estimate(_problem(data, par, options, unknowns, at), start=at)
     if not any(name.startswith("seal.") for name in best.names):
         raise ParameterError(
-            "the slips do not determine the seal's friction with this current: check the units of "
-            "i and p_mc, and motor.K_e, gear and cylinder, which count as known",
+            "the slips do not determine the seal friction with this current: check the units of "
+            "i and p_mc, and the parameters taken as known: motor.K_e, gear and cylinder",
             name="i",
         )
     return led, best
@@ -421,7 +422,7 @@ def shots_of(data: xr.Dataset, options: Options) -> list[Shot]:
     Raises
     ------
     ParameterError
-        When there is none, or the pressure falls where the current rises.
+        When there is none, or the pressure falls while the current rises.
     """
     t, p, i = (data[name].values for name in ("time", "p_mc", "i"))
     together = float(np.mean((p - p.mean()) * (i - i.mean())) / max(p.std() * i.std(), 1e-300))
@@ -430,8 +431,8 @@ def shots_of(data: xr.Dataset, options: Options) -> list[Shot]:
     slips = find_slips(p, even_interval(t), options.least)
     if not slips:
         raise ParameterError(
-            f"p_mc has no slip of more than least = {options.least / 1e5:g} bar, so that friction "
-            "cannot be estimated from it: ramp the current slowly, up and down, without dither",
+            f"p_mc has no slip of more than least = {options.least / 1e5:g} bar, so it cannot "
+            "determine friction: ramp the current slowly, up and down, without dither",
             name="p_mc",
         )
     return cut_out(t, p, i, slips, options.longest)
@@ -452,7 +453,7 @@ def _stribeck(par: MotorcycleParameters, fit: Estimate) -> Curve:
 
 
 def synthetic(par: MotorcycleParameters, options: Options, seed: int) -> xr.Dataset:
-    """Return the ramp of eq. (17) without dither, simulated, with the sensors' noise."""
+    """Return a simulated ramp of eq. (17) without dither, with sensor noise."""
     sensor = par.current_sensor
     share = options.sigma_i / (sensor.i_high - sensor.i_low)
     noisy_par = par.replace({"adc.noise": float(np.hypot(par.adc.noise, share))})
@@ -492,7 +493,7 @@ METHOD = Method(
     simulated=("sigma_p", "sigma_i"),
     unknowns=tuple(f"seal.{name}" for name in _NAMES),
     further={
-        _ZERO: ("A", "reading of the current's sensor without current"),
-        _RIPPLE: ("A", "by how much the current at its peaks exceeds its mean"),
+        _ZERO: ("A", "zero offset of the current sensor"),
+        _RIPPLE: ("A", "excess of the current at its peaks over its mean"),
     },
 )

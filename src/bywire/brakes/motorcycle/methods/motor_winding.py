@@ -32,21 +32,21 @@ from bywire.identification.unknown import parameters_of
 from bywire.simulation.run import simulate
 
 _NAMES = ("motor.R_m", "motor.L_m", "motor.K_e")
-_TURNS = 1.0  # rad/s: below, a shaft counts as locked
-_STEP = 2e-6  # of the simulated experiment [s]: a coarse step shows in L_m where the shaft turns
+_TURNS = 1.0  # rad/s: a slower shaft counts as locked
+_STEP = 2e-6  # of the simulated experiment [s]: a coarse step biases L_m if the shaft turns
 
 
 class Options(ParameterSet):
     """The synthetic experiment."""
 
     rotor: Literal["stuck", "turning"]
-    """whether friction holds the shaft under pressure, or it turns from the retracted end"""
+    """shaft: held by friction under pressure, or turning from the retracted end"""
     p_start: Pressure
     """pressure that the stuck piston holds"""
     i_low: Current
-    """stuck: how far steps go below the holding current, within breakaway"""
+    """stuck: depth of the steps below the holding current, within breakaway"""
     i_high: Current
-    """stuck: how far they go above it"""
+    """stuck: height of the steps above the holding current, within breakaway"""
     v_high: Voltage
     """turning: highest voltage"""
     dwell: Duration
@@ -64,19 +64,19 @@ class Options(ParameterSet):
 def identify(
     data: xr.Dataset, par: MotorcycleParameters, options: Options, effort: Effort
 ) -> Identified:
-    """Return R_m and L_m, and K_e where the shaft turns.
+    """Return R_m and L_m, and K_e if the shaft turns.
 
     Parameters
     ----------
     data
-        ``v``: voltage at the motor, held between samples [V]; ``omega``: speed, zeros where the
-        rotor is locked or sticks [rad/s]; ``i``: current behind the anti-alias filter, whose corner
-        is ``anti_alias.f_aa`` [A]. One or several records.
+        ``v``: voltage at the motor, held between samples [V]; ``omega``: speed [rad/s], zero while
+        the rotor is locked or sticks; ``i``: current [A] after the anti-alias filter, whose corner
+        is ``anti_alias.f_aa``. One or several records.
 
     Raises
     ------
     ParameterError
-        When neither voltage nor current moves.
+        When neither voltage nor current changes.
 
     References
     ----------
@@ -95,9 +95,7 @@ def identify(
     notes = (
         ()
         if turning
-        else (
-            "the shaft does not turn, so that K_e is undetermined: turn it, and measure its speed",
-        )
+        else ("the shaft does not turn, so K_e is undetermined: turn it, and measure its speed",)
     )
     return Identified(
         estimates={"winding": fit},
@@ -109,7 +107,7 @@ def identify(
 
 
 def synthetic(par: MotorcycleParameters, options: Options, seed: int) -> xr.Dataset:
-    """Return steps of the voltage on the whole brake, simulated, with the sensors' noise."""
+    """Return simulated steps of the voltage on the whole brake, with sensor noise."""
     random = np.random.default_rng(seed)
     stuck = options.rotor == "stuck"
     source_par = par.replace({"drive.T_source": options.interval, "adc.law": "ideal"})
@@ -145,7 +143,7 @@ def synthetic(par: MotorcycleParameters, options: Options, seed: int) -> xr.Data
 METHOD = Method(
     name="motor-winding",
     assembly="motorcycle-brake",
-    summary="R_m and L_m from voltage steps, K_e where the shaft turns (2010, eq. 1)",
+    summary="R_m and L_m from voltage steps, K_e if the shaft turns (2010, eq. 1)",
     experiment="motor-open-loop",
     signals={"v": "V", "omega": "rad/s", "i": "A"},
     options=Options,
@@ -166,6 +164,6 @@ METHOD = Method(
     unknowns=_NAMES,
     several=True,
     simulated=tuple(Options.model_fields),
-    bench_note="the record was made with a voltage source, its rotor locked or at a given speed; "
+    bench_note="the record is from a voltage source, with the rotor locked or at a set speed; "
     "the bench's shaft is free and cannot replay it: use only the values",
 )

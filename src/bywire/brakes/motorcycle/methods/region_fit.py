@@ -23,10 +23,10 @@ from bywire.identification.unknown import Unknown, moved
 
 Complex = NDArray[np.complex128]
 
-_LEAST = 0.1  # of the strongest line: what counts as one
-_FINER = 4  # zero padding of the transform that lines are first seen in
-_ROUNDS = 5  # of Newton for their frequencies
-_STILL = 1e-9  # of a signal: what rounding alone moves it by
+_LEAST = 0.1  # of the strongest line: smallest peak that counts as a line
+_FINER = 4  # zero padding of the transform that detects the lines
+_ROUNDS = 5  # Newton iterations for their frequencies
+_STILL = 1e-9  # of a signal: changes from rounding alone
 _HARMONICS = 3  # of the dither
 
 
@@ -42,7 +42,7 @@ class Points:
         Logarithm of output over input, SI: magnitude in the real, phase [rad] in the imaginary
         part; shape (n,).
     deviation
-        Standard deviation of either part, from what the lines leave of both signals; shape (n,).
+        Standard deviation of either part, from both signals' residuals; shape (n,).
     """
 
     frequencies: Array
@@ -72,7 +72,7 @@ def lines(
         return np.empty(0)
     peaks = 1 + np.flatnonzero((spectrum[1:-1] >= spectrum[:-2]) & (spectrum[1:-1] > spectrum[2:]))
     strong = peaks[inside[peaks] & (spectrum[peaks] > _LEAST * spectrum[inside].max())]
-    # A window has side lobes: a peak within the main lobe of a stronger line is no line.
+    # A window has side lobes: a peak within the main lobe of a stronger line does not count.
     kept: list[int] = []
     for k in sorted(strong, key=lambda k: -spectrum[k]):
         if all(abs(k - other) > 2 * _FINER for other in kept):
@@ -81,7 +81,7 @@ def lines(
 
 
 def _refined(u: Array, t: Array, frequencies: Array, base: Array) -> Array:
-    """Return frequencies at which sines leave least of a signal (Gauss-Newton)."""
+    """Return the sines' frequencies with the least residual of a signal (Gauss-Newton)."""
     w = 2.0 * math.pi * frequencies
     for _ in range(_ROUNDS):
         waves = _waves(w, t)
@@ -118,7 +118,7 @@ def _mixed(carriers: Array, alone: Array) -> Array:
 def measured_points(
     u: Array, y: Array, interval: float, frequencies: Array, others: Sequence[float] = ()
 ) -> Points:
-    """Return output over input at given lines, drift and other lines taken off both.
+    """Return output over input at given lines, with drift and other lines removed from both.
 
     ``u``, ``y``: input and output in steady state, shape (rows,); ``interval``: sample time [s];
     ``frequencies``: lines [Hz]; ``others``: further lines of both signals, with three harmonics,
@@ -147,9 +147,9 @@ REGIONS = ("low", "medium", "high")
 BAND = (1.0, 15.0)
 """frequencies [Hz] of the paper's second step"""
 
-_STEP = 0.9  # of the demand's variance that two levels explain: at most 0.81 for a sine
+_STEP = 0.9  # of the demand's variance that two levels must explain: at most 0.81 for a sine
 _REST = 10  # blocks of rest before a step, at least
-_LONGEST = 0.1  # s: mean over dither periods
+_LONGEST = 0.1  # s: longest block of dither periods
 
 
 @dataclass(frozen=True)
@@ -161,12 +161,12 @@ class StepRecord:
     label
         Name of the record.
     u
-        Current minus its mean before the step [A], its moving average over a block, from the end
+        Current minus its mean before the step [A], as moving average over a block, from the end
         of the first block on, shape (n - block + 1,).
     interval
         Sample time [s].
     block
-        Samples over which the pressure is averaged: whole dither periods.
+        Samples per mean of the pressure: whole dither periods.
     pressure
         Mean pressure of every block [Pa], shape (n // block,).
     rest
@@ -194,8 +194,8 @@ class StepRecord:
 class Region:
     """All records of a pressure region.
 
-    ``name``: ``low``, ``medium`` or ``high``; ``steps``: records of steps; ``points``: frequency
-    response of the records of sines, all together; ``pressure``: mean pressure [Pa].
+    ``name``: ``low``, ``medium`` or ``high``; ``steps``: step records; ``points``: frequency
+    response of all sine records; ``pressure``: mean pressure [Pa].
     """
 
     name: str
@@ -207,23 +207,23 @@ class Region:
 def regions_of(
     records: Mapping[str, xr.Dataset], borders: tuple[float, float], f_dit: float | None
 ) -> tuple[Region, ...]:
-    """Return the records sorted.
+    """Return the records, sorted by pressure region and kind.
 
     Parameters
     ----------
     records
-        ``i`` [A] and ``p_mc`` [Pa] over ``time`` [s], by label. A record is a step where two
-        levels explain its current, else sines: one, or several at once, in steady state.
+        ``i`` [A] and ``p_mc`` [Pa] over ``time`` [s], by label. A record is a step if two levels
+        explain its current. Otherwise it has one or several simultaneous sines in steady state.
     borders
         Between low and medium, and medium and high pressure [Pa].
     f_dit
-        Frequency of the dither [Hz]; None where it is off.
+        Frequency of the dither [Hz]; None if it is off.
 
     Raises
     ------
     ParameterError
-        When time is not evenly spaced, a dither period is no whole number of samples, a step has
-        no rest before it, or a record has neither step nor sine.
+        When time is not evenly spaced, a dither period is not a whole number of samples, no rest
+        precedes a step, or a record has neither step nor sine.
     """
     steps: dict[str, list[StepRecord]] = {name: [] for name in REGIONS}
     points: dict[str, list[Points]] = {name: [] for name in REGIONS}
@@ -249,12 +249,12 @@ def regions_of(
 
 
 def block_of(interval: float, f_dit: float | None) -> int:
-    """Return how many samples make whole dither periods.
+    """Return the number of samples of one or a few whole dither periods.
 
     Raises
     ------
     ParameterError
-        When no few periods do.
+        When no such number exists.
     """
     if f_dit is None:
         return max(round(0.02 / interval), 1)
@@ -277,15 +277,15 @@ def averaged(values: Array, block: int) -> Array:
 
 
 def _moving_average(values: Array, block: int) -> Array:
-    """Return the mean over the last samples, from the first whole block on.
+    """Return the moving mean over the last samples, from the first whole block on.
 
-    Current and pressure averaged alike are related as they are themselves, without the dither.
+    The same average of current and pressure keeps their relation and removes the dither.
     """
     return np.convolve(values, np.full(block, 1.0 / block), mode="valid")
 
 
 def step_at(means: Array) -> int | None:
-    """Return the block before which the current steps: two levels fit best; None if no step."""
+    """Return the first block after the current's step, by the best fit of two levels, or None."""
     n = means.size
     if n < 3:
         return None
@@ -299,13 +299,13 @@ def step_at(means: Array) -> int | None:
 
 
 def _step(label: str, i: Array, p: Array, interval: float, block: int, onset: int) -> StepRecord:
-    rest = onset - 1  # the block in which it steps belongs to neither level
+    rest = onset - 1  # the block with the step belongs to neither level
     if rest < _REST:
         least = f">= {_REST * block * interval:g} s"
         raise ParameterError(
             f"record {label or 'of the step'}: the rest before its step is "
-            f"{max(rest, 0) * block * interval:g} s, but it must be {least}, which shows the "
-            "pressure of the start: record more before the step",
+            f"{max(rest, 0) * block * interval:g} s, but it must be {least} to show the "
+            "initial pressure: record more before the step",
             name="rest",
             value=f"{max(rest, 0) * block * interval:g} s",
             valid=least,
@@ -333,7 +333,7 @@ def _scatter(means: Array) -> float:
 
 
 def _around_line(means: Array) -> float:
-    """Return the noise of values that drift at most."""
+    """Return the noise of values with no more than a drift."""
     k = np.arange(means.size)
     left = means - np.polyval(np.polyfit(k, means, 1), k)
     return math.sqrt(float(left @ left) / (means.size - 2))
@@ -345,8 +345,8 @@ def _sines(label: str, i: Array, p: Array, interval: float, f_dit: float | None)
     if not spectrum.size:
         raise ParameterError(
             f"the current of record {label} has neither a step nor a sine from {BAND[0]:g} to "
-            f"{BAND[1]:g} Hz, so that nothing can be estimated from it: step the current demand, "
-            "or let it follow a sine",
+            f"{BAND[1]:g} Hz, so it cannot determine anything: apply a step or a sine to the "
+            "current demand",
             name="i",
         )
     return measured_points(i, p, interval, spectrum, others)
@@ -372,14 +372,14 @@ _STATES, _INPUTS = 6, 2
 
 
 def response(values: Array, u: Array, interval: float, every: int) -> tuple[Array, Array]:
-    r"""Return every so many samples of the response, and its derivatives.
+    r"""Return the response and its derivatives at every n-th sample.
 
     .. math::
         G = K \frac{1 + s \tau_L}{(1 + s T_1)(1 + s T_2)(1 + s T_L)}, \quad
         \frac{\partial y}{\partial T_k} = -\frac{s}{1 + s T_k} y
 
-    The system begins at rest. Between samples the input runs straight, for which the
-    discretization is exact.
+    The system starts at rest. The discretization is exact for an input that is linear between
+    samples.
 
     Parameters
     ----------
@@ -390,7 +390,7 @@ def response(values: Array, u: Array, interval: float, every: int) -> tuple[Arra
     interval
         Sample time [s].
     every
-        Samples from one returned to the next; the first is at the start.
+        Samples from one returned row to the next; the first row is at the start.
 
     Returns
     -------
@@ -431,12 +431,12 @@ def _impulse(values: Array, n: int, interval: float) -> Array:
         Sample time [s].
     """
     u = np.zeros(n + 1)
-    u[1] = 1.0  # within the record: its input runs up to the sample, and down from it
+    u[1] = 1.0  # within the record: a triangular pulse around this sample
     return response(values, u, interval, 1)[0][1:]
 
 
 def _realization(values: Array) -> tuple[Array, Array]:
-    """Return the chain of lags, and one more lag of the output for each time constant."""
+    """Return the chain of lags, with one additional output lag for each time constant."""
     K, tau_L, T_1, T_2, T_L = values
     A, B = np.zeros((_STATES, _STATES)), np.zeros(_STATES)
     lags = (T_1, T_2, T_L)
@@ -471,7 +471,7 @@ def _outputs(values: Array) -> Array:
 
 
 def _first_order_hold(A: Array, B: Array, interval: float) -> tuple[Array, Array, Array]:
-    """Return the transition, and what the input at the begin and at the end of a step adds."""
+    """Return the transition matrix, and the input's weights at begin and end of an interval."""
     from scipy import linalg
 
     n = _STATES
@@ -500,7 +500,7 @@ def log_response(values: Array, frequencies: Array) -> tuple[NDArray[np.complex1
     return np.asarray(G), np.column_stack(slopes)
 
 
-# --- Two fits that share unknowns, in turn until they agree
+# --- Two fits that share unknowns, alternating until they agree
 
 _SETTLED = 1e-6  # of a value
 
@@ -510,18 +510,18 @@ def _in_turn(
 ) -> Estimate:
     r"""Estimate some unknowns by one fit and the others by another, each with the other's values.
 
-    At the end :math:`Z^T r = 0` holds with Z the derivatives of either fit by its own unknowns
-    alone: an instrumental-variable estimate, whose covariance knows that an error of one fit
-    reaches the other.
+    At the end :math:`Z^T r = 0`, where Z holds the derivatives of either fit by its own unknowns
+    alone. This is an instrumental-variable estimate; its covariance includes the effect of one
+    fit's error on the other.
 
     Parameters
     ----------
     problems
         Both with the same unknowns.
     groups
-        Which of them either fit estimates; together all.
+        Indices of the unknowns that each fit estimates; together they cover all.
     most
-        Turns at most; one is what leaves the second fit's values unknown to the first.
+        Largest number of turns. With one, the first fit does not use the second fit's values.
 
     Raises
     ------
@@ -547,8 +547,8 @@ def _in_turn(
     else:
         best = _apart(problems, parts)
         notes.append(
-            f"the two steps do not agree yet: the last turn changed the values by {change:.2g} of "
-            "their size; each step's intervals take the other step's values as known"
+            f"the two steps have not converged: the last turn changed the values by {change:.2g} "
+            "of their size; each step's intervals take the other step's values as known"
         )
     return best.noted((*notes, *notes_of(best)))
 
@@ -558,14 +558,14 @@ def _index(problem: Problem, label: str) -> int:
 
 
 def restricted(problem: Problem, mine: Sequence[int], values: Array) -> Problem:
-    """Return a problem in some of its unknowns, the others held.
+    """Return a problem in some of its unknowns, with the others fixed.
 
     Parameters
     ----------
     mine
-        Indices of those that stay unknown.
+        Indices of the unknowns that remain free.
     values
-        Of all: where they begin, or are held.
+        Values of all unknowns: starts of the free ones, constants of the fixed ones.
     """
     chosen = list(mine)
     begin = moved([problem.unknowns[k] for k in chosen], values[chosen])
@@ -581,7 +581,7 @@ def restricted(problem: Problem, mine: Sequence[int], values: Array) -> Problem:
 
 
 def _apart(problems: tuple[Problem, Problem], parts: Sequence[Estimate]) -> Estimate:
-    """Return both parts as one estimate, each with the covariance that it has alone."""
+    """Return both parts as one estimate, each with its separate covariance."""
     first = len(parts[0].names)
     size = first + len(parts[1].names)
     covariance, spectrum = np.zeros((size, size)), np.zeros(size)
@@ -602,7 +602,7 @@ def _apart(problems: tuple[Problem, Problem], parts: Sequence[Estimate]) -> Esti
 
 
 def _original(problem: Problem, parts: Sequence[Estimate]) -> tuple[Unknown, ...]:
-    """Return the parts' unknowns with the starts they had before the first turn."""
+    """Return the parts' unknowns with their starts from before the first turn."""
     return tuple(problem.unknowns[_index(problem, label)] for part in parts for label in part.names)
 
 
@@ -624,7 +624,7 @@ def _combined(
         r, J = problem.evaluate(values)
         Z = np.zeros((r.size, len(columns)))
         mine = slice(first, first + len(part.names))
-        # Each fit weighs its residuals by their own size: what the noise really was.
+        # Each fit weighs its residuals by their own size, an estimate of the real noise.
         size = float(np.sqrt(r @ r / max(r.size - len(part.names), 1)))
         Z[:, mine] = J[:, columns[mine]] / size
         residuals.append(r / size)
@@ -650,30 +650,30 @@ def _combined(
 # --- The fit
 
 _DECADE = 10.0  # tau_L and T_L begin one decade below T1
-_FAR = 1e3  # how far from its start a time constant may go
+_FAR = 1e3  # largest ratio of a time constant to its start
 _UNITS = {"K": "Pa/A"}
-_WEIGHED = 2  # fits: the noise is weighed by the model that is started from, then by the one found
-_MOVES = 5.0  # of a block's noise: what a step must change the pressure by
+_WEIGHED = 2  # fits: the starting model weighs the noise, then the model from the first fit
+_MOVES = 5.0  # of a block's noise: smallest change of pressure that a step must cause
 
 
 class _Whitening:
-    r"""Makes residuals of block means independent, of size one.
+    r"""Whitening filter: makes residuals of block means independent, with unit variance.
 
     .. math::
         \Sigma = \sigma^2 I + \sigma_u^2 (H - H 1 w^T)(H - H 1 w^T)^T
 
-    with H the response of the means to every sample of the input, and w the mean before the step,
-    which is taken off the input: a model run over a measured current answers to its noise too,
-    slowly, as the brake does, so that neighboring residuals go together over seconds.
+    H is the response of the means to every sample of the input; w takes the mean before the step,
+    which is subtracted from the input. A model driven by a measured current also responds to its
+    noise. Its response is as slow as the brake's, so residuals correlate over seconds.
 
     Parameters
     ----------
     values
-        K, tau_L, T1, T2, T_L of the model that answers; SI, shape (5,).
+        K, tau_L, T1, T2, T_L of the model that responds; SI, shape (5,).
     blocks, block
         Number of means, and samples in each.
     rest
-        Samples before the step whose mean is taken off.
+        Samples before the step whose mean is subtracted.
     sigma, sigma_u
         Noise of a mean of the output, and of a sample of the input.
     interval
@@ -703,14 +703,14 @@ class _Whitening:
         self._root = np.linalg.cholesky(covariance)
 
     def __call__(self, values: Array) -> Array:
-        """Return residuals or their Jacobian, shape (blocks,) or (blocks, p), made independent."""
+        """Return whitened residuals or Jacobian, shape (blocks,) or (blocks, p)."""
         from scipy import linalg
 
         return np.asarray(linalg.solve_triangular(self._root, values, lower=True))
 
 
 def _starts_of(par: MotorcycleParameters, p: float) -> dict[str, float]:
-    """Return where the fit begins, as in the paper: eq. (15), and the pair one decade below.
+    """Return the fit's starts as in the paper: eq. (15), and the slow pair one decade below.
 
     ``p``: pressure [Pa].
 
@@ -725,7 +725,7 @@ def _starts_of(par: MotorcycleParameters, p: float) -> dict[str, float]:
 
 
 def unknowns_of(region: Region, starts: dict[str, float]) -> tuple[Unknown, ...]:
-    """Return the five of eq. (22), and the pressure at rest before every step."""
+    """Return the five unknowns of eq. (22), and the pressure at rest before every step."""
     five = [
         Unknown(
             name,
@@ -752,9 +752,9 @@ def unknowns_of(region: Region, starts: dict[str, float]) -> tuple[Unknown, ...]
 
 
 def _over_time(region: Region, unknowns: tuple[Unknown, ...], near: Array) -> Problem:
-    """Return the fit to the step responses, every block of time one residual.
+    """Return the fit to the step responses, with one residual per block of time.
 
-    ``near``: k, tau_L, T1, T2, T_L by which the noise of the measured current is weighed, shape
+    ``near``: K, tau_L, T1, T2, T_L of the model that weighs the measured current's noise, shape
     (5,).
     """
     whitenings = [
@@ -809,13 +809,13 @@ def fit(
     region
         Its records.
     par
-        Where the search begins, see ``_starts_of``.
+        Parameters for the starts, see ``_starts_of``.
     joint
-        All unknowns by all data; else K, tau_L and T_L by the steps, T1 and T2 by the sines.
+        Fit all unknowns to all data; otherwise K, tau_L and T_L to steps, T1 and T2 to sines.
     turns
-        How often the two steps are taken at most; the paper takes them once.
+        Largest number of turns of the two steps; the paper takes one.
     pair
-        Whether there is a slow pair: eq. (22); else tau_L = T_L, eq. (21).
+        With a slow pair, eq. (22); otherwise tau_L = T_L, eq. (21).
 
     Raises
     ------
@@ -835,7 +835,7 @@ def fit(
 def _fitted(
     region: Region, unknowns: tuple[Unknown, ...], near: Array, *, turns: int, pair: bool
 ) -> Estimate:
-    """Return the estimate, in turns of two steps or, without turns, by all data at once."""
+    """Return the estimate, by turns of two steps or, without turns, from all data together."""
     time, frequency = _over_time(region, unknowns, near), over_frequency(region, unknowns)
     rests = range(len(NAMES), len(unknowns))
     by_steps = [0, *((1, 4) if pair else ()), *rests]
@@ -851,7 +851,7 @@ def _fitted(
 
 
 def five_of(fitted: Estimate) -> dict[str, float]:
-    """Return K, tau_L, T1, T2 and T_L of an estimate, those that were kept included."""
+    """Return K, tau_L, T1, T2 and T_L of an estimate, including those kept at their start."""
     values = {u.name: float(v) for u, v in zip(fitted.unknowns, fitted.values, strict=True)}
     values |= {k.unknown.name: k.unknown.start for k in fitted.kept}
     if "T_L" not in values and "tau_L" not in values:  # eq. (21): any pair that cancels
@@ -863,16 +863,16 @@ def _require(region: Region, joint: bool) -> None:
     where = f"{region.name} pressure"
     if not region.steps:
         raise ParameterError(
-            f"no step response at {where}, so that K, tau_L and T_L cannot be estimated: step the "
-            "current demand from rest there, and record 4 s or more",
+            f"no step response at {where}, so K, tau_L and T_L cannot be estimated: apply a step "
+            "of the current demand from rest there, and record 4 s or more",
             name=where,
         )
     for step in region.steps:
         change = float(np.ptp(step.pressure))
         if not change > _MOVES * step.sigma or float(np.ptp(step.u)) == 0.0:
             raise ParameterError(
-                f"the pressure hardly answers the step at {where} (it changes by "
-                f"{change / 1e5:.2g} bar, its noise is {step.sigma / 1e5:.2g} bar), so that none "
+                f"the pressure hardly responds to the step at {where} (it changes by "
+                f"{change / 1e5:.2g} bar, its noise is {step.sigma / 1e5:.2g} bar), so none "
                 f"of {', '.join(NAMES)} can be estimated: take a larger step, with dither",
                 name=where,
                 value=f"{change / 1e5:.2g} bar",
@@ -881,7 +881,7 @@ def _require(region: Region, joint: bool) -> None:
     if not joint and count < 2:
         raise ParameterError(
             f"{count or 'no'} sine{'s' if count != 1 else ''} from {BAND[0]:g} to {BAND[1]:g} Hz "
-            f"at {where}, so that T1 and T2 cannot be estimated from the frequency response: "
+            f"at {where}, so T1 and T2 cannot be estimated from the frequency response: "
             "record sines of the current demand at two frequencies or more, or set fit = 'joint'",
             name=where,
             value=f"{count or 'no'} sine",

@@ -1,4 +1,4 @@
-"""Stick-slip in a measured signal: every slip, shot from its own rest and laid over the record."""
+"""Stick-slip in a measured signal: simulation of every slip from its own rest, time-aligned."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from bywire.identification.unknown import Unknown
 from bywire.simulation.run import Run, simulate
 from bywire.simulation.sensitivity import simulate_with_sensitivities
 
-_WINDOW = 0.02  # s: over which a change counts as motion
-_SURE = 6.0  # standard deviations of that change
-_OVER_NOISE = 6.0  # standard deviations of the rest before: smaller changes are its noise
+_WINDOW = 0.02  # s: span of the differences that detect motion
+_SURE = 6.0  # standard deviations of such a difference
+_OVER_NOISE = 6.0  # standard deviations of the preceding rest: smaller changes are noise
 _PAUSE = 0.05  # s: shorter rests belong to the slip around them
 
 
@@ -32,7 +32,7 @@ class Slip:
     """A stretch of motion between two rests.
 
     ``begin``, ``end``: samples at which the motion begins and ends (or the record does);
-    ``direction``: 1 for rising, -1 for falling; ``rest``: level at which the signal rested before.
+    ``direction``: 1 for rising, -1 for falling; ``rest``: level of the preceding rest.
     """
 
     begin: int
@@ -45,7 +45,7 @@ def find_slips(values: Array, interval: float, least: float) -> list[Slip]:
     """Return the slips of a signal.
 
     ``values``: shape (n,); ``interval``: sample time [s]; ``least``: smallest change that counts,
-    if it also exceeds the noise of the rest before.
+    provided that it exceeds the noise of the preceding rest.
     """
     width = max(round(_WINDOW / interval), 1)
     smooth = _moving_mean(values, width)
@@ -84,7 +84,7 @@ def _stretches(moving: NDArray[np.bool_], pause: int) -> list[tuple[int, int]]:
 
 
 def _one_way(values: Array, begin: int, end: int, least: float) -> list[tuple[int, int]]:
-    """Split a stretch where it turns back by more than a slip's smallest change."""
+    """Split a stretch where it reverses by more than the smallest change of a slip."""
     part = values[begin:end]
     top, low = int(np.argmax(part)), int(np.argmin(part))
     rise, fall = part[top] - part[0], part[0] - part[low]
@@ -103,10 +103,10 @@ BEFORE = 0.01
 """rest before the model breaks away [s]"""
 _LEAST = 8  # samples
 _COARSEST = 4e-3  # s
-_RESTED = 1.0  # s of rest from which its pressure and the ramp of the current are read
-_COMPARED = 0.9  # of a slip's way: its end, like its beginning, is up to the current's ripple
+_RESTED = 1.0  # s of rest that determine its pressure and the ramp of the current
+_COMPARED = 0.9  # of a slip's travel: the current's ripple decides its end, like its beginning
 _SMOOTHED = 0.02  # s
-_SEEN = 0.016  # s: over which the current is read, short as its ripple moves it
+_SEEN = 0.016  # s: span of the line through the current, short because of the ripple
 
 
 @dataclass(frozen=True)
@@ -116,20 +116,20 @@ class Shot:
     Parameters
     ----------
     slip
-        Where it lies.
+        Its rows and direction.
     time, pressure, current
-        Measured around it, from a little before its onset; shape (n,), SI.
+        Measured signals, from a little before its onset; shape (n,), SI.
     rate
-        Of the current's ramp while the piston rested [A/s].
+        Slope of the current's ramp while the piston rested [A/s].
     unrest
         Standard deviation of the current from that ramp [A].
     before, slope
-        Level [A] and rate [A/s] of the current at each time, from a line through what was
-        measured shortly before it; shape (n,).
+        Level [A] and rate [A/s] of the current at each time, from a line through the samples
+        shortly before it; shape (n,).
     seen
-        How many samples that line goes through.
+        Number of samples of that line.
     steep
-        Rows in which the first half of the way is made.
+        Rows of the first half of the travel.
     """
 
     slip: Slip
@@ -159,8 +159,8 @@ def cut_out(
 ) -> list[Shot]:
     """Return the measured slips with their surroundings, up to the next onset.
 
-    Slips of too few samples, without a rest before, or without a ramp of the current toward them
-    are left out.
+    The function skips slips of too few samples, without a preceding rest, or without a ramp of the
+    current toward them.
 
     Raises
     ------
@@ -219,9 +219,9 @@ def cut_out(
 
 
 def _passed(values: Array, slip: Slip, rest: int, share: float) -> int:
-    """Return the sample at which a slip has covered a share of its way.
+    """Return the sample at which a slip has covered a share of its travel.
 
-    The values must be smooth: the first noisy sample beyond would be early.
+    The values must be smooth: noise would put the first sample beyond the share too early.
     """
     end = float(values[slip.end : slip.end + rest].mean())
     beyond = slip.direction * (values[slip.begin :] - slip.rest) > share * abs(end - slip.rest)
@@ -229,7 +229,7 @@ def _passed(values: Array, slip: Slip, rest: int, share: float) -> int:
 
 
 def _lines_before(values: Array, first: int, last: int, seen: int) -> tuple[Array, Array]:
-    """Return level, and change per sample, at each sample of a line through those before it."""
+    """Return level and change per sample at each sample, from a line through preceding samples."""
     at = np.arange(1 - seen, 1, dtype=float)
     centered = at - at.mean()
     slope = centered / (centered @ centered)
@@ -242,7 +242,7 @@ def _lines_before(values: Array, first: int, last: int, seen: int) -> tuple[Arra
 def onset_of(shot: Shot, shift: float) -> tuple[float, float]:
     """Return level [A] and rate [A/s] of the measured current at an instant of a shot.
 
-    The rate is at least the ramp's, which drives the piston to breakaway and on.
+    The rate is at least that of the ramp, which drives the piston to breakaway and beyond.
     """
     level, slope = (float(np.interp(shift, shot.clock, v)) for v in (shot.before, shot.slope))
     way = float(np.sign(shot.rate)) or float(shot.slip.direction)
@@ -250,7 +250,7 @@ def onset_of(shot: Shot, shift: float) -> tuple[float, float]:
 
 
 def require_calm(shots: Sequence[Shot], noise: float, most: float) -> None:
-    """Refuse a current that does not follow its ramp while the piston rests.
+    """Reject a current that does not follow its ramp while the piston rests.
 
     ``noise``: standard deviation of the current's measurement [A]; ``most``: largest standard
     deviation of the current itself [A].
@@ -267,14 +267,14 @@ def require_calm(shots: Sequence[Shot], noise: float, most: float) -> None:
 
 
 def require_reachable(shots: Sequence[Shot], par: MotorcycleParameters) -> None:
-    """Refuse rests at a pressure that the brake of these parameters cannot hold."""
+    """Reject rests at a pressure that the brake with these parameters cannot hold."""
     highest = max(shot.slip.rest for shot in shots)
     try:
         state_at(max(highest, 0.0), par)
     except ParameterError as error:
         raise ParameterError(
-            f"the measured pressure rests at {highest / 1e5:.4g} bar, which this brake cannot "
-            f"hold: check the unit of p_mc, and the parameters ({error})",
+            f"the measured pressure rests at {highest / 1e5:.4g} bar, but this brake cannot "
+            f"hold it: check the unit of p_mc, and the parameters ({error})",
             name="p_mc",
             value=f"{highest / 1e5:.4g} bar",
             valid=error.valid,
@@ -292,7 +292,7 @@ def overlaid(shot: Shot, p: Array) -> tuple[Array, Array, float]:
     Parameters
     ----------
     p
-        Computed pressure [Pa], shape (n,); moved in time to where it lies best.
+        Computed pressure [Pa], shape (n,); shifted in time for the best fit.
     """
     shift = _best_shift(shot, p, shot.time.size)
     r, v = _laid_over(shot, p, shift)
@@ -300,9 +300,9 @@ def overlaid(shot: Shot, p: Array) -> tuple[Array, Array, float]:
 
 
 def _best_shift(shot: Shot, p: Array, rows: int) -> float:
-    """Return by how much later the computed slip lies on the measured one [s] (Gauss, Newton).
+    """Return the delay [s] of the computed slip that fits the measured one best (Gauss-Newton).
 
-    Compared are the first rows.
+    ``rows``: number of rows compared, from the first on.
     """
     t = shot.clock
     shift = _half_way(t, shot.pressure, shot.slip) - _half_way(t, p, shot.slip)
@@ -319,7 +319,7 @@ def _best_shift(shot: Shot, p: Array, rows: int) -> float:
 
 
 def _laid_over(shot: Shot, p: Array, shift: float) -> tuple[Array, Array]:
-    """Return computed minus measured pressure with the computed one later, and its speed."""
+    """Return computed, delayed by ``shift``, minus measured pressure, and the computed speed."""
     t = shot.clock
     at = t - shift
     v = np.interp(at, t, np.gradient(p, shot.interval))
@@ -328,29 +328,29 @@ def _laid_over(shot: Shot, p: Array, shift: float) -> tuple[Array, Array]:
 
 
 def _half_way(t: Array, p: Array, slip: Slip) -> float:
-    """Return when a slip has gone half of its way [s]."""
+    """Return the time [s] at which a slip has covered half of its travel."""
     middle = 0.5 * (p[0] + p[-1])
     beyond = np.flatnonzero(slip.direction * (p - middle) > 0.0)
     return float(t[beyond[0]]) if beyond.size else float(t[-1])
 
 
 # --- Shooting
-# A fit to the whole pressure curve fails from starts a few percent off: a slip that begins too
-# early or too late costs as much as one that is not there. So each slip is run by itself, from the
-# rest that was measured, beginning where the model breaks away, and moved in time to where it lies
-# best on the measured one. The current at breakaway is a separate residual.
+# A fit to the whole pressure curve fails from starts a few percent off: a slip at the wrong time
+# costs as much as a missing one. So each slip is simulated alone, from the measured rest and the
+# model's breakaway on, and shifted in time until it fits the measured slip best. The current at
+# breakaway is a separate residual.
 #
-# The run's demand ramps through the model's own breakaway current, and the modeled control answers
-# to the motor's induced voltage: the current dips as it did on the bench, at the right time. From
-# where the slip has begun, the demand is corrected by how far the measured current lies beside
-# that.
+# The run's demand ramps through the model's own breakaway current. The modeled controller responds
+# to the motor's induced voltage, so that the current dips as on the bench, at the right time. After
+# the slip has begun, the demand is corrected by the difference between measured and computed
+# current.
 
-_SMOOTHED_SHOT = 0.01  # s: over which the measured current is
-_BEGUN = 0.02  # of a slip: before, the current's noise would decide when the model breaks away
-_BEGUN_AT = 2e3  # Pa: of a long one
-_ALIGNED = 2  # times that the measured current is laid over the slip which it drives
-_DIP = 0.1  # s: how long the current dips as a slip begins
-_LEAST_LATE = 20  # samples that a line is laid through
+_SMOOTHED_SHOT = 0.01  # s: moving average of the measured current
+_BEGUN = 0.02  # of a slip: earlier, the current's noise would decide when the model breaks away
+_BEGUN_AT = 2e3  # Pa: the same for a long slip
+_ALIGNED = 2  # iterations that align the measured current with the slip that it drives
+_DIP = 0.1  # s: length of the current's dip as a slip begins
+_LEAST_LATE = 20  # samples needed to fit a line
 _I_SET = MotorcycleBrake().Stimulus._fields.index("i_set")
 
 
@@ -361,14 +361,14 @@ class Driven:
     Parameters
     ----------
     calm
-        Driven by a line through the current once it no longer dips: its derivatives do not know
-        the current's noise, which would bias what they estimate.
+        Driven by a line through the current after its dip. Its derivatives are therefore free of
+        the current's noise, which would bias the estimates.
     sampled
-        Driven by the current as it was measured.
+        Driven by the current as measured.
     first
-        Row from which both are driven.
+        First row with the measured current.
     onset
-        When the model breaks away [s].
+        Time at which the model breaks away [s].
     """
 
     calm: Run
@@ -378,11 +378,11 @@ class Driven:
 
 
 def _driven_by(ramp: Run, shot: Shot, current: float, zero: float) -> Driven:
-    """Return a slip's run, driven by its ramp, as the measured current drives it.
+    """Return a slip's run with the measured current in place of its ramp.
 
-    ``ramp``: its demand ramps through the current that breaks the model away; ``shot``: the
-    measured slip; ``current``: that breaks the model away [A]; ``zero``: reading of the current's
-    sensor without current [A].
+    ``ramp``: run whose demand ramps through the model's breakaway current; ``shot``: the measured
+    slip; ``current``: the model's breakaway current [A]; ``zero``: zero offset of the current
+    sensor [A].
     """
     middle = shot.clock + 0.5 * shot.interval
     width = 2 * int(0.5 * _SMOOTHED_SHOT / shot.interval) + 1
@@ -410,14 +410,14 @@ def _driven_by(ramp: Run, shot: Shot, current: float, zero: float) -> Driven:
 
 
 def _with_more(run: Run, more: Array) -> Callable[[Array], Array]:
-    """Return the run's stimulus with more demand at each of its intervals."""
+    """Return the run's stimulus with additional demand in each of its intervals."""
     interval = run.record
     demand = run.stimulus(np.arange(more.size, dtype=np.float64) * interval)[:, _I_SET]
     return partial(held, demand + more, interval)
 
 
 def held(ramp: Array, interval: float, at: Array) -> Array:
-    """Return the stimulus whose demand is held over each interval."""
+    """Return a stimulus that holds its demand over each interval."""
     fields = MotorcycleBrake().Stimulus._fields
     rows = np.zeros((at.size, len(fields)))
     index = np.clip(np.floor(at / interval + 1e-6).astype(int), 0, ramp.size - 1)
@@ -425,26 +425,25 @@ def held(ramp: Array, interval: float, at: Array) -> Array:
     return rows
 
 
-_MORE = 1e-3  # A: with which the answer to an offset is computed
+_MORE = 1e-3  # A: offset for computing the response to an offset
 
 
 @dataclass(frozen=True)
 class Fitted:
-    """A slip of the model, laid over the measured one.
+    """A simulated slip, time-aligned with the measured one.
 
     Parameters
     ----------
     residuals
         Computed minus measured pressure [Pa], shape (n,).
     slopes
-        Their derivatives by the unknowns with the shift at its best, shape (n, p).
+        Their derivatives by the unknowns, at the best shift, shape (n, p).
     by_current
         Derivative of the residuals by an offset of the current along the slip [Pa/A], shape (n,).
     answer, speed
-        The same with the shift kept [Pa/A], and how fast the pressure moves [Pa/s], shape (n,).
+        The same at a fixed shift [Pa/A], and the rate of the pressure [Pa/s], shape (n,).
     breakaway, breakaway_slopes
-        Measured minus computed current at the instant of breaking away [A], and its
-        derivatives, shape (p,).
+        Measured minus computed current at breakaway [A], and its derivatives, shape (p,).
     """
 
     residuals: Array
@@ -457,9 +456,9 @@ class Fitted:
 
 
 class Shooting:
-    """Runs slips of the motorcycle brake for values of the unknowns.
+    """Simulation of slips of the motorcycle brake for values of the unknowns.
 
-    ``par``: everything that is known; ``unknowns``: friction parameters; ``step``: substep [s].
+    ``par``: known parameters; ``unknowns``: friction parameters; ``step``: substep [s].
     """
 
     def __init__(
@@ -483,10 +482,10 @@ class Shooting:
         self._error = EquationError(Equation(self.model, "omega", "alpha"), self._source, unknowns)
 
     def breakaway(self, rest: float, direction: int, values: Array) -> tuple[float, Array]:
-        """Return the current [A] that breaks away from a rest [Pa], and its derivatives.
+        """Return the breakaway current [A] from a rest [Pa], and its derivatives.
 
-        Where motor, pressure and breakaway torque balance: the equation of motion without
-        motion, which is affine in the current.
+        At this current, motor, pressure and breakaway torque balance: the equation of motion at
+        standstill, which is affine in the current.
         """
         columns = self._error.at(
             state_at(max(rest, 0.0), self._source)._replace(omega=direction * 1e-12),
@@ -499,15 +498,15 @@ class Shooting:
         return -e[0] / per_ampere, -slopes[0] / per_ampere
 
     def run(self, shot: Shot, values: Array) -> tuple[Run, float, Array]:
-        """Return the run of one slip, the current [A] it breaks away at, and its derivatives.
+        """Return the run of a slip, its breakaway current [A], and that current's derivatives.
 
-        The demand ramps past that current as the measured one did; the control answers to what
-        the motor induces, as it did on the bench.
+        The demand ramps past that current at the measured rate. The controller responds to the
+        motor's back-EMF, as on the bench.
         """
         slip, interval = shot.slip, shot.interval
         current, current_slopes = self.breakaway(slip.rest, slip.direction, values)
         par = self.par.replace(dict(zip(self.names, values.tolist(), strict=True)))
-        after = shot.clock + 0.5 * interval - BEFORE  # what is held over an interval, without lag
+        after = shot.clock + 0.5 * interval - BEFORE  # middle of each held interval: no lag
         demand = current + shot.rate * after
         rest, start = max(slip.rest, 0.0), float(demand[0])
         run = Run(
@@ -523,15 +522,15 @@ class Shooting:
         return run, current, current_slopes
 
     def fit(self, shot: Shot, values: Array, zero: float | None = None) -> Fitted:
-        """Run one slip and lay it over the measured one.
+        """Simulate a slip and align it with the measured one.
 
         Parameters
         ----------
         values
-            Of the unknowns.
+            Values of the unknowns.
         zero
-            Reading of the current's sensor without current [A]. The slip is then driven by the
-            measured current once it has begun; without, by its ramp alone.
+            Zero offset of the current sensor [A]. If given, the measured current drives the slip
+            once it has begun; otherwise only its ramp does.
         """
         run, current, current_slopes = self.run(shot, values)
         driven = None if zero is None else _driven_by(run, shot, current, zero)
@@ -549,7 +548,7 @@ class Shooting:
             answer = (more - p) / _MORE
             p = simulate(driven.sampled, ("p_mc",))["p_mc"]
         r, v, shift = overlaid(shot, p)
-        # the demand begins at the breakaway current, and goes on as measured
+        # The demand starts at the breakaway current and continues as measured.
         by_parameters, all_along = computed.derivatives[:, 0, :-1], computed.derivatives[:, 0, -1]
         slopes = by_parameters + np.outer(all_along - answer, current_slopes)
         at = shot.clock - shift
@@ -570,7 +569,7 @@ class Shooting:
         )
 
     def _start_slopes(self, run: Run, shot: Shot) -> tuple[Array, Array]:
-        """Return derivatives of the start by the unknowns, and by an offset of the demand."""
+        """Return derivatives of the initial state by the unknowns and by a demand offset."""
         rest, start = max(shot.slip.rest, 0.0), float(run.state.i)
 
         def at(current: float) -> Array:

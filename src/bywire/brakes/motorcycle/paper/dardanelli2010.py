@@ -12,7 +12,7 @@ from bywire.reproduction.reproduction import Reproduction, Source, reproduced
 
 
 def _causes(items: Iterable[Item]) -> tuple[RootCause, ...]:
-    """Return the root causes, the numbers taken from the items."""
+    """Return the root causes, with numbers from the items."""
     return causes_of(items, _tables, _gear, _gain, _bandwidth, _slow_pair, _hysteresis, _single)
 
 
@@ -34,7 +34,7 @@ def _tables(q: Quoted) -> RootCause:
 def _gear(q: Quoted) -> RootCause:
     paper, ours = "gear.returned.paper", "gear.returned.directional"
     return RootCause(
-        "Eq. (8) lets the gear give energy where the load drives it: a slow release "
+        "Eq. (8) lets the gear create energy when the load drives it: a slow release "
         f"from 37 bar returns {q(paper)} of {q.stated(paper)} stored "
         f"({q.share(paper)}; with Table 1 {q.share(f'{paper}@table1')}), where a loss "
         f"that depends on direction returns {q(ours)} ({q.share(ours)}).",
@@ -45,11 +45,11 @@ def _gear(q: Quoted) -> RootCause:
 def _gain(q: Quoted) -> RootCause:
     low, high = q("table4.low.K"), q("table4.high.K")
     return RootCause(
-        "Table 3's friction under eq. (20)'s dither does not leave Table 4's gain, "
+        "Table 3's friction under eq. (20)'s dither contradicts Table 4's gain, "
         f"because f_cfr,p exceeds f_cfr,n: {low} at low and {high} at high pressure "
         f"({q('table4.medium.K@table1')} with Table 1) instead of "
-        f"{q.stated('table4.low.K')} and {q.stated('table4.high.K')}; Table 4's gain "
-        f"would take Fig. 5's ramp to {q('table4.medium.p_ramp')}, where its axis "
+        f"{q.stated('table4.low.K')} and {q.stated('table4.high.K')}. With Table 4's gain, "
+        f"Fig. 5's ramp would reach {q('table4.medium.p_ramp')}, but its axis "
         f"ends at {q.stated('table4.medium.p_ramp')}.",
         ("table4.*.K", "table4.*.K@table1"),
     )
@@ -64,8 +64,8 @@ def _bandwidth(q: Quoted) -> RootCause:
         f"of {q.stated('table4.medium.corner')}; on Table 4's linear model, to which our gains "
         f"are tuned, a crossover of {q('fig7.crossover')} and a phase margin of "
         f"{q('fig7.phase_margin')} (required {q.stated('fig7.crossover')}, "
-        f"{q.stated('fig7.phase_margin')}) are reached, though only "
-        f"{q('fig7.bandwidth.table4')} at -3 dB. Gains searched on the nonlinear bench itself meet "
+        f"{q.stated('fig7.phase_margin')}) are reached, but only "
+        f"{q('fig7.bandwidth.table4')} at -3 dB. Gains tuned on the nonlinear bench itself meet "
         f"all four requirements, with an overshoot of {q('requirements.overshoot@retuned')}.",
         (
             "fig7.bandwidth*",
@@ -81,7 +81,7 @@ def _slow_pair(q: Quoted) -> RootCause:
     return RootCause(
         f"Table 4 has the zero of its slow pair below the pole ({zero} and {pole} at "
         f"medium pressure), so that its step overshoots by {q.stated('table4.air')} "
-        "and falls, which the paper puts down to air; 1 ml of air gives "
+        "and falls. The paper attributes this to air, but 1 ml of air gives "
         f"{q('table4.air')}. On our brake, without air, the paper's two steps give "
         f"{q('table4.medium.identified.zero')} and "
         f"{q('table4.medium.identified.T_L')}.",
@@ -92,8 +92,8 @@ def _slow_pair(q: Quoted) -> RootCause:
 def _hysteresis(q: Quoted) -> RootCause:
     ratio, slow = "fig5.loop_area_ratio", "fig5.loop_area_ratio.slow"
     return RootCause(
-        "The hysteresis that is left under dither, where the paper says 'totally "
-        f"removed', is mostly delay: {q(ratio)} of the loop's area without dither "
+        "Some hysteresis remains under dither, which the paper calls 'totally "
+        f"removed'. It is mostly delay: {q(ratio)} of the loop's area without dither "
         f"({q(f'{ratio}@table1')} with Table 1), but {q(slow)} "
         f"({q(f'{slow}@table1')}) on a ramp ten times slower.",
         ("fig5.loop_area_ratio*", "fig5.removed_above*"),
@@ -106,8 +106,8 @@ def _single(q: Quoted) -> RootCause:
     return RootCause(
         f"Single numbers: eq. (12)'s laminar coefficient is {textbook}{q('laminar.coefficient')}; "
         f"the text's mu of {q.stated('section3.mu')} is {q('section3.mu')} by Table 3; eq. (19)'s "
-        f"{q.stated('eq19.A_dit')} at 25 bar leaves out eta_g ({q('eq19.A_dit')}); and the axes "
-        f"of Figs. 4 and 5 have no room for Table 3's friction and dither ({q(top)} of "
+        f"{q.stated('eq19.A_dit')} at 25 bar omits eta_g ({q('eq19.A_dit')}); and the axes "
+        f"of Figs. 4 and 5 are too short for Table 3's friction and dither ({q(top)} of "
         f"{q.stated(top)}, {q(end)} of {q.stated(end)}, {q(ripple)} of {q.stated(ripple)}).",
         ("laminar.*", "section3.mu", "eq19.*", "fig4.*", "fig5.p_max.dither", "fig5.i_max.*"),
     )
@@ -130,11 +130,11 @@ PARTS = {
     "gear": gear.part,
 }
 NAMES = {
-    "": "Calibrated set, and what needs no set",
+    "": "Calibrated set, and results without a set",
     "table1": "Table 1 as printed (ids with @table1)",
     "retuned": "Gains retuned on the bench (ids with @retuned)",
 }
-"""parameter sets, by what follows @ in an item's id"""
+"""titles of the parameter sets, by the text after @ in an item's id"""
 
 SOURCE = Source(
     name=MAIN,

@@ -1,4 +1,4 @@
-"""The same brake as measured: what Dardanelli et al. (2010) measured, and what explains it best."""
+"""The same brake as measured: Dardanelli et al.'s (2010) measurements and their best fit."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from bywire.reproduction.reproduction import Part, Reproduction, Source, reprodu
 
 NAME = "dardanelli2010-measured"
 SETS = {NAME: "", MAIN: "@calibrated", PRINTED: "@table1"}
-"""parameter sets, with what follows an item's id"""
+"""parameter sets, with the suffix of an item's id"""
 TITLES = {
     "": "Estimated from these statements",
     "calibrated": "Calibrated to Table 2",
@@ -54,15 +54,15 @@ def statements(runs: Runs) -> Part:
     items = [_item(s, name, values[name][s.name]) for name in SETS for s in STATEMENTS]
     text = (
         "Table 4, Figs. 5 to 7 and the friction of Table 3 count as measured on the real brake; "
-        "Tables 1 and 2, data sheets and theory, do not. All free parameters were estimated from "
-        "them at once: what is minimized is the sum of soft_l1 losses of the residuals over their "
-        "tolerances, because the statements contradict each other and squares would let the one "
-        "that is furthest off decide. A statement that is met proves nothing, since it was fitted; "
-        "one that is not met contradicts the others, or what the model's structure can do. The "
-        "converter counts as ideal here."
+        "Tables 1 and 2, data sheets and theory, do not. One fit estimates all free parameters. It "
+        "minimizes the sum of soft_l1 losses of the residuals over their tolerances. The "
+        "statements contradict each other, so squares would let the largest residual dominate. A "
+        "statement that is met proves nothing, because the fit used it. A statement that is not "
+        "met contradicts the others, or is beyond the model's structure. The converter counts as "
+        "ideal here."
     )
     return Part(
-        "What was measured",
+        "Measurements",
         text,
         tuple(items),
         tables={"Residuals in tolerances": _side_by_side(values)},
@@ -70,7 +70,7 @@ def statements(runs: Runs) -> Part:
 
 
 def _item(s: Statement, name: str, value: float) -> Item:
-    """Return a statement against a set; a statement that was fitted is no evidence for it."""
+    """Return a statement against a set; a fitted statement is not evidence for the set."""
     r = s.residual(value)
     met = abs(r) <= 1.0
     fitted = name == NAME and met
@@ -88,7 +88,7 @@ def _item(s: Statement, name: str, value: float) -> Item:
 
 
 def _side_by_side(values: Values) -> Table:
-    """Return statement, tolerance, what the sets give, and what is left."""
+    """Return statements, tolerances, the sets' values, and residuals."""
     numeric = ["stated", "tolerance", MAIN, "this set", "residual"]
     rows = []
     for s in STATEMENTS:
@@ -123,26 +123,27 @@ def estimates(runs: Runs) -> Part:
             u.unit,
             best.estimate[u.name],
             f"95 % interval {ends[u.name][0]:.3g} to {ends[u.name][1]:.3g}; Table 1's set has "
-            f"{prior[u.name]:.3g}; told by {' and '.join(best.deciding_statements(u.name))}",
+            f"{prior[u.name]:.3g}; determined by {' and '.join(best.deciding_statements(u.name))}",
         )
         for u in best.estimate.unknowns
     ]
     kept = [k.unknown.name for k in best.estimate.kept]
     text = (
-        "The intervals take what is left for chance, although it is mostly contradiction: they "
-        "say how firmly the statements together hold a value, not how sure it is. No statement "
-        f"tells {' nor '.join(kept) or 'nothing'}, which stay where Table 1's set has them; "
-        "products with a free parameter, such as A_mc k_g, are told by that one alone. Any one "
-        f"parameter moved by 1 % gains at most {100.0 * max(best.gain(), 0.0):.1g} % of the misfit."
+        "The intervals treat the residuals as random, although most of them are contradictions. "
+        "They show how firmly the statements together fix a value, not how certain it is. No "
+        f"statement determines {' nor '.join(kept) or 'nothing'}, which stay at Table 1's values. "
+        "In a product with a free parameter, such as A_mc k_g, the free parameter stands for the "
+        "whole product. A change of 1 % in any one parameter reduces the misfit by at most "
+        f"{100.0 * max(best.gain(), 0.0):.1g} %."
     )
     more = best.estimate.notes
     tables = {
         "Estimated": _estimated(best, ends, prior),
-        "Not told": _not_told(best.estimate.kept),
+        "Not determined": _undetermined(best.estimate.kept),
     }
     appendix = {
         "Free parameters: bounds": _bounds(),
-        "What goes together": text_table(("note",), [(n,) for n in more]),
+        "Notes of the estimate": text_table(("note",), [(n,) for n in more]),
     }
     return Part("The estimate", text, tuple(items), tables=tables, appendix=appendix)
 
@@ -166,7 +167,7 @@ def _estimated(
     return text_table(heading, rows)
 
 
-def _not_told(kept: tuple[Kept, ...]) -> Table:
+def _undetermined(kept: tuple[Kept, ...]) -> Table:
     rows = [(k.unknown.name, amount(k.unknown.start, k.unknown.unit), k.reason) for k in kept]
     rows += [(name, "", reason) for name, reason in HELD.items()]
     return text_table(("parameter", "kept at", "why"), rows)
@@ -180,14 +181,14 @@ def _bounds() -> Table:
 
 
 def beyond(runs: Runs) -> Part:
-    """Return what the paper does not state, and the reasons for what is left are about."""
+    """Return results that the paper does not state, but that the root causes refer to."""
     par = parameters(NAME)
     printed = FACTS["table3.k_brk_p"].value
     softer = par.replace({"seal.k_brk_p": printed, "ecu.est_par.k_brk_p": printed})
     height = FACTS["fig6_step"].value
     small, paper = overshoots(par, "medium", (_SMALL, height))
     (without,) = overshoots(softer, "medium", (height,))
-    of = "step from 25 bar, dither averaged, highest point over its end"
+    of = "step from 25 bar, dither averaged, highest point minus final value"
     items = (
         found("step.small.overshoot", "bar", small, f"{of}; {_SMALL:g} A"),
         found("step.overshoot", "bar", paper, f"{of}; {height:g} A as in Fig. 6"),
@@ -202,11 +203,12 @@ def beyond(runs: Runs) -> Part:
         ),
     )
     text = (
-        "A slow pair overshoots by a share of the step. This brake's steps overshoot by nearly the "
-        "same pressure whatever their height, and hardly with k_brk_p as printed, by which the ECU "
-        "sets the dither. At the height of Fig. 6 it is as much as Table 4's, and no slow pair."
+        "A slow pair overshoots in proportion to the step. This brake's steps overshoot by nearly "
+        "the same pressure at any height. With the printed k_brk_p, from which the ECU computes "
+        "the dither, they hardly overshoot. At the height of Fig. 6 the overshoot equals Table "
+        "4's, but a slow pair is not its cause."
     )
-    return Part("What no statement is of", text, items)
+    return Part("Beyond the statements", text, items)
 
 
 def _fast_pole(q: Quoted) -> RootCause:
@@ -215,7 +217,7 @@ def _fast_pole(q: Quoted) -> RootCause:
         "Eq. (20)'s dither turns Table 3's friction into so much damping that the two "
         f"poles lie apart: T2 is {q(one)} instead of {q.stated(one)} at medium and "
         f"{q(other)} instead of {q.stated(other)} at high pressure. Where more dither "
-        "takes damping away, T2 comes nearer and T1 goes away: it is "
+        "reduces the damping, T2 approaches its stated value and T1 departs from it: T1 is "
         f"{q(slow)} instead of {q.stated(slow)} at medium pressure.",
         ("table4.*.T2*", "table4.medium.T1", "table4.high.T1"),
     )
@@ -224,11 +226,11 @@ def _fast_pole(q: Quoted) -> RootCause:
 def _slow_pair(q: Quoted) -> RootCause:
     name = "table4.low.overshoot"
     return RootCause(
-        "Nothing in eqs. (13) has a slow zero below its pole: the step overshoots by "
-        f"{q(name)} instead of {q.stated(name)} at low pressure, and what it has of "
-        "it at medium and high pressure is no slow pair: "
+        "Eqs. (13) have no slow zero below its pole: the step overshoots by "
+        f"{q(name)} instead of {q.stated(name)} at low pressure. The overshoot at medium and "
+        "high pressure does not come from a slow pair, because it hardly grows with the step: "
         f"{q('step.small.overshoot')} of a step of {_SMALL:g} A from 25 bar, and "
-        f"{q('step.overshoot')} of one seven times as high.",
+        f"{q('step.overshoot')} of a step seven times as high.",
         ("table4.*.overshoot*",),
     )
 
@@ -237,8 +239,8 @@ def _break_away(q: Quoted) -> RootCause:
     name = "table3.k_brk_p"
     return RootCause(
         "Overshoot and Table 3 contradict each other: the ECU dithers in proportion "
-        f"to k_brk_p, {q(name)} instead of {q.stated(name)}, which takes damping "
-        "away; with Table 3's the step of Fig. 6 overshoots by "
+        f"to k_brk_p, {q(name)} instead of {q.stated(name)}, which reduces the damping; "
+        "with Table 3's value the step of Fig. 6 overshoots by "
         f"{q('step.overshoot_by_table3')} instead of {q('step.overshoot')}.",
         (name,),
     )
@@ -246,10 +248,10 @@ def _break_away(q: Quoted) -> RootCause:
 
 def _braking(q: Quoted) -> RootCause:
     return RootCause(
-        "Nothing but dithered friction damps this piston, k_damp being nothing, so "
-        f"that hard braking reaches {q('fig7.peak')} where Fig. 7a's axis leaves "
-        f"{q.stated('fig7.peak')} within half a label; more damping would take the "
-        "overshoot of the steps away.",
+        "Only dithered friction damps this piston, because k_damp is zero. So "
+        f"hard braking reaches {q('fig7.peak')}, where Fig. 7a's axis allows "
+        f"{q.stated('fig7.peak')} within half a label. More damping would remove the "
+        "overshoot of the steps.",
         ("fig7.peak",),
     )
 
@@ -257,7 +259,7 @@ def _braking(q: Quoted) -> RootCause:
 def _ramp(q: Quoted) -> RootCause:
     return RootCause(
         "Table 4's gain contradicts Fig. 5: with it the ramp to 5 A ends at "
-        f"{q('fig5.p_max')}, where the figure's axis leaves {q.stated('fig5.p_max')} "
+        f"{q('fig5.p_max')}, where the figure's axis allows {q.stated('fig5.p_max')} "
         "within half a label.",
         ("fig5.p_max*",),
     )
@@ -265,7 +267,7 @@ def _ramp(q: Quoted) -> RootCause:
 
 def _ripple(q: Quoted) -> RootCause:
     return RootCause(
-        "Eq. (20)'s dither is larger than what Fig. 5 has room for: behind the 20 Hz "
+        "Eq. (20)'s dither exceeds the range of Fig. 5: after the 20 Hz "
         f"low-pass the measured current reaches {q('fig5.i_max')} instead of "
         f"{q.stated('fig5.i_max')}.",
         ("fig5.i_max*",),
@@ -274,9 +276,9 @@ def _ripple(q: Quoted) -> RootCause:
 
 def _stuck(q: Quoted) -> RootCause:
     return RootCause(
-        "The loop that dither leaves is delay of the dithered brake on the ramp, and "
-        f"friction bends its ends: {q('fig5.loop_area_ratio')} of that without, "
-        "where the piston jumps, then sticks at "
+        "The remaining loop under dither is delay of the dithered brake on the ramp, and "
+        f"friction bends its ends. Its area is {q('fig5.loop_area_ratio')} of the loop "
+        "without dither, where the piston jumps, then sticks at "
         f"{q('ramp.p_max_without_dither')} and draws a small loop.",
         ("fig5.loop_area_ratio*",),
     )

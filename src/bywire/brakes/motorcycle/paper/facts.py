@@ -17,7 +17,7 @@ REGIONS = {"low": 5e5, "medium": 25e5, "high": 37e5}
 
 
 def table2_model() -> Rational:
-    """Return the transfer function that Table 2 prints [Pa/A]."""
+    """Return the transfer function printed in Table 2 [Pa/A]."""
     row = FACTS.table("table2")
     return first_orders(
         "Table 2 as printed",

@@ -21,7 +21,7 @@ LOCKED = {"seal.T_pr": 10.0}
 """overrides that lock the rotor: no torque of this motor overcomes 10 N m"""
 BAND = (0.1, 450.0)
 P_LOOP = 25e5
-"""operating point of the small-signal responses [Pa]; it hardly matters"""
+"""operating point of the small-signal responses [Pa]; they are insensitive to it"""
 
 
 def part(runs: Runs) -> Part:
@@ -32,7 +32,7 @@ def part(runs: Runs) -> Part:
             "fig3.bandwidth",
             FACTS["fig3_bandwidth"],
             small_signal(MAIN, "locked", "i_meas"),
-            note="-3 dB of the measured current behind the 180 Hz filter, small signal, rotor "
+            note="-3 dB of the measured current after the 180 Hz filter, small signal, rotor "
             "locked",
             tuned="calibrated",
         ),
@@ -65,10 +65,10 @@ def part(runs: Runs) -> Part:
         *_step_items("fig3.locked", locked, "motor current; rotor locked"),
     ]
     text = (
-        "The paper identifies the motor and tunes a PI for 100 Hz; neither motor nor gains are "
-        "printed. Ours were chosen so that the measured current of the locked rotor has 100 Hz at "
-        "-3 dB. Where the rotor moves, its back-EMF disturbs the loop, so that 'i equals i_set', "
-        "on which the paper's identification rests, holds only for a locked or heavy rotor."
+        "The paper identifies the motor and tunes a PI for 100 Hz, but prints neither motor nor "
+        "gains. Our gains give the measured current a bandwidth of 100 Hz (-3 dB) with the rotor "
+        "locked. If the rotor moves, its back-EMF disturbs the loop. So 'i equals i_set', on which "
+        "the paper's identification relies, is true only for a locked or heavy rotor."
     )
     exhibits = (
         Exhibit(
@@ -79,7 +79,7 @@ def part(runs: Runs) -> Part:
         Exhibit(
             "fig3-free",
             lambda: step_response(step.recordings["run"], "i", "i_ref"),
-            "The same with the piston free to move from its rest position, calibrated set.",
+            "The same step with the piston free to move from its rest position, calibrated set.",
         ),
     )
     return Part(

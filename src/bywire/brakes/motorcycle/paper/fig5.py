@@ -29,7 +29,9 @@ _REMOVED = 0.1
 _SLOWER = 10.0
 """how many times slower than eq. (17) the slow ramp is"""
 _LEVELS = np.arange(ALLOWANCES["level"].size, 45.0, 0.1) * BAR
-_LEAST_RISE = 0.1e5  # Pa: creeping in small steps, as by a converter's resolution, is no jump
+_LEAST_RISE = (
+    0.1e5  # Pa: smaller steps, for example from the converter's resolution, are creep, not jumps
+)
 _DAMPINGS = (0.5, 1.0)
 """other damping ratios of the 80 Hz filter: the paper prints none"""
 
@@ -47,7 +49,7 @@ class _Loops:
 
     @property
     def area_ratio(self) -> float:
-        """Area with dither in % of that without."""
+        """Area with dither in % of the area without."""
         return 100.0 * self.values["loop_area_ratio"]
 
     def p_max(self, label: str) -> float:
@@ -64,7 +66,7 @@ class _Loops:
 
     @property
     def dither_passed(self) -> float:
-        """Share [%] of the dither's amplitude that the motor current has, half-way up."""
+        """Motor current's share [%] of the dither amplitude, halfway up the ramp."""
         recording = self.result.recordings[_WITH]
         t = recording["time"].values
         inside = (t > 12.0 - 1e-9) & (t < 12.5 - 1e-9)
@@ -97,11 +99,11 @@ def part(runs: Runs) -> Part:
     )
     text = (
         "Without dither the pressure climbs in stick-slip jumps. With dither the loop shrinks to "
-        "a fraction. Most of the rest is not friction hysteresis but delay: a ramp ten times "
-        "slower leaves next to nothing. Dither turns dry friction into damping, which "
-        "makes the brake slower; and because seals rub more while applying, it lowers the gain. "
-        "The largest pressure depends on how much of the dither reaches the motor, hence on the "
-        "damping of the 80 Hz filter, which is not printed."
+        "a fraction. Most of the remaining loop is not friction hysteresis but delay: with a ramp "
+        "ten times slower almost nothing remains. Dither turns dry friction into damping, which "
+        "makes the brake slower. It also lowers the gain, because seals rub more while applying. "
+        "The largest pressure depends on how much of the dither reaches the motor, and so on the "
+        "damping of the 80 Hz filter, which the paper does not print."
     )
     recordings = {
         f"fig5-{label}{suffix}": selected(
@@ -130,7 +132,7 @@ def _exhibit(runs: Runs, name: str, suffix: str) -> Exhibit:
         f"fig5{suffix.replace('@', '-')}",
         lambda: hysteresis_loop(recordings, "p_mc", "i_filtered", "i_star", average=0.02),
         "Fig. 5: measured current (low-passed at 20 Hz) over pressure during the slow "
-        "ramp, averaged over one dither period; pale: with its ripple. Parameter set "
+        "ramp, averaged over one dither period; pale: with ripple. Parameter set "
         f"{name}.",
     )
 
@@ -151,14 +153,14 @@ def _set_items(name: str, suffix: str, loops: _Loops) -> list[Item]:
             f"fig5.loop_area_ratio{suffix}",
             FACTS["fig5_loop"],
             loops.area_ratio,
-            note="area with dither over that without, averaged over one dither period; mostly "
+            note="area with dither over the area without, averaged over one dither period; mostly "
             "delay",
         ),
         compared(
             f"fig5.loop_area_ratio.slow{suffix}",
             FACTS["fig5_loop"],
             slow,
-            note=f"the same with dither on a ramp {_SLOWER:g} times slower: friction alone",
+            note=f"the same with dither, on a ramp {_SLOWER:g} times slower: friction alone",
         ),
         compared(
             f"fig5.removed_above{suffix}",
@@ -166,14 +168,14 @@ def _set_items(name: str, suffix: str, loops: _Loops) -> list[Item]:
             loops.removed_above,
             note=f"pressure above which the width stays below {100 * _REMOVED:g} % of the "
             f"undithered loop's at mid-height; {ALLOWANCES['level'].size:g} bar is the lowest "
-            "level looked at",
+            "level evaluated",
         ),
         compared(
             f"fig5.i_max.dither{suffix}",
             FACTS["fig5_current"],
             peak(loops.result.recordings[_WITH], "i_filtered"),
-            note="measured current behind the 20 Hz low-pass: dither of eq. (20) leaves more "
-            "ripple than the figure has room for",
+            note="measured current after the 20 Hz low-pass: the ripple from eq. (20)'s dither "
+            "exceeds the range of the figure",
         ),
         found(f"fig5.jumps{suffix}", "1", float(jumps.size), f"ending at {levels} bar"),
         found(
@@ -233,7 +235,7 @@ def _jump_levels(recording: xr.Dataset) -> Array:
 
 _WAVEFORMS = ("sine", "square", "triangle")
 _P_START = 25e5
-"""pressure from whose equilibrium the brake is left alone under dither [Pa]"""
+"""pressure of the equilibrium at which the brake starts and rests under dither [Pa]"""
 
 
 def waveforms(runs: Runs) -> Part:
@@ -242,11 +244,11 @@ def waveforms(runs: Runs) -> Part:
     for waveform in _WAVEFORMS:
         items += _items(runs, waveform)
     text = (
-        "The paper prefers the sine for its low total harmonic distortion. Compared at equal "
-        "amplitude: the 80 Hz filter and the current loop leave little of the harmonics, so that "
-        "at the motor they differ less in distortion than in amplitude. The "
-        "square's fundamental is larger than the sine's (4/pi), the triangle's smaller (8/pi^2): "
-        "the square frees the piston best and shakes the pressure most."
+        "The paper prefers the sine for its low total harmonic distortion. Here the waveforms "
+        "have equal amplitude. The 80 Hz filter and the current loop remove most of the harmonics, "
+        "so at the motor the waveforms differ less in distortion than in amplitude. The square's "
+        "fundamental is larger than the sine's (4/pi), the triangle's smaller (8/pi^2): "
+        "the square frees the piston best and causes the largest pressure ripple."
     )
     loops = {
         waveform: runs.bench("friction-ramp", MAIN, _chosen(waveform)).recordings[_WITH]
@@ -282,14 +284,14 @@ def _items(runs: Runs, waveform: str) -> list[Item]:
             f"{prefix}.ripple",
             "bar",
             float(np.ptp(window["p_mc"].values)) / BAR,
-            "pressure, peak to peak, at rest at the current that holds 25 bar without friction",
+            "pressure ripple, peak to peak, at the current that holds 25 bar without friction",
         ),
         found(f"{prefix}.p_max", "bar", loops.p_max(_WITH), "on the ramp of eq. (17)"),
         found(
             f"{prefix}.loop_area_ratio",
             "%",
             loops.area_ratio,
-            "area with dither over that without, on the ramp of eq. (17)",
+            "area with dither over the area without, on the ramp of eq. (17)",
         ),
         found(
             f"{prefix}.share_stuck",

@@ -58,10 +58,10 @@ def part(runs: Runs) -> Part:
     step = runs.settled_step(MAIN, START, HEIGHT)
     items.append(_misfit(step.recordings["run"], before(step)))
     text = (
-        "The nonlinear brake, dither on, starts where its pressure has settled at 25 bar. It rises "
-        "less and more slowly than Table 4's model; eq. (15), which knows no friction, has Table "
-        "4's gain. At the current that holds 25 bar without friction the dithered brake settles "
-        "several bar lower."
+        "The nonlinear brake, with dither on, starts settled at 25 bar. Its pressure rises "
+        "less and more slowly than that of Table 4's model. Eq. (15), which has no friction, has "
+        "Table 4's gain. At the current that holds 25 bar without friction, the dithered brake "
+        "settles several bar lower."
     )
     exhibits = tuple(
         _exhibit(runs.settled_step(name, START, HEIGHT), name, f"fig6{suffix.replace('@', '-')}")
@@ -74,7 +74,7 @@ def part(runs: Runs) -> Part:
 
 
 def _nonlinear(runs: Runs, name: str, suffix: str, final: Fact, rise: Fact) -> list[Item]:
-    """Return the nonlinear brake's step, and the pressure that the dither costs it."""
+    """Return the nonlinear brake's step, and its loss of pressure from dither."""
     values = kpis(runs.settled_step(name, START, HEIGHT))
     frictionless = {"p_start": START, "start": "frictionless"}
     bias = before(runs.bench("pressure-step", name, options=frictionless)) / BAR
@@ -113,7 +113,7 @@ def _rise_time(model: Rational) -> float:
 
 
 def _own(name: str, start: float, t: Array) -> list[tuple[str, Array, str]]:
-    """Return the step of the model identified on our brake, which is of the main set."""
+    """Return the step of the model identified on our brake, which has the main set."""
     if name != MAIN:
         return []
     step = start + HEIGHT * identified_model("medium").step(t)
@@ -121,7 +121,7 @@ def _own(name: str, start: float, t: Array) -> list[tuple[str, Array, str]]:
 
 
 def _misfit(run: xr.Dataset, start: float) -> Item:
-    """Return how far the identified model is off the step that it was not fitted to."""
+    """Return the identified model's error for a step that the fit did not use."""
     t = run["time"].values
     error = run["p_mc"].values - (start + HEIGHT * identified_model("medium").step(t))
     means = averaged(

@@ -33,7 +33,7 @@ _AMPLITUDES = (1e5, 3e5)
 """amplitudes of the set point in the sine tests [Pa]"""
 _FREQUENCIES = (0.25, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0, 4.5, 5.0, 6.0, 8.0, 10.0, 12.0)
 _HUNTING = 20.0
-"""time in which the loop without dither shows its limit cycle [s]"""
+"""time for the loop without dither to show its limit cycle [s]"""
 
 
 def part(runs: Runs) -> Part:
@@ -71,14 +71,14 @@ def part(runs: Runs) -> Part:
             "fig7.hunting",
             "bar",
             float(np.ptp(late)) / BAR,
-            f"peak to peak in the last fifth of {_HUNTING:g} s of braking, dither off: it hunts",
+            f"peak to peak in the last fifth of {_HUNTING:g} s of braking, dither off: limit cycle",
         )
     )
     text = (
-        "The PID's gains are not printed; ours were tuned on Table 4's medium model with filters, "
-        "current loop and sampling for a crossover of 10 Hz. On the nonlinear brake overshoot and "
-        "steady state are met; its small-signal bandwidth is far below 10 Hz, because dither turns "
-        "friction into damping that Table 4's models do not have."
+        "The paper does not print the PID's gains. We tuned ours on Table 4's medium model with "
+        "filters, current loop and sampling for a crossover of 10 Hz. The nonlinear brake meets "
+        "the requirements on overshoot and steady state. Its small-signal bandwidth is far below "
+        "10 Hz, because dither turns friction into damping, which Table 4's models lack."
     )
     return Part(
         "Figure 7: pressure control",
@@ -112,16 +112,16 @@ def _hard_braking(result: Result, suffix: str) -> list[Item]:
             f"fig7.settling_time{suffix}",
             "s",
             values["settling_time"],
-            "into 2 % of the step, hard braking",
+            "to within 2 % of the step, hard braking",
         ),
     ]
 
 
 def _tracking(result: Result, suffix: str) -> list[Item]:
     values = kpis(result)
-    note = "built-in ride over 5 to 30 bar; that of Fig. 7b is not published"
+    note = "built-in ride over 5 to 30 bar; the ride of Fig. 7b is not published"
     return [
-        found(f"fig7b.lag{suffix}", "s", values["tracking_lag"], f"delay that fits best; {note}"),
+        found(f"fig7b.lag{suffix}", "s", values["tracking_lag"], f"best-fit delay; {note}"),
         found(
             f"fig7b.rms{suffix}",
             "bar",
@@ -193,7 +193,7 @@ def _linear_loop() -> list[Item]:
             "fig7.phase_margin.pi",
             "deg",
             pi.margin().phase,
-            "a PI that cancels T1, crossover 10 Hz, Table 4, medium: the PID needs its D",
+            "a PI that cancels T1, crossover 10 Hz, Table 4, medium: the derivative is needed",
         )
     )
     return items
@@ -228,7 +228,7 @@ def _exhibits(runs: Runs, tests: dict[str, xr.Dataset]) -> tuple[Exhibit, ...]:
         Exhibit(
             "fig7b",
             lambda: tracking(runs.bench("pedal-tracking", MAIN).recordings["run"], "p_mc", "p_ref"),
-            "Fig. 7b: the pressure follows the pedal; the ride is ours, the range the paper's.",
+            "Fig. 7b: the pressure follows the pedal; our own ride over the paper's range.",
         ),
         Exhibit(
             "fig7-bode",
@@ -295,10 +295,11 @@ def requirements(runs: Runs) -> Part:
             ),
         ]
     text = (
-        "The gains are not printed. Those of Fig. 7's bench, designed on the linear model, lose "
-        "most of their bandwidth to friction at small amplitudes, dither or not. One set of gains "
-        "meets all four requirements on the nonlinear bench, with little to spare: it was searched "
-        "for exactly that, so its agreement proves only that such a set exists."
+        "The paper does not print the gains. The gains of Fig. 7's bench, designed on the linear "
+        "model, lose most of their bandwidth to friction at small amplitudes, with or without "
+        "dither. One set of gains meets all four requirements on the nonlinear bench, with small "
+        "margins. It was tuned for exactly that, so its agreement proves only that such a set "
+        "exists."
     )
 
     def draw() -> Figure:
@@ -308,7 +309,7 @@ def requirements(runs: Runs) -> Part:
     figure = Exhibit(
         "requirements",
         draw,
-        "Pressure over its set point around 20 bar, friction, dither and converter on.",
+        "Pressure over its set point around 20 bar, with friction, dither and converter.",
     )
     return Part("Requirements of section 6 on the nonlinear bench", text, tuple(items), (figure,))
 

@@ -1,4 +1,4 @@
-"""Equation (8)'s gear, which gains energy where the load drives it."""
+"""Equation (8)'s gear, which creates energy when the load drives it."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from bywire.reproduction.reproduction import Exhibit, Part, selected
 P_FROM = 37e5
 """pressure from which the brake is released [Pa], that of Fig. 7a"""
 T_RELEASE = 200.0
-"""time of the release [s]: slow against every pole, so that the damping takes nothing"""
+"""time of the release [s]: slow compared with every pole, so that damping losses vanish"""
 MECHANICAL = {
     "E_gear": "gear and screw",
     "E_damping": "fluid damping",
@@ -27,7 +27,7 @@ LAWS = ("paper", "directional")
 
 
 def part(runs: Runs) -> Part:
-    """Return the energy that a slow release gives back, by both laws of the gear."""
+    """Return the energy that a slow release returns, for both laws of the gear."""
     items: list[Item] = []
     for name, suffix in SETS.items():
         for law in LAWS:
@@ -38,13 +38,14 @@ def part(runs: Runs) -> Part:
                 f"gear.stored.pads{suffix}",
                 "J",
                 pads,
-                "of what is stored, in the pads alone: (A_pd p)^2/(2 K_pd)",
+                "stored in the pads alone: (A_pd p)^2/(2 K_pd)",
             )
         )
     par = parameters(MAIN)
     text = (
-        "Eq. (8) multiplies the motor's torque by a constant efficiency. Driving, that is a loss; "
-        "where the load drives the shaft backward it is a gain: the motor receives 1/eta_g of the "
+        "Eq. (8) multiplies the motor's torque by a constant efficiency. While the motor drives, "
+        "this is a loss. While the load drives the shaft backward, it is a gain: the motor "
+        "receives 1/eta_g of the "
         f"stored energy (eta_g = {par.gear.eta_g:g}). The catalog keeps the paper's law; "
         "gear.law = 'directional' makes the loss a friction that depends on direction."
     )
@@ -69,12 +70,12 @@ def part(runs: Runs) -> Part:
 
 
 def _items(release: xr.Dataset, law: str, suffix: str) -> list[Item]:
-    """Return what was stored, and what came back."""
+    """Return the stored and the returned energy."""
     stored, returned = _energies(release)
     bound = Fact(
         stored,
         "J",
-        "physical bound: no more can return than is stored, by our computation",
+        "physical bound: the returned energy cannot exceed the stored energy; our computation",
         "physical bound",
     )
     note = f"law '{law}', {'eq. (8)' if law == 'paper' else 'ours'}"
@@ -86,7 +87,7 @@ def _items(release: xr.Dataset, law: str, suffix: str) -> list[Item]:
             returned,
             "<=",
             f"work at the motor's shaft during a slow release, {100.0 * returned / stored:.1f} % "
-            f"of what was stored; {note}",
+            f"of the stored energy; {note}",
         ),
     ]
 

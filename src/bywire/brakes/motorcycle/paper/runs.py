@@ -23,7 +23,7 @@ from bywire.reproduction import reproduction
 MAIN = "dardanelli2010"
 PRINTED = "dardanelli2010-table1"
 SETS = {MAIN: "", PRINTED: "@table1"}
-"""parameter sets, with what follows an item's id"""
+"""parameter sets, with the suffix of an item's id"""
 BAR = 1e5
 
 FRICTIONLESS = {
@@ -32,7 +32,7 @@ FRICTIONLESS = {
     "seal.f_cfr_n": 0.0,
     "ecu.dither.waveform": "off",
 }
-"""overrides that remove the dry friction, and with it the dither"""
+"""overrides that remove the dry friction and the dither"""
 
 
 def parameters(name: str) -> MotorcycleParameters:
@@ -61,7 +61,7 @@ def before(step: Result) -> float:
 # --- Sines
 
 WINDOW = 4.0
-"""time over which every sine is evaluated, at least [s]: slow creep under dither is averaged"""
+"""shortest time for evaluating a sine [s]: averages slow creep under dither"""
 
 
 @cache
@@ -81,7 +81,7 @@ def of_set_point(
 def of_current(
     name: str, p: float, amplitudes: tuple[float, ...], frequencies: tuple[float, ...]
 ) -> xr.Dataset:
-    """Return pressure over the current demand [Pa/A], likewise; the demand holds a pressure."""
+    """Return pressure over the current demand [Pa/A], likewise; the mean demand holds ``p``."""
     par = parameters(name).replace({"drive.mode": "current"})
     stimulus = zeros(Stimulus)._replace(i_set=holding_current(p, par))
     point = Point(MotorcycleBrake(), par, state_at(p, par), memory_at(p, par), stimulus)

@@ -21,7 +21,7 @@ P_EQ19 = 25e5
 """pressure at which eq. (19) is checked [Pa], that of Fig. 6"""
 SEED = 1
 OFF = {"k_brk_p": 0.9, "f_cfr_p": 0.8, "c": 1.2, "f_cfr_n": 1.2, "k_brk_n": 1.1, "T_pr": 1.2}
-"""where the search begins, over the values put in"""
+"""starts of the search, relative to the true values"""
 
 
 def part(runs: Runs) -> Part:
@@ -55,8 +55,8 @@ def part(runs: Runs) -> Part:
         *_identified_items(),
     ]
     text = (
-        "Table 3 is used as published; only the preload T_pr, which it omits, is ours. Where the "
-        "curves are vertical the piston sticks: the torque is anything between both ends."
+        "We use Table 3 as published; only the preload T_pr, which it omits, is ours. Where the "
+        "curves are vertical, the piston sticks: the torque is anywhere between both ends."
     ) + _undetermined()
     exhibit = Exhibit(
         "fig4",
@@ -81,7 +81,7 @@ def _viscous(mu_F: float) -> Item:
 
 
 def _eq19() -> Item:
-    """Return the current that breaks the piston away by eq. (8) against eq. (19)'s."""
+    """Return the breakaway current by eq. (8), against eq. (19)'s."""
     bare = {"seal.T_pr": 0.0, "ecu.est_par.T_pr": 0.0}  # not printed
     par = parameters(MAIN).replace(bare)
     seal = seal_friction.output(seal_friction.Input(0.0, P_EQ19), par.seal)
@@ -93,13 +93,13 @@ def _eq19() -> Item:
         Fact(stated, "A", "eq. (19) at 25 bar with Tables 1 and 3, T_pr = 0"),
         needed,
         ALLOWANCES["printed"],
-        "current above the holding current that eq. (8) needs to break away: (19) leaves eta_g out",
+        "current above the holding current for breakaway by eq. (8): eq. (19) omits eta_g",
     )
 
 
 @cache
 def _identified() -> Identified:
-    """Return the friction identified from a simulated ramp (17), from a start off the truth."""
+    """Return the friction identified from a simulated ramp (17), with a start off the truth."""
     par = parameters(MAIN)
     seal = par.seal.flat()
     start = par.replace({f"seal.{name}": share * seal[name] for name, share in OFF.items()})
@@ -109,7 +109,7 @@ def _identified() -> Identified:
 
 
 def _identified_items() -> list[Item]:
-    """Return the estimates against Table 3's values, with which the ramp was simulated."""
+    """Return the estimates against Table 3's values, the truth of the simulation."""
     estimate = _identified().estimates["seal friction"]
     ends = dict(zip(estimate.names, estimate.intervals().tolist(), strict=True))
     rows: list[Item] = []
@@ -124,8 +124,8 @@ def _identified_items() -> list[Item]:
                 fact,
                 estimate[label],
                 None,
-                "identified from our own ramp, which was simulated with it; 95 % interval "
-                f"{low:.4g} to {high:.4g}; the search began "
+                "identified from our own ramp, simulated with this value; 95 % interval "
+                f"{low:.4g} to {high:.4g}; the search started "
                 f"{100.0 * (OFF[name] - 1.0):+.0f} % off",
             )
         )
@@ -142,12 +142,12 @@ def _undetermined() -> str:
 
 
 def _identified_exhibit() -> Exhibit:
-    """Return Fig. 4 as identified, with the band that noise leaves."""
+    """Return Fig. 4 as identified, with its confidence bands."""
     curve = next(c for c in _identified().curves if c.name == "stribeck")
     widest = float((curve.data["high"] - curve.data["value"]).max())
     return Exhibit(
         "fig4-identified",
         lambda: method_curve(curve),
-        "Fig. 4 as identified on our own brake from one ramp with sensors' noise; "
+        "Fig. 4 as identified on our own brake from one ramp with sensor noise; "
         f"bands: 95 % confidence, {widest:.1g} N m to either side at most.",
     )

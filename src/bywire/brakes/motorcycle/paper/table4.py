@@ -35,13 +35,13 @@ _KEYS = {"zero": "tau_L", "T1": "T1", "T2": "T2", "T_L": "T_L"}  # of Table 4, o
 
 @cache
 def identified(model: str) -> Identified:
-    """Return what the experiment of section 5 gives on our brake.
+    """Return the result of section 5's experiment on our brake.
 
     Parameters
     ----------
     model
-        ``"eq-22"``, the paper's two steps from its starts, taken once as there; or ``"eq-21"``,
-        without a slow pair, all records at once.
+        ``"eq-22"``: the paper's two steps, taken once from the paper's starts. ``"eq-21"``: no slow
+        pair, fitted to all records together.
     """
     par = parameters(MAIN)
     p = REGIONS
@@ -80,7 +80,7 @@ def _identified_items() -> list[Item]:
                 row["K"],
                 five["K"] / BAR,
                 note=f"first step, {_interval(five['K'], deviation.get('K', math.nan))}: "
-                "step of 0.35 A, nonlinear brake with dither and sensors' noise",
+                "step of 0.35 A, nonlinear brake with dither and sensor noise",
             )
         )
         for key, name in _KEYS.items():
@@ -106,9 +106,9 @@ def _interval(value: float, deviation: float) -> str:
 
 
 def _without_pair(region: str) -> list[Item]:
-    """Return the corners of eq. (21), which suffices for our brake."""
+    """Return the corners of eq. (21), which is sufficient for our brake."""
     five = five_of(identified("eq-21").estimates[region])
-    note = "eq. (21) without a slow pair, fitted to step and sines at once"
+    note = "eq. (21) without a slow pair, fitted to step and sines together"
     return [
         found(f"table4.{region}.eq21.K", "bar/A", five["K"] / BAR, note),
         found(f"table4.{region}.eq21.T1", "Hz", 1.0 / (2.0 * math.pi * five["T1"]), note),
@@ -169,11 +169,11 @@ def part(runs: Runs) -> Part:
     )
     text = (
         "Table 4's gains fit neither Fig. 5 nor the published friction with the published dither: "
-        "f_cfr,p exceeds f_cfr,n, so that dither leaves a mean friction against applying. Dither "
-        "also damps, so that the brake is slower than eq. (15). Table 4's slow pair has its zero "
-        "below its pole: its step overshoots and falls, which air that fills slowly does not do. "
-        "On our brake, which has no air, the paper's own two steps put the pair's pole where "
-        "friction and dither leave the first pole, and its zero beside T1."
+        "f_cfr,p exceeds f_cfr,n, so a mean friction against applying remains under dither. Dither "
+        "also adds damping, so the brake is slower than eq. (15). Table 4's slow pair has its zero "
+        "below its pole: its step overshoots and falls. Air that fills slowly does not do that. "
+        "On our brake, which has no air, the paper's own two steps place the pair's pole at the "
+        "first pole of the dithered brake, and its zero next to T1."
     )
     return Part(
         "Table 4: identified models",
@@ -206,11 +206,11 @@ def _region(runs: Runs, region: str, p: float) -> list[Item]:
                 f"{prefix}.{key}",
                 row[key],
                 float(pole),
-                note="pole of eq. (15), tuned to Table 2, where the paper's fit started",
+                note="pole of eq. (15), tuned to Table 2: start of the paper's fit",
                 tuned="calibrated",
             )
         )
-    note = "low-frequency pair, put down to air in the fluid; no counterpart in eqs. (13) to (15)"
+    note = "low-frequency pair, attributed to air in the fluid; eqs. (13) to (15) have none"
     return [*items, *(quoted(f"{prefix}.{key}", row[key], note) for key in ("zero", "T_L"))]
 
 
@@ -248,8 +248,8 @@ def _medium_step() -> list[Item]:
             Fact(100.0 * (high / final - 1.0), "%", _EQ22),
             air,
             ALLOWANCES["overshoot"],
-            "overshoot of the step; computed: eq. (15) with 1 ml of air in the chamber, which "
-            "moves the slow pole and adds no pair below it: air is not what Table 4 shows",
+            "overshoot of the step; computed: eq. (15) with 1 ml of air in the chamber. Air "
+            "moves the slow pole and adds no pair below it: it does not explain Table 4",
         ),
     ]
 
@@ -275,7 +275,7 @@ def _sines(runs: Runs) -> dict[str, xr.Dataset]:
 
 
 def _corner(runs: Runs, measured: dict[str, xr.Dataset]) -> list[Item]:
-    """Return where the response has fallen 3 dB below the static gain, against Table 4."""
+    """Return the -3 dB frequency of the response, relative to the static gain, against Table 4."""
     f = np.geomspace(0.05, 20.0, 4000)
     model = table4_model("medium")
     response = np.abs(model.response(f)) / model.gain

@@ -1,4 +1,4 @@
-"""Tables 1 and 2: parameters, transfer function (15), and what makes one give the other."""
+"""Tables 1 and 2: parameters, transfer function (15), and changes that reconcile them."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from bywire.reproduction.item import Item, compared, found
 from bywire.reproduction.reproduction import Exhibit, Part, peak
 
 P_NOMINAL = 20e5
-"""pressure taken for the nominal position x_mc [Pa]; the paper names none"""
+"""assumed pressure at the nominal position x_mc [Pa]; the paper does not state it"""
 _P_HARD = 37e5
 """highest pressure of Fig. 7a [Pa]"""
 
@@ -53,13 +53,13 @@ def table1(runs: Runs) -> Part:
                 f"table1.eq11{suffix}",
                 FACTS["eq11"],
                 ratio,
-                note="beta A_pd^2/(V_pd K_pd) = beta/p_pd at 37 bar, by which (10) becomes (11)",
+                note="beta A_pd^2/(V_pd K_pd) = beta/p_pd at 37 bar; turns (10) into (11)",
             ),
         ]
     text = (
-        "Table 1 gives most physical parameters. Not printed are the piston's stroke s_mc, the "
-        "seals' preload T_pr, the motor's winding, the controllers' gains and the pedal map: "
-        "these are our choices, marked as such in the catalog."
+        "Table 1 gives most physical parameters. The paper does not print the piston's stroke "
+        "s_mc, the seals' preload T_pr, the motor's winding, the controllers' gains and the pedal "
+        "map. These are our choices, marked as such in the catalog."
     )
     appendix = {
         f"All parameters of {name}": parameter_table(
@@ -74,7 +74,7 @@ def table1(runs: Runs) -> Part:
 # --- Table 2
 
 _TWO_POLES_TO = 50.0
-"""end of the band [Hz] over which eq. (21) is judged: five times the required bandwidth"""
+"""upper end of the band [Hz] for judging eq. (21): five times the required bandwidth"""
 
 
 def _numbers(model: Rational) -> dict[str, float]:
@@ -107,15 +107,15 @@ def table2(runs: Runs) -> Part:
             )
     items += _two_poles()
     text = (
-        "Table 1 put into eq. (15) does not give Table 2. Few plausible changes repair it: the "
-        "calibrated set, tuned to Table 2, so that its agreement proves nothing but that such a "
-        "set exists. The figure also shows Table 4's model, identified by the authors with dither."
+        "Table 1 in eq. (15) does not give Table 2. A few plausible changes repair it: the "
+        "calibrated set. It is tuned to Table 2, so its agreement proves only that such a set "
+        "exists. The figure also shows Table 4's model, which the authors identified with dither."
     )
     return Part("Table 2: theoretical transfer function", text, tuple(items), (_figure(),))
 
 
 def _two_poles() -> list[Item]:
-    """Return what eq. (21) leaves out of eq. (15)."""
+    """Return the error of eq. (21) against eq. (15)."""
     items: list[Item] = []
     for name, suffix in SETS.items():
         error = two_pole_error(parameters(name), high=_TWO_POLES_TO)
@@ -181,10 +181,10 @@ def repair(runs: Runs) -> Part:
     items += _short_stroke()
     items.append(_laminar(parameters(PRINTED)))
     text = (
-        "Five values are changed in the calibrated set, each as little and as plausibly as "
-        "possible. A stroke alone cannot repair Table 1: s_mc moves the fastest pole only, and "
-        "where that one fits Table 2 the piston meets the chamber's end within the pressure "
-        "sensor's range, and the other numbers stay wrong."
+        "The calibrated set changes five values, each as little and as plausibly as "
+        "possible. The stroke alone cannot repair Table 1: s_mc moves only the fastest pole. "
+        "A stroke that fits this pole to Table 2 lets the piston meet the chamber's end within "
+        "the pressure sensor's range, and the other numbers stay wrong."
     )
     return Part("How Table 1 was repaired", text, tuple(items))
 
@@ -202,7 +202,7 @@ def _change(change: _Change) -> Item:
 
 
 def _short_stroke() -> list[Item]:
-    """Return the stroke that gives Table 1 the fastest pole of Table 2, and what it costs."""
+    """Return the stroke that gives Table 1 the fastest pole of Table 2, and its drawbacks."""
     printed = parameters(PRINTED)
     stated = FACTS["table2.pole3"].value
 
@@ -228,7 +228,7 @@ def _short_stroke() -> list[Item]:
             FACTS["sensor_range"],
             p_end / BAR,
             note="pressure at which the piston meets the chamber's end with that stroke: within "
-            "the range; not judged, the stroke is a trial of ours",
+            "the range; not judged, because the stroke is only our trial",
         ),
     ]
 
@@ -238,7 +238,7 @@ def _with_stroke(par: MotorcycleParameters, s_mc: float) -> MotorcycleParameters
 
 
 def _rest(par: MotorcycleParameters) -> float:
-    """Return the rest position from which 20 bar are reached at the nominal position [m]."""
+    """Return the rest position [m] that gives 20 bar at the nominal position."""
 
     def excess(x_rest: float) -> float:
         moved = par.replace({"master_cylinder.x_rest": x_rest})
@@ -248,7 +248,7 @@ def _rest(par: MotorcycleParameters) -> float:
 
 
 def _laminar(par: MotorcycleParameters) -> Item:
-    """Return the coefficient that Hagen and Poiseuille's law has in the form of eq. (12)."""
+    """Return the coefficient of the Hagen-Poiseuille law in the form of eq. (12)."""
     d, nu, rho = par.pipeline.d_pl, par.fluid.nu, par.fluid.rho
     textbook = 128.0 * nu * rho * par.pipeline.L_pl / (math.pi * d**4)
     coefficient = par.pipeline.k_lf * textbook / pipeline.resistance(par.pipeline, par.fluid)

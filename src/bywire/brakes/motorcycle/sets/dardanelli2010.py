@@ -1,6 +1,6 @@
 """Parameter sets of Dardanelli et al. (2010), whose values are in TOML files.
 
-``dardanelli2010-measured`` is the brake that best explains what the paper measured. Its free
+``dardanelli2010-measured`` is the brake that best explains the paper's measurements. Its free
 parameters are estimated together from Table 4, Figs. 5 to 7 and the friction of Table 3, by
 ``paper.measured.estimation``: six starts, then random steps from the best one, then ``settled``.
 ``docs/identification.md`` describes the procedure and the misfits, and
@@ -20,7 +20,7 @@ FILE = SourceFile(Path(__file__).with_suffix(".toml"))
 _PUBLISHED = FILE.sets(MotorcycleParameters, FILE.values())
 _TABLE1 = next(entry for entry in _PUBLISHED if entry.name == "dardanelli2010-table1")
 
-# --- The set estimated from what the paper measured
+# --- The set estimated from the paper's measurements
 
 ESTIMATED = SourceFile(Path(__file__).with_name("dardanelli2010_measured.toml")).values()
 UNDETERMINED = ("master_cylinder.s_mc", "fluid.V_air", "seal.T_pr", "seal.mu_T", "pipeline.d_pl")
@@ -34,7 +34,7 @@ _MEASURED = CitedSet(
     name="dardanelli2010-measured",
     assembly=_TABLE1.assembly,
     source=_TABLE1.source,
-    summary="motorcycle brake, estimated from what the paper measured: Table 4, Figs. 5 to 7",
+    summary="motorcycle brake, estimated from the paper's measurements: Table 4, Figs. 5 to 7",
     parameter_class=MotorcycleParameters,
     values={
         **_TABLE1.values,

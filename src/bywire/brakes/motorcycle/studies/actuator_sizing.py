@@ -1,7 +1,7 @@
 """Sizing of the motorcycle actuator: gear ratio and motor power for a bandwidth and a pressure.
 
-The pressure is given as a function of time; flow, travel, torque, current and voltage follow from
-the equations of the plant without any simulation.
+The pressure is a given function of time. Flow, travel, torque, current and voltage follow from the
+equations of the plant without simulation.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ class Motion:
 
     ``omega``: speed [rad/s]; ``torque``: electromagnetic torque [N m]; ``inertia``: part of it that
     accelerates rotor and piston [N m]; ``current``, ``voltage``: current [A] and voltage of the
-    winding [V], its inductance left out; ``available``: voltage that the bridge can give at this
+    winding [V], without its inductance; ``available``: voltage that the bridge can give at this
     current [V].
     """
 
@@ -97,7 +97,7 @@ def sine(par: Par, top: float, amplitude: float, f: float) -> Course:
 
 
 def step(par: Par, p_from: float, p_to: float, bandwidth: float) -> Course:
-    r"""Return a step between two pressures [Pa] as a double pole of a bandwidth [Hz] answers it.
+    r"""Return the response of a double pole with a bandwidth [Hz] to a step of the pressure [Pa].
 
     .. math:: p = p_0 + \Delta (1 - (1 + w t) e^{-w t}), \quad w = 2 \pi f / \sqrt{\sqrt 2 - 1}
     """
@@ -125,8 +125,8 @@ def motion(par: Par, course: Course) -> Motion:
         A_{mc} v = C_{mc} \dot p_{mc} + q, \quad q = (p_{mc} - p_{pd})/K_{lf}, \quad
         \eta_g T = k_g (A_{mc} p_{mc} + k_{damp} v) + T_{fr} + M' \dot\Omega
 
-    with eta_g = 1 for gear law "directional", whose loss is in T_fr. The compliances are those at
-    the middle of the course, the seals slide.
+    with eta_g = 1 for gear law "directional", whose loss is in T_fr. Compliances are evaluated at
+    the middle of the course. The seals slide.
 
     References
     ----------
@@ -141,7 +141,7 @@ def motion(par: Par, course: Course) -> Motion:
     omega = v / k_g
     force, rubbing = _load(par, course.p, v, omega)
     limits = ball_screw_gear.friction_bounds(rubbing.T_p, rubbing.T_n, force, par.gear)
-    # Bounds are torques on the shaft; against its motion they add to what the motor must give.
+    # Bounds are torques on the shaft; against its motion they add to the motor's torque.
     friction = np.where(omega > 0, -np.asarray(limits.low), -np.asarray(limits.high))
     friction = np.where(omega == 0, 0.0, friction)
     efficiency = par.gear.eta_g if par.gear.law == "paper" else 1.0
@@ -160,7 +160,7 @@ def motion(par: Par, course: Course) -> Motion:
 
 
 def breakaway_current(par: Par, p: float) -> float:
-    """Return the current [A] that holds a pressure [Pa] and moves the piston on from there."""
+    """Return the current [A] that holds a pressure [Pa] and breaks the piston away."""
     load, rest = _load(par, p, 0.0, 0.0)
     limit = ball_screw_gear.friction_bounds(rest.T_p, rest.T_n, load, par.gear)
     efficiency = par.gear.eta_g if par.gear.law == "paper" else 1.0
@@ -170,9 +170,9 @@ def breakaway_current(par: Par, p: float) -> float:
 def geared(par: Par, k_g: float) -> Par:
     """Return the brake with another gear ratio [m/rad], seals and pistons unchanged.
 
-    The friction of the seals is stated as a torque at the shaft: as the force that it is, it grows
-    with the ratio, its viscous part with the square. The pressure controller's gains, current per
-    pressure, grow with the ratio too, so that the loop gain at low frequency stays.
+    Parameters state the seals' friction as a torque at the shaft. Physically it is a force, so this
+    torque grows with the ratio, and its viscous part with the square. The pressure controller's
+    gains, current per pressure, also grow with the ratio, to keep the loop gain at low frequency.
     """
     r = k_g / par.gear.k_g
     powers = {
@@ -194,7 +194,7 @@ def geared(par: Par, k_g: float) -> Par:
 
 
 def _load(par: Par, p: Any, v: Any, omega: Any) -> tuple[Any, seal.Output]:
-    """Return the force on the piston and the friction of the seals, of numbers or of arrays."""
+    """Return the force on the piston and the friction of the seals, for numbers or arrays."""
     at = master_cylinder.Input(0.0, v, 0.0)
     force = master_cylinder.output(master_cylinder.State(p), at, par.master_cylinder).force
     return force, seal.output(seal.Input(omega, p), par.seal)
@@ -228,8 +228,8 @@ _ROUNDS, _CLOSE = 8, 0.01  # corrections of the demand's amplitude; relative err
 def sine_figures(label: str, par: Par, top: float, amplitude: float, f: float) -> list[Kpi]:
     """Return key figures of a sine in pressure on the bench, relative to the calculation.
 
-    The loop may be slower than the frequency [Hz] of the sine. So mean and amplitude of the demand
-    are corrected until the pressure, without dither, has the required ones.
+    The loop may be slower than the frequency [Hz] of the sine. So the function corrects mean and
+    amplitude of the demand until the pressure, without dither, has the required values.
     """
     mean, swing = top - amplitude, amplitude
     run, reached = _sine_run(par, mean, swing, f), 0.0
@@ -246,7 +246,7 @@ def sine_figures(label: str, par: Par, top: float, amplitude: float, f: float) -
     calculated = motion(par, sine(par, top, amplitude, f))
     power = run["voltage"] * run["i"]
     note = "" if abs(reached / amplitude - 1.0) < 3 * _CLOSE else "the amplitude is not reached"
-    text = "on the bench, dither off, over the calculated one"
+    text = "on the bench with dither off, relative to the calculation"
     return [
         Kpi(f"{label}_bench_amplitude", reached, "Pa", "Amplitude of the pressure reached.", note),
         Kpi(
@@ -338,7 +338,7 @@ ASSUMPTIONS = (
     "The seals' friction is a force at the piston: at the shaft it grows with the gear ratio.",
     "The pressure follows its demand exactly: flow through the pressure-volume curves of chamber, "
     "pipeline and caliper gives the speed; pressure, friction, efficiency and inertia the torque.",
-    "Compliances are those at the middle of the course; the winding's inductance is left out.",
+    "Compliances are those at the middle of the course; the winding's inductance is neglected.",
     "The seals slide; the current that breaks them away at the peak pressure is also required.",
     "The calculation neglects dither; its current at the peak pressure is listed.",
     "Limits: the pressure controller's current limit, and the bridge's voltage at that current.",
@@ -350,7 +350,7 @@ class Options(ParameterSet):
     """Requirements on the actuator, and the designs to compare."""
 
     bandwidth: Frequency
-    """frequency at which a sine of the amplitude, or a step, is followed"""
+    """required bandwidth: frequency of the sine, or bandwidth of the step response"""
     p_peak: Pressure
     """largest pressure: crest of the sine, end of the step"""
     amplitude: Pressure
@@ -364,13 +364,13 @@ class Options(ParameterSet):
     k_g_max: GearRatio
     """largest gear ratio"""
     ratios: Count
-    """number of gear ratios, evenly spread in their logarithm"""
+    """number of gear ratios, logarithmically spaced"""
     f_min: Frequency
     """lowest bandwidth of the map"""
     f_max: Frequency
     """highest bandwidth of the map"""
     frequencies: Count
-    """number of bandwidths, evenly spread in their logarithm"""
+    """number of bandwidths, logarithmically spaced"""
 
     @model_validator(mode="after")
     def _ordered(self) -> Options:
@@ -390,17 +390,17 @@ SIZES = {
     "torque": ("N*m", "largest torque"),
     "speed": ("rad/s", "largest speed"),
     "current": ("A", "largest current"),
-    "inertia_share": ("1", "inertia's torque over the whole"),
+    "inertia_share": ("1", "inertia's torque over the total"),
     "current_share": ("1", "current over its limit"),
-    "voltage_share": ("1", "voltage over what there is"),
+    "voltage_share": ("1", "voltage over the available voltage"),
 }
 """unit and label of each size of a motion"""
 
 
 _ROWS = 13  # gear ratios of the table
 _AT_EDGE = 1e-3  # share of an end of the range that counts as on it
-_SLOWEST, _FASTEST = 1e-2, 1e3  # bandwidths among which the highest possible is searched [Hz]
-_EXACT = 1e-12  # of the logarithm of a ratio or bandwidth that is searched
+_SLOWEST, _FASTEST = 1e-2, 1e3  # range of the search for the highest bandwidth [Hz]
+_EXACT = 1e-12  # tolerance of the logarithm of a ratio or bandwidth in the search
 
 
 def course(par: Par, options: Options, f: float, demand: str = "") -> Course:
@@ -424,7 +424,7 @@ def compute(par: Par, options: Options, progress: Progress) -> Findings:
             "p_peak",
             f"{options.p_peak / 1e5:g} bar",
             f"< {highest / 1e5:.4g} bar",
-            "where the piston meets its end stop: lower it, or move the stop "
+            "where the piston meets its end stop: reduce it, or move the stop "
             "(master_cylinder.x_end)",
         )
     data = _mapped(
@@ -475,7 +475,7 @@ def _at(par: Par, options: Options, f: float, demand: str = "") -> dict[str, flo
         "current": current,
         "inertia_share": float(np.abs(done.inertia).max()) / torque,
         "current_share": current / par.ecu.pressure.i_max,
-        # Where no voltage is left at this current, the share would change its sign.
+        # If no voltage is available at this current, the share would change its sign.
         "voltage_share": voltage if bool((done.available > 0).all()) else np.inf,
     }
 
@@ -508,7 +508,7 @@ def fastest(par: Par, options: Options, demand: str) -> float:
     low, high = math.log(_SLOWEST), math.log(_FASTEST)
     if excess(low) > 0.0:
         return math.nan
-    # Bisection, because the share of the voltage is infinite where none is left.
+    # Bisection, because the voltage share is infinite if no voltage is available.
     return math.exp(bisect(excess, low, high, xtol=_EXACT))
 
 
@@ -521,7 +521,7 @@ def _figures(label: str, par: Par, options: Options) -> list[Kpi]:
         "speed": "Largest speed.",
         "current": "Largest current, breakaway at the peak pressure included.",
         "inertia_share": "Largest torque of rotor and piston inertia over the largest torque.",
-        "voltage_share": "Largest voltage over what the bridge gives at its current.",
+        "voltage_share": "Largest voltage over the bridge's voltage at that current.",
     }
     current = motion(par, course(par, options, options.bandwidth)).current
     copper = par.motor.R_m * np.mean(current**2)
@@ -546,7 +546,7 @@ def _figures(label: str, par: Par, options: Options) -> list[Kpi]:
                 f"{label}_fastest_{kind}",
                 fastest(par, options, kind),
                 "Hz",
-                f"Highest bandwidth of the {kind} within current and voltage limit.",
+                f"Highest bandwidth of the {kind} within the current and voltage limits.",
             )
             for kind in ("sine", "step")
         ),
@@ -554,7 +554,7 @@ def _figures(label: str, par: Par, options: Options) -> list[Kpi]:
 
 
 def _mapped(par: Par, options: Options, count: int, frequencies: Array) -> xr.Dataset:
-    """Return the variables of `SIZES` over so many gear ratios and bandwidths [Hz]."""
+    """Return the variables of `SIZES` over ``count`` gear ratios and the bandwidths [Hz]."""
     ratios = np.geomspace(options.k_g_min, options.k_g_max, count)
     brakes = [geared(par, float(k_g)) for k_g in ratios]
     rows = [[_at(brake, options, float(f)) for f in frequencies] for brake in brakes]

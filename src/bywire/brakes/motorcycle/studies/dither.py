@@ -1,4 +1,4 @@
-"""Dither of the motorcycle brake: amplitude and frequency that overcome friction at least price."""
+"""Dither of the motorcycle brake: the cheapest amplitude and frequency that overcome friction."""
 
 from __future__ import annotations
 
@@ -46,14 +46,14 @@ Node = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Pressures = Annotated[tuple[Node, ...], Unit("Pa", 2e6), Field(min_length=1, max_length=20)]
 
 ASSUMPTIONS = (
-    "Each dither is tried on the nonlinear brake with the pressure loop closed, which takes the "
+    "Each dither has a trial on the nonlinear brake with the pressure loop closed, which takes the "
     "pressure to the set point from below and from above.",
-    "The amplitude is the gain times the ECU's own eqs. (18) and (19): it follows the pressure.",
-    "Friction counts as overcome when the share of the time stuck and the dead band left (mean "
-    "current from above minus that from below, over the band in which the piston may rest) stay "
-    "within their limits, at this gain and at all higher ones.",
-    "The price is the copper power in excess of that of the mean current, mean over pressures; "
-    "figures between two gains of the grid are interpolated.",
+    "The amplitude is the gain times the ECU's eqs. (18) and (19), so it follows the pressure.",
+    "Friction counts as overcome when the share of the time stuck and the remaining dead band "
+    "(mean current from above minus mean current from below, over the band in which the piston may "
+    "rest) stay within their limits, at this gain and at all higher ones.",
+    "The price is the copper power in excess of that of the mean current, averaged over the "
+    "pressures. Figures between two gains of the grid are interpolated.",
     "Periods are even numbers of the ECU's sample times.",
     "Wear, noise and heat of motor and seals are neglected.",
 )
@@ -63,31 +63,31 @@ class Options(ParameterSet):
     """Pressures, dithers and limits."""
 
     pressures: Pressures
-    """pressures at which friction is to be overcome"""
+    """pressures at which dither must overcome friction"""
     gain_min: Factor
     """smallest gain of the dither's law"""
     gain_max: Factor
     """largest gain of the dither's law"""
     gains: Count
-    """number of gains, evenly spread"""
+    """number of gains, evenly spaced"""
     f_min: Frequency
     """lowest frequency"""
     f_max: Frequency
     """highest frequency"""
     frequencies: Count
-    """number of frequencies, about evenly spread in their logarithm"""
+    """number of frequencies, about logarithmically spaced"""
     stuck_max: Fraction
     """largest share of the time stuck"""
     band_max: Fraction
-    """largest share of the dead band left"""
+    """largest share of the dead band that may remain"""
     ripple_max: Pressure
     """largest ripple of the caliper's pressure, peak to peak"""
     approach: Pressure
-    """distance from which each pressure is approached"""
+    """distance from which the pressure loop approaches each pressure"""
     settle: Duration
-    """time until the pressure loop has settled"""
+    """time for the pressure loop to settle"""
     compare: Literal["waveforms", "none"]
-    """whether waveforms and places of the low-pass filter are compared"""
+    """compare waveforms and places of the low-pass filter"""
 
     @model_validator(mode="after")
     def _ordered(self) -> Options:
@@ -122,7 +122,7 @@ DEFAULTS = Options(
 
 Par = MotorcycleParameters
 
-# Sine, square and triangle against each other, filtered with the demand or past the filter.
+# Comparison of sine, square and triangle, filtered with the demand or bypassing the filter.
 
 WAVEFORMS = ("sine", "square", "triangle")
 PLACES = ("after-dither", "before-dither")
@@ -134,8 +134,8 @@ def compared(
 ) -> Cut:
     """Return the least gain of each waveform that overcomes the friction at one frequency [Hz].
 
-    Each has the least gain that is enough at every pressure; copper power is the mean over the
-    pressures, ripple the worst.
+    Each has the least gain that is enough at every pressure. Copper power is the mean over the
+    pressures; ripple is the largest.
     """
     cases = [(shape, place) for place in PLACES for shape in WAVEFORMS]
     rows: list[dict[str, Any]] = []
@@ -154,14 +154,16 @@ def compared(
         coords={"case": ("case", index)},
     )
     return Cut(
-        f"waveforms at {f:.4g} Hz, filter after or before the dither joins", table, tuple(rows[0])
+        f"waveforms at {f:.4g} Hz, filter after or before the dither is added",
+        table,
+        tuple(rows[0]),
     )
 
 
 def distortion(par: Par, f: float, p: float) -> float:
     """Return the total harmonic distortion of the motor current at a stuck shaft, in %.
 
-    Up to half the ECU's sampling rate, where the converter's hold and the winding leave little.
+    Up to half the ECU's sampling rate; beyond it, the hold and the winding attenuate strongly.
     """
     samples = waveform(par, f)
     orders = np.arange(1, (samples.size + 1) // 2)
@@ -186,12 +188,12 @@ def _row(par: Par, grid: Grid, f: float, limits: Mapping[str, float]) -> dict[st
 
 
 def compute(par: Par, options: Options, progress: Progress) -> Findings:
-    """Return figures over gain and frequency, the dither of least price, and its comparison.
+    """Return figures over gain and frequency, the cheapest dither, and its comparison.
 
     Raises
     ------
     ParameterError
-        When a pressure cannot be reached, or no frequency fits the ECU's sampling.
+        When the brake cannot reach a pressure, or no frequency fits the ECU's sampling.
     """
     _require_reachable(par, options)
     dithered = par
@@ -253,7 +255,7 @@ def _require_reachable(par: Par, options: Options) -> None:
             "pressures",
             f"{largest / 1e5:g} bar",
             f"< {(highest - options.approach) / 1e5:.4g} bar",
-            f"so that the piston, which meets its end stop at {highest / 1e5:.4g} bar, is free "
+            f"because the piston meets its end stop at {highest / 1e5:.4g} bar and must be free "
             f"when it approaches from {options.approach / 1e5:g} bar above",
         )
 
@@ -261,7 +263,7 @@ def _require_reachable(par: Par, options: Options) -> None:
 def _kpis(
     par: Par, options: Options, grid: Grid, designs: dict[str, tuple[float, float]]
 ) -> list[Kpi]:
-    """Return the key figures of each design on the bench, not interpolated."""
+    """Return the key figures of each design, measured on the bench without interpolation."""
     ratios = area_ratios(par, list(designs.values()))
     kpis = []
     for (label, (gain, f)), ratio in zip(designs.items(), ratios, strict=True):
@@ -275,7 +277,7 @@ def _kpis(
             values = [float(figures[name][0, 0]) for figures in figures_of_design]
             mean = name in ("copper", "current_rms")
             value = float(np.mean(values)) if mean else max(values)
-            over = name in limits and value > limits[name] * 1.02  # interpolated designs scatter
+            over = name in limits and value > limits[name] * 1.02  # designs are interpolated
             which = "mean of the pressures" if mean else "worst pressure"
             kpis.append(
                 Kpi(
@@ -291,7 +293,7 @@ def _kpis(
                 f"{label}_area_ratio",
                 ratio,
                 "1",
-                "Area of the loop on the ramp of eq. (17) over that without dither; delay counts.",
+                "Loop area on the ramp of eq. (17) over the area without dither, delay included.",
             )
         )
         kpis += _plant(par, label, gain, f, grid.pressures[len(grid.pressures) // 2])
@@ -357,8 +359,8 @@ def _limits(grid: Grid, each: list[Candidate], best: int | None) -> tuple[str, .
         return ()
     chosen = each[best]
     texts = [
-        f"the gain of {chosen.gain:.3g} is required by the {NAMES[chosen.binding]} at "
-        f"{grid.pressures[chosen.decisive] / 1e5:g} bar"
+        f"the {NAMES[chosen.binding]} at {grid.pressures[chosen.decisive] / 1e5:g} bar requires "
+        f"the gain of {chosen.gain:.3g}"
     ]
     out = [
         f"{f:.4g} Hz ({e.verdict})"
@@ -379,16 +381,16 @@ def _warnings(
     texts = []
     f = grid.frequencies[best]
     if best in (0, len(each) - 1):
-        texts.append(f"the optimum lies at the edge of the frequencies, {f:g} Hz: widen the range")
+        texts.append(f"the optimum is at the edge of the frequencies, {f:g} Hz: widen the range")
     if math.isclose(each[best].gain, options.gain_min):
-        texts.append(f"the smallest gain is enough, {options.gain_min:g}: widen the range")
+        texts.append(f"the smallest gain, {options.gain_min:g}, is enough: widen the range")
     return tuple(texts)
 
 
 STUDY = Study(
     name="dither",
     assembly="motorcycle-brake",
-    summary="amplitude and frequency of the dither that overcomes the friction at least price",
+    summary="amplitude and frequency of the cheapest dither that overcomes the friction",
     options=Options,
     defaults=DEFAULTS,
     compute=compute,

@@ -17,11 +17,11 @@ from bywire.plant.road import SurfaceName
 from bywire.vehicle.ideal_stop import RidingSpeed
 
 _LEFT = 0.1  # share of the torque below which the brake counts as released
-_END = 0.1  # s at the end over which the drag is averaged
+_END = 0.1  # s: averaging window at the end
 
 FIGURES = Figures(
     drag=("N*m", f"Mean torque that the rear brake holds in the last {_END:g} s."),
-    residual_pressure=("Pa", "Mean pressure at its pads then."),
+    residual_pressure=("Pa", "Mean pressure at its pads in that time."),
     release_time=(
         "s",
         f"Time from the release until the torque stays below {_LEFT:g} of its start.",
@@ -36,7 +36,7 @@ class Options(ParameterSet):
     v_0: RidingSpeed
     """speed at the start"""
     p_rear: Demand
-    """rear pressure at the start, which the rider demands until the release"""
+    """rear pressure that the rider demands from the start until the release"""
     hold: Duration
     """time of the release"""
     surface: SurfaceName

@@ -1,4 +1,4 @@
-"""Rear lift: the front brake alone lifts the rear wheel off the ground, with or without control."""
+"""Rear lift: the front brake alone lifts the rear wheel, with or without lift control."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from bywire.vehicle.ideal_stop import RidingSpeed
 FIGURES = Figures(
     undefined="the rear wheel stays on the ground",
     lift_time=("s", "Time from zero until the rear wheel leaves the ground."),
-    lift_deceleration=("m/s**2", "Deceleration at which it does."),
-    flat_limit=("m/s**2", "Deceleration at which the level body lifts at rest, g l_f/h."),
+    lift_deceleration=("m/s**2", "Deceleration at the lift."),
+    flat_limit=("m/s**2", "Static lift limit of the level body, g l_f/h."),
     time_to_5_deg=("s", "Time from lift to a pitch of 5 degrees."),
     peak_pitch=("rad", "Largest pitch, nose down."),
     air_time=("s", "Time in which the rear wheel is off the ground."),
@@ -35,9 +35,9 @@ class Options(ParameterSet):
     p_front: Demand
     """front pressure that the rider demands"""
     p_rate: PressureRate
-    """its build-up rate; with a faster one the wheel locks before it is loaded"""
+    """build-up rate of the front pressure; too fast, the wheel locks before it is loaded"""
     grip: Factor
-    """factor on the adhesion of the road: sport tyres hold more than the surfaces' car tyres"""
+    """factor on the road's adhesion: sport tyres hold more than the car tyres of the surfaces"""
     duration: Duration
     """time recorded"""
 

@@ -1,9 +1,9 @@
 """Repeated stops: brakes that warm up from stop to stop, fade, and heat their fluid once parked.
 
-The stops run one after the other, each from the temperatures at the end of the last one. Between
-them no brake acts, and only the heat changes: three temperatures a wheel, over minutes. These
-stretches use the equations of the same element at the speed driven. A method of high order with
-error control integrates them, without substeps of 20 us; the vehicle regains its speed at once.
+The stops run one after the other, each from the final temperatures of the previous one. Between
+them no brake acts and only the heat changes: three temperatures per wheel, over minutes. These
+stretches use the equations of the same element at the driven speed. A high-order method with error
+control integrates them without substeps of 20 us; the vehicle regains its speed instantly.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def braked(case: Case) -> dict[str, Array]:
     Raises
     ------
     ParameterError
-        When the vehicle does not come to one.
+        When the vehicle does not come to a standstill.
     """
     run = as_run(case, case.par.ecu.T_s / _SUBSTEPS)  # type: ignore[attr-defined]
     with interrupts_deferred():
@@ -64,7 +64,7 @@ def braked(case: Case) -> dict[str, Array]:
     if math.isnan(end):
         raise ParameterError(
             f"{case.label} does not come to a standstill within {case.duration:g} s: its brakes "
-            "have faded, or the road does not hold; give fewer options.stops, a longer "
+            "have faded, or the road is too slippery; set fewer options.stops, a longer "
             "options.pause or a smaller options.deceleration",
             name=case.label,
             valid=f"{case.duration:g} s",
@@ -115,7 +115,7 @@ def peak_time(t: Array, T: Array) -> float | tuple[float, str]:
     """Return when a temperature is highest [s], by a parabola through its highest rows."""
     k = int(T.argmax())
     if k + 1 == t.size:
-        return math.nan, "the fluid still warms up at the end: give a longer options.parked"
+        return math.nan, "the fluid still warms up at the end: set a longer options.parked"
     if k == 0:
         return 0.0
     bend, slope, _ = np.polyfit(t[k - 1 : k + 2] - t[k], T[k - 1 : k + 2] - T[k], 2)
@@ -123,7 +123,7 @@ def peak_time(t: Array, T: Array) -> float | tuple[float, str]:
 
 
 _COURSE = "course-temperatures"
-_ROWS, _PARKED_ROWS = 40, 600  # of a pause, and of the time parked
+_ROWS, _PARKED_ROWS = 40, 600  # of a pause, and of the parked time
 _USUAL, _LONGEST, _AFTER = 1.3, 3.0, 1.0  # times the length of a cold stop; s beyond a standstill
 _STOP = Signal("1", "number of the stop, 0 between stops")
 
@@ -138,34 +138,34 @@ ALL = Figures(
     pads_last=("K", "Temperature of the front pads after the last stop."),
     fluid_last=("K", "Temperature of the front fluid after the last stop."),
     rear_disc_last=("K", "Temperature of the rear disc after the last stop."),
-    pressure_cold=("Pa", "Front pressure for the deceleration with cold pads."),
-    pressure_hot=("Pa", "The same with pads as hot as after the last stop."),
-    fluid_peak=("K", "Highest temperature of the front fluid, the time parked included."),
-    fluid_peak_time=("s", "Time of that peak after the last standstill."),
+    pressure_cold=("Pa", "Front pressure needed for the deceleration with cold pads."),
+    pressure_hot=("Pa", "The same with the pad temperature after the last stop."),
+    fluid_peak=("K", "Highest temperature of the front fluid, parked time included."),
+    fluid_peak_time=("s", "Time of this peak after the last standstill."),
 )
 
 
 class Options(ParameterSet):
     """The stops, and the drive from one to the next.
 
-    ``hold``: the rider presses equally in every stop (``"pressure"``), or more in proportion to the
-    fading of the pads when it begins (``"deceleration"``).
+    ``hold``: the rider applies the same pressure in every stop (``"pressure"``), or raises it in
+    proportion to the fading of the pads at the start of the stop (``"deceleration"``).
     """
 
     v_0: RidingSpeed
     """speed at the start of each stop"""
     deceleration: Annotated[float, Unit("m/s**2", 8.0), Field(gt=0, allow_inf_nan=False)]
-    """deceleration of the mass by cold brakes, without drag and rolling resistance"""
+    """deceleration from cold brakes alone, without drag and rolling resistance"""
     share: Weight
-    """share of the braking force that the front brake gives"""
+    """share of the braking force from the front brake"""
     hold: Literal["pressure", "deceleration"]
-    """quantity that the rider keeps from stop to stop"""
+    """quantity that the rider keeps constant from stop to stop"""
     stops: Annotated[float, Unit("1", 10.0), Field(ge=1, le=200, multiple_of=1)]
     """number of stops"""
     pause: Duration
-    """time driven from a standstill to the next stop"""
+    """driving time from a standstill to the next stop"""
     v_pause: Annotated[float, Unit("m/s", 28.0), Field(ge=0, allow_inf_nan=False)]
-    """speed in that time"""
+    """speed during the driving time"""
     parked: Duration
     """time parked after the last stop"""
 
@@ -187,7 +187,7 @@ def cases(par: TwoWheelerParameters, options: Options, _: object = None) -> tupl
 
 
 def preview(par: TwoWheelerParameters, options: Options, _: object = None) -> tuple[Case, ...]:
-    """Return both as if the brakes were cold."""
+    """Return both stops with cold brakes."""
     warm = par.replace(WARM)
     cold = cold_start(warm.front.heat, warm.rear.heat)
     return tuple(_case(warm, options, cold, label) for label in ("first", "last"))
@@ -241,7 +241,7 @@ def static(par: TwoWheelerParameters, options: Options) -> dict[str, xr.Dataset]
         whole, count = (options.parked, _PARKED_ROWS) if is_last else (options.pause, _ROWS)
         t = np.linspace(0.0, whole, count + 1)
         after = cooled(at_end(rows), warm, v, t)
-        inside = slice(1, None if is_last else -1)  # the next stop has the last instant
+        inside = slice(1, None if is_last else -1)  # the next stop contains the last instant
         rest = {name: y[inside] for name, y in after.items()}
         still = 0.0 * rest["time"]
         pieces.append(rest | {"time": begin + rest["time"], "v": still + v, "stop": still})

@@ -30,9 +30,9 @@ _DRIVEN = {"p_f_set": _FRONT, "p_r_set": _REAR}
 
 FIGURES = Figures(
     undefined="the rider demands nothing",
-    rider_share_front=("%", "Impulse of the front pressure over that of the rider's demand."),
-    rider_share_rear=("%", "The same of the rear brake."),
-    rider_share=("%", "The same of both brakes' torques, until the vehicle stands."),
+    rider_share_front=("%", "Impulse of the front pressure over the impulse of the demand."),
+    rider_share_rear=("%", "The same for the rear brake."),
+    rider_share=("%", "The same for the torques of both brakes, until standstill."),
 )
 
 
@@ -55,7 +55,7 @@ def driven(_: Options) -> Mapping[str, str]:
 def cases(
     par: TwoWheelerParameters, options: Options, stimuli: Mapping[str, Stimulus] | None = None
 ) -> tuple[Case, ...]:
-    """Return the single run; with one demand given, the other is zero."""
+    """Return the single run; if the user sets one demand, the other is zero."""
     custom: dict[str, float | Course] = {
         name: each.sample for name, each in (stimuli or {}).items()
     }
@@ -69,7 +69,7 @@ def _course(values: tuple[float, ...]) -> Course:
 
 
 def _parameters_of(run: xr.Dataset) -> TwoWheelerParameters:
-    """Return the parameters with which a recording was made."""
+    """Return the parameters of a recording."""
     par = getattr(run, "par", None)  # plain rows carry them
     if isinstance(par, TwoWheelerParameters):
         return par
@@ -77,7 +77,7 @@ def _parameters_of(run: xr.Dataset) -> TwoWheelerParameters:
 
 
 def rider_shares(run: xr.Dataset, _: Options) -> tuple[Kpi, ...]:
-    """Return the remaining shares of the rider's demand."""
+    """Return the shares of the rider's demand that the brakes apply."""
     return FIGURES(**_shares(run))
 
 

@@ -58,7 +58,7 @@ SLOW_FIGURES = Figures(
     stopping_time=("s", "Time from zero to the first standstill."),
     rebound_speed=(
         "m/s",
-        "Largest speed backward after it: the final jerk, by the tyres' elasticity.",
+        "Largest speed backward after the standstill: the final jerk, from the tyres' elasticity.",
     ),
     rollback=("m", "Distance from the farthest place to the place at the end."),
     ringing_time=("s", f"Time from the standstill until the speed stays below {_QUIET:g} m/s."),

@@ -1,6 +1,6 @@
-"""Panic stops: the rider demands more than the road holds, with slip control or without.
+"""Panic stops: the rider demands more than the road's adhesion, with or without slip control.
 
-The same demand on one surface, with a whole brake by wire at the rear wheel, with ever quicker
+The same demand on one surface, with a whole brake by wire at the rear wheel, with increasingly fast
 brakes, and across a change of the surface.
 """
 
@@ -46,7 +46,7 @@ def _demands(options: PanicOptions) -> dict[str, float]:
 
 
 def _locked_stop(v_0: float, par: VehicleParameters) -> float:
-    """Return a time [s] in which locked wheels stop a vehicle, on most roads even one wheel."""
+    """Return a time [s] within which locked wheels, on most roads even one, stop a vehicle."""
     road_ahead, body = par.road, par.body
     slope = road.slope(0.0, road_ahead)
     locked = adhesion.adhesion(1.0, road.surface(0.0, road_ahead), par.front_tyre)
@@ -96,11 +96,11 @@ STRAIGHT_STOP = Experiment(
 # --- With a whole brake by wire at the rear wheel
 
 ACTUATOR_FIGURES = Figures(
-    rear_energy=("J", "Energy that the rear brake draws until the vehicle stands."),
-    rear_current=("A", "Largest magnitude of the current of its motor until then."),
+    rear_energy=("J", "Energy that the rear brake draws until standstill."),
+    rear_current=("A", "Largest magnitude of its motor current until standstill."),
     rear_pressure_error=(
         "Pa",
-        "Root mean square of the demand on the rear brake minus the pressure at its pads.",
+        "Root mean square of the rear demand minus the pressure at the pads.",
     ),
 )
 _ACTUATOR_SIGNALS = ("v", "E_rear_source", "rear_i", "p_r_ref", "p_r")
@@ -117,7 +117,7 @@ def whole_rear_stop(
 
 
 def actuator_effort(run: xr.Dataset, _: StraightStopOptions) -> tuple[Kpi, ...]:
-    """Return energy, current and pressure error of the rear actuator until the vehicle stands."""
+    """Return energy, current and pressure error of the rear actuator until standstill."""
     t, *signals = (run[name].values for name in ("time", *_ACTUATOR_SIGNALS))
     end = vehicle_stop.standstill(t, signals[0])
     braked = (t >= 0.0) & (t <= (end if math.isfinite(end) else math.inf))
@@ -192,7 +192,7 @@ def bandwidths(
 
 
 def judge_bandwidths(recordings: Recordings, options: BandwidthsOptions) -> tuple[Kpi, ...]:
-    """Return the figures by which the stops differ, with the frequency behind each name."""
+    """Return the figures that differ between the stops; their names end with the frequency."""
     return tuple(
         Kpi(f"{kpi.name}_{f:g}Hz", kpi.value, kpi.unit, kpi.definition, kpi.note)
         for f in options.f_n
@@ -245,7 +245,7 @@ JUMP_FIGURES = Figures(
         "Time from the front wheel's step onto the further surface until its slip stays below "
         f"{_CALM:g} of the slip of the peak there, above {vehicle_stop.SLOW:g} m/s.",
     ),
-    jump_speed=("m/s", "Speed at that step."),
+    jump_speed=("m/s", "Speed at the change of the surface."),
 )
 
 
@@ -257,7 +257,7 @@ class SurfaceJumpOptions(PanicOptions):
     further: SurfaceName
     """surface from x_change on"""
     x_change: Distance
-    """place where that surface begins"""
+    """place where the further surface begins"""
     duration: Duration
     """time recorded"""
 

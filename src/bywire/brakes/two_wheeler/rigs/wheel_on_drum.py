@@ -1,4 +1,4 @@
-"""A wheel with its brake on a drum that keeps its speed: where slip control is designed."""
+"""A wheel with its brake on a drum of constant speed, for the design of slip control."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class DrumParameters(ParameterSet):
     v: DrumSpeed
     """speed of its surface"""
     N: Load
-    """force that presses the wheel on it"""
+    """force that presses the wheel on the drum"""
     surface: adhesion.SurfaceParameters
 
 
@@ -68,7 +68,7 @@ class Memory(NamedTuple):
 class WheelOnDrum(Assembly[WheelOnDrumParameters, Memory]):
     """A turning wheel, so that brake and rolling resistance are a torque in linear models.
 
-    The rig is not valid where the wheel would lock; a warning then says so.
+    The rig is not valid if the wheel locks; bywire then warns.
     """
 
     name: ClassVar[str] = "wheel-on-drum"
@@ -119,7 +119,9 @@ class WheelOnDrum(Assembly[WheelOnDrumParameters, Memory]):
         """Return the warnings about a recording."""
         warnings = super().watch(recording, par)
         if "omega" in recording and bool((recording["omega"] <= 0).any()):
-            warnings.append("the wheel came to a stop: on this rig it would turn backward then")
+            warnings.append(
+                "the wheel locked: the rig is not valid then, it lets the wheel turn backward"
+            )
         return warnings
 
     def rest(self, par: Par) -> tuple[Any, Any]:

@@ -1,4 +1,4 @@
-"""The two-wheeler with a whole brake by wire at its rear wheel: that of Dardanelli et al. (2010).
+"""The two-wheeler with the whole brake by wire of Dardanelli et al. (2010) at its rear wheel.
 
 The front brake is modeled by its pressure loop alone. The rear brake is complete: battery, motor,
 screw, cylinder, line, caliper, and an ECU with dither that follows the rider's demand, lowered by
@@ -26,7 +26,7 @@ Par = WholeRearParameters
 class TwoWheelerWholeRear(HotBrakes[WholeRearParameters, Any]):
     """A vehicle whose ECU lowers the demand on the rear brake's ECU.
 
-    The pads press as hard as the caliper pushes them: a caliper that sticks drags.
+    The pads press with the caliper's force: a sticking caliper drags.
     """
 
     name: ClassVar[str] = "two-wheeler-whole-rear"
@@ -63,7 +63,7 @@ class TwoWheelerWholeRear(HotBrakes[WholeRearParameters, Any]):
         )
 
     def tasks(self, par: Par) -> tuple[Task, ...]:
-        """Return the vehicle's task, then that of the brake, which follows it at once."""
+        """Return the vehicle's task, then the brake's, which follows in the same tick."""
         return (Task("ecu", par.ecu.T_s, tick), *super().tasks(par))
 
     def rest(self, par: Par) -> tuple[Any, Any]:
@@ -74,14 +74,14 @@ class TwoWheelerWholeRear(HotBrakes[WholeRearParameters, Any]):
 def at_speed(
     v: float, par: Par, heat: Mapping[str, Any] | None = None, p_rear: float = 0.0
 ) -> tuple[Any, Any]:
-    """Return the vehicle rolling at a speed [m/s], its front brake open, its ECUs awake.
+    """Return the vehicle rolling at a speed [m/s], its front brake open, its ECUs running.
 
     Parameters
     ----------
     heat
         Temperatures of the brakes by their parts, see `cold_start`, which is the default.
     p_rear
-        Pressure [Pa] that the rear brake's ECU holds, and the vehicle's demands.
+        Pressure [Pa] that the vehicle's ECU demands and the rear brake's ECU holds.
     """
     warm = cold_start(par.front.heat, par.rear.heat) if heat is None else heat
     vehicle, brake = rolling_start(v, par.vehicle), par.rear.actuator

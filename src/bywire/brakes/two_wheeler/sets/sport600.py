@@ -19,13 +19,13 @@ _DRY = {
 
 
 def _gain(disc: Any) -> float:
-    """Return the torque over the pressure of a brake."""
+    """Return torque per pressure of a brake."""
     gain: float = disc.faces * disc.mu_pad * disc.A_cal * disc.r_eff
     return gain
 
 
 def _lift(par: Any) -> float:
-    """Return the deceleration at which lift control acts, just below that of lifting."""
+    """Return the deceleration at which lift control acts, just below the lift limit."""
     body = par.vehicle.body
     limit: float = 0.95 * body.g * body.l_f / body.h
     return limit
@@ -84,8 +84,8 @@ _BRAKE = next(e for e in dardanelli2010.ENTRIES if e.name == "dardanelli2010-ret
 WHOLE_REAR = CitedSet(
     name="sport600-whole-rear",
     assembly="two-wheeler-whole-rear",
-    source=f"{FILE.citation}; all of the rear brake: {dardanelli2010.FILE.citation}",
-    summary="the sport motorcycle, its rear brake that of dardanelli2010-retuned",
+    source=f"{FILE.citation}; the whole rear brake: {dardanelli2010.FILE.citation}",
+    summary="the sport motorcycle with the rear brake of dardanelli2010-retuned",
     parameter_class=WholeRearParameters,
     values={
         **{

@@ -1,4 +1,4 @@
-"""Brake heart: two screws and a wedge that push on each other and never pull."""
+"""Brake heart: two screws and a wedge that push on each other but never pull."""
 
 from __future__ import annotations
 
@@ -166,7 +166,7 @@ def solve(d: Overlaps, par: Parameters) -> Forces:
     c = compliances(par)
     w, t, s = c.wedge, c.tips, c.screw
     lower, upper = ops.fmin(d.d_1, d.d_2), ops.fmax(d.d_1, d.d_2)
-    # The root moves down where a contact opens: the largest candidate is the root.
+    # An opening contact lowers the root, so the largest candidate is the root.
     none = d.d_12 / t
     upper_alone = (d.d_12 + s / w * upper) / (t - s * s / w)
     both = (d.d_12 + s / w * (upper + lower)) / (t - 2.0 * s * s / w)

@@ -26,7 +26,7 @@ NormalForce = Annotated[float, Signal("N", "normal force", 3e3)]
 
 
 class Parameters(ParameterSet):
-    """Pads, disc and caliper as one spring that presses and never pulls.
+    """Pads, disc and caliper as one spring that pushes but never pulls.
 
     ``law``: ``"linear"`` is the stiffness; ``"table"`` interpolates a measured curve of force and
     travel and continues beyond its end with its last slope.
@@ -59,7 +59,7 @@ class Parameters(ParameterSet):
         if self.law == "table" and not n:
             raise ValueError(
                 "law = 'table' needs 2 nodes or more in n_table [m] and F_table [N], which are "
-                "empty: give both, or take law = 'linear'"
+                "empty: set both, or law = 'linear'"
             )
         return self
 
@@ -150,9 +150,9 @@ def normal_force(
 
     Notes
     -----
-    Contacts have constant compliances, which decide on touching. The table bends their forces:
-    C f is the damped overlap. So the damping is tau times the slope of the curve at small rates.
-    It never pulls and never adds energy, because the curve rises.
+    Contacts have constant compliances, which determine whether they touch. The table bends their
+    forces: C f is the damped overlap. So the damping is tau times the slope of the curve at small
+    rates. It never pulls and never adds energy, because the curve rises.
     """
     if par.law == "linear":
         return f

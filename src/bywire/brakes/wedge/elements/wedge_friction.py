@@ -14,8 +14,8 @@ from bywire.core.signals import Power, Signal
 class Parameters(ParameterSet):
     """Coulomb friction, set-valued at rest.
 
-    ``stopped_disc``: ``"drop"`` drops the pad's friction once the disc stands, as in the paper
-    (worst case for the actuator); ``"stick"`` lets the standing disc hold the wedge.
+    ``stopped_disc``: ``"drop"`` drops the pad's friction once the disc is at rest, as in the paper
+    (worst case for the actuator); ``"stick"`` lets the resting disc hold the wedge.
     """
 
     mu_int: Gain
@@ -23,7 +23,7 @@ class Parameters(ParameterSet):
     mu_R: Gain
     """coefficient of friction of the rollers"""
     stopped_disc: Literal["drop", "stick"]
-    """friction of the pad on the wedge while the disc stands"""
+    """friction of the pad on the wedge while the disc is at rest"""
 
 
 FAULTS = (
@@ -66,5 +66,5 @@ def power_loss(
     force: Annotated[float, Signal("N", "friction force on the wedge", 50.0)],
     v: Annotated[float, Signal("m/s", "velocity of the wedge", 0.02)],
 ) -> Power:
-    """Return the heat of the friction, signed as force and velocity are given."""
+    """Return the heat of the friction, with the signs of force and velocity."""
     return -force * v

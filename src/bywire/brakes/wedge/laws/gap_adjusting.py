@@ -1,7 +1,8 @@
-"""Law of the wedge brake's adjuster: it reads the gap from the moment control, and corrects it.
+"""Law of the wedge brake's adjuster: it takes the gap from the moment control, and corrects it.
 
-The moment control estimates the travel from parking to contact. The adjuster subtracts from it the
-teeth that it commands, so that the next application does not creep through a gap that is gone.
+The moment control estimates the travel from parking to contact. The adjuster subtracts its
+commanded teeth from this travel, so that the next application does not creep through a gap that no
+longer exists.
 """
 
 from __future__ import annotations
@@ -23,11 +24,11 @@ NEEDS = {"adjuster.law": "screw"}
 FAULTS = tuple(
     ParameterFault(name, f"adjuster {what}", with_it={"fault": name}, needs=NEEDS)
     for name, what in (
-        ("stuck", "turns nothing, and counts on"),
-        ("one-way", "gives no clearance back, and counts on"),
-        ("slips", "slips on every second tooth, and counts on"),
+        ("stuck", "does not turn, but keeps counting"),
+        ("one-way", "does not return clearance, but keeps counting"),
+        ("slips", "slips on every second tooth, but keeps counting"),
         ("over-adjusts", "turns one tooth too many"),
-        ("blind-to-heat", "takes a hot disc for a cold one"),
+        ("blind-to-heat", "mistakes a hot disc for a cold one"),
     )
 )
 
@@ -36,7 +37,7 @@ class Parameters(wear_adjuster.Parameters):
     """The adjuster's law, its sample time, and its assumptions."""
 
     T_adjust: Duration
-    """sample time, in which all due teeth turn"""
+    """sample time, long enough to turn all due teeth"""
     gap_slope_hat: Slope
     """assumed clearance per motor angle"""
     T_disc_hat: Temperature
@@ -60,7 +61,7 @@ class Input(NamedTuple):
 
 
 class Output(NamedTuple):
-    """Teeth commanded, and turned; mode; clearance of the cold brake after them."""
+    """Teeth commanded and turned; mode; resulting clearance of the cold brake."""
 
     teeth: wear_adjuster.Teeth
     turned: wear_adjuster.Teeth

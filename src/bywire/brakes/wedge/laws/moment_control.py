@@ -1,6 +1,6 @@
 """Moment control of a wedge brake: parked, gap crossing, moment, retracting.
 
-Works on the angle toward clamping, so that both directions of rotation look alike. Its output is
+It works on the angle toward clamping, so that both directions of rotation look alike. Its output is
 the speed of the common angle reference, which the faster position task integrates.
 """
 
@@ -46,9 +46,9 @@ class Parameters(ParameterSet):
     omega_creep: SpeedLimit
     """speed at the estimated contact position, kept until contact is detected"""
     M_on: SomeMoment
-    """moment demand from which the brake leaves its parking position"""
+    """smallest moment demand for which the brake leaves its parking position"""
     M_contact: SomeMoment
-    """measured moment that counts as contact: threshold of the gap mode"""
+    """smallest measured moment that counts as contact: threshold of the gap mode"""
     Omega_still: SpeedLimit
     """disc speed below which the control does not use the moment sensor"""
 
@@ -87,8 +87,8 @@ def observed(x: State, u: Input, par: Parameters) -> Moment:
 def next_mode(mode: Flag, braking: Flag, touching: Flag, home: Flag) -> Flag:
     """Return the next mode, by flags of 0 or 1.
 
-    ``braking``, ``touching``, ``home``: whether braking is demanded, the pads touch, the reference
-    is back at its parking position.
+    ``braking``, ``touching``, ``home``: flags of a braking demand, of pad contact, of a reference
+    back at its parking position.
     """
     from_parked = ops.where(braking > 0.5, GAP, PARKED)
     from_gap = ops.where(braking > 0.5, ops.where(touching > 0.5, MOMENT, GAP), RETRACTING)
@@ -101,7 +101,7 @@ def next_mode(mode: Flag, braking: Flag, touching: Flag, home: Flag) -> Flag:
 
 
 def crossing_speed(distance: Angle, rate: Speed, T: SampleTime, par: Parameters) -> Speed:
-    r"""Return the speed toward a position: limited in speed and acceleration, creeping at last.
+    r"""Return the speed toward a position: limited speed and acceleration, creeping at the end.
 
     .. math:: \omega = \min(\omega_{gap}, |\omega_{k-1}| + a T, \sqrt{\omega_{creep}^2 + 2 a d})
     """

@@ -1,4 +1,4 @@
-"""Offset between the two screws: squeeze the wedge against free-play, or push it together."""
+"""Offset between the two screws: squeeze the wedge to remove free-play, or push it jointly."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Parameters(ParameterSet):
     """Positive offsets preload the wedge, negative ones let the screws push on each other.
 
     ``law``: ``"preload"`` keeps the preload; ``"scheduled"`` preloads near the neutral point and
-    lets the motors co-operate where the actuation force is large.
+    lets the motors cooperate if the actuation force is large.
     """
 
     law: Literal["preload", "scheduled"]
@@ -28,13 +28,13 @@ class Parameters(ParameterSet):
     delta_preload: Position
     """offset of each screw from the middle, preload"""
     delta_together: Position
-    """offset of each screw from the middle, co-operation (law "scheduled")"""
+    """offset of each screw from the middle, cooperation (law "scheduled")"""
     F_low: Force
-    """actuation force up to which the wedge is preloaded (law "scheduled")"""
+    """actuation force up to which the screws preload the wedge (law "scheduled")"""
     F_high: Force
     """actuation force from which the motors work together (law "scheduled")"""
     T_change: Duration
-    """time constant with which the offset changes, slow against the position loop"""
+    """time constant of the offset's changes, slow compared with the position loop"""
     k_hat: GearRatio
     """travel per shaft angle, assumed by the controller"""
 
@@ -67,8 +67,8 @@ def offset(
 def advance(delta: ScrewTravel, target: ScrewTravel, T: SampleTime, par: Parameters) -> ScrewTravel:
     """Return the offset one sample later: it approaches its target as a first-order lag.
 
-    The actuation force is estimated from currents that the offset itself moves: a schedule
-    without this lag chatters.
+    The offset itself affects the currents from which the controller estimates the actuation force:
+    a schedule without this lag chatters.
     """
     return delta + T / (T + par.T_change) * (target - delta)
 
@@ -82,7 +82,7 @@ def output(
 
     References
     ----------
-    Roberts et al. (2003), section "Brake heart": preload near the ideal point, co-operation
+    Roberts et al. (2003), section "Brake heart": preload near the ideal point, cooperation
     elsewhere.
     """
     apart = delta / par.k_hat

@@ -36,21 +36,21 @@ from bywire.synthesis.study import (
 _ASSUMPTIONS = (
     "The wedge's slope and the screws' lead vary; motors, drives, bearings, stiffnesses, clearance "
     "and the travel that preloads the screws are constant.",
-    "The screws' friction angle is constant, so that their efficiency grows with the lead and a "
-    "small lead locks itself; with efficiency 'as-given' the efficiency is constant.",
-    "The controllers know the design: travel per shaft angle and moment per angle follow it.",
+    "The screws' friction angle is constant: their efficiency grows with the lead, and a small "
+    "lead is self-locking. With efficiency 'as-given' the efficiency is constant.",
+    "The controllers know the design: their travel per shaft angle and moment per angle follow it.",
     "Equal response: all speeds and accelerations of the reference are scaled so that the pads "
     "close equally fast; with response 'enforced' they get a common factor, the smallest at which "
     "the sensor shows 90 % of the demand in time at every friction coefficient.",
     "Bandwidths are constant: those of the position loops on the shaft, and the crossover of the "
     "moment loop.",
     "The end stops of the wedge allow the same travel of the pads as before.",
-    "A design is infeasible if at any coefficient it is more than 2 % late (where the response is "
-    "enforced), does not hold 95 % of the demand, does not release, or presses on an end stop.",
-    "Power counts at the drives' input, standby included, in build-up and hold, and in the release "
-    "where that counts.",
+    "A design is infeasible if at any coefficient it is more than 2 % late (with an enforced "
+    "response), does not hold 95 % of the demand, does not release, or presses on an end stop.",
+    "Power is the power at the drives' input, standby included, in build-up and hold, and "
+    "optionally in the release.",
     "Each case runs with the disc at four angles, a quarter turn apart, and the worst counts: "
-    "the phase of the run-out at the stop is chance, and holding the moment against it takes "
+    "the phase of the run-out at the stop is random, and holding the moment against it takes "
     "power.",
 )
 
@@ -61,19 +61,19 @@ class Options(ParameterSet):
     moment: SomeMoment
     """moment demanded in one step"""
     t_90: Duration
-    """time in which the sensor must show 90 % of it"""
+    """time within which the sensor must show 90 % of the moment"""
     t_hold: Duration
-    """length of the demand"""
+    """length of the moment demand"""
     t_release: Duration
-    """time in which the brake must release after it"""
+    """time within which the brake must release after the demand"""
     counted: Literal["build-up-and-hold", "whole-pulse"]
-    """whether the power of the release counts too"""
+    """whether the power of the release also counts"""
     omega_gap: SpeedLimit
     """largest speed of the given drive train while crossing the gap, scaled with all others"""
     mu_B: Coefficients
     """friction coefficients of the pads; the worst counts"""
     believed: Literal["known", "as-given"]
-    """whether the moment controller knows them, or assumes that of the parameter set"""
+    """whether the moment controller knows them, or assumes the parameter set's coefficient"""
     response: Literal["enforced", "as-scaled"]
     """whether the time is enforced, or the pads close as fast as with the given drive train"""
     efficiency: Efficiency
@@ -157,7 +157,7 @@ def compute(par: WedgeParameters, options: Options, progress: Progress) -> Findi
         options.counted == "whole-pulse",
     )
     par = par.replace({"control.moment.omega_gap": options.omega_gap})
-    given = answer(par, demand)  # first and alone: it also builds the kernels
+    given = answer(par, demand)  # first and alone, because it also builds the kernels
     slopes = np.linspace(options.tan_alpha_min, options.tan_alpha_max, options.slopes)
     leads = np.linspace(options.lead_min, options.lead_max, options.leads)
     data = _mapped(par, demand, slopes, leads, partial(progress, "designs"), options.efficiency)
@@ -193,7 +193,7 @@ def compute(par: WedgeParameters, options: Options, progress: Progress) -> Findi
 
 
 def _smallest(data: xr.Dataset, power: str) -> _Best:
-    """Return the feasible design of least power; there must be one."""
+    """Return the feasible design of least power; at least one must exist."""
     worst = data[f"worst_{power}"].values
     i, j = np.unravel_index(int(np.nanargmin(worst)), worst.shape)
     at = data.isel(tan_alpha=int(i), lead=int(j))
@@ -201,7 +201,7 @@ def _smallest(data: xr.Dataset, power: str) -> _Best:
 
 
 def _around(nodes: Array, middle: float, halvings: int) -> Array:
-    """Return five finer nodes around a value, or those of them within the range."""
+    """Return up to five finer nodes around a value, within the range."""
     step = (nodes[1] - nodes[0]) / 2**halvings
     near = middle + step * np.arange(-2.0, 3.0)
     inside = (near >= nodes[0] - _TINY * step) & (near <= nodes[-1] + _TINY * step)
@@ -282,7 +282,7 @@ def _optimum(best: _Best, grids: Sequence[xr.Dataset], options: Options) -> tupl
 def _given(given: Answer, options: Options) -> tuple[Kpi, ...]:
     sizes = getattr(given, options.power)
     k, t_90 = int(np.argmax(sizes)), float(given.t_90.max())
-    note = "" if math.isfinite(t_90) else "a case does not reach it"
+    note = "" if math.isfinite(t_90) else "a case does not reach 90 %"
     return (
         Kpi(
             "given_power",
@@ -303,7 +303,7 @@ def _given(given: Answer, options: Options) -> tuple[Kpi, ...]:
             "given_t_90",
             t_90,
             "s",
-            "Time to 90 % of the demand reached by it, slowest coefficient.",
+            "Its time to 90 % of the demand, slowest friction coefficient.",
             note,
         ),
         Kpi(
@@ -334,7 +334,7 @@ def _warnings(data: xr.Dataset) -> tuple[str, ...]:
 
 
 def _edges(best: _Best, options: Options) -> tuple[str, ...]:
-    """Return whether the optimum lies at the edge of the designs compared."""
+    """Return a warning if the optimum is at the edge of the range of designs."""
     slopes = (options.tan_alpha_min, options.tan_alpha_max)
     leads = (options.lead_min, options.lead_max)
     return (
@@ -346,7 +346,7 @@ def _edges(best: _Best, options: Options) -> tuple[str, ...]:
 # --- Many drive trains as a dataset
 
 _LATE = 1.02
-"""share of the demanded time up to which a design answers equally fast"""
+"""share of the demanded time up to which a design counts as equally fast"""
 
 
 _HELD = 0.95
@@ -370,7 +370,7 @@ _PER_CASE = {
     "copper": ("J", "copper loss"),
     "friction": ("J", "friction of bearings and screws"),
     "held": ("N*m", "mean moment at the end of the stop"),
-    "left": ("N*m", "moment left at the end"),
+    "left": ("N*m", "residual moment at the end"),
     "stop": ("N", "force on the end stops"),
 }
 
@@ -383,7 +383,7 @@ def _mapped(
     progress: Callable[[float], None],
     efficiency: Efficiency,
 ) -> xr.Dataset:
-    """Return the responses of all designs on a grid, computed on all cores; can be interrupted.
+    """Return the responses of all designs on a grid, computed on all cores; interruptible.
 
     ``slopes``, ``leads``: slopes of the wedge, shape (n,), and leads of the screws [m], shape (m,);
     ``progress``: called with the finished share, 0 to 1; ``efficiency``: see `redesigned`.
@@ -394,7 +394,7 @@ def _mapped(
         Dimensions ``tan_alpha``, ``lead`` and ``mu_B``. Per case the fields of `Answer`; per
         design ``closing_speed``, ``lateness`` (slowest time over the demanded one), ``infeasible``
         (0 or 1), and ``worst_filtered`` and ``worst_instantaneous``, NaN where infeasible, with
-        ``mu_B_filtered`` and ``mu_B_instantaneous``, where each occurs.
+        ``mu_B_filtered`` and ``mu_B_instantaneous``, the coefficients at which they occur.
     """
     designs = [(float(a), float(b)) for a in slopes for b in leads]
     answers: list[Answer] = []
@@ -484,7 +484,7 @@ def active(at: xr.Dataset, par: WedgeParameters, options: Options) -> list[str]:
 
 
 def failures(at: xr.Dataset, options: Options) -> list[str]:
-    """Return why a design is infeasible; empty where it is not."""
+    """Return the reasons why a design is infeasible; empty if it is feasible."""
     reasons = []
     slowest = float(at["t_90"].max(skipna=False))
     if math.isnan(slowest):
@@ -503,7 +503,7 @@ def failures(at: xr.Dataset, options: Options) -> list[str]:
 def around(grids: Sequence[xr.Dataset], best: xr.Dataset, options: Options) -> list[str]:
     """Return the neighbors of the best design, on the finest grid that contains it.
 
-    ``grids``: maps of designs, coarse to fine; ``best``: one design of the last grid that holds it.
+    ``grids``: maps of designs, coarse to fine; ``best``: design of the last grid with it.
     """
     tan_alpha, lead = float(best["tan_alpha"]), float(best["lead"])
     power, texts = float(best[f"worst_{options.power}"]), []

@@ -35,9 +35,9 @@ from bywire.synthesis.study import (
 
 _POINTS = 200  # frequencies of a disk margin
 _LOWEST = 0.05  # Hz
-_SPAN = 1.5  # factor of the search for a border to either side of the neutral point
+_SPAN = 1.5  # factor on both sides of the neutral point for the search for a border
 _EXACT = 1e-9
-_FREE = 1e-12  # share of the largest coupling below which a coupling is rounding
+_FREE = 1e-12  # share of the largest coupling below which a coupling is a rounding error
 
 
 class Motion(NamedTuple):
@@ -48,7 +48,7 @@ class Motion(NamedTuple):
     growth, frequency
         Largest growth rate [1/s] with the motors at constant currents, and its frequency [Hz].
     rigid
-        The same rate by the closed form of a rigid heart without damping [1/s]; 0 below neutral.
+        The same rate by the closed form of a rigid, undamped brake heart [1/s]; 0 below neutral.
     locked
         Largest growth rate with locked motors [1/s].
     """
@@ -65,9 +65,9 @@ class Controlled(NamedTuple):
     Parameters
     ----------
     disk
-        Disk margin; NaN where it is unstable.
+        Disk margin; NaN if unstable.
     unstable
-        1 where it is unstable, else 0; NaN where there is no operating point.
+        1 if unstable, else 0; NaN without an operating point.
     """
 
     disk: float
@@ -98,7 +98,7 @@ def motion(par: WedgeParameters, F_N: float) -> Motion:
         When there is no operating point.
     """
     whole = mechanical(full(par, F_N))
-    # Where the force exceeds the preload, one motor is free: no state depends on its angle.
+    # If the force exceeds the preload, one motor is free: no state depends on its angle.
     acting = np.abs(whole.A).max(axis=0) > _FREE * np.abs(whole.A).max()
     bound = whole.reduced(
         [n for n, acts in zip(whole.states, acting, strict=True) if acts], held=True
@@ -143,7 +143,7 @@ def neutral(par: WedgeParameters, F_N: float) -> float:
 def controlled(par: WedgeParameters, moment: float) -> Controlled:
     """Return stability and disk margin of the closed moment loop at a moment [N m].
 
-    All NaN where the brake has no operating point at the moment.
+    All NaN if the brake has no operating point at this moment.
     """
     try:
         gain, closed = MOMENT_LOOP.gain_and_closed(par, moment)
@@ -182,10 +182,10 @@ Coefficient = Annotated[float, Unit("1", 0.4), Field(gt=0, le=5, allow_inf_nan=F
 Force = Annotated[float, Unit("N", 1e3), Field(gt=0, allow_inf_nan=False)]
 
 _ASSUMPTIONS = (
-    "Exact linear models of the brake, dry friction removed: friction also holds the brake, so "
-    "that the real brake is stable in a wider range.",
+    "Exact linear models of the brake without dry friction. Friction also holds the brake, so the "
+    "real brake is stable in a wider range.",
     "Without control: both motors at constant currents, or locked; the wedge is preloaded between "
-    "the screws and carries the given normal force. Where the actuation force exceeds the preload, "
+    "the screws and carries the given normal force. If the actuation force exceeds the preload, "
     "one screw loses the wedge, and the other moves or holds it alone.",
     "With control: sampled moment loop around position and current loops, at the given moment; its "
     "controllers know the wedge's slope.",
@@ -197,12 +197,12 @@ _SEARCHED = 40
 _PLANES = {
     "growth_open": ("1/s", "growth rate, motors at constant currents"),
     "frequency_open": ("Hz", "frequency of that motion"),
-    "growth_rigid": ("1/s", "growth rate by the closed form of a rigid heart"),
+    "growth_rigid": ("1/s", "growth rate by the closed form of a rigid brake heart"),
     "growth_locked": ("1/s", "growth rate, motors locked"),
     "disk_moment": ("1", "disk margin of the moment loop"),
     "unstable_moment": ("1", "whether the moment loop is unstable"),
 }
-_FAST = 5.0  # growth [1/s] from which rates are compared with the closed form
+_FAST = 5.0  # smallest growth rate [1/s] for the comparison with the closed form
 
 
 class Options(ParameterSet):
@@ -225,7 +225,7 @@ class Options(ParameterSet):
     moment: SomeMoment
     """moment of the moment loop"""
     believed: Literal["known", "as-given"]
-    """whether the moment controller knows mu_B, or assumes that of the parameter set"""
+    """whether the moment controller knows mu_B, or assumes the parameter set's value"""
 
     @model_validator(mode="after")
     def _ordered(self) -> Options:
@@ -298,9 +298,9 @@ def _maps(data: xr.Dataset, given: Mark) -> dict[str, Map]:
             "growth_open",
             "mu_B",
             "tan_alpha",
-            "Largest growth rate of the wedge without control, motors at constant currents; dashed "
-            "the closed form of the neutral point. The hatched border is computed; colors are "
-            "interpolated between designs, and the rate jumps there.",
+            "Largest growth rate of the wedge without control, motors at constant currents; "
+            "dashed: closed form of the neutral point. The hatched border is computed. Colors are "
+            "interpolated between designs, although the rate jumps at the border.",
             (given,),
             {"unstable without control": ("beyond_open", 0.0)},
             closed,
@@ -309,7 +309,7 @@ def _maps(data: xr.Dataset, given: Mark) -> dict[str, Map]:
             "disk_moment",
             "mu_B",
             "tan_alpha",
-            "Disk margin of the closed moment loop; dashed the neutral point of the wedge.",
+            "Disk margin of the closed moment loop; dashed: neutral point of the wedge.",
             (given,),
             {"unstable in the moment loop": ("unstable_moment", 0.5)},
             closed,
@@ -353,7 +353,7 @@ def _uncontrolled(par: WedgeParameters, data: xr.Dataset, options: Options) -> t
             "locked_growth_max",
             float(data["growth_locked"].max()),
             "1/s",
-            "Largest growth rate with locked motors; below 0 where they hold the wedge.",
+            "Largest growth rate with locked motors; negative if they hold the wedge.",
         ),
     )
 
@@ -385,8 +385,8 @@ def _controlled(par: WedgeParameters, data: xr.Dataset, options: Options) -> tup
             "moment_mu_B",
             border[0] if border else math.nan,
             "1",
-            "Friction coefficient from which the given wedge's moment loop is unstable, its "
-            "controller as given.",
+            "Friction coefficient from which the given wedge's moment loop is unstable with its "
+            "given controller.",
             note,
         ),
     )

@@ -1,4 +1,4 @@
-/* What a harness on a Cortex-M needs: text by semihosting, a clock, and the depth of the stack. */
+/* Services for a harness on a Cortex-M: text by semihosting, a clock, and the depth of the stack. */
 #ifndef BYWIRE_TARGET_H
 #define BYWIRE_TARGET_H
 

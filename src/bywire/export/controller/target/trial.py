@@ -22,7 +22,7 @@ EMULATOR = "qemu-system-arm"
 INSTALL = "apt-get install gcc-arm-none-eabi libnewlib-arm-none-eabi qemu-system-arm"
 HERE = Path(__file__).parent
 RUNTIME = ("startup.c", "target.h", "target.ld")
-"""files of this folder that run a harness on a Cortex-M"""
+"""files of this folder for a harness on a Cortex-M"""
 
 
 @dataclass(frozen=True)
@@ -32,9 +32,9 @@ class Target:
     Parameters
     ----------
     name
-        What users call it.
+        Name for users.
     flags
-        For the compiler.
+        Flags of the compiler.
     machine
         Board of the emulator.
     """
@@ -60,7 +60,7 @@ TARGETS = (
 
 
 def missing_tools() -> str:
-    """Return what is missing for targets, and how it is installed; empty where nothing is."""
+    """Return the missing tools of targets, and how to install them; empty if none is missing."""
     absent = [name for name in (CROSS, EMULATOR) if find_program(name) is None]
     if not absent:
         return ""
@@ -70,12 +70,12 @@ def missing_tools() -> str:
 # --- A harness for a Cortex-M
 
 SAMPLES = 100
-"""vectors of a task whose instructions are counted, at most"""
+"""largest number of vectors of a task whose instructions are counted"""
 _REPEATS = 40
 
 
 def target_harness(program: Program, every: Sequence[Vectors]) -> str:
-    """Return a program that says how many values differ, then a line of figures for every task."""
+    """Return a program that prints the number of different values, then figures for every task."""
     name = program.name
     what = f"Tries the compiled ECU of {program.model.name} on a Cortex-M."
     tasks = [c_name(each.step.task.name) for each in every]
@@ -144,7 +144,7 @@ _TIMEOUT = 300.0
 
 @dataclass(frozen=True)
 class TaskFigures:
-    """What a task takes: instructions at most and on average, stack in bytes."""
+    """Cost of a task: largest and average number of instructions, stack in bytes."""
 
     instructions: int
     average: int
@@ -153,21 +153,21 @@ class TaskFigures:
 
 @dataclass(frozen=True)
 class Trial:
-    """An ECU that was run on all its vectors.
+    """Result of an ECU for all its vectors.
 
     Parameters
     ----------
     target
         Name of the processor; ``host`` for this machine.
     differing
-        Values that are not those of Python.
+        Number of values that differ from Python's.
     bits
-        A number made of all results, equal where they are equal in every bit.
+        A hash of all results, equal if they are equal in every bit.
     breaches
-        Trials of the contract of a step that failed: refused inputs, and memory of any bits.
+        Failed trials of the contract of a step: invalid inputs, and memory of arbitrary bits.
     rom, ram
-        Bytes: code, constants and parameters with what the compiler's library brings; memory of
-        the ECU. None on the host.
+        Bytes: code, constants and parameters including the compiler's library; memory of the ECU.
+        None on the host.
     """
 
     target: str
@@ -181,7 +181,7 @@ class Trial:
 
 
 def host_trial(program: Program, folder: Path, compiler: Compiler, scratch: Path) -> Trial:
-    """Return how the exported ECU does on this machine.
+    """Return the result of the exported ECU on this machine.
 
     Raises
     ------
@@ -210,7 +210,7 @@ def host_trial(program: Program, folder: Path, compiler: Compiler, scratch: Path
 def target_trial(
     program: Program, every: Sequence[Vectors], folder: Path, target: Target, scratch: Path
 ) -> Trial:
-    """Return how the exported ECU does on another processor, as the emulator runs it.
+    """Return the result of the exported ECU on another processor, run by the emulator.
 
     Raises
     ------
@@ -255,7 +255,7 @@ def target_trial(
 def _sizes(
     program: Program, objects: Sequence[str], target: Target, scratch: Path
 ) -> tuple[int, int]:
-    """Return read-only and other memory of the ECU, with what its compiler's library brings."""
+    """Return read-only and other memory of the ECU, including its compiler's library."""
     parts = scratch / "parts.elf"
     steps = [f"-Wl,-u,{step.name}" for step in program.steps]
     _call(

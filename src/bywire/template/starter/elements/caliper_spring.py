@@ -11,14 +11,14 @@ from bywire.core import ops
 
 
 class Parameters(ParameterSet):
-    """A curve without hysteresis: what pads and housing lose is left out."""
+    """A curve without hysteresis: losses in pads and housing are neglected."""
 
     x_gap: Annotated[float, Unit("m", 2e-4), Field(ge=0, allow_inf_nan=False)]
     """travel across the clearance"""
     k: Stiffness
-    """stiffness where the pads touch"""
+    """stiffness at first contact"""
     x_stiff: Annotated[float, Unit("m", 1e-3), Field(gt=0, allow_inf_nan=False)]
-    """compression at which the secant stiffness has doubled"""
+    """compression that doubles the secant stiffness"""
 
 
 class Input(NamedTuple):
@@ -29,7 +29,7 @@ class Input(NamedTuple):
 
 
 class InputRate(NamedTuple):
-    """Derivative of what the stored energy depends on."""
+    """Derivative of the stored energy's argument."""
 
     x: Annotated[float, Signal("m/s", "velocity", 5e-3)]
 
@@ -41,7 +41,7 @@ def output(u: Input, par: Parameters) -> Annotated[float, Signal("N", "clamp for
 
 
 def input_rate(u: Input) -> InputRate:
-    """Return how the travel moves."""
+    """Return the rate of the travel."""
     return InputRate(x=u.v)
 
 
@@ -52,5 +52,5 @@ def energy(u: Input, par: Parameters) -> Energy:
 
 
 def power_in(u: Input, par: Parameters) -> Power:
-    """Return the work that goes into the caliper."""
+    """Return the power into the caliper."""
     return output(u, par) * u.v

@@ -26,10 +26,10 @@ Loss = Annotated[float, Signal("W", "viscous loss", role=Role("sink", "viscous f
 
 
 class Parameters(ParameterSet):
-    """Stiff: no backlash, no windup. Friction is the same in both directions."""
+    """A stiff spindle without backlash or windup; friction is the same in both directions."""
 
     J: Inertia
-    """inertia of all that turns, at the rotor"""
+    """inertia of all rotating parts, at the rotor"""
     r: GearRatio
     """travel of the nut per angle of the rotor"""
     d: RotaryDamping
@@ -55,7 +55,7 @@ class Factors(NamedTuple):
 
 
 class Balance(NamedTuple):
-    """What drives angle and speed."""
+    """Right-hand sides of angle and speed."""
 
     theta: Speed
     omega: signals.Torque
@@ -89,12 +89,12 @@ def balance(x: State, u: Input, par: Parameters) -> Balance:
 
 
 def output(x: State, par: Parameters) -> Output:
-    """Return how far and how fast the nut moves."""
+    """Return travel and velocity of the nut."""
     return Output(x=par.r * x.theta, v=par.r * x.omega)
 
 
 def dry_friction(u: Input, par: Parameters) -> Annotated[float, Signal("N*m", "dry friction", 0.1)]:
-    """Return what the dry friction can hold, and what it takes while sliding."""
+    """Return the magnitude of the dry friction, at rest its limit."""
     return par.T_0 + par.c_F * u.force
 
 
@@ -104,10 +104,10 @@ def energy(x: State, par: Parameters) -> Energy:
 
 
 def power_in(x: State, u: Input, par: Parameters) -> Power:
-    """Return the motor's power less what goes into the caliper."""
+    """Return the motor's power minus the power into the caliper."""
     return (u.torque - par.r * u.force) * x.omega
 
 
 def power_loss(x: State, par: Parameters) -> Loss:
-    """Return what viscous friction takes, >= 0."""
+    """Return the power lost in viscous friction, >= 0."""
     return par.d * x.omega * x.omega

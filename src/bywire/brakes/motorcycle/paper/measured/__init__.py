@@ -1,1 +1,1 @@
-"""What Dardanelli et al. (2010) measured, and the parameters that explain it best."""
+"""Measurements of Dardanelli et al. (2010), and the parameters that explain them best."""

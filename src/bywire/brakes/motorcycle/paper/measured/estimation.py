@@ -1,4 +1,4 @@
-"""All free parameters from all statements at once: unknowns, misfit, search, uncertainty."""
+"""All free parameters from all statements together: unknowns, misfit, search, uncertainty."""
 
 from __future__ import annotations
 
@@ -43,11 +43,13 @@ class _Free:
 
 FREE: Mapping[str, _Free] = {
     "master_cylinder.A_mc": _Free(0.4e-4, 3e-4, "bores of 7 to 20 mm"),
-    "gear.eta_g": _Free(0.5, 1.0, "ball screw and gear; no machine gives more than it takes"),
+    "gear.eta_g": _Free(0.5, 1.0, "ball screw and gear; no machine returns more than its input"),
     "gear.J_mot": _Free(2e-6, 2e-4, "a motor of 20 to 80 mm"),
     "master_cylinder.k_damp": _Free(0.0, 2e5, "none to ten times Table 1"),
     "caliper.K_pd": _Free(1e5, 1e7, _TENFOLD),
-    "fluid.V_air": _Free(0.0, 6e-7, "none to what the nominal position leaves room for", 1e-7),
+    "fluid.V_air": _Free(
+        0.0, 6e-7, "none to the largest volume that fits the nominal position", 1e-7
+    ),
     "pipeline.d_pl": _Free(4e-3, 16e-3, "half to twice Table 1"),
     "master_cylinder.s_mc": _Free(15.5e-3, 60e-3, "beyond the end stop; three times our choice"),
     "seal.T_pr": _Free(0.0, 3e-2, "none to Fig. 4's torque at low pressure"),
@@ -66,7 +68,7 @@ TIED: Mapping[str, str] = {
     "ecu.est_par.f_cfr_p": "seal.f_cfr_p",
     "ecu.est_par.k_brk_p": "seal.k_brk_p",
 }
-"""the friction that the ECU assumes when it sets the dither, and the parameter it is equal to"""
+"""friction that the ECU assumes for the dither, and the parameter with the same value"""
 
 HELD: Mapping[str, str] = {
     "gear.k_g": "acts only through A_mc k_g, k_damp k_g^2 and the chamber's volume, which A_mc, "
@@ -146,15 +148,15 @@ def brake(values: Mapping[str, float]) -> Par:
 # --- The misfit
 
 LOSS: Loss = "soft_l1"
-"""weight of large residuals: the statements contradict each other, and with squares the one that is
-furthest off would decide"""
+"""weight of large residuals: the statements contradict each other, and with squares the largest
+residual would dominate"""
 _STEP = 0.01
-"""step of the differences as a share of an unknown's scale: larger steps see the curvature of the
-gain, smaller ones the roughness of stick and slip"""
+"""step of the differences as a share of an unknown's scale: larger steps add the curvature of the
+gain, smaller ones the roughness of stick-slip"""
 _PARTS = tuple(Part(s.name, "", 1, s.fact.unit, s.tolerance) for s in STATEMENTS)
 """one part per residual"""
 
-_RESOLVED = 1e-4  # of the misfit: less is the roughness that stick and slip leave
+_RESOLVED = 1e-4  # of the misfit: smaller changes are roughness from stick-slip
 
 
 def predicted(brakes: Sequence[Par]) -> list[dict[str, float]]:
@@ -193,7 +195,7 @@ def problem(free: tuple[Unknown, ...] | None = None) -> Problem:
         Unknowns; all of them by default.
     """
     free = unknowns() if free is None else free
-    last: dict[bytes, tuple[Array, Array]] = {}  # a parameter that is held costs no further runs
+    last: dict[bytes, tuple[Array, Array]] = {}  # a fixed parameter needs no further runs
 
     def evaluate(values: Array) -> tuple[Array, Array]:
         if (key := values.tobytes()) not in last:
@@ -207,7 +209,7 @@ def problem(free: tuple[Unknown, ...] | None = None) -> Problem:
             r, lower, upper, ends = _around(free, values)
         except (
             ParameterError
-        ) as error:  # a trial step that was too long: the search takes a shorter one
+        ) as error:  # the trial step was too long: the search takes a shorter one
             raise SolverError(str(error)) from error
         return r, slopes(values, r, lower, upper, ends)
 
@@ -250,7 +252,7 @@ def _named(free: Sequence[Unknown], values: Array) -> Mapping[str, float]:
 
 
 def misfit(r: Array) -> float:
-    """Return the cost that is minimized: half the sum of the losses of residuals in tolerances."""
+    """Return the cost of the fit: half the sum of the losses of residuals in tolerances."""
     return 0.5 * float(rho(r**2, LOSS)[0].sum())
 
 
@@ -262,13 +264,13 @@ def _sized(values: Array) -> tuple[Unknown, ...]:
     )
 
 
-# --- What the statements determine of a brake that is taken for the best one
+# --- Uncertainty of a brake that is assumed to be the best
 
 
 def appraised(par: Par) -> Appraisal:
-    """Return the uncertainty of a brake's free parameters, taken for the minimum of the misfit.
+    """Return the uncertainty of a brake's free parameters, assumed to be the misfit's minimum.
 
-    Parameters that the statements do not determine count as held at their values.
+    Parameters that the statements do not determine count as fixed at their values.
 
     Raises
     ------
@@ -319,22 +321,22 @@ class Appraisal:
         return misfit(self.residuals)
 
     def gain(self) -> float:
-        """Return the largest share of the misfit that a step of 1 % in one parameter would save.
+        """Return the misfit's largest relative reduction by a step of 1 % in one parameter.
 
-        At a minimum only the roughness from stick and slip is left of it.
+        At a minimum only the roughness from stick-slip remains.
         """
         misfits = [misfit(r) for side in self.beside for r in side]
         return 1.0 - float(np.nanmin(misfits)) / self.misfit
 
     def deciding_statements(self, name: str, most: int = 3) -> tuple[str, ...]:
-        """Return the statements whose shift by their tolerance moves a parameter most.
+        """Return the statements whose shift by one tolerance moves a parameter most.
 
         Parameters
         ----------
         name
             Name of the parameter.
         most
-            Largest number of statements; those with less than a third of the first are left out.
+            Largest number of statements; omits those with less than a third of the first.
         """
         _, steep = influence(self.residuals, LOSS)
         weighed = self.jacobian * steep[:, None]
@@ -349,7 +351,7 @@ class Appraisal:
 _SPREAD = 0.3
 """largest distance of the other starts from Table 1, as a share of it"""
 
-_ROUNDS = 6  # of holding and searching: two were enough
+_ROUNDS = 6  # of fixing parameters and searching: two were enough
 
 
 def estimated(
@@ -357,10 +359,10 @@ def estimated(
 ) -> Estimate:
     """Return the free parameters that explain the statements best.
 
-    From the end of the best start, the parameter that is determined least returns to Table 1, and
-    the search goes on without it, until all others are determined. Then one search with all
-    parameters free follows, and `settled`. Parameters that the statements do not determine stay at
-    Table 1 and are listed with the reason.
+    From the end of the best start, the least determined parameter returns to Table 1. The search
+    continues without it until the data determine all others. Then a search with all parameters
+    free follows, and `settled`. Parameters that the statements do not determine stay at Table 1;
+    the result lists them with the reason.
 
     Parameters
     ----------
@@ -389,15 +391,15 @@ def estimated(
     table1 = {u.name: u.start for u in unknowns()}
     values = table1 | dict(zip(first.names, first.values.tolist(), strict=True))
     best = settled(_searched(np.array([values[name] for name in table1]), ())).estimate
-    return best.noted((f"{led.reached} of {starts} starts met the lowest minimum",))
+    return best.noted((f"{led.reached} of {starts} starts reached the lowest minimum",))
 
 
 def settled(values: Array) -> Appraisal:
-    """Return the minimum near by with all parameters at Table 1 that it does not determine.
+    """Return the nearby minimum whose undetermined parameters are at Table 1.
 
     Which parameters the statements determine depends on the brake. So the undetermined ones return
-    to Table 1, the others are searched again, and this repeats until the undetermined parameters of
-    the minimum are those that were held. If that never happens, the lowest minimum counts.
+    to Table 1, and the search repeats for the others, until the undetermined parameters of the
+    minimum are the fixed ones. If that never happens, the lowest minimum counts.
 
     Parameters
     ----------
@@ -423,7 +425,7 @@ def settled(values: Array) -> Appraisal:
 
 
 def _searched(values: Array, held: tuple[int, ...]) -> Array:
-    """Return the minimum near by with the unknowns of some indices at Table 1."""
+    """Return the nearby minimum with the unknowns of some indices fixed at Table 1."""
     table1 = np.array([u.start for u in unknowns()])
     free = np.setdiff1d(np.arange(values.size), held)
     begin = np.where(np.isin(np.arange(values.size), held), table1, values)

@@ -1,6 +1,6 @@
 """Measured statements of the paper with tolerances, and their counterparts in simulation.
 
-Table 1 and Table 2 are theory and data sheets, and are not among them.
+Table 1 and Table 2 are theory and data sheets, so they do not count.
 """
 
 from __future__ import annotations
@@ -95,7 +95,7 @@ def _table4(region: str) -> Iterator[Statement]:
         "%",
         f"{where}, eq. (22)",
         tolerance=ALLOWANCES["overshoot"],
-        note="highest point of the step over its end after 4 s: the effect of "
+        note="highest point of the step minus its value after 4 s: the effect of "
         "the slow pair, whose zero and pole have no counterpart",
     )
     yield Statement(f"table4.{region}.overshoot", overshoot)
@@ -107,7 +107,7 @@ def _statements() -> Iterator[Statement]:
     for name, fact in FACTS.table("table3").items():
         digit = _FILE.allowances[name]
         yield Statement(f"table3.{name}", replace(fact, tolerance=digit, note="the parameter"))
-    ratio = "area of the loop with dither over that without, averaged over a dither period"
+    ratio = "area of the loop with dither over the area without, averaged over a dither period"
     error = "mean of the last 0.24 s of hard braking minus 37 bar"
     read = _FILE.facts
     for name, fact in (
@@ -131,7 +131,7 @@ def allowances() -> tuple[Allowance, ...]:
 
 
 # --- Counterparts, computed for many brakes at once
-# The converter counts as ideal, so that what is computed changes smoothly with the parameters.
+# An ideal converter makes the computed values change smoothly with the parameters.
 
 Par = MotorcycleParameters
 
@@ -141,10 +141,10 @@ _AMPLITUDE = 0.1
 """of the sines [A]"""
 
 _BAR, _SUBSTEP = 1e5, 20e-6
-_SETTLE, _ROUNDS, _AWAY = 3.0, 3, 1.15  # s; corrections of the current; where they begin
-_WINDOW, _AFTER, _LATE = 2.0, 4.0, 0.6  # s: of a sine, of a step, over which levels are means
-_FIRST, _SECOND = 1.0, 10.0  # Hz: where the search for T1 and T2 begins
-_END = 0.24  # s: over which the end of hard braking is taken
+_SETTLE, _ROUNDS, _AWAY = 3.0, 3, 1.15  # s; corrections of the current; their start
+_WINDOW, _AFTER, _LATE = 2.0, 4.0, 0.6  # s: of a sine, of a step, and for the means of levels
+_FIRST, _SECOND = 1.0, 10.0  # Hz: start of the search for T1 and T2
+_END = 0.24  # s: window for the end of hard braking
 
 
 def computed(brakes: Sequence[Par]) -> list[dict[str, float]]:
@@ -153,7 +153,7 @@ def computed(brakes: Sequence[Par]) -> list[dict[str, float]]:
     Parameters
     ----------
     brakes
-        Parameter sets of one structure: they may differ in numbers alone.
+        Parameter sets of one structure: they may differ only in numbers.
 
     Raises
     ------
@@ -200,7 +200,7 @@ def _driven(
 def _settled(brakes: Sequence[Par], p: float) -> list[float]:
     """Return the equilibria [Pa] without friction whose currents let each brake settle at p.
 
-    A fixed number of corrections, unlike ``settled_start``: what follows is smooth.
+    A fixed number of corrections, unlike ``settled_start``, keeps the result smooth.
     """
     starts = np.full(len(brakes), _AWAY * p)
     for _ in range(_ROUNDS):
@@ -257,7 +257,7 @@ def _region(brakes: Sequence[Par], name: str) -> list[dict[str, float]]:
 
 
 def overshoots(par: Par, name: str, heights: Sequence[float]) -> list[float]:
-    """Return by how much steps of the current [A] in a region overshoot their ends [bar]."""
+    """Return the overshoot [bar] of current steps [A] in a region, above the final value."""
     ideal, p = par.replace({"adc.law": "ideal"}), REGIONS[name]
     (start,) = _settled([ideal], p)
     i = holding_current(start, ideal)
@@ -287,9 +287,9 @@ def _line(sine: Trajectory, f: float) -> complex:
 
 
 def _time_constants(K: float, lines: Complex) -> tuple[float, float]:
-    """Return T1 and T2 of eq. (21) [s] by magnitude and phase at the sines, the gain given.
+    """Return T1 and T2 of eq. (21) [s] from magnitude and phase at the sines, for a known gain.
 
-    The paper's second step: the gain is the step's.
+    This is the paper's second step; the gain comes from the step response.
     """
     slow, fast = (1.0 / (2.0 * math.pi * f) for f in (_FIRST, _SECOND))
     log_gain = np.log(np.abs(lines)) + 1j * np.unwrap(np.angle(lines))
@@ -340,7 +340,7 @@ def _runs(cases: Iterable[Case], signals: Sequence[str]) -> Sequence[Trajectory]
 
 
 def _low_passed(run: Trajectory, f: float) -> Array:
-    """Return the measured current behind the first-order low-pass of Fig. 5."""
+    """Return the measured current after the first-order low-pass of Fig. 5."""
     return low_passed(run["i_meas"], f, float(run.time[1] - run.time[0]))
 
 
