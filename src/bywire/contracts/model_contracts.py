@@ -439,7 +439,7 @@ def _orders(trial: Trial, frictions: bool, wanted: float) -> Iterator[Evidence]:
             how = "with" if frictions else "without"
             text = (
                 f"{name} converges with order {order:.2f} +- {doubt:.2f} in the substep {how} dry "
-                f"friction, wanted is {wanted:g}"
+                f"friction, but it must be {wanted:g}"
             )
             place = trial.place("balance", "wire")
             yield measured(max(wanted - order - doubt, 0.0), SHORTFALL, text, place)

@@ -19,7 +19,7 @@ from bywire.simulation.stages import STATE, Stages, indented, leaf_namer, statem
 
 # The same as ``scheme.project_exact``, which explains it, but as a loop: a tenth of the code.
 PROJECTION = """
-// Solve S w = b of the rows that move, by elimination on the diagonal; where none does, nothing.
+// Solve S w = b for the moving rows, by elimination on the diagonal; nothing if no row moves.
 static inline void with_signs(const double *S, const double *c, const double *low,
     const double *high, const int *sign, double *w) {
   double A[SETS][SETS], b[SETS], inverse[SETS];
@@ -47,7 +47,7 @@ static inline void with_signs(const double *S, const double *c, const double *lo
   }
 }
 
-// By how much velocities miss the conditions, as a share of what their rows add up.
+// Return the violation of the conditions by velocities, relative to the sums of their rows.
 static inline double misfit(const double *S, const double *c, const double *low,
     const double *high, const double *w) {
   double total = 0.0;
@@ -66,10 +66,10 @@ static inline double misfit(const double *S, const double *c, const double *low,
   return total;
 }
 
-enum { GUESSES = 4 }; // a row's sign follows from the others' velocities, so often at most
+enum { GUESSES = 4 }; // largest number of updates of the signs from the other rows' velocities
 
-// Take signs that rows give each other in turn, if they fit; else try every combination, and take
-// the one that fits best. Return whether it fails.
+// Iterate on the signs of the rows, and accept them if they fit. Otherwise try every combination,
+// and take the one that fits best. Return whether it fails.
 static APART int project(const double *posed, double *w, double *force) {
   const double *S = posed, *c = S + SETS * SETS, *low = c + SETS, *high = low + SETS;
   double best = NEVER, tried[SETS];
@@ -132,11 +132,11 @@ static APART int settle(const double *c, double h, const double *m, const double
   return 1;
 }
 
-// Where a substep was cut: length of each part but the last, and which velocity is zero at its end;
-// and how many parts were tried.
+// Cuts of a substep: length of each part except the last, index of the velocity that is zero at its
+// end, and number of tried parts.
 typedef struct { int count, which[CUTS], tries; double length[CUTS]; } cuts;
 
-// Which velocity is the first to change its sign within a part, -1 if none does, and when.
+// Return the first velocity to change its sign within a part, -1 if none does, and the instant.
 static inline int first_turn(const double *x, const double *o, double *share) {
   int first = -1;
   *share = 1.0;
@@ -150,15 +150,15 @@ static inline int first_turn(const double *x, const double *o, double *share) {
   return first;
 }
 
-// A part of length t; last: half increments of a whole substep h, from which it is predicted.
+// Compute a part of length t; last: half increments of a whole substep h, for its prediction.
 static inline int part(const double *c, double h, double t, const double *m, const double *x,
     const double *last, double *d, double *o) {
   for (int k = 0; k < NX; ++k) d[k] = last[k] * (t / h);
   return settle(c, t, m, x, d, o);
 }
 
-// Where a velocity that goes from v to w within a part of length t is zero, on the parabola that
-// has the mean slope before over an earlier length h, too.
+// Return the zero of a velocity that changes from v to w within a part of length t, on the parabola
+// that also has the mean slope before over an earlier length h.
 static inline double zero_of(double v, double w, double t, double before, double h) {
   const double mean = (w - v) / t, linear = -v / mean;
   const double bend = before != 0.0 ? 2.0 * (mean - before) / (t + h) : 0.0;
@@ -179,13 +179,13 @@ static APART int locate(const double *c, double h, double *t, const double *m, c
   double P = 0.0, at_P = x[turns], Q = *t, at_Q = o[turns];
   double N = zero_of(at_P, at_Q, Q, 2.0 * last[turns] / h, h);
   double change = fabs(at_P - at_Q), before = 0.0, was[RESULTS];
-  for (int n = 1;; ++n) { // what is left of the last attempt is of the length that is returned
+  for (int n = 1;; ++n) { // the last attempt has the returned length
     N = fmin(fmax(N, first), final);
     *failed = part(c, h, N, m, x, last, d, o);
     ++*tries;
     if (known && o[JUMP + which] == 0.0) return -1;
     const int other = VELOCITIES > 1 ? first_turn(x, o, &share) : -1;
-    if (other >= 0 && other != which && n < ATTEMPTS) { // another one is earlier
+    if (other >= 0 && other != which && n < ATTEMPTS) { // another velocity is earlier
       which = other, turns = velocity[which];
       low = 0.0, high = N;
       P = 0.0, at_P = x[turns], Q = N, at_Q = o[turns], N = N * share;
@@ -200,7 +200,7 @@ static APART int locate(const double *c, double h, double *t, const double *m, c
         - (at_Q - at_P) / (Q - P);
     const double next = N - at_N / slope;
     const int is_near = fabs(at_N) <= NEAR * change && next > first && next < final;
-    if (is_near && before > 0.0) { // the rest on the line through two attempts
+    if (is_near && before > 0.0) { // continue on the line through two attempts
       const double share = (next - N) / (N - before);
 #ifdef TURNS // lanes: where compilers know what that means
       #pragma omp simd
@@ -218,26 +218,26 @@ static APART int locate(const double *c, double h, double *t, const double *m, c
   return which;
 }
 
-// Half the increment behind a zero of what had a before it: less by the jump of friction, which
-// opposes the other direction, and nothing where it holds.
+// Return half the increment after a zero, from a before it: reduced by the jump of friction, which
+// opposes the other direction, and zero if friction holds.
 static inline double turned_back(double a, double j) {
   return copysign(fmax(fabs(a) - j, 0.0), a);
 }
 
-// At the end of a part of length t of a substep h that was cut, from speeds x: what is zero there
-// in o, and last, half increments from which the next part is predicted.
+// End a part of length t of a cut substep h, from speeds x: set zero velocities in o, and last, the
+// half increments for the prediction of the next part.
 static inline void rest(const double *x, int which, double t, double h, double *o, double *last) {
   for (int k = 0; k < NX; ++k) last[k] = o[NX + k] * (h / t);
   for (int k = 0; k < VELOCITIES; ++k) {
-    const int v = velocity[k]; // bodies that are alike stop at once
+    const int v = velocity[k]; // equal bodies stop at the same instant
     if (k != which && fabs(o[v]) >= STILL * fabs(x[v])) continue;
     o[v] = 0.0;
     last[v] = turned_back(last[v], o[JUMP + k] * (h / t));
   }
 }
 
-// A substep, repeated until it settles, and cut where velocities pass zero. known: o holds
-// velocities of the whole substep, which has settled, from an ordinary pass.
+// Compute a substep, repeated until it settles, and cut at zeros of velocities. known: o contains
+// velocities of the whole settled substep, from an ordinary pass.
 static APART int located(const double *c, double h, const double *m, const double *x,
     const double *d, int known, double *o, cuts *made) {
   double at[NX], last[NX], guess[NX], sum[FLOWS + 1], left = h, share;
@@ -251,7 +251,7 @@ static APART int located(const double *c, double h, const double *m, const doubl
     if (!known) failed = part(c, h, left, m, at, last, guess, o), ++made->tries;
     const int turns = first_turn(at, o, &share) >= 0;
     if (!turns && !known) break;
-    if (made->count == CUTS) { // there is no end to it
+    if (made->count == CUTS) { // too many cuts
       for (int k = 0; k < VELOCITIES; ++k)
         if (at[velocity[k]] * o[velocity[k]] * o[JUMP + k] < 0.0) o[velocity[k]] = 0.0;
       failed = 1;
@@ -259,7 +259,7 @@ static APART int located(const double *c, double h, const double *m, const doubl
     }
     double t = left;
     const int which = turns ? locate(c, h, &t, m, at, last, known, o, &failed, &made->tries) : -1;
-    if (which < 0) { // then once more, knowing nothing
+    if (which < 0) { // then again, without known velocities
       --made->count;
       continue;
     }

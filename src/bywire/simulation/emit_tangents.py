@@ -28,7 +28,7 @@ from bywire.simulation.stages import (
 )
 
 _LOCATED = """
-// What a part of length t gives, and its tangents along parameters, start and length, in lanes.
+// Compute a part of length t with tangents along parameters, start and length, in lanes.
 static APART void part_tangents(int lanes, const double *p, const double *c, double t,
     const double *m, const double *x, const double *d, const double *sp, const double *sm,
     const double *sx, const double *sd, const double *st, double *o, double *o_t) {
@@ -46,8 +46,8 @@ static APART void part_tangents(int lanes, const double *p, const double *c, dou
   }
 }
 
-// At the end of a part of length t: its flows join the sum of the substep h, its increments and how
-// they jump, become those of the whole.
+// End a part of length t: add its flows to the sum of the substep h, and scale its increments and
+// their jumps to the whole substep.
 static inline void part_ends(double t, double h, const double *moved, const double *end,
     double *o_t, double *sum) {
   for (int k = 0; k < FLOWS * L; ++k)
@@ -81,7 +81,7 @@ static APART int located_tangents(const double *p, const double *c, double h, co
     for (int k = 0; k < NX; ++k) guess[k] = last[k] * (t / h);
     for (int k = 0; k < NX * L; ++k) guess_t[k] = last_t[k] * (t / h);
     part_tangents(L, p, c, t, m, at, guess, sp, sm, at_t, guess_t, none, end, o_t);
-    // Along the length in a lane of its own, which says how far it moves in every other.
+    // A separate lane along the length gives the change of the length in all other lanes.
     for (int k = 0; k < NX; ++k) guess_t[k * L] = last[k] / h;
     part_tangents(1, p, c, t, m, at, guess, none, none, none, guess_t, one, end, by);
     for (int l = 0; l < L; ++l) moved[l] = -o_t[turns * L + l] / by[turns * L];
@@ -101,7 +101,7 @@ static APART int located_tangents(const double *p, const double *c, double h, co
     }
     left -= t;
   }
-  // The last part is what is left, and with it its tangents.
+  // The last part is the remainder, with its tangents.
   for (int k = 0; k < NX; ++k) guess[k] = last[k] * (left / h);
   for (int k = 0; k < NX * L; ++k)
     guess_t[k] = last_t[k] * (left / h) + last[k / L] / h * gone[k % L];

@@ -106,7 +106,9 @@ def test_what_is_not_defined_is_nan_with_a_reason():
     assert_undefined(figures(np.append(lag, 1.0), twice)["rise_time"], "times do not increase")
     assert_undefined(figures(0.5 + lag, T)["dead_time"], "already at 50 %")
     assert_undefined(figures(lag, T, window=(7.0, 8.0))["ripple"], "contains fewer than 2 samples")
-    assert_undefined(figures(lag, T, end=None, window=(7.0, 8.0))["rise_time"], "fewer than 2 samples")
+    assert_undefined(
+        figures(lag, T, end=None, window=(7.0, 8.0))["rise_time"], "fewer than 2 samples"
+    )
     assert_undefined(figures(lag, T, t_step=3.0)["rise_time"], "outside 0 to 3 s")
     assert_undefined(figures(lag[:1], T[:1])["rise_time"], "too few")
     lag[7] = math.nan
