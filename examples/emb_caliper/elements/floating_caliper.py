@@ -58,8 +58,8 @@ class Parameters(ParameterSet):
         slope = self.k_1 + (2.0 * self.k_2 + 3.0 * self.k_3 * self.n_max) * self.n_max
         if not slope > 0.0:
             raise ValueError(
-                f"the force must rise up to n_max = {self.n_max:g} m, where its slope is "
-                f"{slope:.3g} N/m: lower n_max or raise k_3 = {self.k_3:g} N/m**3"
+                f"the force must increase up to n_max = {self.n_max:g} m, where its slope is "
+                f"{slope:.3g} N/m: reduce n_max or increase k_3 = {self.k_3:g} N/m**3"
             )
         return self
 
