@@ -139,7 +139,7 @@ def test_the_example_says_what_noise_does_to_its_first_step(
     said = capsys.readouterr().out
     assert "J: noise biases inverse dynamics" in said
     assert "does not explain" not in said
-    assert "angle left over: 0.003 rad" in said
+    assert "residual angle: 0.003 rad" in said
 
 
 def test_with_instruments_both_criteria_agree(axis: ModuleType) -> None:
