@@ -1,7 +1,7 @@
 """A hydraulic brake of your own in one file: motor, gear, rack, master cylinder, caliper.
 
-Every element but the brake itself comes from `bywire.plant`. The tutorial
-"A hydraulic brake of your own" goes through this file from top to bottom.
+All elements come from `bywire.plant`; only the brake itself is new. The tutorial
+"A hydraulic brake of your own" explains this file from top to bottom.
 """
 
 from typing import Annotated, NamedTuple
@@ -48,7 +48,7 @@ VoltagePerPressureTime = Annotated[float, Unit("V/(Pa*s)", 1e-5), Field(ge=0, al
 
 
 class Control(ParameterSet):
-    """Pressure control by the motor's voltage, PI with anti-wind-up."""
+    """Pressure control by the motor's voltage, PI with anti-windup."""
 
     k_p: VoltagePerPressure
     """proportional gain"""
@@ -61,7 +61,7 @@ class Control(ParameterSet):
 
 
 class Parameters(ParameterSet):
-    """Those of the elements, and those of the controller."""
+    """Parameters of the elements and the controller."""
 
     motor: dc_motor.Parameters
     shaft: shaft.Parameters
@@ -77,13 +77,13 @@ class Parameters(ParameterSet):
 
 
 class Stimulus(NamedTuple):
-    """What acts from outside."""
+    """External inputs."""
 
     p_set: Annotated[float, Signal("Pa", "pressure demand", 3e6)]
 
 
 class Memory(NamedTuple):
-    """What the controller holds between its ticks."""
+    """Memory of the controller between its ticks."""
 
     v: Annotated[float, Signal("V", "motor voltage", 5.0), Limited("control.v_max")]
     v_i: Annotated[float, Signal("V", "integral part", 5.0)]
@@ -91,7 +91,7 @@ class Memory(NamedTuple):
 
 
 def control(x, m, u, par):
-    """Run the pressure control once; the integral waits while the voltage is limited."""
+    """Run the pressure control once; the integral stops while the voltage is limited."""
     c = par.control
     error = u.p_set - x.p_mc
     wanted = c.k_p * error + m.v_i
@@ -104,7 +104,7 @@ def control(x, m, u, par):
 
 
 class HydraulicBrake(Assembly[Parameters, Memory]):
-    """One dry friction at the motor shaft: of the gears and of the cup seal."""
+    """A brake with one dry friction at the motor shaft, from the gears and the cup seal."""
 
     name = "hydraulic-brake"
     Memory, Stimulus = Memory, Stimulus
@@ -127,7 +127,7 @@ class HydraulicBrake(Assembly[Parameters, Memory]):
     load = Wire("N", "load on the piston", 1e3)
 
     def wire(self, w):
-        """Say what every part feels, from the line back to the motor."""
+        """Connect the parts, from the line back to the motor."""
         carrier = planetary_gear.output(
             planetary_gear.Input(w.shaft.x.theta, w.shaft.x.omega, 0.0), w.gear.par
         )
@@ -150,7 +150,7 @@ class HydraulicBrake(Assembly[Parameters, Memory]):
         w.shaft.u = shaft.Input(torque - sun.load, 0.0)
 
     def friction(self, w):
-        """Return the dry friction at the shaft, forward and backward; at rest all between."""
+        """Return the limits of the dry friction at the shaft; at rest it is between them."""
         per_force = w.rack.par.r_p / planetary_gear.ratio(w.gear.par)
         gears = planetary_gear.friction(w.gear.u, w.gear.par)
         gears = gears + rack.friction(w.rack.u, w.rack.par) / planetary_gear.ratio(w.gear.par)
@@ -158,7 +158,7 @@ class HydraulicBrake(Assembly[Parameters, Memory]):
         return ((-gears - per_force * seal.F_p, gears + per_force * seal.F_n),)
 
     def power(self, w):
-        """Return the powers that no part gives: what the supply gives, what the friction takes."""
+        """Return the powers that do not follow from the parts: supply and friction."""
         return {
             "E_source": w.m.v * w.motor.x.i,
             "E_friction": -w.reaction[0] * w.shaft.x.omega,
@@ -180,11 +180,11 @@ def travel_per_angle(par):
 
 
 def held(par, p):
-    """Return state and memory in which the motor alone holds a pressure [Pa]."""
+    """Return the state and memory with which the motor alone holds a pressure [Pa]."""
     cylinder, pads, fluid = par.master_cylinder, par.caliper, par.fluid
     taken = p * pads.A_pd**2 / pads.K_pd  # volume in the caliper
     chamber = cylinder.A_mc * (cylinder.s_mc - cylinder.x_rest)
-    # The rest of the stroke compresses what stands in the chamber.
+    # The remaining stroke compresses the fluid in the chamber.
     stroke = (taken + chamber * (1.0 - ops.exp(-p / fluid.beta))) / cylinder.A_mc
     theta = (cylinder.x_rest + stroke) / travel_per_angle(par)
     i = p * cylinder.A_mc * travel_per_angle(par) / par.motor.K_e
@@ -236,7 +236,7 @@ _NUMBERS = {
     "rack.eta": chosen(0.94, "straight teeth"),
     "seal.F_pr": chosen(15.0, "two cups on a bore of 19 mm"),
     "seal.f_p": chosen(6e-6, "2 % of the piston's load"),
-    "seal.f_n": chosen(6e-6, "the same both ways"),
+    "seal.f_n": chosen(6e-6, "the same in both directions"),
     "seal.k_brk": chosen(1.5, "elastomer, greased"),
     "seal.v_S": chosen(5e-4, "elastomer, greased"),
     "seal.mu": chosen(50.0, "elastomer, greased"),
@@ -254,7 +254,7 @@ _NUMBERS = {
     "master_cylinder.x_nominal": chosen(5e-3, "travel at 30 bar"),
     "master_cylinder.k_damp": chosen(200.0, "guides"),
     "stop.k_stop": chosen(2e7, "steel on steel"),
-    "stop.tau_stop": chosen(1e-4, "a stop without rebound of note"),
+    "stop.tau_stop": chosen(1e-4, "a stop without noticeable rebound"),
     "pipeline.d_pl": chosen(3.2e-3, "hose of a motorcycle"),
     "pipeline.L_pl": chosen(0.8, "hose of a motorcycle"),
     "pipeline.k_lf": chosen(8.0, "Hagen-Poiseuille"),
@@ -267,11 +267,11 @@ _NUMBERS = {
     "caliper.leak": chosen("tight", "a fault, off"),
     "caliper.G_leak": chosen(0.0, "a fault, off"),
     "caliper.fluid_heat": chosen("off", "a fault, off"),
-    "caliper.V_hot": chosen(5e-6, "what a caliper of this size holds"),
+    "caliper.V_hot": chosen(5e-6, "volume of a caliper of this size"),
     "caliper.alpha_V": chosen(7e-4, "glycol ethers"),
     "caliper.T_rate": chosen(0.0, "a fault, off"),
-    "control.k_p": chosen(2e-6, "by hand, to be designed"),
-    "control.k_i": chosen(2e-5, "by hand, to be designed"),
+    "control.k_p": chosen(2e-6, "set by hand, to be designed"),
+    "control.k_i": chosen(2e-5, "set by hand, to be designed"),
     "control.v_max": chosen(12.0, "battery"),
     "control.T_s": chosen(1e-3, "1 kHz"),
 }
@@ -279,7 +279,7 @@ SET = CitedSet(
     "hydraulic-1",
     "hydraulic-brake",
     "our own layout",
-    "a hydraulic brake laid out by hand",
+    "a hydraulic brake designed by hand",
     Parameters,
     _NUMBERS,
 )

@@ -1,8 +1,8 @@
 """Identify your own servo axis: measured angle and motor voltage in, parameters out.
 
-An inertia with dry and viscous friction that differ by direction, and an offset of the drive.
-Here a simulation under closed-loop control stands in for the bench; with the name of a file,
-`identify_servo_axis.py axis.csv`, your own measurement is identified.
+The axis is an inertia with dry and viscous friction that differ by direction, and an offset of
+the drive. A simulation under closed-loop control replaces the bench. To identify your own
+measurement, give its file: `identify_servo_axis.py axis.csv`.
 """
 
 import sys
@@ -41,7 +41,7 @@ Volt = Annotated[float, Unit("V")]
 
 
 class Axis(ParameterSet):
-    """All in volts at the motor: divided by the torque per volt."""
+    """Parameters in volts at the motor: torques divided by the torque per volt."""
 
     J: Annotated[float, Unit("V*s**2/rad", 0.01)]
     d_p: Annotated[float, Unit("V*s/rad", 0.05)]
@@ -79,11 +79,11 @@ class ServoAxis(Driven):
 
 
 TRUTH = Axis(J=0.02, d_p=0.05, d_n=0.07, T_p=0.6, T_n=0.4, offset=0.1, T_s=1e-3)
-# Motion shows T_p + offset and T_n - offset, never all three: ask for them, and you are told so.
-# The drive's offset is known from its data sheet.
+# Motion determines T_p + offset and T_n - offset, but not all three: bywire reports this if you
+# ask for all. The drive's offset is known from its data sheet.
 NAMES = ("J", "d_p", "d_n", "T_p", "T_n")
 NOISE = 1e-4
-"""of the encoder [rad]; intervals follow from what is left over, not from this"""
+"""noise of the encoder [rad]; intervals follow from the residuals, not from this value"""
 
 
 class ClosedLoop(ServoAxis):
@@ -104,7 +104,7 @@ class ClosedLoop(ServoAxis):
 
 
 def measured(seed=1, noise=NOISE):
-    """Return 10 s of the axis under control, with the noise of its encoder."""
+    """Return 10 s of the axis in closed loop, with encoder noise."""
     f = np.array([[0.5], [0.9], [1.7]])
     target = lambda t: (np.array([2.0, 1.0, 0.5]) @ np.sin(2 * np.pi * f * t))[:, None]  # noqa: E731
     run = bywire.Run(ClosedLoop(), TRUTH, zeros(State), zeros(Voltage), target, 10.0)
@@ -116,17 +116,16 @@ def measured(seed=1, noise=NOISE):
 
 
 def filtered(data):
-    """Return the motion with its speed and acceleration, all through the same low-pass."""
+    """Return the motion with its speed and acceleration, filtered by the same low-pass."""
     return differentiated(data, "theta", ("omega", "alpha"), cutoff=60.0, held=["v"])
 
 
 def identified(data):
     """Return the parameters by inverse dynamics, by output error, and with instruments.
 
-    Inverse dynamics takes any start. But noise of the angle, differentiated twice, passes for
-    acceleration: J comes out too small, by more than its interval says. Output error has no such
-    bias. Neither has inverse dynamics with the motion of the fitted model as instruments, which
-    no noise has touched.
+    Inverse dynamics works from any start. But noise of the angle, differentiated twice, looks like
+    acceleration, so J is too small by more than its interval. Output error has no such bias. Nor
+    has inverse dynamics with the fitted model's motion as instruments, which is free of noise.
     """
     rough = Axis(J=0.01, d_p=0, d_n=0, T_p=1, T_n=1, offset=0.1, T_s=1e-3)
     equation = Equation(ServoAxis(), "omega", "alpha", slowest=1.0, unit="V")
@@ -134,7 +133,7 @@ def identified(data):
     first = inverse_dynamics(*problem, bandwidth=30.0)
     if "J" in first.names and first["J"] < 0.0:
         raise ParameterError(
-            f"theta goes against v (J = {first['J']:.2g} V s^2/rad): negate one of the two"
+            f"theta and v have opposite signs (J = {first['J']:.2g} V s^2/rad): negate one of them"
         )
 
     known = rough.replace(first.parameters())
@@ -150,7 +149,7 @@ def identified(data):
 
 
 def apart(first, other):
-    """Return the unknowns of which two estimates differ by 3.5 standard deviations and 0.1 %."""
+    """Return the unknowns whose two estimates differ by 3.5 standard deviations and 0.1 %."""
     names = [n for n in NAMES if n in first.names and n in other.names]
     reach = [np.hypot(*(e.deviations[e.names.index(n)] for e in (first, other))) for n in names]
     return [
@@ -168,7 +167,7 @@ if __name__ == "__main__":
         )
     except bywire.BywireError as error:
         sys.exit(f"identify_servo_axis: {error}")
-    print(f"angle left over: {NOISE * second.rms:.2g} rad; the encoder's noise, if all is well")
+    print(f"residual angle: {NOISE * second.rms:.2g} rad; equals the encoder noise in a good fit")
     print(f"output error\n{second}\n\ninverse dynamics with instruments\n{third}")
     for name in apart(first, second):
         print(f"{name}: noise biases inverse dynamics without instruments: {first[name]:.4g}")

@@ -1,13 +1,13 @@
 """Your own actuator in one file: a servo axis with dry friction.
 
 A DC motor turns an inertia against viscous friction and against dry friction that is larger
-forward than backward. An encoder counts its angle; position (P) and speed (PI with anti-wind-up)
-are controlled at 1 kHz.
+forward than backward. An encoder counts its angle. A position (P) and a speed controller (PI with
+anti-windup) run at 1 kHz.
 
-Without the integral part the axis comes to rest, exactly, where the friction can hold what the
-position error asks of the motor: short of the target by up to T R_m / (K_e k_p k_angle), with the
-friction T of the direction in which it arrives, and half a count. With the integral part it
-creeps on until the encoder shows the target, and rests as exactly.
+Without the integral part the axis comes to an exact rest where the friction balances the motor
+torque from the position error. It is short of the target by up to T R_m / (K_e k_p k_angle) plus
+half a count, with the friction T in the direction of arrival. With the integral part the axis
+creeps until the encoder shows the target, and then also rests exactly.
 """
 
 from argparse import ArgumentParser
@@ -40,7 +40,7 @@ from bywire.plant import dc_motor, shaft
 
 
 class Parameters(ParameterSet):
-    """Every number has a unit and a range, which are checked."""
+    """All parameters; bywire checks the unit and range of each."""
 
     motor: dc_motor.Parameters
     shaft: shaft.Parameters
@@ -55,7 +55,7 @@ class Parameters(ParameterSet):
 
 
 class Memory(NamedTuple):
-    """What the controller holds between its ticks: measured angle, voltage, integral part."""
+    """Memory of the controller between its ticks: measured angle, voltage, integral part."""
 
     seen: Angle
     v: Annotated[float, Signal("V", "voltage"), Limited("v_max")]
@@ -63,13 +63,13 @@ class Memory(NamedTuple):
 
 
 class Stimulus(NamedTuple):
-    """What acts from outside."""
+    """External inputs."""
 
     target: Angle
 
 
 def control(x, m, u, par):
-    """Run the cascade once; the integral part waits while the voltage is limited."""
+    """Run the cascade once; the integral part stops while the voltage is limited."""
     seen = par.count * ops.floor(x.theta / par.count + 0.5)
     error = par.k_angle * (u.target - seen) - (seen - m.seen) / par.T_s
     wanted = par.k_p * error + m.v_i
@@ -90,16 +90,16 @@ class ServoAxis(Assembly[Parameters, Memory]):
     E_friction = Integral("J", "loss of the dry friction", role=Role("sink", "dry friction"))
 
     def wire(self, w):
-        """Say what every part feels."""
+        """Connect the parts."""
         w.motor.u = dc_motor.Input(w.m.v, w.shaft.x.omega)
         w.shaft.u = shaft.Input(dc_motor.output(w.motor.x, w.motor.par).torque, 0.0)
 
     def friction(self, w):
-        """Return the dry friction while turning forward, backward; at rest all between."""
+        """Return the limits of the dry friction; at rest it is anywhere between them."""
         return ((-w.par.T_forward, w.par.T_backward),)
 
     def power(self, w):
-        """Return the powers that no part gives."""
+        """Return the powers that do not follow from the parts."""
         lost = -w.reaction[0] * w.shaft.x.omega
         return {"E_source": w.m.v * w.motor.x.i, "E_friction": lost}
 

@@ -1,7 +1,7 @@
-"""An electro-mechanical disc brake for cars: an actuator of one's own, written outside bywire.
+"""An electro-mechanical disc brake for cars: your own actuator, written outside bywire.
 
 Motor, planetary gear and ball screw press the pads of a floating caliper together; force, speed
-and current are controlled in a cascade. See the README beside this file.
+and current control form a cascade. See the README next to this file.
 """
 
 from bywire.authoring import Brake

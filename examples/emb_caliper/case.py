@@ -1,4 +1,4 @@
-"""What the experiments share: runs that start at rest at a clamp force."""
+"""Shared part of the experiments: runs that start at rest at a clamp force."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ def case_from_rest(
     Parameters
     ----------
     par
-        Parameters, of which ``drive`` is replaced.
+        Parameters, except ``drive``.
     drive
-        What the stimulus commands.
+        Quantity that the stimulus commands.
     F
-        Clamp force at the start [N]; parked where it is 0.
+        Clamp force at the start [N]; 0 for the parked piston.
     stimulus, duration, label
-        As of a case.
+        As in `Case`.
     timing
         ``settle``, ``keep`` and ``record`` of the case [s].
     """

@@ -14,7 +14,7 @@ from emb_caliper.parameters import CaliperBrakeParameters as Par
 
 
 class Stimulus(NamedTuple):
-    """External inputs; which of them acts depends on ``drive``."""
+    """External inputs; ``drive`` determines which of them acts."""
 
     F_set: Annotated[float, Signal("N", "force demand", 1e4)]
     omega_set: Annotated[float, Signal("rad/s", "speed demand", 100.0)]
@@ -24,7 +24,7 @@ class Stimulus(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """What the ECU holds between its ticks."""
+    """Memory of the ECU between its ticks."""
 
     F_meas: Annotated[float, Signal("N", "measured clamp force", 1e4)]
     theta_meas: Annotated[float, Signal("rad", "measured motor angle", 50.0)]
@@ -44,7 +44,7 @@ class Memory(NamedTuple):
 
 
 class Readings(NamedTuple):
-    """What the sensors show at a tick; resolver and current sensor are ideal."""
+    """Readings of the sensors at a tick; resolver and current sensor are ideal."""
 
     F_cl: Annotated[float, Signal("N", "clamp force", 1e4)]
     theta: Annotated[float, Signal("rad", "motor angle", 50.0)]
@@ -53,14 +53,14 @@ class Readings(NamedTuple):
 
 
 def force_tick(r: Readings, m: Memory, u: Stimulus, par: Par) -> Memory:
-    """Read the force sensor, and run force control once: the speed set point is renewed."""
+    """Read the force sensor, and run force control once to update the speed set point."""
     share = adc.sample(r.F_cl / par.F_span, u.noise_F, par.adc)
     m = m._replace(F_meas=share * par.F_span, theta_meas=r.theta)
     return _force_control(m, u, par) if par.drive == "force" else m
 
 
 def speed_tick(r: Readings, m: Memory, u: Stimulus, par: Par) -> Memory:
-    """Run speed control once: the current set point is renewed."""
+    """Run speed control once to update the current set point."""
     m = m._replace(omega_meas=r.omega)
     if par.drive == "speed":
         m = m._replace(omega_ref=u.omega_set)
@@ -90,7 +90,7 @@ def current_tick(r: Readings, m: Memory, u: Stimulus, par: Par) -> Memory:
 
 
 def source_tick(r: Readings, m: Memory, u: Stimulus, par: Par) -> Memory:
-    """Renew the voltage that an ideal source holds."""
+    """Update the voltage of an ideal source."""
     return m._replace(v_source=u.v_set)
 
 
@@ -100,7 +100,7 @@ def travel_per_angle(par: Any) -> float:
 
 
 def _force_control(m: Memory, u: Stimulus, par: Par) -> Memory:
-    """Return the memory with the speed set point renewed: press, or park clear of the disc."""
+    """Return the memory with a new speed set point: press, or park clear of the disc."""
     ecu = par.ecu
     state, out = limited_pi.force(
         limited_pi.ForceState(m.force_integral),
@@ -122,7 +122,7 @@ def _force_control(m: Memory, u: Stimulus, par: Par) -> Memory:
 
 
 def _factor(m: Memory, par: Par) -> float:
-    """Return what the force controller's gains are multiplied by."""
+    """Return the factor on the force controller's gains."""
     if par.ecu.scheduling == "off":
         return 1.0
     n = ops.fmax(travel_per_angle(par) * m.theta_meas - par.caliper.clearance, 0.0)
@@ -130,7 +130,7 @@ def _factor(m: Memory, par: Par) -> float:
 
 
 def _ahead(m: Memory, par: Par) -> float:
-    """Return the current that is fed forward [A]."""
+    """Return the feed-forward current [A]."""
     if par.ecu.load == "off":
         return 0.0
     return travel_per_angle(par) * ops.fmax(m.F_meas, 0.0) / par.motor.K_e

@@ -1,4 +1,4 @@
-"""What may fail in the brake beside what its elements say."""
+"""Faults of the brake in addition to those that its elements declare."""
 
 from __future__ import annotations
 

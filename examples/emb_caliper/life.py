@@ -25,7 +25,7 @@ from emb_caliper.parameters import CaliperBrakeParameters
 
 
 class WearParameters(ParameterSet):
-    """Pads, what a stop costs them, and when the brake is too slow."""
+    """Pads, their load in a stop, and the limit of the brake's dead time."""
 
     pads: pad_wear.Parameters
     disc: warm_stops.Parameters
@@ -36,7 +36,7 @@ class WearParameters(ParameterSet):
     h_min: Length
     """thickness at which pads are replaced"""
     t_most: Duration
-    """longest time until the force rises"""
+    """longest admissible time until the force rises"""
 
 
 def begin(par: CaliperBrakeParameters, wear: WearParameters) -> dict[str, float]:
@@ -47,7 +47,7 @@ def begin(par: CaliperBrakeParameters, wear: WearParameters) -> dict[str, float]
 def follows(
     z: Mapping[str, float], par: CaliperBrakeParameters, wear: WearParameters
 ) -> dict[str, float]:
-    """Return the clearance; the measured curve of the caliper is kept."""
+    """Return the clearance; the measured curve of the caliper does not change."""
     return {"caliper.clearance": z["clearance"]}
 
 
@@ -58,7 +58,7 @@ def effects(
     par: Any,
     wear: WearParameters,
 ) -> Effects:
-    """Return what each stop wears, and how long the brake took to clamp."""
+    """Return the wear of each stop, and the simulated dead time."""
     work = np.full(figures["dead_time"].shape, wear.W_stop)
     before, after = warm_stops.temperatures(work, stops["pause"], stops["T_air"], wear.disc)
     thinned = warm_stops.thinned(work, before, after, wear.pads)
@@ -71,40 +71,40 @@ def effects(
 def between(
     z: Mapping[str, float], readings: Mapping[str, float], par: Any, wear: Any
 ) -> dict[str, float]:
-    """Return the slow states with the dead time that was simulated."""
+    """Return the slow states with the simulated dead time."""
     return {**z, **readings}
 
 
 def left(z: Mapping[str, float], par: Any, wear: WearParameters) -> dict[str, float]:
-    """Return the lining that is left, and the time until the brake is too slow."""
+    """Return the remaining lining, and the margin of the dead time to its limit."""
     return {"lining": z["h_pad"] - wear.h_min, "time": wear.t_most - z["dead_time"]}
 
 
 CALIPER_PADS = Life(
     name="caliper-pads",
-    summary="pads of a caliper without adjuster, until they are worn or it is too slow",
+    summary="pads of a caliper without adjuster, until they are worn or the brake is too slow",
     experiment="clamp-step",
     wear=WearParameters,
     values={
         "pads.kappa_0": chosen(3.6e-14, "180 cm^3 of pad over about 5 GJ: a car's front axle"),
-        "pads.T_hot": chosen(503.0, "230 degC, as usual of organic linings"),
+        "pads.T_hot": chosen(503.0, "230 degC, usual for organic linings"),
         "pads.T_act": chosen(2760.0, "four times the wear at 400 degC"),
         "pads.n_pads": chosen(2.0, "a floating caliper"),
         "pads.A_pad": chosen(50e-4, "front pads of a mid-size car"),
-        "pads.E_pad": chosen(5e8, "of no use here: the caliper's curve was measured"),
+        "pads.E_pad": chosen(5e8, "not used here: the caliper's curve was measured"),
         "disc.C_d": chosen(3.4e3, "7 kg of cast iron"),
         "disc.tau_d": chosen(300.0, "minutes, in the wind of driving"),
         "W_stop": chosen(174e3, "450 kg from 100 km/h"),
         "h_new": chosen(10e-3, "front pads of a mid-size car"),
         "h_min": chosen(2e-3, "usual limit of wear"),
-        "t_most": chosen(0.15, "3 m more of way at 130 km/h"),
+        "t_most": chosen(0.15, "3 m of additional stopping distance at 130 km/h"),
     },
     states={
         "h_pad": Slow("m", "pad thickness"),
         "clearance": Slow("m", "clearance"),
         "dead_time": Slow("s", "dead time"),
     },
-    limits={"lining": Slow("m", "lining left"), "time": Slow("s", "time left")},
+    limits={"lining": Slow("m", "remaining lining"), "time": Slow("s", "remaining time")},
     begin=begin,
     follows=follows,
     effects=effects,

@@ -82,7 +82,7 @@ class EmbCaliper(Assembly[Par, ecu.Memory]):
     )
 
     def wire(self, w: Self) -> None:
-        """Say what every part feels: electrics, motion from the rotor out, loads back to it."""
+        """Connect the parts: electrics, motion from the rotor outward, loads back to it."""
         w.voltage, w.i_dc = _electrics(w)
         w.supply.u = battery_supply.Input(w.i_dc)
         w.motor.u = dc_motor.Input(w.voltage, w.rotor.x.omega)
@@ -106,7 +106,7 @@ class EmbCaliper(Assembly[Par, ecu.Memory]):
         return ((-limit, limit),)
 
     def power(self, w: Self) -> dict[str, float]:
-        """Return what the source gives, what dry friction takes, and 1 while the shaft is stuck."""
+        """Return the powers of source and dry friction, and 1 while the shaft is stuck."""
         battery = battery_supply.power_source(w.supply.u, w.supply.par)
         return {
             "E_source": w.voltage * w.motor.x.i if w.par.drive == "voltage" else battery,
@@ -115,7 +115,7 @@ class EmbCaliper(Assembly[Par, ecu.Memory]):
         }
 
     def record(self, w: Self) -> dict[str, float]:
-        """Return what is recorded beside states, wires and losses."""
+        """Return the recorded signals other than states, wires and losses."""
         battery = battery_supply.power_source(w.supply.u, w.supply.par)
         return {
             "T_fr": -w.reaction[0],
@@ -125,7 +125,7 @@ class EmbCaliper(Assembly[Par, ecu.Memory]):
         }
 
     def tasks(self, par: Par) -> tuple[Task, ...]:
-        """Return the controllers that the drive mode needs, from the slowest loop inward."""
+        """Return the controllers of the drive mode, from the slowest loop inward."""
         current = Task("current", par.ecu.T_current, _reading(ecu.current_tick))
         if par.drive == "voltage":
             return (Task("source", par.ecu.T_current, _reading(ecu.source_tick)),)
@@ -136,7 +136,7 @@ class EmbCaliper(Assembly[Par, ecu.Memory]):
         return (*outer, current)
 
     def watch(self, recording: Any, par: Any) -> list[str]:
-        """Return what the user should know of a recording."""
+        """Return the warnings about a recording."""
         said = super().watch(recording, par)
         if "F_stop" in recording and bool((recording["F_stop"] != 0).any()):
             said.append("the piston reached an end stop")
@@ -165,7 +165,7 @@ def _electrics(w: EmbCaliper) -> tuple[float, float]:
 
 
 def _reading(law: Callable[..., ecu.Memory]) -> Callable[[Any, Any, Any, Any], ecu.Memory]:
-    """Return a controller's tick, which sees what the sensors show of the state."""
+    """Return a controller's tick with the readings of the sensors."""
 
     def tick(x: Any, m: ecu.Memory, u: ecu.Stimulus, par: Par) -> ecu.Memory:
         piston = travel(rotor.State(x.theta, x.omega), par)

@@ -1,4 +1,4 @@
-"""What time traces of the brake show."""
+"""Panels of the brake's time traces."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Parameters of the brake: one group per element, the ECU's apart."""
+"""Parameters of the brake: one group per element, and a separate group for the ECU."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ DriveMode = Literal["force", "speed", "current", "voltage"]
 
 
 class StopParameters(end_stop.Parameters):
-    """Where the piston meets its stops, and how hard they are."""
+    """Positions and stiffness of the piston's end stops."""
 
     x_rest: Position
-    """travel of the retracted piston at its stop"""
+    """piston travel at the retracted stop"""
     x_end: Position
-    """travel of the extended piston at its stop"""
+    """piston travel at the extended stop"""
 
     @model_validator(mode="after")
     def _leaves_a_stroke(self) -> StopParameters:
@@ -44,11 +44,11 @@ class StopParameters(end_stop.Parameters):
 
 
 class EcuParameters(ParameterSet):
-    """The ECU: sample times, controllers, and what it believes of the brake.
+    """The ECU: sample times, controllers, and its model of the brake.
 
-    ``scheduling``: ``"stiffness"`` divides the force controller's gains by the stiffness that the
-    piston's travel promises, in units of that at first touch. ``load``: ``"fed-forward"`` adds the
-    current that the measured force needs, friction left out.
+    ``scheduling``: ``"stiffness"`` divides the force controller's gains by the expected stiffness
+    at the piston's travel, relative to the stiffness at first contact. ``load``: ``"fed-forward"``
+    adds the current that the measured force needs without friction.
     """
 
     T_force: Duration
@@ -56,13 +56,13 @@ class EcuParameters(ParameterSet):
     T_current: Duration
     """sample time of current control"""
     F_on: Force
-    """force demand below which the piston is parked, clear of the disc"""
+    """force demand below which the ECU parks the piston, clear of the disc"""
     k_park: PerTime
-    """gain of the position control that parks it"""
+    """gain of the position control for parking"""
     scheduling: Literal["off", "stiffness"]
     """whether the force controller's gains follow the stiffness"""
     load: Literal["off", "fed-forward"]
-    """whether the current that holds the force is fed forward"""
+    """whether a feed-forward adds the current that holds the force"""
     force: limited_pi.ForceParameters
     speed: limited_pi.SpeedParameters
     current: current_pi.Parameters
@@ -91,11 +91,11 @@ class CaliperBrakeParameters(ParameterSet):
     caliper: floating_caliper.Parameters
     stop: StopParameters
     F_span: Force
-    """clamp force at which the force sensor ends"""
+    """full-scale clamp force of the force sensor"""
     adc: adc.Parameters
     ecu: EcuParameters
     drive: DriveMode
-    """what the stimulus commands; voltage is an ideal source at the motor"""
+    """quantity that the stimulus commands; voltage is an ideal source at the motor"""
 
     @model_validator(mode="after")
     def _stop_is_beyond(self) -> CaliperBrakeParameters:

@@ -1,4 +1,4 @@
-"""Parameters that stand first in pages of this brake: those that say most of how it brakes."""
+"""Parameters at the top of this brake's pages: those with the most effect on braking."""
 
 from bywire.authoring import Sliders
 

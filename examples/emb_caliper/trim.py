@@ -27,7 +27,7 @@ def overlap_at(F: float, par: Par) -> float:
             f"{most / 1e3:.4g} kN, where the caliper's measured curve ends (caliper.n_max)"
         )
 
-    from scipy.optimize import brentq  # here: a run from rest does without it
+    from scipy.optimize import brentq  # imported late: a run from rest does not need it
 
     def missing(n: float) -> float:
         return float(floating_caliper.elastic(n, par.caliper)) - F
@@ -50,7 +50,7 @@ def state_at(F: float, par: Par) -> Any:
 
 
 def memory_at(F: float, par: Par) -> Memory:
-    """Return the memory in which every controller, or the ideal source, holds that state."""
+    """Return the memory with which every controller, or the ideal source, holds that state."""
     i = holding_current(F, par)
     v = par.motor.R_m * i
     # D (V_bat - R_bat D i) = v, by a fixed point that contracts with R_bat i / V_bat.

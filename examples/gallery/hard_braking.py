@@ -1,14 +1,14 @@
 """Hard braking: one bench file, one thing changed
 ===============================================
 
-The bench asks for a pressure step from 6 to 37 bar, as in Fig. 7a of Dardanelli, Alli, Savaresi
+The bench demands a pressure step from 6 to 37 bar, as in Fig. 7a of Dardanelli, Alli, Savaresi
 (2010). Its ECU shakes the piston with a dither current that just overcomes the seals' breakaway
 torque: gain 1. This script changes the gain.
 
-Without dither the piston sticks before the pressure arrives: it stays more than half a bar off,
-exactly at rest, although the controller's integral grows. Dither takes the error away, in
-exchange for a ripple that grows with its gain, and for energy. The overshoot stays below the
-15 % that the paper allows at every gain.
+Without dither the piston sticks before the pressure reaches its demand. It stays more than half a
+bar off, exactly at rest, although the controller's integral grows. Dither removes the error, at the
+cost of energy and of a ripple that grows with its gain. At every gain the overshoot stays below the
+15 % that the paper allows.
 """
 
 from argparse import ArgumentParser
@@ -28,7 +28,7 @@ bench = bywire.load(Path(__file__).parents[2] / "benches" / "hard_braking.toml")
 gains = (0.0, 0.75, 1.0, 1.5, 2.0)
 results = {g: bywire.run(replace(bench, overrides={"ecu.dither.gain": g})) for g in gains}
 
-# What the requirements judge comes as KPIs; anything else is in the recording.
+# Requirements judge KPIs; everything else is in the recording.
 overshoot, error, ripple, energy = {}, {}, {}, {}
 print("gain  overshoot  mean error  ripple     stuck  energy")
 for gain, result in results.items():

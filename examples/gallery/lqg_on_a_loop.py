@@ -1,14 +1,14 @@
 """LQG from python-control, on the exact sampled model of a loop
 =============================================================
 
-Loops are designed from requirements by ``bywire design``. What textbooks offer beyond that (LQR,
-observers, pole placement, loop shaping) comes from python-control: a loop's models are
-``control.StateSpace`` systems with all delays, filters and inner loops in them.
+``bywire design`` designs loops from requirements. Other textbook methods (LQR, observers, pole
+placement, loop shaping) come from python-control: a loop's models are ``control.StateSpace``
+systems that contain all delays, filters and inner loops.
 
 Here a regulator with an integrator and a Kalman predictor takes the place of the motorcycle
 brake's pressure PID. Its plant is the brake with its current loop, from the current demand to the
-pressure. It is quicker than the PID of the catalog, and shows what every course warns of: the
-margin that feedback of all states would have is lost where an observer has to guess them.
+pressure. It is faster than the PID of the catalog, and shows a textbook result: the margin of full
+state feedback is lost when an observer has to estimate the states.
 """
 
 import math
@@ -35,11 +35,13 @@ whole = closed_loop(
 )
 kept = whole.effective()
 A, B = whole.A[np.ix_(kept, kept)], whole.B[kept]
-scale = np.linalg.norm(B, axis=1) + np.abs(A).max(axis=1) * 1e-6  # states of like size
+scale = (
+    np.linalg.norm(B, axis=1) + np.abs(A).max(axis=1) * 1e-6
+)  # scales the states to similar size
 A, B, C = A / scale[:, None] * scale, B / scale[:, None], whole.C[:, kept] * scale / BAR
 n, T = len(kept), whole.period
 
-# The integral of the error is one more state; the regulator weighs it and the current.
+# The integral of the error is an additional state; the regulator weighs it and the current.
 A_i = np.block([[A, np.zeros((n, 1))], [-T * C, np.eye(1)]])
 B_i = np.vstack([B, np.zeros((1, 1))])
 Q = np.zeros((n + 1, n + 1))

@@ -2,11 +2,11 @@
 ===============================================
 
 Five friction parameters of the seals vary independently, by 25 % (log-normal, one standard
-deviation); the ECU goes on believing in the nominal ones. All cases run side by side in the
-lanes of the vector unit and on all cores.
+deviation), while the ECU assumes the nominal values. All cases run in parallel, in the lanes of the
+vector unit and on all cores.
 
-With dither nine in ten brakes hold the pressure within a quarter of a bar. Without it each one
-sticks where its own friction lets it: the band is several times wider, and it stays so.
+With dither nine in ten brakes hold the pressure within a quarter of a bar. Without dither each
+brake sticks wherever its friction allows. The band is several times wider, and it stays so.
 """
 
 import time

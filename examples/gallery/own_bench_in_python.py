@@ -1,13 +1,13 @@
-"""A bench in Python, without a file: find the weakest battery that still serves
-=============================================================================
+"""A bench in Python, without a file: find the weakest battery that is sufficient
+==============================================================================
 
-The winding is hot (0.5 ohm instead of 0.35) and the battery's leads are old (40 mohm). The brake
-shall still rise to 35 bar within 0.1 s and overshoot by 15 % at most. A bench is a frozen object:
-`replace` gives another one, and `run` judges it.
+The winding is hot (0.5 ohm instead of 0.35) and the battery's leads are old (40 mohm). The
+pressure must still rise to 35 bar within 0.1 s and overshoot by 15 % at most. A bench is a frozen
+object: `replace` returns a changed copy, and `run` judges it.
 
-Halving the interval finds the lowest battery voltage that passes, between 6 and 7 V. Down to 10 V
-the rise takes hardly longer; below, the duty cycle saturates, the rise slows down, and the
-overshoot is the first requirement that fails.
+Bisection finds the lowest battery voltage that passes, between 6 and 7 V. Down to 10 V the rise
+hardly takes longer. Below 10 V the duty cycle saturates, the rise slows down, and the overshoot is
+the first requirement that fails.
 """
 
 from argparse import ArgumentParser

@@ -2,13 +2,13 @@
 ============================================
 
 The kernel computes exact derivatives of a whole run, here of the pressure in hard braking, with
-respect to any number of parameters. Times one per cent of the parameter they are bars.
+respect to any number of parameters. Multiplied by one per cent of the parameter they are in bar.
 
-While the pressure rises, caliper, pads, motor constant, gear and piston matter most, friction
-little: dither does its work. At the end the controller's integral has removed all of it, but for
-one: the ECU takes a fixed ambient pressure off the sensor's absolute reading, so that one per
-cent of ambient pressure stays as 0.01 bar, in the other direction. The pipeline's four
-parameters act through one resistance: no test of this kind can tell them apart.
+While the pressure rises, caliper, pads, motor constant, gear and piston matter most. Friction
+matters little, because dither removes it. At the end the controller's integral has removed all
+effects but one: the ECU subtracts a fixed ambient pressure from the sensor's absolute reading, so
+one per cent of ambient pressure remains as 0.01 bar, in the opposite direction. The pipeline's
+four parameters act through one resistance: no test of this kind can separate them.
 """
 
 from argparse import ArgumentParser
@@ -26,7 +26,7 @@ parser.add_argument("--out", type=Path, help="folder for the figure")
 out = parser.parse_args().out
 
 BAR, PERCENT = 1e5, 0.01
-# A quantized reading has the derivative zero: the loop would be cut. So an ideal converter here.
+# A quantized reading has zero derivative, which would open the loop. So the converter is ideal.
 bench = bywire.Bench("hard-braking", "dardanelli2010", overrides={"adc.law": "ideal"})
 case = bench.cases()[0]
 run = as_run(case, bench.step)
@@ -47,7 +47,7 @@ ranked = sorted(names, key=peak.__getitem__, reverse=True)
 for name in ranked[:12]:
     print(f"{name:24s} {peak[name]:6.3f} bar in the rise, {left[name]:+7.4f} bar at the end")
 
-# The same by differences, for one parameter: two more runs.
+# The same by finite differences, for one parameter: two more runs.
 up, down = (
     bywire.simulate(replace(run, par=run.par.replace({"motor.K_e": values["motor.K_e"] * factor})))
     for factor in (1.001, 0.999)
@@ -58,7 +58,9 @@ if out:
     figure = Figure(figsize=(7.0, 4.5), layout="constrained")
     axes = figure.subplots()
     axes.barh(ranked[11::-1], [peak[name] for name in ranked[11::-1]], label="largest, in the rise")
-    axes.plot([abs(left[name]) for name in ranked[11::-1]], ranked[11::-1], "k.", label="left over")
+    axes.plot(
+        [abs(left[name]) for name in ranked[11::-1]], ranked[11::-1], "k.", label="at the end"
+    )
     axes.set(xlabel="change of the pressure per 1 % [bar]")
     axes.legend()
     out.mkdir(parents=True, exist_ok=True)

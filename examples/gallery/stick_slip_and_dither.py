@@ -1,5 +1,5 @@
-"""Stick and slip: a slow current ramp, without and with dither
-============================================================
+"""Stick-slip: a slow current ramp, without and with dither
+========================================================
 
 The current demand rises to 5 A and falls again, 0.2 A/s, as in eq. (17) and Fig. 5 of
 Dardanelli, Alli, Savaresi (2010). Without dither the piston sticks most of the time. It breaks
@@ -7,8 +7,8 @@ away where the motor's torque overcomes load and breakaway torque, eqs. (8), (16
 
     eta_g K_e i = k_g A_mc p + k_brk,p (T_pr + f_cfr,p p)
 
-and slips to a pressure half as large again or more: the staircase. With dither the pressure
-follows the current both ways, and the loop loses most of its area.
+and slips to a pressure at least half as large again: the staircase. With dither the pressure
+follows the current in both directions, and the loop loses most of its area.
 """
 
 from argparse import ArgumentParser
@@ -19,7 +19,7 @@ from matplotlib.figure import Figure
 
 import bywire
 
-parser = ArgumentParser(description="Show stick-slip on a current ramp, and what dither does.")
+parser = ArgumentParser(description="Show stick-slip on a current ramp, and the effect of dither.")
 parser.add_argument("--out", type=Path, help="folder for the figure")
 out = parser.parse_args().out
 
@@ -35,7 +35,7 @@ pressure, current = rough["p_mc"].values, rough["i"].values
 top = int(np.argmax(pressure))
 begins = np.flatnonzero(stuck[:top] & ~stuck[1 : top + 1])
 afterward = np.append(pressure[begins[1:]], pressure[top])
-chosen = pressure[begins] > 1.0 * BAR  # at low pressure the current's resolution shows
+chosen = pressure[begins] > 1.0 * BAR  # at low pressure the current's resolution matters
 begins, before, after = begins[chosen], pressure[begins[chosen]], afterward[chosen]
 
 par = bench.par
@@ -46,13 +46,13 @@ print("breaks away at    predicted   pressure before       and after")
 for slipped, expected, low, high in zip(current[begins], predicted, before, after, strict=True):
     print(f"{slipped:12.3f} A {expected:10.3f} A {low / BAR:13.2f} bar {high / BAR:11.2f} bar")
 print(f"stuck for {100 * kpis['share_stuck_undithered']:.0f} % of the time")
-print(f"area of the loop with dither over that without: {kpis['loop_area_ratio']:.2f}")
+print(f"loop area with dither over the area without: {kpis['loop_area_ratio']:.2f}")
 
 if out:
     figure = Figure(figsize=(7.0, 4.5), layout="constrained")
     axes = figure.subplots()
     for recording, label in ((rough, "without dither"), (dithered, "with dither")):
-        mean = recording[["p_mc", "i_meas"]].rolling(time=20, center=True).mean()  # of a period
+        mean = recording[["p_mc", "i_meas"]].rolling(time=20, center=True).mean()  # over a period
         axes.plot(mean["p_mc"] / BAR, mean["i_meas"], label=label)
     axes.plot(before / BAR, predicted, "k.", label="predicted breakaway")
     axes.set(xlabel="pressure [bar]", ylabel="measured current [A]")

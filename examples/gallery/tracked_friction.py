@@ -1,9 +1,9 @@
 """Fading pads: the friction of a wedge brake, tracked through brakings
 ====================================================================
 
-From braking to braking the pads' coefficient of friction falls, as hot pads' does. Moment and
-normal force tell it, M = mu_B 2 r_B F_N (Roberts et al. 2003): a relation that is linear in mu_B. A
-Kalman filter lets mu_B walk at random; how fast is what makes the record likeliest.
+From braking to braking the pads' coefficient of friction falls, as in hot pads. Moment and normal
+force determine it, M = mu_B 2 r_B F_N (Roberts et al. 2003), a relation that is linear in mu_B. A
+Kalman filter models mu_B as a random walk, with the rate of maximum likelihood.
 """
 
 from argparse import ArgumentParser
@@ -51,7 +51,7 @@ print(f"95 % bands that hold the truth: {100 * inside.mean():.0f} %")
 if out:
     figure = Figure(figsize=(7.0, 4.0), layout="constrained")
     axes = figure.subplots()
-    axes.plot(record["time"], truth, "k--", linewidth=1.0, label="put in")
+    axes.plot(record["time"], truth, "k--", linewidth=1.0, label="true value")
     axes.fill_between(mu["time"], mu["low"], mu["high"], alpha=0.3, label="95 % band")
     axes.plot(mu["time"], mu["value"], label="tracked")
     axes.set(xlabel="time [s]", ylabel="coefficient of friction [-]", ylim=(0.28, 0.4))

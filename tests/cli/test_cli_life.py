@@ -34,7 +34,7 @@ def test_a_life_is_written_and_told(bywire, tmp_path):
         "report.html",
     }
     page = (out / "report.html").read_text(encoding="utf-8")
-    assert all(text in page for text in ("fluid in the reservoir", "lining left", "kappa_0"))
+    assert all(text in page for text in ("fluid in the reservoir", "remaining lining", "kappa_0"))
     no_half_files(out)
 
 

@@ -139,7 +139,7 @@ def test_the_example_says_what_noise_does_to_its_first_step(
     said = capsys.readouterr().out
     assert "J: noise biases inverse dynamics" in said
     assert "does not explain" not in said
-    assert "angle left over: 0.003 rad" in said
+    assert "residual angle: 0.003 rad" in said
 
 
 def test_with_instruments_both_criteria_agree(axis: ModuleType) -> None:
@@ -345,7 +345,7 @@ def test_several_starts_of_a_model_of_ones_own(axis: ModuleType, data: xr.Datase
     [
         (lambda d: d.rename(theta="phi"), "unknown measured signal 'theta': known are"),
         (lambda d: d.isel(time=slice(None, None, 10)), "cutoff = 60 Hz is not valid"),
-        (lambda d: d.assign(theta=-d["theta"]), r"theta goes against v \(J = -0.02 .*negate one"),
+        (lambda d: d.assign(theta=-d["theta"]), r"opposite signs \(J = -0.02 .*negate one"),
         (None, "none.nc cannot be read"),
     ],
 )

@@ -9,7 +9,7 @@ from bywire.authoring import Length, ParameterSet, Signal
 
 
 class Parameters(ParameterSet):
-    """Rigid and without loss: friction is reckoned at the motor."""
+    """A rigid screw without loss: the motor shaft carries all friction."""
 
     lead: Length
     """travel per turn"""
@@ -37,6 +37,6 @@ def slope(par: Parameters) -> Annotated[float, Signal("m/rad", "travel per angle
 
 
 def output(u: Input, par: Parameters) -> Output:
-    """Return what the screw makes of motion and force; power in equals power out."""
+    """Return motion of the nut and load of the screw; power in equals power out."""
     k = slope(par)
     return Output(x=k * u.theta, v=k * u.omega, load=k * u.force)

@@ -34,19 +34,19 @@ Loss = Annotated[
 
 
 class Parameters(ParameterSet):
-    """Pads, disc and bridge in series, reckoned along the piston's travel; it never pulls.
+    """Pads, disc and bridge in series, along the piston's travel; the caliper never pulls.
 
-    The floating body centers itself without friction, so that one travel closes both sides.
+    The floating body centers itself without friction, so a single travel closes both sides.
     """
 
     k_1: Stiffness
-    """stiffness at first touch"""
+    """stiffness at first contact"""
     k_2: Quadratic
     """factor of the square of the overlap"""
     k_3: Cubic
-    """factor of its cube; below 0 where the curve straightens toward high forces"""
+    """factor of its cube; negative if the curve straightens toward high forces"""
     n_max: Length
-    """overlap up to which the curve was measured; it rises up to there"""
+    """largest measured overlap; the curve rises up to it"""
     tau: TimeConstant
     """damping over stiffness"""
     clearance: Clearance
@@ -54,12 +54,12 @@ class Parameters(ParameterSet):
 
     @model_validator(mode="after")
     def _rises(self) -> Parameters:
-        # The slope is a parabola: least at an end, or at its vertex where k_3 > 0 > k_2 (excluded).
+        # The slope is a parabola: least at an end, or at its vertex if k_3 > 0 > k_2 (excluded).
         slope = self.k_1 + (2.0 * self.k_2 + 3.0 * self.k_3 * self.n_max) * self.n_max
         if not slope > 0.0:
             raise ValueError(
-                f"the force must rise up to n_max = {self.n_max:g} m, where its slope is "
-                f"{slope:.3g} N/m: lower n_max or raise k_3 = {self.k_3:g} N/m**3"
+                f"the force must increase up to n_max = {self.n_max:g} m, where its slope is "
+                f"{slope:.3g} N/m: reduce n_max or increase k_3 = {self.k_3:g} N/m**3"
             )
         return self
 
@@ -72,7 +72,7 @@ class Input(NamedTuple):
 
 
 class InputRate(NamedTuple):
-    """Derivatives of what the stored energy depends on."""
+    """Derivatives of the stored energy's arguments."""
 
     x: Annotated[float, Signal("m/s", "piston speed", 3e-3)]
 
@@ -94,7 +94,7 @@ def overlaps(u: Input, par: Parameters) -> Overlap:
 
 
 def compliance(par: Parameters) -> ContactCompliance:
-    """Return the compliance at first touch, which decides on touching."""
+    """Return the compliance at first contact, which determines whether the pads touch."""
     return 1.0 / par.k_1
 
 
@@ -116,8 +116,8 @@ def stiffness(
 def bent(f: Forces, par: Parameters) -> Forces:
     """Return the clamp force that belongs to a contact force of constant compliance.
 
-    Contacts have constant compliances: f is the first slope times the overlap, and the curve bends
-    it. It rises, so that nothing pulls, and the damping never gives energy.
+    Contacts have constant compliances: f is the initial slope times the overlap, and the curve
+    bends it. The curve rises, so the contact never pulls, and the damping never adds energy.
     """
     return Forces(F_cl=elastic(f.F_cl * compliance(par), par))
 
@@ -128,7 +128,7 @@ def forces(u: Input, par: Parameters) -> Forces:
 
 
 def input_rate(u: Input) -> InputRate:
-    """Return how the piston moves: the caliper stores energy, and its travel is the port."""
+    """Return the rate of the travel, the port of the caliper's stored energy."""
     return InputRate(x=u.v)
 
 
@@ -144,12 +144,12 @@ def power_in(u: Input, f: Forces) -> Work:
 
 
 def power_loss(u: Input, f: Forces, par: Parameters) -> Loss:
-    """Return what the damping takes, >= 0."""
+    """Return the power lost in the damping, >= 0."""
     return (f.F_cl - elastic(ops.fmax(depth(u, par), 0.0), par)) * u.v
 
 
 def watch(u: Input, par: Parameters, t: Array) -> list[str]:
-    """Return whether the pads were pressed beyond the measured curve, and when first."""
+    """Return a warning if the pads were pressed beyond the measured curve, with the first time."""
     text = (
         f"the pads were pressed beyond the measured curve, caliper.n_max = {1e3 * par.n_max:g} mm,"
     )

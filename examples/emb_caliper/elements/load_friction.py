@@ -14,7 +14,7 @@ StribeckSpeed = Annotated[float, Unit("rad/s", 2.0), Field(gt=0, allow_inf_nan=F
 
 
 class Parameters(ParameterSet):
-    """Set-valued at rest, the same both ways: what sticks holds exactly.
+    """Dry friction, set-valued at rest and equal in both directions: a stuck shaft holds exactly.
 
     The viscous part belongs to the rotor.
     """
@@ -26,14 +26,14 @@ class Parameters(ParameterSet):
     T_s: Torque
     """breakaway torque without load, not below C"""
     omega_s: StribeckSpeed
-    """speed within which breakaway falls to sliding friction"""
+    """speed range in which breakaway falls to sliding friction"""
 
     @model_validator(mode="after")
     def _breaks_away(self) -> Parameters:
         if self.T_s < self.C:
             raise ValueError(
-                f"T_s = {self.T_s:g} N*m must be >= C = {self.C:g} N*m: what rests is held by no "
-                "less than what rubs"
+                f"T_s = {self.T_s:g} N*m must be >= C = {self.C:g} N*m: breakaway friction is at "
+                "least sliding friction"
             )
         return self
 
@@ -58,9 +58,8 @@ def output(u: Input, par: Parameters) -> Output:
 
     Notes
     -----
-    That friction grows with the clamp force, and that it sticks, are the findings of Line, Manzie
-    and Good (2008); that the growth is in proportion, and the way in which breakaway falls to
-    sliding friction, are chosen.
+    Line, Manzie and Good (2008) found that the friction grows with the clamp force, and that it
+    sticks. We chose the proportional growth, and the transition from breakaway to sliding friction.
     """
     pressed = ops.fmax(u.F_cl, 0.0)
     fall = ops.decay(ops.fabs(u.omega) / par.omega_s)
@@ -71,5 +70,5 @@ def power_loss(
     torque: Annotated[float, Signal("N*m", "friction torque on the shaft", 0.1)],
     omega: Annotated[float, Signal("rad/s", "motor speed", 5.0)],
 ) -> Power:
-    """Return the heat of the friction, signed as torque and speed are given."""
+    """Return the heat of the friction, signed like torque times speed."""
     return -torque * omega

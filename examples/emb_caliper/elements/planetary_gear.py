@@ -15,7 +15,7 @@ Torque = Annotated[float, Signal("N*m", "torque", 0.5)]
 
 
 class Parameters(ParameterSet):
-    """Teeth of both stages; rigid and without loss: friction is reckoned at the motor."""
+    """Teeth of both stages; rigid and without loss: the motor shaft carries all friction."""
 
     z_sun_1: Teeth
     """teeth of the first sun"""
@@ -67,6 +67,6 @@ def ratio(par: Parameters) -> Annotated[float, Signal("1", "speed ratio", 30.0)]
 
 
 def output(u: Input, par: Parameters) -> Output:
-    """Return what the gear makes of motion and load; power in equals power out."""
+    """Return motion of the carrier and load of the sun; power in equals power out."""
     i = ratio(par)
     return Output(theta=u.theta / i, omega=u.omega / i, load=u.load / i)

@@ -1,4 +1,4 @@
-"""Rotor of the motor with all that turns with it."""
+"""Rotor of the motor with all parts that turn with it."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ Loss = Annotated[
 
 
 class Parameters(ParameterSet):
-    """One inertia: gear, screw and piston are rigid, their inertia reckoned at the motor."""
+    """One inertia: gear, screw and piston are rigid, with their inertia at the motor shaft."""
 
     J: Inertia
     """inertia of rotor, gear, screw and piston at the motor's shaft"""
@@ -35,7 +35,7 @@ class Factors(NamedTuple):
 
 
 class Balance(NamedTuple):
-    """What drives angle and speed."""
+    """Right-hand sides of angle and speed."""
 
     theta: Annotated[float, Signal("rad/s", "motor speed", 100.0)]
     omega: Annotated[float, Signal("N*m", "accelerating torque", 1.0)]
@@ -68,10 +68,10 @@ def energy(x: State, par: Parameters) -> Energy:
 
 
 def power_in(x: State, u: Input, par: Parameters) -> Power:
-    """Return what motor and friction give less what the load takes."""
+    """Return the power of motor and friction minus the power of the load."""
     return (u.torque - u.load + u.friction) * x.omega
 
 
 def power_loss(x: State, par: Parameters) -> Loss:
-    """Return what the viscous friction takes, >= 0."""
+    """Return the power lost in viscous friction, >= 0."""
     return par.D * x.omega * x.omega

@@ -26,11 +26,11 @@ class Options(ParameterSet):
     """The maneuver."""
 
     F_top: TopForce
-    """clamp force that is held"""
+    """clamp force during the hold"""
     t_ramp: Duration
-    """time in which the demand rises, and in which it falls"""
+    """time for the demand to rise, and to fall"""
     t_hold: Duration
-    """time in between"""
+    """length of the hold"""
     duration: Duration
     """time recorded"""
 
@@ -45,7 +45,7 @@ def demand(t: Array, options: Options) -> Array:
 def cases(
     par: CaliperBrakeParameters, options: Options, _: Stimulus | None = None
 ) -> tuple[Case, ...]:
-    """Return the one run, from the parked piston."""
+    """Return the single run, from the parked piston."""
     return (
         case_from_rest(
             par, "force", 0.0, lambda t: {"F_set": demand(t, options)}, options.duration
@@ -54,7 +54,7 @@ def cases(
 
 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
-    """Return how well the demand is followed, what holding costs, and when the disc is free."""
+    """Return tracking errors, holding current, and the time until the disc is free."""
     run = recordings["run"]
     t, F = run["time"].values, run["F_cl"].values
     error = run["F_ref"].values - F

@@ -23,13 +23,13 @@ class Options(ParameterSet):
     """The step."""
 
     x_to: Length
-    """travel asked for"""
+    """travel demand"""
     duration: Duration
     """time recorded"""
 
 
 def cases(par: ApproachParameters, options: Options, _: Stimulus | None = None) -> tuple[Case, ...]:
-    """Return the one run, from rest."""
+    """Return the single run, from rest."""
     state, memory = at_rest()
     stimulus = step_at_zero("x_set", 0.0, options.x_to)
     run = Case(

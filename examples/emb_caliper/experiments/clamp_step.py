@@ -34,7 +34,7 @@ class Options(ParameterSet):
     F_from: ClampForce
     """clamp force before the step; 0 for the parked piston"""
     F_to: ClampForce
-    """clamp force asked for"""
+    """clamp force after the step"""
     duration: Duration
     """time recorded after the step"""
     settle: TimeConstant
@@ -44,7 +44,7 @@ class Options(ParameterSet):
 def cases(
     par: CaliperBrakeParameters, options: Options, _: Stimulus | None = None
 ) -> tuple[Case, ...]:
-    """Return the one run."""
+    """Return the single run."""
     stimulus = step_at_zero("F_set", options.F_from, options.F_to)
     return (
         case_from_rest(
@@ -65,7 +65,7 @@ def step(options: Options) -> step_response.Setting:
 
 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
-    """Return the step's key figures, those of the effort, and the largest motor speed."""
+    """Return the key figures of step and effort, and the largest motor speed."""
     run = recordings["run"]
     figures = evaluate("step_response", run, step(options))
     figures |= evaluate("effort", run, effort.Setting())

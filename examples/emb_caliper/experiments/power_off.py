@@ -1,4 +1,4 @@
-"""Power off: the motor's current ends under load, and friction decides what force stays."""
+"""Power off: the motor current ends under load, and friction determines the residual force."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from emb_caliper.trim import memory_at
 
 
 class Options(ParameterSet):
-    """The clamp force that is left alone."""
+    """Clamp force and kind of the power loss."""
 
     F_from: TopForce
     """clamp force before"""
     circuit: Literal["open", "short"]
-    """whether the motor carries no current from then on, or its winding is short-circuited"""
+    """open circuit without current, or short-circuited winding"""
     duration: Duration
     """time recorded after the current ends"""
 
@@ -28,7 +28,7 @@ class Options(ParameterSet):
 def held_force(par: CaliperBrakeParameters) -> float:
     """Return the largest clamp force [N] that friction holds without current; inf for any.
 
-    Where the load's torque grows faster than the friction: (N - G) F = T_s.
+    If the load's torque grows faster than the friction, (N - G) F = T_s.
     """
     grows = travel_per_angle(par) - par.friction.G
     return par.friction.T_s / grows if grows > 0.0 else float("inf")
@@ -37,7 +37,7 @@ def held_force(par: CaliperBrakeParameters) -> float:
 def cases(
     par: CaliperBrakeParameters, options: Options, _: Stimulus | None = None
 ) -> tuple[Case, ...]:
-    """Return the one run; the current loop stands for the open circuit."""
+    """Return the single run; the current loop models the open circuit."""
     drive: DriveMode
     held, F = memory_at(options.F_from, par), options.F_from
     if options.circuit == "open":
@@ -48,7 +48,7 @@ def cases(
 
 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
-    """Return what force stays, and when the shaft comes to rest."""
+    """Return the residual force, and the time until the shaft is at rest."""
     run = recordings["run"].sel(time=slice(-1e-9, None))
     time, stuck = run["time"].values, run["stuck"].values > 0.5
     rests = bool(stuck[-1])
@@ -57,14 +57,14 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     note = "" if rests else "the shaft does not come to rest in the recorded time"
     return (
         Kpi("residual_force", float(run["F_cl"].values[-1]), "N", "Clamp force at the end."),
-        Kpi("time_to_rest", t_rest, "s", "Time until the shaft rests for good.", note),
+        Kpi("time_to_rest", t_rest, "s", "Time until the shaft rests permanently.", note),
     )
 
 
 EXPERIMENT = Experiment(
     name="power-off",
     assembly="emb-caliper",
-    summary="{F_from:kN}, then no current: what clamp force the friction holds",
+    summary="{F_from:kN}, then no current: clamp force held by friction",
     options=Options,
     defaults=Options(F_from=25e3, circuit="open", duration=1.0),
     cases=cases,

@@ -31,16 +31,16 @@ class Options(ParameterSet):
     """The strokes."""
 
     F_top: TopForce
-    """clamp force at which a stroke turns"""
+    """clamp force at which a stroke reverses"""
     speeds: Annotated[Nodes, Unit("rad/s", 10.0)]
-    """motor speed of each stroke, up and down again"""
+    """motor speed of each stroke, up and down"""
     record: Duration
-    """recording interval; as short as that of current control, or the means of the current lie"""
+    """recording interval; if longer than that of current control, mean currents are wrong"""
 
     @model_validator(mode="after")
     def _moves(self) -> Options:
         if not self.speeds or min(self.speeds) <= 0.0:
-            raise ValueError("speeds must hold one motor speed or more, each > 0 rad/s")
+            raise ValueError("speeds must contain one motor speed or more, each > 0 rad/s")
         return self
 
 
@@ -54,7 +54,7 @@ def turns(par: CaliperBrakeParameters, options: Options) -> Array:
 def cases(
     par: CaliperBrakeParameters, options: Options, _: Stimulus | None = None
 ) -> tuple[Case, ...]:
-    """Return the one run: from the parked piston, the speed controlled."""
+    """Return the single run: from the parked piston, under speed control."""
     instants = turns(par, options)
     demands = np.array([way * speed for speed in options.speeds for way in (1.0, -1.0)])
 
@@ -82,7 +82,7 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
 
 
 def _current_at(run: xr.Dataset, level: float, moving: Array) -> float:
-    """Return the current at the first crossing of a clamp force in one direction, NaN without."""
+    """Return the current at the first crossing of a clamp force in one direction, or NaN."""
     F, i = run["F_cl"].values, run["i"].values
     for k, (a, b) in enumerate(pairwise(F)):
         if moving[k] and moving[k + 1] and (a - level) * (b - level) <= 0.0 and a != b:

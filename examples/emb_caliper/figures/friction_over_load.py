@@ -1,4 +1,4 @@
-"""Figure: motor torque over clamp force while the shaft turns, both ways."""
+"""Figure: motor torque over clamp force while the shaft turns, in both directions."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from bywire.authoring import FigureKind, Result, ShownFigure, style
 
-_STEADY = 0.02  # of the speed demand: what is farther from it accelerates
+_STEADY = 0.02  # of the speed demand: at larger errors the motor accelerates
 
 
 def _draw(result: Result) -> list[ShownFigure]:

@@ -1,7 +1,7 @@
-"""PI controllers of the cascade, each with its limit; the integral part waits at it.
+"""PI controllers of the cascade, each with a limit at which its integral part stops.
 
-Back-calculation would charge the integral part with all that is beyond the limit: a force step of
-25 kN asks for three times the largest speed, and the brake then creeps toward its demand.
+Back-calculation would charge the integral part with the whole excess over the limit. A force step
+of 25 kN demands three times the largest speed, and the brake would then creep toward its demand.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class ForceParameters(ParameterSet):
     k_i: SpeedPerForceTime
     """integral gain"""
     omega_max: MotorSpeed
-    """largest speed asked for"""
+    """largest speed demand"""
 
 
 class SpeedParameters(ParameterSet):
@@ -41,18 +41,18 @@ class SpeedParameters(ParameterSet):
     k_i: CurrentPerAngle
     """integral gain"""
     i_max: Current
-    """largest current asked for"""
+    """largest current demand"""
 
 
 class ForceInput(NamedTuple):
-    """Error of the force, and what the gain is multiplied by."""
+    """Error of the force, and the factor on the gains."""
 
     error: Annotated[float, Signal("N", "error of the clamp force", 1e3)]
     factor: Annotated[float, Signal("1", "factor of the gains", 1.0)]
 
 
 class SpeedInput(NamedTuple):
-    """Error of the speed, and the current that is known to be needed."""
+    """Error of the speed, and the feed-forward current."""
 
     error: Annotated[float, Signal("rad/s", "error of the speed", 10.0)]
     ahead: Annotated[float, Signal("A", "current fed forward", 5.0)]

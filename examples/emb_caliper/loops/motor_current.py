@@ -7,7 +7,7 @@ from emb_caliper.loops.points import CAUSES, FORCE, point
 
 
 def at(par: ParameterSet, value: float) -> Point:
-    """Return the brake held at a clamp force [N] by its current."""
+    """Return the brake that its current holds at a clamp force [N]."""
     return point(par, value, "current", 10e-6)
 
 

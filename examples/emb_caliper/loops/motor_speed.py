@@ -7,7 +7,7 @@ from emb_caliper.loops.points import CAUSES, FORCE, point
 
 
 def at(par: ParameterSet, value: float) -> Point:
-    """Return the brake held at a clamp force [N] by its speed loop."""
+    """Return the brake that its speed loop holds at a clamp force [N]."""
     return point(par, value, "speed")
 
 
@@ -21,8 +21,8 @@ LOOP = Loop(
     cut="i_ref",
     point=at,
     causes=CAUSES,
-    # Above, what the sampled demand does between its samples shows in a continuous speed: the
-    # linear model tells the instants of sampling alone (0.03 deg apart at 60 Hz, 1.2 at 200 Hz).
+    # At higher frequencies the continuous speed shows the held demand between its samples. The
+    # linear model is valid only at the sampling instants (0.03 deg off at 60 Hz, 1.2 at 200 Hz).
     band=(0.5, 60.0),
     amplitudes=(0.1, 3.0),
     tunables={"ecu.speed.k_p": (1e-2, 10.0), "ecu.speed.k_i": (0.1, 500.0)},

@@ -1,4 +1,4 @@
-"""Operating points of the loops, and what makes them nonlinear."""
+"""Operating points of the loops, and causes of their nonlinearity."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ CAUSES: Mapping[str, Mapping[str, Any]] = {
     "dry friction": {"friction.C": 0.0, "friction.G": 0.0, "friction.T_s": 0.0},
     "converter": {"adc.law": "ideal"},
 }
-"""cause -> parameters without it; the stiffness bends at any amplitude and cannot be left out"""
+"""cause -> parameters without it; the nonlinear stiffness cannot be removed"""
 
 
 def point(par: ParameterSet, F: float, drive: DriveMode, step: float = 20e-6) -> Point:
-    """Return the brake held at a clamp force [N].
+    """Return the brake in equilibrium at a clamp force [N].
 
     Raises
     ------
@@ -31,8 +31,8 @@ def point(par: ParameterSet, F: float, drive: DriveMode, step: float = 20e-6) ->
     driven = cast(CaliperBrakeParameters, par.replace({"drive": drive}))
     if driven.ecu.F_on > F:
         raise ParameterError(
-            f"clamp force = {F:g} N is no operating point: below ecu.F_on = {driven.ecu.F_on:g} N "
-            "the piston is parked; take for instance '5 kN'"
+            f"clamp force = {F:g} N is not a valid operating point: below ecu.F_on = "
+            f"{driven.ecu.F_on:g} N the ECU parks the piston; use for example '5 kN'"
         )
     state = state_at(F, driven)
     held = {

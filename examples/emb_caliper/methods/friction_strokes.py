@@ -40,22 +40,22 @@ MotorSpeed = Annotated[float, Unit("rad/s", 5.0), Field(gt=0, allow_inf_nan=Fals
 
 _NAMES = ("friction.C", "friction.G", "rotor.D")
 _STEP = 20e-6
-_SMALL = 1e-3  # of the friction: what is left over below that is not judged
-_SPREAD = 1.5  # by which loads, and speeds, have to differ for their parts of the friction to part
+_SMALL = 1e-3  # of the friction: smaller residuals are not judged
+_SPREAD = 1.5  # least ratio of loads, and of speeds, that separates the parts of the friction
 _ADVICE = "go up to a high clamp force and back at two speeds, as 'bywire run slow-strokes' does"
 
 
 class Options(ParameterSet):
-    """Which part of the strokes counts, how it is filtered, and the synthetic noise."""
+    """Evaluated part of the strokes, filters, and the synthetic noise."""
 
     slowest: MotorSpeed
-    """speed that a stroke keeps; slower, breakaway rules it"""
+    """smallest speed of a stroke; below it breakaway dominates"""
     margin: Duration
-    """time left out at either end of a stroke"""
+    """time omitted at either end of a stroke"""
     window: Duration
-    """time over which the torque balance is averaged"""
+    """averaging window of the torque balance"""
     cutoff: Frequency
-    """low-pass before the angle is differentiated"""
+    """low-pass before differentiation of the angle"""
     sigma_i: Annotated[float, Unit("A", 0.05), Field(ge=0)]
     """noise of the measured current in synthetic measurements"""
     sigma_F: Annotated[float, Unit("N", 20.0), Field(ge=0)]
@@ -71,7 +71,7 @@ def identify(
 
     .. math:: K_e i - N F_{cl} - J \dot\omega = \mathrm{sgn}(\omega) (C + G F_{cl}) + D \omega
 
-    averaged over windows within the strokes; torque constant, ratio and inertia are known.
+    averaged over windows within the strokes. Torque constant, ratio and inertia must be known.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ def identify(
     Raises
     ------
     ParameterError
-        When strokes, loads or speeds do not tell the friction, or a sign is wrong.
+        When strokes, loads or speeds do not determine the friction, or a sign is wrong.
     """
     signals = data[["i", "theta", "F_cl"]]
     moved = differentiated(signals, "theta", ("omega", "alpha"), options.cutoff)
@@ -115,18 +115,18 @@ def identify(
         np.full(torque.size, 1.0 / scatter),
         richer,
         len(_NAMES),
-        "whether the friction bends over the load, or its slope changes with speed",
+        "whether the friction is nonlinear in the load, or its slope changes with speed",
     )
     if scatter < _SMALL * float(np.median(np.abs(torque))):
-        # A record without noise: anything shows, and nothing of it matters.
-        small = f"less than {100 * _SMALL:g} % of the friction is left over: not judged"
+        # A record without noise: even irrelevant deviations are significant.
+        small = f"the residual is below {100 * _SMALL:g} % of the friction: not judged"
         check = replace(check, limit=None, note=f"{check.note}; {small}")
     return Identified(
         estimates={"friction": best},
         parameters=best.parameters(),
         checks=(check,),
         curves=(_curve(mean["F_cl"], torque, fitted),),
-        notes=("breakaway is not told by strokes that slide: friction.T_s stays as it is",),
+        notes=("sliding strokes do not determine breakaway: friction.T_s is unchanged",),
     )
 
 
@@ -148,8 +148,8 @@ def _require_spread(mean: dict[str, Array]) -> None:
         low, high = np.quantile(np.abs(mean[name]), (0.02, 0.98))
         if high < _SPREAD * low or high == 0.0:
             raise ParameterError(
-                f"the data does not tell {parameter} from friction.C: {name} stays near {high:.3g} "
-                f"{unit}; {_ADVICE}"
+                f"the data cannot separate {parameter} from friction.C: {name} stays near "
+                f"{high:.3g} {unit}; {_ADVICE}"
             )
 
 
@@ -175,7 +175,7 @@ def _curve(F: Array, torque: Array, fitted: Array) -> Curve:
 
 
 def synthetic(par: CaliperBrakeParameters, options: Options, seed: int) -> xr.Dataset:
-    """Return the slow strokes, simulated, with the sensors' noise."""
+    """Return simulated slow strokes with sensor noise."""
     experiment = slow_strokes.EXPERIMENT
     (case,) = experiment.cases(par, experiment.defaults, None)
     noise = {"i": options.sigma_i, "theta": options.sigma_theta, "F_cl": options.sigma_F}

@@ -1,1 +1,1 @@
-"""What the sources state, beside what this model computes."""
+"""Statements of the sources, compared with this model."""

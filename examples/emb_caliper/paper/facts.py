@@ -1,4 +1,4 @@
-"""What was read in the sources, and how a sentence was read as a number."""
+"""Statements of the sources, and interpretations of sentences as numbers."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ UNEVEN = Fact(
 IMPROVED = Fact(
     1.0,
     "1",
-    f"{_ABSTRACT}: gain scheduling is an improvement; read as: with it small steps take more alike",
+    f"{_ABSTRACT}: gain scheduling is an improvement; read as: small steps differ less with it",
     "reading",
 )
 STICKS = Fact(

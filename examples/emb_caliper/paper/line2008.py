@@ -1,4 +1,4 @@
-"""Line, Manzie and Good (2008): what title, abstract and index terms state of the cascade."""
+"""Line, Manzie and Good (2008): statements of title, abstract and index terms on the cascade."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def _rise(runs: Runs, name: str, low: float) -> float:
 
 
 def _envelope(runs: Runs) -> SourcePart:
-    """Return how small steps differ over the clamp force, without and with gain scheduling."""
+    """Return the spread of small steps over the clamp force, without and with gain scheduling."""
     ratio = {name: _rise(runs, name, 1e3) / _rise(runs, name, 19e3) for name in (MAIN, MODIFIED)}
     uneven = {name: abs(float(np.log(value))) for name, value in ratio.items()}
     items = (
@@ -51,7 +51,7 @@ def _envelope(runs: Runs) -> SourcePart:
             facts.IMPROVED,
             uneven[MODIFIED] / uneven[MAIN],
             "<=",
-            "logarithm of that ratio with scheduling over that without",
+            "logarithm of this ratio with scheduling, over the same without scheduling",
         ),
     )
     return SourcePart(
@@ -73,7 +73,7 @@ def _large(runs: Runs) -> SourcePart:
             facts.SATURATES,
             100.0 * least / limit,
             ">=",
-            "least of three steps' peak currents over the limit of the demand",
+            "smallest peak current of three steps, over the limit of the demand",
         )
     ]
     for F, result in zip(STEPS, results, strict=True):
@@ -90,7 +90,7 @@ def _large(runs: Runs) -> SourcePart:
         f"step-{F / 1e3:g}kN": r.recordings["run"] for F, r in zip(STEPS, results, strict=True)
     }
     exhibit = Exhibit("steps", _drawn(recordings), "Steps of the force demand, standard cascade.")
-    text = "The paper's own steps were not at hand: 5, 15 and 25 kN are chosen."
+    text = "The paper's own steps were not available: we chose 5, 15 and 25 kN."
     return SourcePart("Large steps", text, tuple(items), (exhibit,), recordings)
 
 
@@ -111,7 +111,7 @@ def _drawn(recordings: dict[str, xr.Dataset]) -> Any:
 
 
 def _mechanism(runs: Runs) -> SourcePart:
-    """Return friction over load, the stiffness curve, and what force stays without current."""
+    """Return friction over load, the stiffness curve, and the force held without current."""
     strokes = runs.bench("slow-strokes", MAIN)
     run, par = strokes.recordings["run"], parameters(MAIN)
     half = [_width(run, F) for F in (5e3, 25e3)]
@@ -121,7 +121,7 @@ def _mechanism(runs: Runs) -> SourcePart:
             facts.STICKS,
             half[1] / half[0],
             ">=",
-            "distance of the branches' currents at 25 kN over that at 5 kN",
+            "current difference of the branches at 25 kN, over that at 5 kN",
         ),
         found("friction.width", "A", kpis(strokes)["loop_width"], "at 15 kN, at 20 rad/s"),
         found(
@@ -144,7 +144,7 @@ def _mechanism(runs: Runs) -> SourcePart:
 
 
 def _width(run: xr.Dataset, level: float) -> float:
-    """Return the distance of the branches' currents at a clamp force, of the slowest stroke."""
+    """Return the current difference of the slowest stroke's branches at a clamp force."""
     F, i, omega = (run[name].values for name in ("F_cl", "i", "omega"))
     slow = np.abs(omega) < 30.0
     means = [
@@ -155,7 +155,7 @@ def _width(run: xr.Dataset, level: float) -> float:
 
 
 def reproduce(progress: Progress | None = None) -> Reproduction:
-    """Put the abstract's statements beside what the model computes."""
+    """Compare the abstract's statements with the model."""
     runs = Runs(progress)
     parts = []
     for label, part in (
@@ -171,6 +171,6 @@ def reproduce(progress: Progress | None = None) -> Reproduction:
 
 SOURCE = Source(
     name="line2008",
-    summary="electro-mechanical caliper under cascaded PI control: what the abstract states",
+    summary="electro-mechanical caliper under cascaded PI control: statements of the abstract",
     reproduce=reproduce,
 )

@@ -22,7 +22,7 @@ _EXACT = 1e-6
 
 
 def reproduce(progress: Progress | None = None) -> Reproduction:
-    """Compute the current's pole, and how far the pads come, at both ends of the interval."""
+    """Compute the current's pole and the travel of the pads at both ends of the interval."""
     runs = Runs(progress)
     runs.report("approach", 0.0)
     state, memory = at_rest()

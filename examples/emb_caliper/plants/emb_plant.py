@@ -13,7 +13,7 @@ CURRENT = Quantity("current", "A", 7.5)
 
 
 def model(par: ParameterSet, at: PlantPoint) -> LinearModel:
-    """Return the exact plant at a clamp force, or where a current holds it without friction."""
+    """Return the exact plant at a clamp force, or at the force that a current holds."""
     caliper = cast(CaliperBrakeParameters, par)
     F = at.value
     if at.quantity is CURRENT:

@@ -1,8 +1,8 @@
 """Approach: the linear benchmark of an EMB that closes its clearance under position control.
 
 The model of Strathmann and Oehlerking, Verifying properties of an electro-mechanical braking
-system, ARCH 2015, as the verification tools' competitions state it: a winding, a rotor without
-inertia against viscous friction, a gear, and a sampled PI controller without limits.
+system, ARCH 2015, in the version of the verification tools' competitions. It has a winding, a rotor
+without inertia against viscous friction, a gear, and a sampled PI controller without limits.
 """
 
 from __future__ import annotations
@@ -48,21 +48,21 @@ class ApproachParameters(ParameterSet):
 
 
 class State(NamedTuple):
-    """What the engine integrates."""
+    """State of the simulation."""
 
     i: Annotated[float, Signal("A", "motor current", 100.0)]
     x: Annotated[float, Signal("m", "travel", 5e-3)]
 
 
 class Memory(NamedTuple):
-    """What the controller holds."""
+    """Memory of the controller."""
 
     x_e: Annotated[float, Signal("m", "error", 5e-3)]
     x_c: Annotated[float, Signal("m*s", "integral of the error", 1e-4)]
 
 
 class Stimulus(NamedTuple):
-    """What acts from outside."""
+    """External inputs."""
 
     x_set: Annotated[float, Signal("m", "travel demand", 5e-3)]
 
@@ -74,7 +74,7 @@ class Flow(NamedTuple):
 
 
 class Output(NamedTuple):
-    """What a recording holds."""
+    """Recorded signals."""
 
     x: Annotated[float, Signal("m", "travel", 5e-3)]
     x_set: Annotated[float, Signal("m", "travel demand", 5e-3)]
@@ -83,7 +83,7 @@ class Output(NamedTuple):
 
 
 def tick(x: State, m: Memory, u: Stimulus, par: ApproachParameters) -> Memory:
-    """Take the error, and add it to its integral."""
+    """Compute the error, and add it to its integral."""
     error = u.x_set - x.x
     return Memory(x_e=error, x_c=m.x_c + par.T_sample * error)
 
@@ -94,7 +94,7 @@ def speed(x: State, par: ApproachParameters) -> float:
 
 
 class Approach(Model):
-    """The motor moves the piston through the clearance; nothing is touched."""
+    """The motor moves the piston through the clearance, without contact."""
 
     name: ClassVar[str] = "emb-approach"
     State: ClassVar = State

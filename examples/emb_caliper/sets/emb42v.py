@@ -1,8 +1,8 @@
-"""A 42 V brake of the size of that of Line, Manzie and Good (2008).
+"""A 42 V brake of the same size as that of Line, Manzie and Good (2008).
 
-The full text of the paper was not at hand, only title, abstract and index terms, and of Line,
-Manzie and Good (2006) the abstract and the description of the mechanism. So no number is marked as
-printed: those that are passed on with this brake are chosen, and said to be unverified.
+The full text of the paper was not available, only title, abstract and index terms. Of Line, Manzie
+and Good (2006) only the abstract and the description of the mechanism were available. So no number
+is marked as printed: the numbers in circulation for this brake are chosen and marked as unverified.
 """
 
 from __future__ import annotations
@@ -17,18 +17,18 @@ SOURCE = (
     "IEEE Trans. Control Systems Technology 16(3), 446-457, 2008; mechanism: the same authors, "
     "Robust control of an automotive electromechanical brake, IFAC, 2006"
 )
-_TOLD = "said to be that of the actuator of the source; unverified"
+_TOLD = "in circulation for the source's actuator; unverified"
 _CURVE = "-7.23 x^3 + 33.7 x^2 - 4.97 x kN (x in mm), unverified, from its positive root on"
-_MOTOR = "an EMB motor's in the benchmark of Strathmann and Oehlerking (ARCH 2015)"
+_MOTOR = "EMB motor in the benchmark of Strathmann and Oehlerking (ARCH 2015)"
 
 _A, _B, _C = -7.23e12, 33.7e9, -4.97e6  # of the cubic's powers, SI
 _TOUCH = (-_B + math.sqrt(_B * _B - 4.0 * _A * _C)) / (2.0 * _A)  # its root: the pads touch
 
 _PLANT = {
-    "supply.V_bat": chosen(42.0, "42 V vehicles were the plan; 40 A at 300 rad/s need 41 V"),
+    "supply.V_bat": chosen(42.0, "for planned 42 V vehicles; 40 A at 300 rad/s need 41 V"),
     "supply.R_bat": chosen(0.02, "battery and leads of this class"),
     "bridge.D_max": chosen(1.0, "|D| <= 1"),
-    "bridge.f_pwm": chosen(20e3, "above hearing; informative"),
+    "bridge.f_pwm": chosen(20e3, "inaudible; informative"),
     "motor.R_m": chosen(0.5, _MOTOR),
     "motor.L_m": chosen(1e-3, _MOTOR),
     "motor.K_e": chosen(0.0697, _TOLD),
@@ -37,7 +37,7 @@ _PLANT = {
     "friction.C": chosen(0.0304, _TOLD),
     "friction.G": chosen(1.17e-5, _TOLD),
     "friction.T_s": chosen(0.0379, _TOLD),
-    "friction.omega_s": chosen(2.0, "breakaway is gone at a few turns a minute"),
+    "friction.omega_s": chosen(2.0, "breakaway vanishes at a few turns per minute"),
     "gear.z_sun_1": chosen(16.0, "30.25 in two equal stages: 0.0263 mm/rad with the screw"),
     "gear.z_ring_1": chosen(72.0, "30.25 in two equal stages: 0.0263 mm/rad with the screw"),
     "gear.z_sun_2": chosen(16.0, "30.25 in two equal stages: 0.0263 mm/rad with the screw"),
@@ -47,11 +47,11 @@ _PLANT = {
     "caliper.k_2": derived(_B + 3.0 * _A * _TOUCH, _CURVE),
     "caliper.k_3": derived(_A, _CURVE),
     "caliper.n_max": chosen(1.3e-3, "about 40 kN; the curve stiffens up to 1.4 mm"),
-    "caliper.tau": chosen(1e-4, "small beside the viscous friction"),
+    "caliper.tau": chosen(1e-4, "small compared with the viscous friction"),
     "caliper.clearance": chosen(3e-4, "0.15 mm on either side of the disc"),
-    "stop.k_stop": chosen(2e7, "stiff against the pads, slow against the step"),
-    "stop.tau_stop": chosen(1e-3, "a stop without rebound of note"),
-    "stop.x_rest": chosen(-5e-4, "clear of where the piston parks"),
+    "stop.k_stop": chosen(2e7, "stiff compared with the pads, slow compared with the step"),
+    "stop.tau_stop": chosen(1e-3, "a stop without noticeable rebound"),
+    "stop.x_rest": chosen(-5e-4, "clear of the parking position"),
     "stop.x_end": chosen(4e-3, "worn pads are not modeled"),
     "F_span": chosen(40e3, "above the highest demand"),
     "adc.law": chosen("quantized", "a converter has a resolution"),
@@ -66,7 +66,7 @@ _ECU = {
     "ecu.F_on": chosen(200.0, "above the resolution of the force sensor"),
     "ecu.k_park": chosen(30.0, "parks within 0.2 s without overshoot"),
     "ecu.scheduling": chosen("off", "the standard cascade has fixed gains"),
-    "ecu.load": chosen("off", "the standard cascade feeds nothing forward"),
+    "ecu.load": chosen("off", "the standard cascade has no feed-forward"),
     "ecu.force.k_p": chosen(0.04, _DESIGN),
     "ecu.force.k_i": chosen(0.04, _DESIGN),
     "ecu.force.omega_max": chosen(300.0, _TOLD),
@@ -82,7 +82,7 @@ _ECU = {
 
 _MODIFIED = {
     "ecu.scheduling": chosen("stiffness", "the abstract names gain scheduling"),
-    "ecu.load": chosen("fed-forward", "the abstract names feedback linearization; load part of it"),
+    "ecu.load": chosen("fed-forward", "the load part of the abstract's feedback linearization"),
     "ecu.force.k_p": chosen(0.2, "the product of gain and stiffness is 0.2 k_1 everywhere"),
     "ecu.force.k_i": chosen(0.2, "as k_p"),
 }
@@ -99,7 +99,7 @@ MODIFIED = CitedSet(
     name="emb42v-modified",
     assembly="emb-caliper",
     source=SOURCE,
-    summary="the same brake, gains that follow the stiffness, load fed forward",
+    summary="the same brake with gains that follow the stiffness, and load feed-forward",
     parameter_class=CaliperBrakeParameters,
     values=_PLANT | _ECU | _MODIFIED,
 )

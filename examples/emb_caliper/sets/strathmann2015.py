@@ -1,8 +1,8 @@
 """The linear benchmark of Strathmann and Oehlerking (2015).
 
-Read in the models of the competitions that use it (ARCH-COMP; CORA, JuliaReach) and in the problem
-statement of the archive (cps-vo.org, node 67351); the paper itself was not at hand. Lengths are
-read as decimeters: x0 = 0.05 is a clearance of 5 mm.
+The values come from the models of the competitions that use it (ARCH-COMP; CORA, JuliaReach) and
+from the problem statement in the archive (cps-vo.org, node 67351). The paper itself was not
+available. Lengths are interpreted as decimeters: x0 = 0.05 is a clearance of 5 mm.
 """
 
 from __future__ import annotations

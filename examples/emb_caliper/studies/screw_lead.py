@@ -1,4 +1,4 @@
-"""Lead of the screw: how fast the brake applies, and what holding costs."""
+"""Lead of the screw: apply time of the brake, and holding current."""
 
 from __future__ import annotations
 
@@ -91,9 +91,9 @@ def compute(par: CaliperBrakeParameters, options: Options, progress: Progress) -
     data = xr.Dataset(
         {
             "t_apply": variable(values[:, :, 0], dims, "s", "time to 90 % of the clamp force"),
-            "energy": variable(values[:, :, 1], dims, "J", "electrical energy up to there"),
-            "i_press": variable(pressing, dims, "A", "current that presses on slowly"),
-            "i_hold": variable(np.array(held), ("lead",), "A", "current that holds, no friction"),
+            "energy": variable(values[:, :, 1], dims, "J", "electrical energy until then"),
+            "i_press": variable(pressing, dims, "A", "current for slow pressing"),
+            "i_hold": variable(np.array(held), ("lead",), "A", "holding current without friction"),
         },
         {
             "lead": variable(leads, ("lead",), "m", "lead of the screw"),
@@ -106,7 +106,7 @@ def compute(par: CaliperBrakeParameters, options: Options, progress: Progress) -
     if not np.isfinite(times).any():
         raise ParameterError(
             f"no lead presses with {options.F_to / 1e3:g} kN within ecu.speed.i_max = "
-            f"{par.ecu.speed.i_max:g} A: lower F_to or lead_min"
+            f"{par.ecu.speed.i_max:g} A: reduce F_to or lead_min"
         )
     best = int(np.nanargmin(times))
     given = Mark("given brake", par.screw.lead, par.caliper.clearance)
@@ -119,8 +119,15 @@ def compute(par: CaliperBrakeParameters, options: Options, progress: Progress) -
             "Lead that applies fastest at the given clearance.",
         ),
         Kpi("t_apply_fastest", float(nearest["t_apply"][best]), "s", "Its apply time."),
-        Kpi("i_hold_fastest", float(held[best]), "A", "Current that then holds the clamp force."),
-        Kpi("i_hold_given", holding_current(options.F_to, par), "A", "The same as it is given."),
+        Kpi(
+            "i_hold_fastest",
+            float(held[best]),
+            "A",
+            "Current that holds the clamp force with this lead.",
+        ),
+        Kpi(
+            "i_hold_given", holding_current(options.F_to, par), "A", "The same with the given lead."
+        ),
     )
     applied = Map(
         "t_apply",
@@ -136,7 +143,7 @@ def compute(par: CaliperBrakeParameters, options: Options, progress: Progress) -
 
 
 def _applied(par: CaliperBrakeParameters, options: ParameterSet) -> tuple[float, float]:
-    """Return the time to 90 % of the clamp force [s] and the energy up to there [J]."""
+    """Return the time to 90 % of the clamp force [s] and the energy until then [J]."""
     (case,) = clamp_step.cases(par, options)  # type: ignore[arg-type]
     computed = simulate(as_run(case, 20e-6), ("F_cl", "E_source"))
     wanted: step_response.Setting = clamp_step.step(options)  # type: ignore[arg-type]

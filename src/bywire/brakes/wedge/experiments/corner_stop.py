@@ -1,4 +1,4 @@
-"""Stops of a car's corner: a stop that is held, and a panic stop beyond the road's adhesion."""
+"""Stops of a car's corner: a stop with hold, and a panic stop beyond the road's adhesion."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class StopOptions(ParameterSet):
     surface: SurfaceName
     """surface of the road"""
     T_disc: Temperature
-    """temperature of the disc at the start, where heat counts (corner.heat.law)"""
+    """temperature of the disc at the start, if corner.heat.law is on"""
 
 
 def _stop_case(
@@ -42,7 +42,7 @@ def _stop_case(
     levels: Mapping[float, float],
     duration: float,
 ) -> Case:
-    """Return a stop with moments [N m] that are demanded from their times [s] on."""
+    """Return a stop with moment demands [N m] from their times [s] on."""
     given = {"command.mode": "moment", "flywheel.law": "coasting", **changes}
     changed = par.replace(given | laid("corner.road", options.surface))
     state, memory = at_speed(options.v_0, changed, options.T_disc)
@@ -58,9 +58,9 @@ def _stop_case(
     )
 
 
-# --- Stop, hold and release: the tyre rocks back, and the wheel with it as far as the pads let it
+# --- Stop, hold and release: the tyre rocks back, and the wheel as far as the pads allow
 
-_CALM = 1.0  # s from the stop on, in which tyre and brake come to rest
+_CALM = 1.0  # s after the stop, for tyre and brake to come to rest
 
 STOP_FIGURES = Figures(
     undefined="the vehicle does not stop before the release",
@@ -145,16 +145,16 @@ CORNER_STOP = Experiment(
 )
 
 
-# --- Panic stop: more moment is demanded than the road holds
+# --- Panic stop: the demand exceeds the road's adhesion
 
 PANIC_FIGURES = Figures(
-    undefined="the vehicle does not stop in the recorded time: give a longer options.duration",
+    undefined="the vehicle does not stop in the recorded time: set a longer options.duration",
     stopping_distance=("m", "Distance from the demand to the first standstill."),
     stopping_time=("s", "Time from the demand to the first standstill."),
-    braking_efficiency=("%", "Ideal stopping distance on this road over the distance."),
+    braking_efficiency=("%", "Ideal stopping distance on this road over the actual one."),
     first_bite=("s", "Time from the demand until the pads touch."),
     peak_slip=("1", f"Largest slip above {SLOW:g} m/s."),
-    locked_time=("s", f"Time in which the wheel stands, above {SLOW:g} m/s."),
+    locked_time=("s", f"Time in which the wheel is locked, above {SLOW:g} m/s."),
     peak_moment=("N*m", "Largest moment of the brake."),
     supply_energy=("J", "Energy that the drives take until the stop."),
     disc_energy=("J", "Energy taken from the wheel until the stop."),

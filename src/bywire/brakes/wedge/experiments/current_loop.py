@@ -48,7 +48,7 @@ class Options(ParameterSet):
 
 
 def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Case, ...]:
-    """Return one run per winding and gain, the shaft clamped."""
+    """Return one run per winding and gain, with a clamped shaft."""
     check_current("i_step", options.i_step, par)
     factors = product(options.windings, options.gains)
     runs: list[Case] = []

@@ -1,7 +1,7 @@
-"""Disc stop: a disc of little energy is braked to standstill, held, and released.
+"""Disc stop: the brake stops a disc of little energy, holds it, and releases it.
 
 Roberts et al. (2003), section "Wedge and calliper", drop the pad's friction on the wedge once the
-disc stands. In the other reading the standing pad sticks. The experiment runs both.
+disc is at rest. In the other reading the pad then sticks to the disc. The experiment runs both.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ READINGS = ("drop", "stick")
 _CALM = 0.05  # time after the stop [s] in which wedge and current may still move
 
 FIGURES = Figures(
-    stopping_time=("s", "Time from the demand until the disc stands."),
+    stopping_time=("s", "Time from the demand until the disc is at rest."),
     stopping_angle=("rad", "Angle that the disc turns until then."),
     moment_before_stop=("N*m", "Mean moment in the last tenth of braking, run-out included."),
     force_before_stop=("N", "Mean normal force in the last tenth of braking."),
@@ -40,7 +40,7 @@ FIGURES = Figures(
     force_change=("N", "Normal force peak to peak in that time."),
     reference_change=(
         "rad",
-        "Wind-up: travel of the common reference toward clamping while the disc stands.",
+        "Windup: travel of the common reference toward clamping while the disc is at rest.",
     ),
     hold_power=("W", "Mean input power in that time, standby included."),
 )
@@ -63,7 +63,7 @@ class Options(ParameterSet):
 
 
 def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Case, ...]:
-    """Return one run for each reading of the pads' effect on the wedge while the disc stands."""
+    """Return one run for each reading of the pads' effect on the wedge with the disc at rest."""
     levels = {0.0: options.M_brake, options.t_hold: 0.0}
     return tuple(
         case_from_parked(
@@ -88,7 +88,7 @@ def stop_figures(run: xr.Dataset, options: Options) -> dict[str, float] | str:
     braked = run.sel(time=slice(-1e-9, options.t_hold - 1e-9))
     turns = np.abs(braked["Omega"].values) > parameters_of(run).flywheel.Omega_still
     if not turns[:1].any():
-        return "the disc stands from the start"
+        return "the disc is at rest from the start"
     if turns[-1]:
         return "the disc still turns when the demand falls to zero"
     k = int(np.flatnonzero(turns)[-1]) + 1
@@ -96,7 +96,7 @@ def stop_figures(run: xr.Dataset, options: Options) -> dict[str, float] | str:
     stop = float(standing["time"].values[0])
     begin, end = stop + _CALM, options.t_hold
     if begin > float(braked["time"].values[-1]):
-        return f"the disc stands for less than {_CALM:g} s before the demand falls to zero"
+        return f"the disc is at rest for less than {_CALM:g} s before the demand falls to zero"
     reference = np.abs(standing["theta_ref"].values)
     return {
         "stopping_time": stop,
@@ -134,7 +134,7 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
 EXPERIMENT = Experiment(
     name="disc-stop",
     assembly="wedge-brake",
-    summary="{M_brake} until the disc stands, held and released; both readings of a stopped disc",
+    summary="{M_brake} until the disc stops, hold, release; both readings of a stopped disc",
     options=Options,
     defaults=Options(M_brake=300.0, Omega_0=5.0, t_hold=1.5, t_end=0.3, settle=0.05),
     cases=cases,

@@ -1,7 +1,7 @@
 """Friction sweep: a moment step in closed loop for several friction coefficients of the pads.
 
-Above tan(alpha) the wedge is unstable without control; the paper names extreme coefficients as
-the next tests (Roberts et al. 2003, sections "Introduction" and "Programme status").
+Above tan(alpha) the wedge is unstable without control. The paper announces tests with extreme
+coefficients (Roberts et al. 2003, sections "Introduction" and "Programme status").
 """
 
 from __future__ import annotations
@@ -32,14 +32,14 @@ from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration
 
-_BAND = 0.05  # of the step: half width of the band in which a stable loop ends
+_BAND = 0.05  # of the step: half width of the final band of a stable loop
 _LAST = 0.2  # of the hold
 _NO_ROW = "the recording has no row in this time: record more often"
 
 EACH = Figures(
     stable=(
         "1",
-        "1 where the last fifth of the hold stays within 5 % of the step, without an end stop.",
+        "1 if the last fifth of the hold stays within 5 % of the step, without an end stop.",
     ),
     hold_power=("W", "Mean input power in the last fifth of the hold, standby included."),
     undefined=_NO_ROW,
@@ -57,8 +57,8 @@ ALL = Figures(
 class Options(ParameterSet):
     """The step, and the variations.
 
-    ``slope``: with ``"known"`` the controller assumes the slope of moment over angle that belongs
-    to each coefficient; with ``"fixed"`` it keeps the slope of the parameter set.
+    ``slope``: with ``"known"`` the controller assumes the correct slope of moment over angle for
+    each coefficient; with ``"fixed"`` it keeps the slope of the parameter set.
     ``friction``: ``"none"`` removes the brake's dry friction, which helps to hold.
     """
 
@@ -77,7 +77,7 @@ class Options(ParameterSet):
 
 
 def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Case, ...]:
-    """Return one run for each friction coefficient, on a true disc: run-out would hide the rest."""
+    """Return one run for each friction coefficient, without run-out, which would hide the rest."""
     levels = {0.0: options.M_step}
     changes: dict[str, Any] = {"flywheel.runout": 0.0}
     if options.friction == "none":
@@ -97,7 +97,7 @@ def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Cas
 
 
 def _stable(run: xr.Dataset, options: Options) -> tuple[float, str]:
-    """Return 1 where a moment ends within 5 % of the step, without the help of an end stop."""
+    """Return 1 if a moment ends within 5 % of the step, without the help of an end stop."""
     last = run.sel(time=slice((1.0 - _LAST) * options.t_hold, None))
     if not last.sizes["time"]:
         return math.nan, _NO_ROW

@@ -30,7 +30,7 @@ FIGURES = Figures(
     gap_error=("m", "Clearance estimated by the adjuster at the end, minus the true one."),
     contact_first=("s", "Time until the pads press, first application."),
     contact_last=("s", "Time until the pads press, last application."),
-    adjuster_work=("J", "Work of the adjuster on the caliper: 0 where it turns within the gap."),
+    adjuster_work=("J", "Work of the adjuster on the caliper: 0 if it turns within the gap."),
     undefined="the pads do not press, or the adjuster does not turn",
 )
 
@@ -41,13 +41,13 @@ class Options(ParameterSet):
     M_brake: SomeMoment
     """moment of every application"""
     more: Growth
-    """clearance in excess of the bench's, as wear leaves it; the brake knows its contact angle"""
+    """excess clearance from wear; the brake knows its contact angle"""
     applications: Count
     """number of applications"""
     t_hold: Duration
     """length of each"""
     t_pause: Duration
-    """time to the next, and after the last one"""
+    """time between applications, and after the last one"""
     settle: Duration
     """time parked before the first"""
 
@@ -57,7 +57,7 @@ def _begins(options: Options) -> list[float]:
 
 
 def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Case, ...]:
-    """Return the single run; the disc is driven, so that all applications are alike."""
+    """Return the single run, with a driven disc for equal conditions in all applications."""
     begins = _begins(options)
     levels = {begin: options.M_brake for begin in begins}
     levels |= {begin + options.t_hold: 0.0 for begin in begins}

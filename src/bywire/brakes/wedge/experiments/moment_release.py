@@ -40,7 +40,7 @@ def _braked_case(
     return case_from_parked(par, stimulus, duration, settle=settle, keep=min(settle, 0.1))
 
 
-# --- Release: how fast the brake lets go, and how freely the pads stand
+# --- Release: its speed, and the remaining clearance of the pads
 
 _LOW = 0.05  # of the moment at the release
 
@@ -53,7 +53,7 @@ FREEDOM = Figures(
     travel_left=("m", "Distance of the wedge from its middle at the end."),
     clearance_regained=(
         "m",
-        "Clearance at the end, both pads together, no run-out; negative where they press.",
+        "Clearance at the end, both pads together, no run-out; negative if they press.",
     ),
     clearance_nominal=("m", "The same with the wedge centered."),
     travel_beyond=("m", "Largest travel of the wedge past its middle, toward the other side."),
@@ -109,12 +109,12 @@ def judge_release(recordings: Recordings, options: ReleaseOptions) -> tuple[Kpi,
 
 
 def _clearance(x: float, par: WedgeParameters) -> float:
-    """Return the clearance of the pads [m] at a wedge travel [m], run-out left out."""
+    """Return the clearance of the pads [m] at a wedge travel [m], without run-out."""
     return par.caliper.clearance - abs(x) * wedge.slope(par.wedge)
 
 
 def _toward(run: xr.Dataset) -> xr.DataArray:
-    """Return the wedge's travel, positive on the side on which it stood at the release."""
+    """Return the wedge's travel, positive on its side at the release."""
     return run["x"] * (-1.0 if float(run["x"].values[0]) < 0 else 1.0)
 
 

@@ -85,7 +85,7 @@ def _braking(run: xr.Dataset, target: float, end: float) -> tuple[Kpi, ...]:
 
 
 def _contact(held: xr.Dataset) -> float:
-    """Return when the pads first press [s]; without clearance they touch from the start."""
+    """Return the time [s] of the first contact; without clearance the pads touch from the start."""
     return 0.0 if parameters_of(held).caliper.clearance == 0.0 else first(held, "F_N", 0.0)
 
 
@@ -94,7 +94,7 @@ def _gained(run: xr.Dataset, name: str) -> float:
 
 
 def _too_coarse(run: xr.Dataset, begin: float, end: float, rows: int = 1) -> str:
-    """Return why rows are too far apart to judge a moment between two times [s]; else "".
+    """Return the reason if rows are too far apart to judge a moment between two times [s], or "".
 
     Parameters
     ----------
@@ -123,8 +123,7 @@ PULSES_FIGURES = Figures(
     hold_moment=("N*m", f"Mean moment {_OVER}."),
     hold_error=(
         "%",
-        "Relative error of that moment: far below 0 where the demand exceeds the brake's "
-        "capability.",
+        "Relative error of that moment: far below 0 if the demand exceeds the brake's capability.",
     ),
     hold_ripple=("N*m", f"Moment peak to peak {_OVER}: the disc's run-out."),
     hold_power=("W", f"Mean input power {_OVER}, standby included."),

@@ -73,7 +73,7 @@ class Options(ParameterSet):
     f_high: Frequency
     """natural frequency of the position loop of high bandwidth"""
     delta: Position
-    """offset of each screw, which preloads the wedge; that of the parameters unless given"""
+    """offset of each screw, which preloads the wedge; default: the parameters' value"""
     duration: Duration
     """time recorded after each step"""
     settle: Duration
@@ -86,7 +86,7 @@ def following(par: WedgeParameters) -> Mapping[str, Any]:
 
 
 def _arrangements(par: WedgeParameters, delta: float) -> dict[str, dict[str, float]]:
-    """Return the changes that remove the wedge, and then the other motor's screw.
+    """Return the changes that remove the wedge, and then also the other motor's screw.
 
     The screws alone push on each other, tip to tip, with the force that they had on the wedge.
     """

@@ -27,7 +27,7 @@ from bywire.core.quantities import Current, Duration, Inertia
 from bywire.core.typing import Array
 
 LABELS = ("free", "added", "braked")
-_HALF = 0.5  # of the first speed, down to which decelerations are taken
+_HALF = 0.5  # of the initial speed: end of the range for decelerations
 STOPPING = Figures(
     stopping_time=("s", "Time from the end of the spin-up until the shaft rests."),
     undefined="the shaft does not turn long enough, or does not come to rest",
@@ -36,10 +36,10 @@ FIGURES = Figures(
     speed=("rad/s", "Speed at the end of the spin-up."),
     inertia_by_added=(
         "kg*m**2",
-        "Inertia of shaft and motor, by the mean decelerations over equal speeds with and without "
-        "the added one.",
+        "Inertia of shaft and motor, from mean decelerations over equal speeds with and without "
+        "the added inertia.",
     ),
-    inertia_by_torque=("kg*m**2", "The same by the known current's torque."),
+    inertia_by_torque=("kg*m**2", "The same from the known current's torque."),
     inertia_true=("kg*m**2", "True value."),
     undefined=STOPPING.undefined,
 )

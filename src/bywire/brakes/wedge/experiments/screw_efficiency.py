@@ -61,12 +61,12 @@ EFFICIENCY_FIGURES = Figures(
 
 
 class EfficiencyOptions(ParameterSet):
-    """Currents and slow motion; at a speed where the friction no longer falls with it."""
+    """Currents and slow motion, beyond the speed range in which friction falls with speed."""
 
     i_drive: Current
     """current of motor 1 while it drives and motor 2 gives way"""
     i_back: Current
-    """current of motor 1 while motor 2 pushes it back; small, so that motor 2 can"""
+    """current of motor 1 while motor 2 pushes it back; must be small enough for motor 2"""
     omega_slow: SlowSpeed
     """speed of the motion"""
     settle: Duration
@@ -215,7 +215,7 @@ SCREW_EFFICIENCY = Experiment(
 )
 
 
-# --- Load sweep: many forces separate the friction with load from that without
+# --- Load sweep: many forces separate load-dependent friction from the rest
 
 Levels = Annotated[int, Unit("1", 3.0), Field(ge=1, le=100)]
 
@@ -229,7 +229,7 @@ LOAD_SWEEP_FIGURES = Figures(
     eta_f_true=("1", "True value."),
     eta_b_slope=("1", "The same, inverse, motor 1 driven back."),
     eta_b_true=("1", "True value."),
-    undefined="the force does not grow with the current: take more levels",
+    undefined="the force does not grow with the current: set more levels",
 )
 
 
@@ -239,13 +239,13 @@ class LoadSweepOptions(ParameterSet):
     i_drive: Current
     """largest current of motor 1 while it drives"""
     i_back: Current
-    """largest current while motor 2 pushes it back; small, so that motor 2 can"""
+    """largest current while motor 2 pushes motor 1 back; must be small enough for motor 2"""
     levels: Levels
     """number of currents, evenly spaced up to the largest"""
     omega_slow: SlowSpeed
     """speed of the motion"""
     t_stroke: Duration
-    """time of one stroke"""
+    """length of one stroke"""
 
 
 class Stroke(NamedTuple):

@@ -1,6 +1,6 @@
-"""Slow rotation: a single motor turns slowly once forward and once back; its current is measured.
+"""Slow rotation: a motor's current during one slow revolution forward and one back.
 
-Cogging depends on the angle alone, dry friction on the direction: turning both ways separates them.
+Cogging depends only on the angle, dry friction on the direction: both directions separate them.
 """
 
 from __future__ import annotations

@@ -56,7 +56,7 @@ STIFFNESS_FIGURES = Figures(
     K_W_true=("N/m", "True value."),
     free_play=("m", "Travel between the lines of compression and tension at no force."),
     free_play_true=("m", "True value."),
-    undefined="no travel under load: take a larger current",
+    undefined="no travel under load: set a larger current",
 )
 
 
@@ -74,7 +74,7 @@ class Line(NamedTuple):
 
     slope: float
     start: float
-    """where it crosses zero"""
+    """its zero crossing"""
 
 
 def stiffness(
@@ -84,11 +84,11 @@ def stiffness(
 
     Notes
     -----
-    Friction is kept out as on a real rig. Stage 1 reads force and travel both at the line, beyond
-    all friction. Stage 2 has no force sensor: there the current gives the force, by a calibration
-    of stage 1 that holds for rising current, with the friction of rising current in it. As in the
-    paper, symmetry is assumed: unequal motors drag the wedge along, and its friction then counts
-    as stiffness (K_W reads 5 % high where the torque constants are 10 % apart).
+    The evaluation excludes friction as on a real rig. Stage 1 measures force and travel at the
+    sensor, so friction has no effect. Stage 2 has no force sensor: the current gives the force, by
+    a calibration from stage 1 that includes the friction of rising current. As in the paper,
+    symmetry is assumed. Unequal motors drag the wedge along, and its friction then counts as
+    stiffness (K_W is 5 % too high if the torque constants differ by 10 %).
     """
     check_current("i_max", options.i_max, par)
     t = options.t_ramp
@@ -154,7 +154,7 @@ def _profile(options: StiffnessOptions) -> tuple[list[float], list[float]]:
 
 
 def _rising(run: xr.Dataset, sign: float, options: StiffnessOptions) -> Any:
-    """Return which rows lie in the upper part of one direction's rising current."""
+    """Return the rows in the upper part of one direction's rising current."""
     times = _profile(options)[0]
     begin, end = (times[0], times[1]) if sign > 0 else (times[4], times[5])
     t, level = run["time"].values, sign * _squeezing_current(run)
@@ -162,7 +162,7 @@ def _rising(run: xr.Dataset, sign: float, options: StiffnessOptions) -> Any:
 
 
 def _closer(run: xr.Dataset) -> Array:
-    """Return by how much the nuts have come closer, by the encoders [m]."""
+    """Return the approach of the nuts from the encoders [m]."""
     par = parameters_of(run)
     angles: list[Any] = [run["theta_1"].values, run["theta_2"].values]
     q_1, q_2 = (shaft_encoder.reading(angle, par.encoder) for angle in angles)
@@ -199,7 +199,7 @@ FORCE_CYCLE_FIGURES = Figures(
     peak_current_sensor=("A", "Largest mean current of both motors, on the sensor."),
     peak_current_heart=("A", "The same in the brake heart."),
     hysteresis=("N*m", "Friction torque, half the loop's width, mean over the cycle."),
-    undefined="no travel: give larger options",
+    undefined="no travel: set larger options",
 )
 
 

@@ -190,9 +190,9 @@ def _standing_out(angle: Array, torque: Array, highest: int) -> tuple[int, ...]:
     """Return the orders that stand out of the noise, strongest first.
 
     The power of noise at an order has an exponential distribution; its mean is the median over all
-    orders divided by log 2. An order counts if its power exceeds that mean more than chance allows
-    for any order. Orders are subtracted one after the other, so that a strong one does not leak
-    into others.
+    orders divided by log 2. An order counts if its power exceeds this mean beyond the significance
+    level for all orders together. Orders are subtracted one after the other, so that a strong one
+    does not leak into others.
     """
     residual, orders = torque - torque.mean(), list[int]()
     limit = math.log(highest / _FALSE) / math.log(2.0)
@@ -221,7 +221,7 @@ class Options(ParameterSet):
     slowest: AngularSpeed
     """speed below which the shaft counts as reversing"""
     margin: Duration
-    """time left out at either end of a motion"""
+    """time omitted at either end of a motion"""
     highest: Annotated[int, Unit("1", 400.0), Field(ge=1, le=10000)]
     """highest order of a revolution in the search"""
     sigma_i: Annotated[float, Unit("A", 0.02), Field(ge=0)]
@@ -304,7 +304,7 @@ def _slope(par: WedgeParameters, turning: Turning) -> float:
 
 def _notes(best: Estimate, orders: tuple[int, ...]) -> tuple[str, ...]:
     turned_by = np.degrees(best["phase"]) / orders[0]
-    notes = [f"the cogging's zero lies {-turned_by:.4g} degrees of shaft angle from the encoder's"]
+    notes = [f"the cogging's zero is {-turned_by:.4g} degrees of shaft angle from the encoder's"]
     if len(orders) > 1:
         notes.append(
             f"orders {', '.join(map(str, orders[1:]))} are present too; the model has only the "

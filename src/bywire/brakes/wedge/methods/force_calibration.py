@@ -50,7 +50,7 @@ class RigOptions(ParameterSet):
     slowest: AngularSpeed
     """speed of one motor toward the other that counts as motion"""
     margin: Duration
-    """time left out at either end of a motion"""
+    """time omitted at either end of a motion"""
     window: Duration
     """time over which signals are averaged"""
     sigma_i: Annotated[float, Unit("A", 0.02), Field(ge=0)]
@@ -217,8 +217,8 @@ def squeeze(
     if not (np.any(ways > 0) and np.any(ways < 0)):
         raise ParameterError(
             f"{where}: the screws do not move both toward each other and apart at more than "
-            f"{options.slowest:g} rad/s, so that friction and force cannot be separated: squeeze "
-            "and let go slowly, as 'bywire run force-cycle' does",
+            f"{options.slowest:g} rad/s, so friction and force cannot be separated: squeeze "
+            "and release slowly, as 'bywire run force-cycle' does",
             name=where,
         )
 
@@ -337,8 +337,8 @@ def identify(
     Parameters
     ----------
     data
-        ``i_1``, ``i_2`` [A], ``q_1``, ``q_2`` [rad], ``y_F`` [N]: two motors that squeeze and let
-        go slowly. A motor that only holds may stand still.
+        ``i_1``, ``i_2`` [A], ``q_1``, ``q_2`` [rad], ``y_F`` [N]: two motors that squeeze and
+        release slowly. A motor that only holds may be at rest.
 
     Raises
     ------
@@ -379,8 +379,8 @@ def identify(
         ),
         curves=(_curve(cycle, values),),
         notes=(
-            "half widths hold at the mean speed of the test; at rest the force may be anywhere "
-            "within them",
+            "half widths are valid at the mean speed of the test; at rest the force may be "
+            "anywhere within them",
             "the change of the bearings' friction with speed is that of the parameter set",
         ),
     )

@@ -98,7 +98,7 @@ def _deceleration(run: RunDown) -> float:
 
 
 def _has_scale(runs: Sequence[RunDown]) -> bool:
-    """Tell whether a known inertia or torque is large enough to set the scale.
+    """Return whether a known inertia or torque is large enough to set the scale.
 
     The current that the back-EMF drives through the loop is proportional to the deceleration. It
     acts like inertia and does not set a useful scale.
@@ -148,9 +148,9 @@ class Options(ParameterSet):
     """Part of a run-down that counts, filter, and the synthetic noise."""
 
     slowest: AngularSpeed
-    """speed down to which a run-down counts; below, cogging and Stribeck effect dominate"""
+    """lowest speed that counts; below it cogging and the Stribeck effect dominate"""
     margin: Duration
-    """time left out at either end of that part"""
+    """time omitted at either end of that part"""
     window: Duration
     """time over which the torque balance is averaged"""
     cutoff: Frequency
@@ -225,7 +225,7 @@ def _agreement(sources: dict[str, tuple[float, float]]) -> tuple[Check, ...]:
 
 
 def _fits(runs: Sequence[RunDown], best: Estimate) -> Check:
-    """Return whether a separate cubic over speed for every record would fit better."""
+    """Return the check whether a separate cubic over speed for every record would fit better."""
     residuals = _residuals_of(runs, best)
     rows, columns, weights = sum(map(len, residuals)), [], []
     begin = 0

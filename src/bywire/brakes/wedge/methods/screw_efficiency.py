@@ -1,7 +1,8 @@
 """Roller-screw efficiency, driving and driven back, from a sweep of the load (Roberts 2003).
 
 Current and speed of both motors and the force between them give two torque balances. Friction
-proportional to the force is the screw's; friction without force, or with its square, the bearings'.
+proportional to the force belongs to the screw; friction without force, or with its square, belongs
+to the bearings.
 """
 
 from __future__ import annotations
@@ -76,7 +77,7 @@ def _strokes(shaft: Motions, residuals: Array, par: WedgeParameters, side: int) 
 
 
 def _fits(strokes_read: list[Stroke], best: Estimate) -> Check:
-    """Return whether a separate curve for every shaft and direction would fit better."""
+    """Return the check whether a separate curve for every shaft and direction would fit better."""
     F = np.array([s.F for s in strokes_read]) / max(s.F for s in strokes_read)
     kind = [(s.side, s.drives) for s in strokes_read]
     groups = [np.array([each == k for each in kind], dtype=float) for k in sorted(set(kind))]

@@ -29,7 +29,7 @@ _TURNS = 20
 _LONG_HOLD = {"t_hold": 3.0}
 """[s], longer than that many revolutions"""
 _FROM = 0.5
-"""time [s] from which the hold is settled"""
+"""time [s] after which the hold has settled"""
 
 
 def fig7(runs: Runs) -> Part:
@@ -37,9 +37,9 @@ def fig7(runs: Runs) -> Part:
     result = runs.bench("moment-pulses", MAIN)
     items = [*_held_moments(result), *_oscillation(runs), *_hold_power(result), *_course(result)]
     text = (
-        "The demand goes straight into the simulation, as in the paper; its times, the controller "
-        "and most parameters are not printed and are ours. The figure is stacked as the paper's; "
-        "a measured recording can be drawn on it. Shaded: shafts and wedge stick, so that the "
+        "The demand goes directly into the simulation, as in the paper. The paper does not print "
+        "its times, the controller and most parameters; they are ours. The figure is stacked like "
+        "the paper's and can include a measured recording. Shaded: shafts and wedge stick, so the "
         "run-out acts fully on the moment until the controller has broken them away."
     )
     exhibit = Exhibit(
@@ -339,9 +339,9 @@ def fig9(runs: Runs) -> Part:
         *_tail(runs),
     ]
     text = (
-        "The length of the pulse is not printed; ours is 0.2 s. Standby power, the filter of the "
-        "power and the rate limit were tuned to the paper's 60 W: that number is no evidence. "
-        "The disc gives nearly all of the energy that the caliper stores."
+        "The paper does not print the length of the pulse; ours is 0.2 s. Standby power, the "
+        "filter of the power and the rate limit were tuned to the paper's 60 W, so that number is "
+        "not evidence. The disc supplies nearly all of the energy that the caliper stores."
     )
     run = result.recordings["run"]
     exhibit = Exhibit(

@@ -43,7 +43,7 @@ reproduce = SOURCE.reproduce
 
 
 def causes(items: Iterable[Item]) -> tuple[RootCause, ...]:
-    """Return the root causes, the numbers taken from the items."""
+    """Return the root causes, with numbers from the items."""
     return causes_of(
         items, _neutral_band, _pulse_length, _bearings, _dead_band, _preload, _limit, _stiff_loop
     )
@@ -84,7 +84,7 @@ def _bearings(q: Quoted) -> RootCause:
 
 def _dead_band(q: Quoted) -> RootCause:
     return RootCause(
-        "Position steps stop where friction holds them: with the soft low-bandwidth "
+        "Position steps end where friction holds the shaft: with the soft low-bandwidth "
         f"controller a shaft can rest {q('position.dead_band.low')} from its "
         "reference, and the preload that remains with the wedge decides where. Its "
         f"response differs from that of the screws alone by {q('position.wedge.low')} "

@@ -28,13 +28,13 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _COEFFICIENTS = (0.2, 0.35, 0.6)
-"""below, near and above the neutral point: brake factors that are judged"""
+"""below, near and above the neutral point: coefficients of the judged brake factors"""
 _TRIED = (0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.5, 0.55, 0.6)
 """coefficients at which the actuation force is computed"""
 _LOWEST, _HIGHEST = 0.32, 0.62
 """bounds of the search for the lowest coefficient that runs away"""
 _GROWN = 1.05
-"""moment over that at power-off from which the brake has run away"""
+"""moment relative to power-off beyond which the brake counts as run away"""
 _VARIANTS = (
     ("", "fixed", "kept"),
     (".frictionless", "fixed", "none"),
@@ -55,8 +55,8 @@ def part(runs: Runs) -> Part:
     items = [*_static(runs), *_poles(), *_runaway(runs), *_closed_loop(runs), *_free_play(runs)]
     text = (
         "The paper derives the brake factor and the neutral point without friction. Without "
-        "friction the model obeys both. With friction the neutral point is a band, which the "
-        "brake does not leave by itself; the band narrows with the load."
+        "friction the model obeys both. With friction the neutral point is a band in which the "
+        "brake stays by itself. The band narrows with the load."
     )
 
     def pulses() -> Figure:
@@ -164,9 +164,9 @@ def _runaway(runs: Runs) -> list[Item]:
 
 
 def _lowest(runs: Runs, changes: dict[str, Any], M_hold: float) -> float:
-    """Return the lowest coefficient of a grid at which the moment grows, by bisection.
+    """Return the lowest coefficient of a grid at which the moment grows, from a bisection.
 
-    NaN where it grows at the lowest already, or not even at the highest.
+    NaN if it grows already at the lowest, or not even at the highest.
     """
 
     def grows(k: int) -> bool:

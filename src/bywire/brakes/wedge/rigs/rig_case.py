@@ -98,19 +98,19 @@ def torque_constant_of(par: WedgeParameters) -> float:
 
 
 def peak(run: xr.Dataset, name: str) -> float:
-    """Return the largest magnitude of a signal after time zero."""
+    """Return the largest magnitude of a signal after t = 0."""
     return float(np.abs(run[name].sel(time=slice(-1e-9, None)).values).max())
 
 
-# --- Runs of the rigs and the brake that begin at another angle of the shafts
+# --- Runs of the rigs and the brake from another angle of the shafts
 
 _ANGLES = ("theta_", "last_")
 
 
 def turned(case: Case, angle: float) -> Case:
-    """Return a rig's run that begins at another angle of the shafts and is otherwise equal.
+    """Return a rig's run from another angle of the shafts that is otherwise equal.
 
-    Encoder counts and cogging then fall elsewhere, as they do on a bench from day to day.
+    Encoder counts and cogging then have other phases, as on a bench from day to day.
 
     ``case``: of a rig, or of the wedge brake, whose wedge moves along; ``angle``: added to every
     shaft's angle [rad].

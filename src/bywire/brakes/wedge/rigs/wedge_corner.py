@@ -42,7 +42,7 @@ Memory: Any = joined(__name__, "Memory", control.Memory, corner_slip.Memory)
 
 
 class WedgeCorner(HotCorner[WedgeCornerParameters, Any], WedgeBrake):
-    """The brake with all its controllers; the flywheel is the wheel, the road turns it.
+    """The brake with all its controllers; the flywheel is the wheel, turned by the road.
 
     Slip control acts above the moment control: it lowers the demanded moment. Pads that fade
     reinforce the wedge less: the motors have to compensate for it.
@@ -126,7 +126,7 @@ class WedgeCorner(HotCorner[WedgeCornerParameters, Any], WedgeBrake):
         return super()._moment(x, _contact_tracked(x, m, par), left, par)
 
     def remarks(self, recording: Any, par: Any) -> list[str]:
-        """Return remarks on a slip that is held far below that of the largest adhesion."""
+        """Return remarks on a slip far below the slip of the largest adhesion."""
         if par.ecu.abs != "pi":
             return []
         return far_from_peak(
@@ -163,9 +163,9 @@ def _slip(x: Any, m: Any, u: control.Stimulus, par: WedgeCornerParameters) -> An
 def _contact_tracked(x: Any, m: Any, par: WedgeCornerParameters) -> Any:
     """Return the memory with the angle of contact by the measured moment, while the wheel turns.
 
-    Once the wheel stands, the control estimates the moment from the angle and keeps the last angle
-    of contact. Otherwise an error of the assumed stiffness would make the motors push against a
-    wedge that rests.
+    Once the wheel is at rest, the control estimates the moment from the angle and keeps the last
+    angle of contact. Otherwise an error of the assumed stiffness would make the motors push against
+    a resting wedge.
     """
     law, seen = par.control.moment, readings(x, par)
     measured = ops.where(seen.Omega < 0, -1.0, 1.0) * seen.M
