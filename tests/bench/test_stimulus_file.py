@@ -85,7 +85,7 @@ def test_nodes_come_from_any_measurement_file(tmp_path: Path) -> None:
         ("column = true", r"\[stimulus\] column = true: write its title in quotation marks"),
         ('rate = "5 ms"', "rate = '5 ms' has the wrong unit"),
         ('tme = "t"', "tme"),
-        ('column = "a"\nunit = "V"', "the file says 'A' and the mapping 'V'"),
+        ('column = "a"\nunit = "V"', "the file has 'A' and the mapping 'V'"),
     ],
 )
 def test_a_choice_that_makes_no_sense_is_refused(tmp_path: Path, more: str, words: str) -> None:

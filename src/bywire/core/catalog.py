@@ -90,7 +90,7 @@ class _Values:
         groups = (f"{there}.", f"{place}.")
         if not any(each.startswith(groups) for each in (*self._values, *self._moved)):
             raise ModelError(
-                f"a formula of a derived value reads {there}, which the set lacks", name=there
+                f"a formula of a derived value reads {there}, which is not in the set", name=there
             )
         return _Values(self._values, self._moved, self._read, place)
 
@@ -207,7 +207,7 @@ def _computed_values(values: Mapping[str, Cited]) -> dict[str, Cited]:
             except KeyError:  # one of them is still to be computed
                 continue
         if not ready:
-            raise ModelError(f"formulas of {', '.join(sorted(waiting))} wait for each other")
+            raise ModelError(f"formulas of {', '.join(sorted(waiting))} depend on each other")
         known |= ready
         waiting = {name: each for name, each in waiting.items() if name not in ready}
     return {name: replace(each, value=known[name]) for name, each in values.items()}

@@ -150,7 +150,7 @@ def processes_with_brakes(
             yield pool
     except BrokenProcessPool:
         raise RunError(
-            f"a process of the study was killed, most likely for want of memory: {advice}"
+            f"a process of the study was killed, probably out of memory: {advice}"
         ) from None
 
 

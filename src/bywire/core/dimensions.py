@@ -126,7 +126,9 @@ class Dimension:
         if name in _PURE or name == "power":
             for value in args:
                 if not _unknown(value) and any(_dimension(value).powers):
-                    raise DimensionError(f"ops.{name} of a quantity in {value}: no pure number")
+                    raise DimensionError(
+                        f"ops.{name} needs a pure number, not a quantity in {value}"
+                    )
             return Dimension.of("1")
         if name == "sqrt":
             return self**0.5
@@ -134,7 +136,7 @@ class Dimension:
             return self
         if name in ("fmax", "fmin"):
             return _alike("compared", *args)
-        raise DimensionError(f"ops.{name} says no dimension")
+        raise DimensionError(f"ops.{name} has no dimension")
 
 
 class Condition:

@@ -12,7 +12,7 @@ _INPUT = ("--input", "Inputs")  # of a command, and of a form
 _CHANGE = "KEY=VALUE, for instance motor.R_m=0.4ohm"
 _FORMS = {
     **dict.fromkeys(
-        _INPUT, "STIMULUS=SIGNAL, what drives the model and what was measured: p_set=p_ref"
+        _INPUT, "STIMULUS=SIGNAL, a stimulus of the model and the measured signal: p_set=p_ref"
     ),
     "--option": "NAME=VALUE, an option of the method ('bywire list METHOD')",
     "--prior": "NAME=VALUE +- DEVIATION, for instance 'motor.R_m=0.35 +- 0.02 ohm'",
@@ -39,7 +39,7 @@ def named(texts: Iterable[str] | None, flag: str) -> dict[str, str]:
             )
         if name in values:
             raise ParameterError(
-                f"{flag} {text}: {name} is given twice: leave one of them out",
+                f"{flag} {text}: {name} is given twice: remove one of them",
                 name=flag,
                 value=text,
             )
@@ -68,7 +68,7 @@ def changes(texts: Iterable[str] | None, flag: str = "--set") -> dict[str, str]:
             )
         if key in values:
             raise ParameterError(
-                f"{flag} {text}: {key} is set twice: leave one of them out", name=flag, value=text
+                f"{flag} {text}: {key} is set twice: remove one of them", name=flag, value=text
             )
         values[key] = value
     return values

@@ -184,7 +184,7 @@ def _is_group(annotation: Any) -> bool:
     return isinstance(annotation, type) and issubclass(annotation, BaseModel)
 
 
-# --- What is said of values that are refused: one line each, in the user's words
+# --- Errors for values that are not valid: one line each
 
 _BOOL, _TEXT = "it must be true or false", "it must be a text"
 _PLAIN_WORDS = {"bool_parsing": _BOOL, "bool_type": _BOOL, "string_type": _TEXT}
@@ -231,8 +231,8 @@ def _explain(
     leaf = leaves.get(name) or leaves.get(name.rpartition(".")[0])
     if leaf is not None and kind != "value_error" and not _is_length(detail):
         is_broken = leaf.is_whole and (kind.startswith("int") or kind == "multiple_of")
-        wanted = "a whole number, " if is_broken else ""
-        return _out_of_range(name, value, leaf, wanted, texts.get(name, ""))
+        kind_text = "a whole number, " if is_broken else ""
+        return _out_of_range(name, value, leaf, kind_text, texts.get(name, ""))
     if _is_length(detail):
         return _wrong_count(name, detail, texts)
     message = _PLAIN_WORDS.get(kind, str(detail["msg"]).removeprefix("Value error, "))
@@ -240,24 +240,24 @@ def _explain(
     return ParameterError(f"{name or owner}: {message}{given}", name=name or owner)
 
 
-def _out_of_range(name: str, value: Any, leaf: Leaf, wanted: str, text: str) -> InputError:
+def _out_of_range(name: str, value: Any, leaf: Leaf, kind: str, text: str) -> InputError:
     symbol = leaf.unit.symbol
     number, written = split(text)
     if symbol == "rad" and written not in ("", symbol):  # drawings have angles in degrees
-        return not_valid(name, f"{number} {written}", wanted + leaf.range_in(written))
+        return not_valid(name, f"{number} {written}", kind + leaf.range_in(written))
     unit = "" if symbol == "1" else f" {symbol}"
     got = "" if written in ("", symbol) else f"got {quoted(text)}"
-    return not_valid(name, f"{value}{unit}", wanted + leaf.range_text, got)
+    return not_valid(name, f"{value}{unit}", kind + leaf.range_text, got)
 
 
 def _wrong_count(name: str, detail: Mapping[str, Any], texts: Mapping[str, str]) -> InputError:
     """Return the error for a table with too few or too many nodes."""
     context, value = detail["ctx"], detail["input"]
     short = detail["type"] == "too_short"
-    wanted = f"at least {context['min_length']}" if short else f"at most {context['max_length']}"
+    valid = f"at least {context['min_length']}" if short else f"at most {context['max_length']}"
     written = [texts.get(f"{name}.{k}", "") for k in range(len(value))]
     got = quoted(", ".join(written)) if written and all(written) else quoted(value)
-    return ParameterError(f"{name}: {wanted} wanted, got {got}", name=name, valid=wanted)
+    return ParameterError(f"{name} must have {valid} values, got {got}", name=name, valid=valid)
 
 
 def _is_length(detail: Mapping[str, Any]) -> bool:
@@ -267,7 +267,7 @@ def _is_length(detail: Mapping[str, Any]) -> bool:
 def _unknown_choice(name: str, value: Any, expected: str) -> InputError:
     near = get_close_matches(quoted(value), re.findall(r"'[^']*'", expected), n=1, cutoff=0.6)
     hint = f": did you mean {near[0]}?" if near else ""
-    text = f"{name}: it must be {expected}, got {quoted(value)}{hint}"
+    text = f"{name} must be {expected}, got {quoted(value)}{hint}"
     return ParameterError(text, name=name, value=quoted(value), valid=expected)
 
 

@@ -118,7 +118,7 @@ def _parameters_at(path: str, par: Any, where: str, declaration: str) -> Any:
         value = getattr(value, name, None)
     if value is None:
         raise ModelError(
-            f"{where}: the parameters have no {path!r}: say where they stand, {declaration}"
+            f"{where}: the parameters have no {path!r}: give their place, {declaration}"
         )
     return value
 
@@ -267,7 +267,7 @@ class Part(Generic[X, U, F, P]):
         power = signal_in(hints.get("return"))
         if power is None:
             raise ModelError(
-                f"{self.where}: {self.kind}.{function} says no unit: annotate its result with "
+                f"{self.where}: {self.kind}.{function} has no unit: annotate its result with "
                 "Annotated[float, Signal('W', label)]"
             )
         return Signal("J", power.label, role=power.role)
@@ -405,12 +405,12 @@ class Sub(Generic[A]):
         self.feeds = dict(feeds or {})
         if not hasattr(kind, "parts"):
             raise ModelError(
-                f"Sub({kind.__name__}): it is no assembly with a memory: hold a class that "
+                f"Sub({kind.__name__}): it is not an assembly with a memory: hold a class that "
                 "inherits from Assembly and declares Memory"
             )
         if not f"{prefix}x".isidentifier() or prefix.startswith("_"):
             raise ModelError(
-                f"Sub({kind.__name__}): the prefix {prefix!r} makes no names: take a word and an "
+                f"Sub({kind.__name__}): the prefix {prefix!r} is not valid: use a word and an "
                 "underscore, like 'rear_'"
             )
         for name in self.feeds:

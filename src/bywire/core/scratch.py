@@ -142,8 +142,8 @@ def process_folder() -> Path:
         return _folder_of(os.getpid())
     except OSError as error:
         raise FileError(
-            f"a temporary folder cannot be made ({error.strerror or error}): make room where "
-            "temporary files go, or set TMPDIR to another folder"
+            f"a temporary folder cannot be made ({error.strerror or error}): free some space "
+            "there, or set TMPDIR to another folder"
         ) from None
 
 
@@ -171,8 +171,7 @@ def require_finished(folder: Path) -> None:
     """
     if (folder / UNFINISHED).exists():
         raise FileError(
-            f"{folder} holds a result that was not written to its end: run the command that wrote "
-            "it again",
+            f"{folder} holds a result that is incomplete: run the command that wrote it again",
             name=str(folder),
         )
 

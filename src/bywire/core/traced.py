@@ -34,7 +34,7 @@ class Traced:
         return Traced(getattr(np, name), *inputs)
 
     def __bool__(self) -> bool:
-        raise TypeError("what a traced number is shows only on rows")
+        raise TypeError("a traced number has a value only on rows")
 
 
 def _forward(operation: Callable[..., Any]) -> Callable[..., Traced]:

@@ -442,7 +442,7 @@ class _Reader:
         inside = "" if name == self._plain else f" in {whole}"
         if name in _LOGARITHMIC:
             return (
-                f"the unit {quoted(name)}{inside} is logarithmic, so that no factor converts it: "
+                f"the unit {quoted(name)}{inside} is logarithmic, so no factor converts it: "
                 "convert the values to a linear unit first"
             )
         whole_word = _squeezed(self._plain)
@@ -452,7 +452,7 @@ class _Reader:
 
     def _ambiguous(self) -> UnknownUnitError:
         return UnknownUnitError(
-            f"the unit {quoted(self._text)} can be read in two ways: put what divides in brackets, "
+            f"the unit {quoted(self._text)} can be read in two ways: put the divisor in brackets, "
             "as in J/(kg*K), or write it last"
         )
 

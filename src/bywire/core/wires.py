@@ -125,9 +125,9 @@ class Wired(Generic[X, U, F, P]):
         if name in self._instant.shared:
             return getattr(self._instant.par, name)
         raise ModelError(
-            f"{self._part.where}: {self._part.kind}.{function.__name__} takes {name!r}, which no "
-            f"assembly knows: x, u, f and par are, and parameters that it names in shared "
-            f"({', '.join(self._instant.shared) or 'none now'})"
+            f"{self._part.where}: {self._part.kind}.{function.__name__} takes {name!r}, which is "
+            f"not available: use x, u, f, par or a parameter that the assembly names in shared "
+            f"({', '.join(self._instant.shared) or 'none so far'})"
         )
 
 

@@ -244,7 +244,7 @@ def _axis(qualities: dict[str, ChannelQuality], step: float, method: str) -> NDA
     if size > room():
         raise ParameterError(
             f"interval = {step:g} s would make {last - first + 1:.3g} samples of each signal, "
-            f"{size / 2**30:.3g} GiB, and {room() / 2**30:.3g} GiB are made at most: choose a "
+            f"{size / 2**30:.3g} GiB, and {room() / 2**30:.3g} GiB are the limit: choose a "
             "larger one, or fewer signals",
             name="interval",
             value=f"{step:g} s",
@@ -276,7 +276,7 @@ def _on_axis(
             flawed[_inside(stretch, axis, step, reach, ends=flaw == "clipped")] = True
     if flawed.all():
         raise ParameterError(
-            f"{name} has no value left after excluding {', '.join(left_out)}: check its limits, "
+            f"{name} has no values left after excluding {', '.join(left_out)}: check its limits, "
             "or exclude less",
             name=name,
         )

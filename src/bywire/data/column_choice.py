@@ -77,8 +77,8 @@ def _missing_units(file: Path, signals: Mapping[str, str], clock: str = "") -> M
     for name, column in signals.items():
         title, inside = f"{column} [mm]", f"[signals.{name}] unit = 'mm'"
     text = (
-        f"{lacking}: write it behind the title, as '{title}', or in a mapping, as "
-        f"{inside}, or '1' for none"
+        f"{lacking}: write it after the title, as '{title}', or in a mapping, as "
+        f"{inside}; write '1' for a pure number"
     )
     return MissingUnitsError(text, lacking, signals, clock)
 
@@ -127,7 +127,7 @@ class Chosen:
             values += self.mapping.offset
         if unit_of(self.unit).reference == "absolute":
             notes.append(
-                f"{self.mapping.name}: its unit {self.unit!r} says absolute pressure, while "
+                f"{self.mapping.name}: its unit {self.unit!r} means absolute pressure, but "
                 "pressures of brakes are relative to ambient: offset = '-1.013 bar' in the mapping "
                 "subtracts a usual one"
             )
@@ -281,8 +281,8 @@ def _require_same(signal: SignalMapping, column: Column, where: str) -> None:
     if (unit.factor, unit.zero, unit.powers) == (said.factor, said.zero, said.powers):
         return
     raise UnitError(
-        f"{where}: the file says {column.unit!r} and the mapping {signal.unit!r}: leave "
-        f"signals.{signal.name}.unit out, or give signals.{signal.name}.scale, which tells how "
+        f"{where}: the file has {column.unit!r} and the mapping {signal.unit!r}: remove "
+        f"signals.{signal.name}.unit, or give signals.{signal.name}.scale, which states how "
         f"many {signal.unit} the number 1 is",
         name=signal.name,
         value=str(signal.unit),
@@ -300,11 +300,11 @@ def _clock(file: Path, source: Source, column: Column, given: Clock | None) -> C
         name = column.clock or _usual_clock(source)
         if name is None:
             before = (
-                "; where other lines stand before the table, a mapping's skip_lines tells how many"
+                "; if other lines precede the table, give their number as skip_lines in a mapping"
             )
             why = "; ".join(("", *left_out_note(source.left_out)))
             raise NoClockError(
-                f"{file} does not state when it was measured: call a column 'time [s]', or write "
+                f"{file} does not state when it was measured: name a column 'time [s]', or write "
                 "in a mapping "
                 'time = { column = "t", unit = "ms" } or rate = "1 kHz"; '
                 + _listing(source.columns)

@@ -192,7 +192,7 @@ def library(name: str, what: str, extra: str = "measurements") -> ModuleType:
         return importlib.import_module(name)
     except ImportError:
         raise FileError(
-            f"{what} need the library {name.partition('.')[0]}, which is not installed: "
+            f"{what} need the library {name.partition('.')[0]}, which is not installed; "
             f"{how_to_install(extra)}"
         ) from None
 

@@ -20,12 +20,12 @@ _NOT_READ = (
     (b"|CF,", "a FAMOS file of imc", "export it as CSV or MDF 4 with FAMOS"),
     (b"\xd0\xcf\x11\xe0", "an Excel workbook (.xls)", "save its sheet as 'CSV UTF-8'"),
     (b"PK\x03\x04", "a ZIP archive, as .xlsx and .ods are", "save its sheet as 'CSV UTF-8'"),
-    (b"\x1f\x8b", "packed by gzip", "unpack it first"),
-    (b"7z\xbc\xaf", "packed by 7-Zip", "unpack it first"),
+    (b"\x1f\x8b", "compressed with gzip", "unpack it first"),
+    (b"7z\xbc\xaf", "compressed with 7-Zip", "unpack it first"),
     (b"#ROSBAG", "a bag of ROS", "export its topics as CSV"),
     (b"\x89MCAP", "an MCAP file of ROS 2", "export its topics as CSV"),
     (b"SQLite format 3", "an SQLite database", "export its table as CSV"),
-    (b"%PDF", "a PDF file", "ask for the data it was made from"),
+    (b"%PDF", "a PDF file", "ask for its source data"),
 )
 _ASC_OF_VECTOR = (b"date ", b"base ")  # how an ASC log of a bus begins
 
@@ -67,14 +67,15 @@ def format_to_read(path: Path, name: str = "") -> FileFormat:
         )
     said = f"format = {name!r}" if name else f"its ending {path.suffix!r}"
     if holds:
-        content, hint = holds[0].title, f"rename it, or say format = {holds[0].name!r}"
+        content, hint = holds[0].title, f"rename it, or give format = {holds[0].name!r}"
     else:
         content = f"something else (it begins with {quoted(head[:8])})"
-        hint = "export it again from the program that measured"
+        hint = "export it again from the program that recorded it"
         if wanted[0].name == "mat":
             hint = "if it is a MAT file of version 4, save it with '-v7' in MATLAB"
     raise FileError(
-        f"{path} holds {content}, not {wanted[0].title} as {said} says: {hint}", name=str(path)
+        f"{path} contains {content}, not {wanted[0].title} as {said} declares: {hint}",
+        name=str(path),
     )
 
 

@@ -224,7 +224,7 @@ class LimitedSource:
                 raise self._too_small(limit)
             raise FileError(
                 f"{self._path} takes more than {self._memory / 2**30:.3g} GiB of memory to read: "
-                "it is damaged or was made to exhaust it; where it is sound, choose fewer signals, "
+                "it is damaged or malicious; if it is intact, choose fewer signals, "
                 "or write it again in smaller pieces",
                 name=str(self._path),
             )
@@ -237,9 +237,9 @@ class LimitedSource:
             is_quick = not (self._is_open or self._child.is_late)
             most = min(self._seconds, self._kind.opening) if is_quick else self._seconds
             return FileError(
-                f"{self._path}: {'reading' if self._is_open else 'opening'} it took longer than "
-                f"{most:g} s without getting further: it is damaged or was made to take so long; "
-                "where it is sound, copy it to a local disk or choose fewer signals",
+                f"{self._path}: {'reading' if self._is_open else 'opening'} made no progress for "
+                f"{most:g} s: it is damaged or malicious; "
+                "if it is intact, copy it to a local disk or choose fewer signals",
                 name=str(self._path),
             )
         if limit := address_space():
@@ -259,8 +259,8 @@ class LimitedSource:
 
     def _torn(self, name: str, size: int, declared: int) -> FileError:
         return FileError(
-            f"{self._path} is damaged: {name!r} has {declared} numbers by its own count, and "
-            f"{size} were read: copy it again, or export it again from where it was made",
+            f"{self._path} is damaged: {name!r} declares {declared} numbers, but {size} "
+            "were read: copy it again, or export it again from its source",
             name=name,
         )
 
@@ -268,7 +268,7 @@ class LimitedSource:
 def _limited_to(limit: int) -> str:
     return (
         f"; the address space of this process is limited to {limit / 2**30:.3g} GiB (ulimit -v): "
-        "where the file is sound, raise that limit, as by ulimit -v unlimited"
+        "if the file is intact, raise that limit, for example with ulimit -v unlimited"
     )
 
 
@@ -295,15 +295,15 @@ def limited(path: Path, kind: FileFormat, seconds: float | None = None) -> Itera
         library = name.partition(".")[0]
         if find_spec(library) is None:
             raise FileError(
-                f"{path}: {kind.title} needs the library {library}, which is not installed: "
+                f"{path}: {kind.title} needs the library {library}, which is not installed; "
                 f"{how_to_install('measurements')}",
                 name=library,
             )
     memory = min(MOST_MEMORY, int(machine_memory() / 2))
     if not _IS_LINUX:
         warnings.warn(
-            f"on this system the memory that reading {kind.title} takes is not limited, only its "
-            "time: read files of strangers on Linux",
+            f"on this system bywire limits only the time to read {kind.title}, not the memory: "
+            "open untrusted files on Linux only",
             stacklevel=2,
         )
     module = kind.open.__module__

@@ -263,7 +263,7 @@ def _signal(name: str, section: SignalSection, place: str) -> SignalMapping:
         text = f"{where}{needs_unit[0]} needs a unit: give the unit of the signal"
         raise UnitError(text, name="unit")
     if section.scale == 0.0:
-        raise not_valid(f"{where}scale", "0", "another number", "or every value is the same")
+        raise not_valid(f"{where}scale", "0", "another number", "or all values are equal")
     if section.sign == 0:
         raise not_valid(f"{where}sign", "0", _SIGNS)
     number, column = _numbered(section.column)
@@ -318,7 +318,7 @@ def _clock(
     number, column = _numbered(time.column)
     if bool(column) == (rate is not None):
         raise ParameterError(
-            f"{where}time.column or {where}rate: give one of them, as "
+            f"{where}time.column or {where}rate: give exactly one of them, as "
             'time = { column = "t", unit = "ms" } or rate = "1 kHz"',
             name="time",
         )
@@ -331,7 +331,7 @@ def _clock(
         )
     if column and start is not None:
         raise ParameterError(
-            f"{where}start goes with a rate: a column has its own instants", name="start"
+            f"{where}start needs a rate: a time column has its own instants", name="start"
         )
     return Clock(column, unit, rate or 0.0, start or 0.0, number)
 

@@ -31,8 +31,8 @@ _SIMULINK = re.compile(_SIGNAL.format("signals", "values"))
 _DSPACE = re.compile(_SIGNAL.format("Y", "Data"))
 _SERIES = re.compile(r"(?P<scope>.+)\.(?:Data|data)(?P<column>\(:,[0-9]+\)|\([0-9]+,:\))?")
 OBJECT = (
-    "it is an object of MATLAB, such as a timeseries or a Dataset, which only MATLAB reads: save "
-    "its times and values as arrays, as t = ts.Time; y = ts.Data"
+    "it is an object of MATLAB, such as a timeseries or a Dataset, which only MATLAB can read: "
+    "save its times and values as arrays, as t = ts.Time; y = ts.Data"
 )
 """why an object is not read"""
 
@@ -192,8 +192,8 @@ def _of_row(
         return "", ""
     if name == first:
         remarks.append(
-            f"{part.array} has a signal in each row: its first one increases, and is read as the "
-            "time in s, as Simulink's To File writes it"
+            f"{part.array} has a signal in each row. The first one increases, so bywire reads it "
+            "as time in s, as Simulink's To File writes it"
         )
     return ("", "s") if name == first else (first, "")
 
@@ -211,8 +211,8 @@ def described(dataset: xr.Dataset, path: Path) -> dict[str, dict[str, str]]:
     for name in (*signals, *axes):
         if not _NAME.fullmatch(name) or name in (*NOTES, CLOCKS):
             raise FileError(
-                f"cannot write {path}: {quoted(name)} is no name of a variable in MATLAB: letters, "
-                "digits and _ after a letter; choose another name in a mapping"
+                f"cannot write {path}: {quoted(name)} is not a valid variable name in MATLAB "
+                "(letters, digits and _ after a letter): choose another name in a mapping"
             )
     structs = {
         struct: {n: str(dataset[n].attrs.get(key, "")) for n in (*signals, *axes)}

@@ -91,7 +91,7 @@ def instants(
             time -= key.delay
     if time.size < 2:
         raise FileError(
-            f"{file} has too few rows, {time.size}: two at least are needed",
+            f"{file} has too few rows ({time.size}): it needs at least two",
             name=str(file),
             value=str(time.size),
         )
@@ -111,7 +111,7 @@ def _measured(
             what = "is repeated" if now == before else f"comes after {before:.10g}"
             fix = "time must increase: sort the rows, remove repeated ones"
         else:
-            what, fix = "is no instant", "remove the row"
+            what, fix = "is not an instant", "remove the row"
         raise FileError(f"{where}: {now:.10g} {clock.unit} {what}: {fix}")
     convert_in_place(time, unit_of(clock.unit), "s")
     return time
@@ -347,7 +347,7 @@ def _dimensions(chosen: Sequence[Chosen], keys: Sequence[_AxisKey]) -> dict[_Axi
     for signal in chosen:
         if signal.mapping.name in dimensions.values():
             raise ParameterError(
-                f"signal {quoted(signal.mapping.name)} has the name of the instants of signals: "
+                f"signal {quoted(signal.mapping.name)} has the name of a time axis: "
                 "give it another one in a mapping",
                 name=signal.mapping.name,
             )
@@ -456,7 +456,7 @@ def _names(file: Path, source: Source, meaning: MeasurementMapping) -> tuple[str
         there = ", ".join(source.columns)
         raise FileError(
             f"{file}: none of its columns {quoted(there)} beside time has a name: add a first row, "
-            "as 'time [s], pedal [mm]', or say in a mapping what they are",
+            "as 'time [s], pedal [mm]', or name them in a mapping",
             name=str(file),
         )
     return names
@@ -470,7 +470,8 @@ def _chosen(file: Path, source: Source, meaning: MeasurementMapping, name: str) 
     near = [c for c in source.columns if c.casefold() == said.column.casefold()]
     if len(near) > 1:
         raise FileError(
-            f"{file}, column {quoted(said.column)}: the name occurs twice, capitals or not: rename "
+            f"{file}, column {quoted(said.column)}: the name occurs twice (upper and lower "
+            "case count as equal): rename "
             "one of them",
             name=said.column,
         )
@@ -483,7 +484,7 @@ def _require_quantity(file: Path, source: Source, signal: xr.DataArray, symbol: 
         unit = source.columns[column].unit or signal.attrs["units"]
         raise UnitError(
             f"{file}, column {quoted(column)}: {quoted(unit)} has the wrong unit, it cannot be "
-            f"{symbol}: choose a column in {display_unit(symbol)} or a unit like it",
+            f"converted to {symbol}: choose a column in {display_unit(symbol)} or a unit like it",
             name=column,
             value=unit,
             valid=symbol,
@@ -509,7 +510,7 @@ def _require_whole(file: Path, source: Source, signal: xr.DataArray, longest: fl
         raise FileError(
             f"{file}, {source.place(column, k + 1)}: a gap of {steps[k]:.4g} s after "
             f"{time[k]:.6g} s ({gaps.size} in the file, the longest {most:.4g} s; max_gap is "
-            f"{longest:g} s): fill it in, or, if a straight line across it is what you want, allow "
+            f"{longest:g} s): fill it in, or, to bridge it with a straight line, allow "
             f'it with max_gap="{1.01 * most:.3g} s"',
             name=column,
         )

@@ -25,7 +25,7 @@ from bywire.data.file_format import room
 from bywire.data.mapping import Clock, MeasurementMapping, SignalMapping
 from bywire.data.measurement import dataset_of, opened
 
-_BRACKETS = "each with the unit of its own column in the brackets, or 1 for a pure number"
+_BRACKETS = "each with its column's unit in the brackets, or 1 for a pure number"
 
 
 @dataclass(frozen=True)
@@ -127,9 +127,7 @@ def renamed(data: xr.Dataset, named: NamedColumns) -> xr.Dataset:
         When instants are named, which signals in memory have already.
     """
     if named.time:
-        raise ParameterError(
-            f"{option('time')} is for measurement files: leave it out", name="time"
-        )
+        raise ParameterError(f"{option('time')} is for measurement files: remove it", name="time")
     for name, column in named.signals.items():
         if column not in data:
             raise unknown_name("signal", column, [str(each) for each in data.data_vars])

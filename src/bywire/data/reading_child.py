@@ -82,7 +82,7 @@ def main(module: str, is_forking: bool) -> None:
         missing = str(error) or "out of memory"
     while (request := receive(requests)) is not None:
         if missing:
-            what = f"{request['path']}: the library that reads {kind.title} does not load"
+            what = f"{request['path']}: the library that reads {kind.title} cannot be loaded"
             text = f"{what} ({missing}): install it again"
             send(answers, {"error": text, "is_of_library": True})
         elif not is_forking:
@@ -139,12 +139,12 @@ def _serve(
     except Exception as error:  # libraries fail in as many ways as files can be damaged
         reason = getattr(error, "strerror", None) or " ".join(str(error).split())[:200]
         if isinstance(error, LookupError) or not reason:
-            reason = "its parts do not fit together"
-        what = f"{path} is damaged, as {kind.title} it cannot be read ({reason})"
-        hint = "copy it again, or export it again from where it was made"
+            reason = "its parts are inconsistent"
+        what = f"{path} is damaged: bywire cannot read it as {kind.title} ({reason})"
+        hint = "copy it again, or export it again from its source"
         if getattr(error, "errno", None) == errno.ENOSPC:
-            what = f"{path} cannot be read: the library's temporary files have no room"
-            hint = "make room where they go, or set TMPDIR to another folder"
+            what = f"{path} cannot be read: there is no space for the library's temporary files"
+            hint = "free some space there, or set TMPDIR to another folder"
         send(answers, {"error": f"{what}: {hint}", "is_of_library": True})
 
 

@@ -32,7 +32,7 @@ MARKS = frozenset(("", *_MARKS.split()))
 COMMENTS = ("#", "%", "//", "!")
 """what a line of comment begins with"""
 
-NUMBER, TEXT, UNCLEAR = "number", "text", "time of no clear order"
+NUMBER, TEXT, UNCLEAR = "number", "text", "time in an ambiguous order"
 """kinds of columns, beside those of time stamps"""
 
 _ROWS = 200  # rows that are looked at for the decimal mark and the kinds of columns
@@ -210,7 +210,7 @@ def dialect_of(head: Head) -> Dialect:
     while begin < len(head.lines) and (head.is_blank(begin) or _is_comment(head.plain(begin))):
         begin += 1
     if begin >= len(head.lines):
-        raise FileError(f"{path} holds no row after {options.skip_lines} lines that are skipped")
+        raise FileError(f"{path} has no rows after {options.skip_lines} skipped lines")
     if chosen and chosen not in SEPARATORS:
         raise FileError(f"{path}: its first line names the separator {quoted(chosen)}: use ';'")
     dialect = None
@@ -220,11 +220,13 @@ def dialect_of(head: Head) -> Dialect:
         separator = chosen or (first[0] if first else _separator_of(head, begin))
         dialect = _headed(head, begin, separator, options.titles)
     if dialect.separator == "," and options.decimal == ",":
-        raise FileError(f"{path}: a comma cannot separate columns and mark decimals: decimal = '.'")
+        raise FileError(
+            f"{path}: a comma cannot be both column separator and decimal mark: write decimal = '.'"
+        )
     before = [k for k in range(at, begin) if not head.is_blank(k)]
     if before:
         note = (
-            f"{len(before)} lines before the table are not read, from line {before[0] + 1} "
+            f"{len(before)} lines before the table are skipped, from line {before[0] + 1} "
             f"({quoted(head.plain(before[0]).strip())}) to {before[-1] + 1}"
         )
         dialect = replace(dialect, notes=(note, *dialect.notes))
@@ -276,7 +278,7 @@ def with_mark(path: Path, dialect: Dialect, indices: Sequence[int]) -> Dialect:
             f"{path}, line {number}, column {quoted(dialect.label(k))}: {quoted(cell)} mixes "
             f"decimal comma and decimal point ({quoted(before[2])} in line {before[0]}), columns "
             f"separated by {SEPARATORS[dialect.separator]}: write all numbers with one of them, "
-            "and none with a separator of thousands"
+            "without a thousands separator"
         )
     return replace(dialect, decimal=next(iter(first), "."))
 
@@ -341,13 +343,13 @@ def _from_numbers(
         titles, units = _titles_of(rows[start], rows[alike[-1]] if has_units else [])
         notes += _doubtful_titles(titles, start)
         if _is_comment(head.plain(start)):
-            notes.append(f"line {start + 1} is a comment, and is read as titles")
+            notes.append(f"line {start + 1} is a comment, but read as titles")
     elif above and above[-1] == begin:
         return None, begin  # a header of other cells than the rows
     elif above and start > begin:
         notes.append(
-            f"the columns have no titles, since line {above[-1] + 1} has other cells than the rows "
-            "below it: they are called 1, 2, ..."
+            f"the columns have no titles, since line {above[-1] + 1} does not match the rows "
+            "below it: they are named 1, 2, ..."
         )
     # Between words of a sentence stand blanks too: there, a row begins with its number.
     first_ones = 1 if separator == " " else None

@@ -94,7 +94,7 @@ def blocks_of(path: Path, encoding: str, size: int = _BLOCK) -> Iterator[bytes]:
             except UnicodeDecodeError as error:
                 line = lines + 1 + block[: error.start].count(b"\n")
                 raise FileError(
-                    f"{path}, line {line}: it is not text in {encoding}: name the right encoding "
+                    f"{path}, line {line}: it is not text in {encoding}: give the right encoding "
                     "in the mapping, as encoding = 'cp1252'"
                 ) from None
             lines += text.count("\n")
@@ -133,7 +133,7 @@ def head_text(path: Path, named: str, size: int) -> tuple[list[str], str, bool]:
 def not_utf8(path: Path, line: int) -> FileError:
     """Return the error for a line that is not UTF-8."""
     return FileError(
-        f"{path}, line {line}: it is not UTF-8: name its encoding in a mapping, as "
+        f"{path}, line {line}: it is not UTF-8: give its encoding in a mapping, as "
         "encoding = 'cp1252' (Windows) or 'latin-1', or save it as UTF-8 (in spreadsheets: "
         "'CSV UTF-8')"
     )

@@ -93,7 +93,7 @@ def _text(file: Path, kind: str, missing: Callable[[Path], str], too_large: str)
         raise FileError(f"cannot read {kind} {file}: {reason}: {hint}", name=str(file)) from None
     if len(data) > LARGEST:
         raise FileError(
-            f"{file} has more than {LARGEST // 1000} kB, too much for a {kind}{too_large}",
+            f"{file} has more than {LARGEST // 1000} kB, too large for a {kind}{too_large}",
             name=str(file),
         )
     try:
@@ -170,7 +170,7 @@ def require_kind(content: Mapping[str, Any], wanted: str, file: Path) -> None:
     if not kind or kind == wanted or (head in content and head != HEADS[kind]):
         return
     raise ParameterError(
-        f"this is {_WORDS[kind]} and not {_WORDS[wanted]}: '{_COMMANDS[kind]} {file}' takes it",
+        f"this is {_WORDS[kind]}, not {_WORDS[wanted]}: use '{_COMMANDS[kind]} {file}'",
         name=str(file),
         value=kind,
         valid=wanted,

@@ -78,8 +78,7 @@ def write_measurement(
         reason = getattr(error, "strerror", None) or " ".join(str(error).split())[:200]
         reason = reason or type(error).__name__
         raise FileError(
-            f"cannot write {target}: {reason}: make room there, or choose a folder that you may "
-            "write to",
+            f"cannot write {target}: {reason}: free some space there, or choose a writable folder",
             name=str(target),
         ) from None
     return target
@@ -113,7 +112,7 @@ def require_free(target: Path, *, overwrite: bool) -> None:
             )
         if not target.parent.is_dir():
             raise FileError(
-                f"cannot write {target}: there is no folder {target.parent}: make it",
+                f"cannot write {target}: there is no folder {target.parent}: create it",
                 name=str(target),
             )
 
@@ -126,12 +125,12 @@ def _require_fit(dataset: xr.Dataset, target: Path, kind: FileFormat) -> None:
             dims = ", ".join(map(str, signal.dims)) or "none"
             raise FileError(
                 f"cannot write {target}: {name} has the dimensions {dims}: a measurement file "
-                "holds signals over time; choose one case of each",
+                "contains signals over time; choose one case of each",
                 name=str(name),
             )
         if not np.issubdtype(signal.dtype, np.number) and signal.dtype != np.bool_:
             raise FileError(
-                f"cannot write {target}: {name} contains {signal.dtype} and not numbers",
+                f"cannot write {target}: {name} contains {signal.dtype}, not numbers",
                 name=str(name),
             )
         unit = dataset[signal.dims[0]].attrs.get("units", "s")
@@ -154,7 +153,7 @@ def _require_fit(dataset: xr.Dataset, target: Path, kind: FileFormat) -> None:
         )
     raise FileError(
         f"cannot write {target}: the signals were measured at different instants "
-        f"({', '.join(axes)}), and a {kind.name} file has one time: bring them to one time axis "
+        f"({', '.join(axes)}), and a {kind.name} file has one time: resample them to one time axis "
         "(bywire convert --rate, or resample), or write mat, mdf4 or netcdf",
         name=str(target),
     )

@@ -60,10 +60,10 @@ def _compared_outputs(
         wanted = [n for n in known if _tells(data[n].values, signals[n].unit)] or known
         passed = [n for n in known if n not in wanted]
         if passed:
-            notes = (f"left out as flags, sums or constants: {', '.join(passed)}",)
+            notes = (f"not compared (flags, sums or constants): {', '.join(passed)}",)
     if not wanted:
         raise ParameterError(
-            "no measured signal is an output of the model: name signals as the model does "
+            "no measured signal is an output of the model: use the model's signal names "
             f"({option('mapping')}), "
             f"for instance {', '.join(list(signals)[:6])}; measured are "
             f"{nearest_first(there, signals)}",
@@ -90,8 +90,8 @@ def _missed_samples(data: xr.Dataset, compared: Sequence[str]) -> list[str]:
     counts = {name: int(np.isnan(data[name].values).sum()) for name in compared}
     total = data.sizes["time"]
     return [
-        f"{name} misses {count} of {total} samples ({100.0 * count / total:.2g} %), where nothing "
-        "is compared"
+        f"{name} misses {count} of {total} samples ({100.0 * count / total:.2g} %), which are "
+        "not compared"
         for name, count in counts.items()
         if count
     ]
@@ -103,7 +103,7 @@ def _require_measured(data: xr.Dataset, name: str, signal: Signal) -> None:
     unit = str(data[name].attrs.get("units", "1"))
     if unit != signal.unit and not measures(unit_of_symbol(unit), signal.unit):
         raise UnitError(
-            f"{name} is measured in {unit}, and must be in {signal.unit}: check the map",
+            f"{name} is measured in {unit}, but must be in {signal.unit}: check the mapping",
             name=name,
             value=unit,
             valid=signal.unit,
@@ -199,7 +199,7 @@ def measured_run(
     chosen = case_of(bench, case)
     if not settle and chosen.settle > 0.0:
         chosen = replace(chosen, settle=0.0)
-        notes = (*notes, "begins with the record: the experiment's settling is left out")
+        notes = (*notes, "starts with the record, without the experiment's settling")
     data, chosen, said = _on_grid(bench, data, chosen)
     for signal in driven.values():
         missing = np.flatnonzero(np.isnan(data[signal].values))
@@ -237,7 +237,7 @@ def case_of(bench: Bench, label: str) -> Case:
     cases = {case.label: case for case in bench.cases()}
     if not cases:
         raise ParameterError(
-            f"experiment {bench.experiment!r} makes no run: choose another one",
+            f"experiment {bench.experiment!r} does not make a run: choose another one",
             name="experiment",
             value=bench.experiment,
         )
@@ -398,7 +398,7 @@ def replay(
     """
     if RECORD in data:
         raise ParameterError(
-            "replay takes one record, and this measurement has several", name="data"
+            "replay needs a single record, but this measurement has several", name="data"
         )
     measured = measured_run(bench, data, inputs, outputs, case)
     wanted = dict.fromkeys((*measured.compared, *energy_signals(measured.run)))

@@ -243,30 +243,30 @@ def is_white(residuals: Array, lags: int = 20) -> bool:
     return all(special.chdtrc(most, float(terms[:most].sum())) > level for most in asked)
 
 
-# --- What the data tells of unknowns, and what it does not: singular values, correlations
+# --- Which unknowns the data determine: singular values, correlations
 
-_TOLD = 1.0  # standard deviation per scale above which nothing is known
+_DETERMINED = 1.0  # largest standard deviation per scale of a determined unknown
 _FLAT = 1e-7  # singular value per the largest one: below it rounding decides
 _FAR = 10.0  # times the noise: residuals that no noise explains
 _MISFIT = 4.0  # times the noise: sensors whose noise is filtered leave up to 3
 _AS_ASSUMED = (0.5, 1.5)  # times the noise that was assumed: it explains what is left
 _EXACT = (
-    "nothing but rounding is left: the record agrees with the model to the last digits, and its "
-    "intervals do not hold for a measured record, which has noise"
+    "the residual is only rounding: the record agrees with the model to the last digits, so its "
+    "intervals are not valid for a measured record, which has noise"
 )
 _CONTRADICTED = 3.0  # standard deviations of a prior
 
 
 class MisfitWarning(UserWarning):
-    """A model leaves more than noise, or its step is too coarse: intervals do not hold."""
+    """The residual exceeds the noise, or the step is too coarse: intervals are not valid."""
 
 
 def misfit(estimate: Estimate) -> str:
-    """Return what a model leaves that is no noise, in a sentence; empty where it is noise.
+    """Describe a residual that exceeds the noise in a sentence; empty if it is only noise.
 
-    What neighboring residuals differ by is noise; what they have in common above it is the
-    model's. Where a noise was assumed and explains what is left, it is believed. What rounding or
-    the step of the simulation explains says nothing of the model.
+    Differences of neighboring residuals are noise; their common part beyond it comes from the
+    model. An assumed noise that explains the residual is accepted. Residuals from rounding or from
+    the step of the simulation do not count against the model.
     """
     worst = max(
         (
@@ -284,25 +284,27 @@ def misfit(estimate: Estimate) -> str:
         return ""
     size = shown(float(f"{worst.rms:.3g}"), difference_unit(worst.unit))
     return (
-        f"{worst.label}: the model leaves {size}, {worst.over_noise:.2g} times the noise between "
-        "neighboring samples: something is missing in it or wrong, and the intervals do not hold, "
-        "which take what is left for chance"
+        f"{worst.label}: the residual is {size}, {worst.over_noise:.2g} times the noise between "
+        "neighboring samples: the model is incomplete or wrong, and the intervals are invalid, "
+        "since they assume a random residual"
     )
 
 
-def untold(estimate: Estimate, J: Array) -> tuple[int, str] | None:
-    """Return the unknown that the data tells least, and why, if there is one."""
+def least_determined(estimate: Estimate, J: Array) -> tuple[int, str] | None:
+    """Return the unknown that the data do not determine, with the reason; None if there is none."""
     share = estimate.singular_values[-1] / max(estimate.singular_values[0], 1e-300)
     reason = f"smallest singular value {share:.1e} of the largest"
     silent = np.flatnonzero(~J.any(axis=0))
     if silent.size:
-        return int(silent[0]), "nothing measured depends on it"
+        return int(silent[0]), "no measured signal depends on it"
     if share < _FLAT:
         direction = np.linalg.svd(J, full_matrices=False)[2][-1]
-        return int(np.argmax(np.abs(direction))), f"only a combination with others shows ({reason})"
+        return int(np.argmax(np.abs(direction))), (
+            f"only a combination with others is determined ({reason})"
+        )
     relative = estimate.deviations / np.array([u.scale for u in estimate.unknowns])
     index = int(np.argmax(relative))
-    if relative[index] <= _TOLD:
+    if relative[index] <= _DETERMINED:
         return None
     unknown = estimate.unknowns[index]
     return index, (
@@ -312,44 +314,44 @@ def untold(estimate: Estimate, J: Array) -> tuple[int, str] | None:
 
 
 def advice(estimate: Estimate, silent: bool) -> str:
-    """Return what to do where the data tells nothing.
+    """Return advice for unknowns that the data do not determine.
 
     Parameters
     ----------
     estimate
-        Where the search ended, with its residuals.
+        End of the search, with its residuals.
     silent
-        Whether it is known why nothing depends on the unknown.
+        Whether the model explains why no output depends on the unknown.
     """
     left = robust_scale(estimate.residuals)
     if left > _FAR:
         return (
-            f"the model does not fit, it leaves {left:.2g} times the noise at its best: check sign "
-            f"and unit of what was measured ({option('mapping')}), then what is taken as known"
+            f"the model does not fit: its best residual is {left:.2g} times the noise; check sign "
+            f"and unit of the measured signals ({option('mapping')}), then the known parameters"
         )
     return "switch it on, or name another unknown" if silent else "excite the system more"
 
 
 def notes_of(estimate: Estimate) -> tuple[str, ...]:
-    """Return what the user should know: what goes together, lies at a bound, or off its prior."""
+    """Return notes about correlated unknowns, bounds, contradicted priors, and misfit."""
     notes = [
-        f"{a} and {b} go together (correlation {c:.3f}): the data tells their combination better "
-        "than either"
+        f"{a} and {b} are correlated ({c:.3f}): the data determine their combination better "
+        "than either one"
         for a, b, c in estimate.correlated()
     ]
     bounds = estimate.at_bounds()
     for u, value in zip(estimate.unknowns, estimate.values, strict=True):
         if u.label in bounds:
-            notes.append(f"{u.label} lies at its bound, {shown(bounds[u.label], u.unit)}")
+            notes.append(f"{u.label} is at its bound, {shown(bounds[u.label], u.unit)}")
         if u.prior is None:
             continue
         mean, deviation = u.prior
         away = abs(float(value) - mean) / deviation
         if away > _CONTRADICTED:
             notes.append(
-                f"{u.label} = {shown(float(f'{value:.4g}'), u.unit)} lies {away:.2g} deviations "
-                f"of its prior ({shown(mean, u.unit)} ± "
-                f"{shown(deviation, difference_unit(u.unit))}) away: the prior or the model is "
+                f"{u.label} = {shown(float(f'{value:.4g}'), u.unit)} is {away:.2g} standard "
+                f"deviations from its prior ({shown(mean, u.unit)} ± "
+                f"{shown(deviation, difference_unit(u.unit))}): the prior or the model is "
                 "wrong"
             )
     if estimate.is_exact:
@@ -402,7 +404,7 @@ class Disagreement:
             )
         )
         return (
-            f"records do not agree: {self.name} is {there} in {self.record} and {rest} in the "
+            f"records disagree: {self.name} is {there} in {self.record} and {rest} in the "
             f"others (standard deviations), {self.apart:.2g} of their difference's apart: look at "
             "that record, or at what differs between them; no joint interval holds"
         )

@@ -104,8 +104,8 @@ def require_steps(data: xr.Dataset, name: str, answer: str, label: str) -> None:
     demand, current = data[name].values, data[answer].values
     if not float(np.ptp(demand)) > 0.0:
         raise ParameterError(
-            f"{name} of record {label or '1'} does not move: an answer at rest determines neither "
-            "winding nor gains; step it between several levels, the rotor locked",
+            f"{name} of record {label or '1'} does not move: a response at rest determines neither "
+            "winding nor gains; step it between several levels with the rotor locked",
             name=name,
         )
     together = float(np.corrcoef(demand, current)[0, 1]) if np.ptp(current) > 0.0 else 0.0
@@ -168,7 +168,7 @@ def checks_of(trials: Sequence[Trial], fit: Estimate) -> tuple[Check, ...]:
             "residual_over_noise",
             fit.rms,
             limit=_MISFIT,
-            note="1 where nothing but the sensor's noise is left",
+            note="1 if only the sensor's noise remains",
         ),
         Check(
             "parameters_without_meaning",
@@ -192,7 +192,7 @@ def as_curve(trial: Trial, fit: Estimate) -> Curve:
     columns = {"measured": trial.measured[signal], "modeled": modeled}
     data = over(("time", computed.time, "s", "time"), columns, "A", "current")
     name = f"current-{trial.label}" if trial.label else "current"
-    return Curve(name, "Current: measured, and modeled where it counts.", data, "time")
+    return Curve(name, "Current: measured, and modeled where it is fitted.", data, "time")
 
 
 class LoopOptions(ParameterSet):

@@ -248,16 +248,16 @@ def _require_told(W: Array, unknowns: Sequence[Unknown]) -> None:
     silent = [u.label for u, s in zip(unknowns, size, strict=True) if s == 0.0]
     if silent:
         raise ParameterError(
-            f"the data do not determine {', '.join(silent)}: nothing that it acts on moves; "
-            "excite it, or take it as known",
+            f"the data do not determine {', '.join(silent)}: nothing that depends on it moves; "
+            "excite it, or treat it as known",
             name=", ".join(silent),
         )
     _, s, V = np.linalg.svd(W / size, full_matrices=False)  # U would have samples squared
     if s[-1] < 1e-10 * s[0]:
         together = [u.label for u, v in zip(unknowns, V[-1], strict=True) if abs(v) > 0.1]
         raise ParameterError(
-            f"the data determine only a combination of {', '.join(together)}: take one of them as "
-            "known, or excite them apart",
+            f"the data determine only a combination of {', '.join(together)}: treat one of them as "
+            "known, or excite them separately",
             name=", ".join(together),
         )
 

@@ -231,9 +231,9 @@ class Estimate:
         reasons = {}
         for u, value, half in zip(self.unknowns, self.values, reach, strict=True):
             if u.label in bounds:
-                reasons[u.label] = f"lies at its bound, {shown(bounds[u.label], u.unit)}"
+                reasons[u.label] = f"is at its bound, {shown(bounds[u.label], u.unit)}"
             elif half > abs(value):
-                reasons[u.label] = f"is {value:.3g} +- {half:.2g} {u.unit}: that may be nothing"
+                reasons[u.label] = f"is {value:.3g} +- {half:.2g} {u.unit}: it may be zero"
         return reasons
 
     def noted(self, notes: tuple[str, ...]) -> Estimate:
@@ -276,12 +276,12 @@ class Estimate:
             )
         ]
         kept = [
-            f"{k.unknown.label:<16} not told by the data, kept at {k.unknown.start:g} "
+            f"{k.unknown.label:<16} not determined by the data, kept at {k.unknown.start:g} "
             f"{k.unknown.unit}: {k.reason}"
             for k in self.kept
         ]
         left = [
-            f"{leftover.label} leaves "
+            f"residual of {leftover.label} "
             + shown(float(f"{leftover.rms:.3g}"), difference_unit(leftover.unit))
             + (f", fit {leftover.fit:.1f} %" if math.isfinite(leftover.fit) else "")
             for leftover in self.leftovers()

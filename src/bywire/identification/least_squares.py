@@ -20,10 +20,10 @@ from bywire.identification.confidence import (
     MisfitWarning,
     advice,
     between_records,
+    least_determined,
     misfit,
     notes_of,
     uncertainty,
-    untold,
 )
 from bywire.identification.estimate import Estimate, Kept, Part
 from bywire.identification.unknown import Unknown
@@ -232,7 +232,7 @@ def _with_step_share(
         difference = np.zeros(len(J))
         difference[:count] = finer - best.residuals
     except (*NO_ESTIMATE, ValueError) as error:  # a ValueError: other rows count in half steps
-        return best, (f"what the step does to the estimates is not known: {error}",)
+        return best, (f"the effect of the step on the estimates is unknown: {error}",)
     weights = np.ones(len(J))
     measured = count - problem.apart
     weights[:measured] = np.sqrt(np.maximum(influence(best.residuals[:measured], loss)[1], 0.0))
@@ -260,10 +260,10 @@ def _parts(parts: Iterable[Part], difference: Array) -> Iterator[Part]:
 def _exceeding(best: Estimate, errors: Array) -> list[str]:
     half = 0.5 * np.diff(best.intervals(), axis=1).ravel()
     return [
-        f"{u.label} is off by about {shown(float(f'{error:.2g}'), difference_unit(u.unit))} from "
-        "the step of the simulation, more than its 95 % interval reaches, "
+        f"{u.label} has an error of about {shown(float(f'{error:.2g}'), difference_unit(u.unit))} "
+        "from the simulation step, more than the half width of its 95 % interval, "
         f"{shown(float(f'{reach:.2g}'), difference_unit(u.unit))}: "
-        "take a smaller step"
+        "use a smaller step"
         for u, error, reach in zip(best.unknowns, errors, half, strict=True)
         if error > max(reach, _SMALL * u.scale)
     ]
@@ -329,7 +329,7 @@ def solve(
             cache.clear()
             r, J = _with_priors(problem, z * scale)
             if not (np.isfinite(r).all() and np.isfinite(J).all()):
-                raise SolverError("a residual, or how it changes, is not defined at these values")
+                raise SolverError("a residual or its derivative is not defined at these values")
             cache[key] = (r, J * scale)
         return cache[key]
 
@@ -428,7 +428,7 @@ def estimate(
     while True:
         solution = _solved(problem, begin, loss) if search else Solution(begin, math.nan)
         best, J = _at_minimum(problem, solution, loss)
-        worst = untold(best, J)
+        worst = least_determined(best, J)
         if worst is None:
             records = between_records(best, J) if loss == "linear" else ()
             apart = tuple(str(record) for record in records[:1])

@@ -121,7 +121,7 @@ def joined(records: Mapping[str, xr.Dataset]) -> xr.Dataset:
         When there is none, or one has other signals than the first.
     """
     if not records:
-        raise ParameterError("no record is given: at least one is needed")
+        raise ParameterError("there is no record: give at least one")
     first, *others = records
     if not others:
         return records[first]
@@ -132,7 +132,7 @@ def joined(records: Mapping[str, xr.Dataset]) -> xr.Dataset:
             differing = ", ".join(sorted(wanted ^ set(map(str, record.data_vars))))
             raise ParameterError(
                 f"records {first} and {label} differ in their signals ({differing}): records of "
-                "one experiment have the same signals",
+                "one experiment need the same signals",
                 name=label,
             )
         t = record["time"].values - record["time"].values[0]
@@ -322,7 +322,7 @@ def require(data: xr.Dataset, signals: Mapping[str, str], where: str) -> tuple[s
         given = str(data[name].attrs.get("units", "1"))
         if unit not in ("", given) and not measures(unit_of_symbol(given), unit):
             raise UnitError(
-                f"{where}: {name} is in {given}, and must be in {unit}: check the map",
+                f"{where}: {name} is in {given}, but must be in {unit}: check the mapping",
                 name=name,
                 value=given,
                 valid=unit,
@@ -353,7 +353,9 @@ def as_even(
         (dim,) = steps
         return data if dim == "time" else data.rename({dim: "time"}), []
     if "record" in data:
-        raise ParameterError("several records in one file cannot be resampled: give a file each")
+        raise ParameterError(
+            "several records in one file cannot be resampled: give one file per record"
+        )
     if multiple is not None and interval is None:
         step = float(f"{max(round(step / multiple), 1) * multiple:.9g}")
     resampled = resample(data, step)
@@ -366,7 +368,7 @@ def as_even(
 
 def _said(report: AlignmentReport) -> str:
     missing = max(channel.excluded for channel in report.channels)
-    left_out = f"; {missing} of them in gaps and left out" if missing else ""
+    left_out = f"; {missing} of them are in gaps and not used" if missing else ""
     return (
         f"resampled to {report.samples} samples every {1e3 * report.interval:.6g} ms (its own "
         f"instants are not evenly spaced){left_out}"
@@ -382,7 +384,7 @@ def _require_whole(data: xr.Dataset, where: str, gaps: bool) -> None:
             at = float(data["time"].values[missing[0]])
             raise ParameterError(
                 f"{where}: {name} misses {missing.size} samples, the first at {at:.4g} s: cut the "
-                "record there, or fill it knowingly with 'bywire convert --exclude nothing'",
+                "record there, or fill it deliberately with 'bywire convert --exclude nothing'",
                 name=str(name),
             )
 
@@ -399,6 +401,6 @@ def wrong_sign(signal: str, other: str, evidence: str) -> ParameterError:
         What shows it, with its value.
     """
     return ParameterError(
-        f"{signal} goes against {other} ({evidence}): one of the two has the wrong sign; "
-        "write sign = -1 for it in the map"
+        f"{signal} moves against {other} ({evidence}): one of the two has the wrong sign; "
+        "write sign = -1 for it in the mapping"
     )

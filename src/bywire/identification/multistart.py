@@ -83,7 +83,7 @@ def multistart(
     Returns
     -------
     Estimate
-        With a note on how many starts met the lowest minimum.
+        With a note on how many starts reached the lowest minimum.
 
     Raises
     ------
@@ -94,9 +94,9 @@ def multistart(
     """
     starts = scattered(problem.unknowns, count, spread, seed)
     led = search(problem, starts, loss, progress, store)
-    note = f"{led.reached} of {count} starts met the lowest minimum"
+    note = f"{led.reached} of {count} starts reached the lowest minimum"
     if led.reached == 1 < count:
-        note += ": there may be a lower one; take more starts, narrower bounds or fewer unknowns"
+        note += ": there may be a lower one; use more starts, narrower bounds or fewer unknowns"
     return estimate(problem, loss, led.best.values).noted((note,))
 
 
@@ -171,7 +171,8 @@ def search(
         raise refused[-1]
     if not solutions:
         raise SolverError(
-            "no start could be computed: begin nearer to the truth, or measure at other points"
+            "no start could be computed: start closer to the true values, "
+            "or measure at other points"
         )
     return Search(tuple(solutions[k] for k in sorted(solutions)), len(starts) - len(solutions))
 

@@ -278,20 +278,20 @@ def _bare(name: str, case: Case, known: ParameterSet, outputs: Iterable[str]) ->
         return Unknown(name, 0.0, scale=signal.nominal, unit=signal.unit)
     if name.startswith("initial."):
         raise ParameterError(
-            f"unknown {name}: initial values are each record's own; write "
+            f"unknown {name}: each record has its own initial values; write "
             f"{option('states')} {name.removeprefix('initial.')}",
             name=name,
         )
     given, leaves = known.flat().get(name), leaf_fields(type(known))
     if name not in leaves and given is not None:
         raise ParameterError(
-            f"unknown {name}: it is a choice, here {quoted(given)}, and no number; try each with "
+            f"unknown {name}: it is a choice (here {quoted(given)}), not a number; try each with "
             f"{option('overrides', {name: '...'})}",
             name=name,
         )
     if isinstance(given, tuple):
         raise ParameterError(
-            f"unknown {name}: it is a table, of which no node can be estimated; name a number",
+            f"unknown {name}: it is a table, whose nodes cannot be estimated; name a number",
             name=name,
         )
     if name not in leaves:
@@ -340,7 +340,7 @@ def _pair(
     low, high = _EXAMPLES[kind]
     if len(parts) != 2 or not all(part.strip() for part in parts):
         raise ParameterError(
-            f"{kind} of {unknown.name}: {quoted(text)} cannot be read; write for instance "
+            f"{kind} of {unknown.name}: {quoted(text)} is not valid; write for instance "
             f"'{shown(low * unknown.scale, unknown.unit)}{sign}"
             f"{shown(high * unknown.scale, _second_unit(unknown, kind))}'",
             name=f"{kind} of {unknown.name}",

@@ -102,7 +102,7 @@ def estimate_lag(
                 name=name,
             )
         if np.ptp(values) == 0.0:
-            raise ParameterError(f"{name} does not move: it shows no lag", name=name)
+            raise ParameterError(f"{name} does not move: it has no lag", name=name)
     most = int(np.ceil(reach / step))
     if not most >= 1 or a.size - most < _LEAST:
         overlap = f"leave an overlap of {_LEAST} steps in {a.size * step:g} s"
@@ -281,8 +281,8 @@ def found_in(demand: xr.DataArray, tolerances: Mapping[str, str]) -> list[Segmen
     merged.append(ends[-1])
     if len(merged) - 1 > _MOST:
         raise ParameterError(
-            f"the demand {demand.name} holds and moves {len(merged) - 1} times: name the "
-            f"stretches that matter in a file, {option('segments')} FILE",
+            f"the demand {demand.name} changes between holding and moving {len(merged) - 1} times: "
+            f"name the segments that matter in a file, {option('segments')} FILE",
             name="segments",
         )
     counts = {"hold": 0, "move": 0}
@@ -326,13 +326,13 @@ def _from(content: Mapping[str, Any], tolerances: Mapping[str, str]) -> list[Seg
     file = SegmentFile.read(content, "a file of segments")
     if not file.segments:
         raise ParameterError(
-            "no segment: write [segments.NAME] with start and stop", name="segments"
+            "there is no segment: write [segments.NAME] with start and stop", name="segments"
         )
     shared = {**tolerances, **file.tolerances}
     segments = []
     for name, section in file.segments.items():
         if not section.start < section.stop:
-            raise ParameterError(f"[segments.{name}]: start must lie before stop", name=name)
+            raise ParameterError(f"[segments.{name}]: start must be before stop", name=name)
         limits = {**shared, **section.tolerances}
         segments.append(Segment(name, section.start, section.stop, limits))
     return segments
@@ -364,7 +364,7 @@ def read_tolerances(texts: Sequence[str]) -> dict[str, str]:
         name, compare, bound = parted(text)
         if compare is None or not name or not bound:
             raise ParameterError(
-                f"{option('tolerances')} {text!r} cannot be read: write for instance 'nrmse <= 5 "
+                f"{option('tolerances')} {text!r} is not valid: write for instance 'nrmse <= 5 "
                 "%' or 'p_mc.max_error <= 2 bar'",
                 name="tolerances",
                 value=text,
@@ -433,8 +433,8 @@ def _limits(key: str, text: str, kpi: Kpi) -> list[Limit]:
     for limit in limits:
         if limit.bound < 0.0:
             raise ParameterError(
-                f"tolerance {limit} bounds the magnitude, which is never negative: give a "
-                f"lower limit as well, such as '{key} >= ...', and both are taken with their sign",
+                f"tolerance {limit} bounds the magnitude, which is never negative: add a "
+                f"lower limit, such as '{key} >= ...', so that both limits are signed",
                 name=key,
             )
     return [replace(limit, of_magnitude=True) for limit in limits]
@@ -507,24 +507,26 @@ def fit_figures(pair: xr.Dataset, segment: Segment) -> tuple[Kpi, ...]:
     lag, lag_note = _lag(part, there)
     still = "the measured signal does not move"
     return (
-        Kpi("rmse", rmse, unit, "Root mean square of modeled less measured."),
+        Kpi("rmse", rmse, unit, "Root mean square of modeled minus measured."),
         Kpi(
             "nrmse",
             100.0 * rmse / span if span else math.nan,
             "%",
-            "That over the measured range of the whole record.",
+            "Root mean square error over the measured range of the whole record.",
             "" if span else still,
         ),
         Kpi(
             "vaf",
             100.0 * (1.0 - float(np.var(error)) / variance) if variance else math.nan,
             "%",
-            "Variance accounted for: 1 less that of the error over that of the measurement.",
+            "Variance accounted for: 1 minus error variance over measured variance.",
             "" if variance else still,
         ),
         Kpi("max_error", float(np.abs(error).max()), unit, "Largest magnitude of the error."),
-        Kpi("bias", float(error.mean()), unit, "Mean of modeled less measured."),
-        Kpi("lag", lag, "s", "By how much the model is later, by correlation.", lag_note),
+        Kpi("bias", float(error.mean()), unit, "Mean of modeled minus measured."),
+        Kpi(
+            "lag", lag, "s", "Delay of the model against the measurement, by correlation.", lag_note
+        ),
     )
 
 
@@ -534,8 +536,8 @@ def _require_within(time: Array, segment: Segment) -> None:
     spare = 1.001 * float(np.median(np.diff(time)))
     if segment.start < first - spare or segment.stop > last + spare:
         raise ParameterError(
-            f"segment {segment.name!r}, {segment.start:g} to {segment.stop:g} s, goes beyond the "
-            f"record, which holds {first:.6g} to {last:.6g} s: correct its start or stop",
+            f"segment {segment.name!r}, {segment.start:g} to {segment.stop:g} s, extends beyond "
+            f"the record, which covers {first:.6g} to {last:.6g} s: correct its start or stop",
             name=segment.name,
         )
 
@@ -559,7 +561,7 @@ def _lag(part: xr.Dataset, there: NDArray[np.bool_]) -> tuple[float, str]:
             value = peak.value if abs(peak.value) > _NO_LAG * step else 0.0
             return value, f"correlation {peak.correlation:.4f}"
         reach *= 2.0
-    return math.nan, "no lag stands out"
+    return math.nan, "no lag is distinct"
 
 
 def judged(

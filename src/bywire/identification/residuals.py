@@ -52,7 +52,7 @@ def lack_of_fit(
     r = int(np.linalg.matrix_rank(A))
     more, left = r - unknowns, e.size - r
     if more < 1 or left < 1:
-        return Check(name, 0.0, note=f"too few readings to tell: {note}")
+        return Check(name, 0.0, note=f"too few readings for this check: {note}")
     rest = e - A @ np.linalg.lstsq(A, e, rcond=None)[0]
     within = max(float(rest @ rest) / left, 1e-300)
     # What a richer model bends is slow: there colored noise is larger than on the average.
@@ -63,8 +63,8 @@ def lack_of_fit(
         value,
         limit=float(special.fdtri(more, left, 1.0 - _LEVEL)),
         note=note,
-        next_step="see in the curve where it bends, and identify the part of the range that is "
-        "straight, or a law that bends",
+        next_step="see in the curve where it bends, and identify the straight part of the range, "
+        "or a law that bends",
     )
 
 

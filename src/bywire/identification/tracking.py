@@ -309,8 +309,8 @@ def likeliest(
     p = regressors.shape[1]
     if counts.sum() < 10 * p:
         raise ParameterError(
-            f"{int(counts.sum())} samples count: too few to track {p} parameters; measure longer, "
-            "or where the relation holds",
+            f"{int(counts.sum())} samples are valid, too few to track {p} parameters: measure "
+            "longer, or where the relation holds",
             name="samples",
             value=str(int(counts.sum())),
         )

@@ -1,4 +1,4 @@
-"""Tables of an identification: parameters with their intervals, what is not told, checks."""
+"""Tables of an identification: parameters with their intervals, undetermined unknowns, checks."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ def estimate_table(
     Parameters
     ----------
     estimate
-        What was found; what the data does not tell stands below it. Where its model is simulated,
-        a column says how far the step of that moves it.
+                Estimates; unknowns that the data do not determine are below them. If the model is
+        simulated, a column gives the error from the simulation step.
     start
         Values from which the search began, by label.
     put_in
-        What a simulated measurement is made of, by label.
+        True values of a simulated measurement, by label.
     """
     beside: dict[str, Mapping[str, float]] = {"put in": put_in or {}, "start": start or {}}
     beside = {
@@ -68,7 +68,8 @@ def estimate_table(
     for u in (kept.unknown for kept in estimate.kept):
         number, _, unit = with_interval(u.start, 0.0, u.unit)
         by_step = [] if steps is None else [Cell("-")]
-        rows.append((u, [Cell(number), Cell("not told", "bad"), *by_step, Cell("-"), Cell(unit)]))
+        undetermined = Cell("not determined", "bad")
+        rows.append((u, [Cell(number), undetermined, *by_step, Cell("-"), Cell(unit)]))
     return Table(
         (
             Column("parameter"),
@@ -97,7 +98,7 @@ def with_interval(value: float, half: float, symbol: str) -> tuple[str, str, str
 
 
 def _percent(share: float) -> str:
-    """Return an uncertainty in percent; a thousand of them say no more than many."""
+    """Return an uncertainty in percent, capped at 1000 %."""
     if share >= 1000.0:
         return "> 1000 %"
     return f"{share:.0f} %" if share >= 10.0 else f"{share:.2g} %"

@@ -114,7 +114,7 @@ def test_table_between_and_outside_its_nodes():
         ("ramp", {"slope": "0 A/s"}, ParameterError, "slope = 0.0 A/s .* must be > 0 A/s"),
         ("ramp", {"start": math.nan}, ParameterError, "any finite number in A"),
         ("ramp", {"after": "reverse"}, ParameterError, "after: .*'stay' or 'return'"),
-        ("ramp", {"start": [1, 2]}, ParameterError, "one value is wanted"),
+        ("ramp", {"start": [1, 2]}, ParameterError, "must be one value"),
     ],
 )
 def test_wrong_values_are_refused(kind, changes, error, text):

@@ -115,7 +115,7 @@ def test_without_its_compiler_nothing_is_written(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(module, "bundled_compiler", lambda: None)
-    with pytest.raises(CompilerError, match=r"pip install 'bywire\[compiler\]'"):
+    with pytest.raises(CompilerError, match=r"pip install -e '\.\[compiler\]'"):
         export_wasm(BENCHES["motorcycle"], tmp_path / "out")
     assert not (tmp_path / "out").exists()
 

@@ -149,21 +149,20 @@ def _require_width(path: Path, line: int, cells: list[str], dialect: Dialect) ->
     if dialect.is_ragged:
         if cells[0].startswith(END_OF_HEADER) or cells[0] == "Channels":
             raise FileError(
-                f"{path}, line {line}: another table begins here: save each in a file of its own"
+                f"{path}, line {line}: another table begins here: save each in a separate file"
             )
         cells += [""] * (dialect.width - len(cells))
     if len(cells) != dialect.width:
         fix = (
-            "complete the row: where blanks separate columns, a missing value needs a mark such as "
-            "nan"
+            "complete the row: if blanks separate columns, a missing value needs a mark such as nan"
             if dialect.separator == " "
             else "complete the row, or remove it if the recording was cut here; with decimal "
             "commas, separate the columns by semicolons"
         )
         raise FileError(
             f"{path}, line {line}: {len(cells)} cells, but the first row has {dialect.width} "
-            f"(separated by {SEPARATORS[dialect.separator]}): {fix}; where other lines stand "
-            "before the table, skip_lines in the mapping tells how many"
+            f"(separated by {SEPARATORS[dialect.separator]}): {fix}; if other lines "
+            "precede the table, give their number as skip_lines in the mapping"
         )
 
 
@@ -177,7 +176,7 @@ def _number(path: Path, line: int, cell: str, column: int, dialect: Dialect, see
     if kind not in (NUMBER, DIGITS):
         stamp = nanoseconds(cell, kind)
         if stamp is None:
-            raise FileError(f"{where} is no {kind} like those above it: correct it")
+            raise FileError(f"{where} is not a {kind} like those above it: correct it")
         return (stamp - seen.origins[column]) / 1e9
     plain = cell if dialect.decimal == "." else cell.replace(",", ".")
     ok = _NUMBER.fullmatch(plain) and (dialect.decimal == "." or "." not in cell)
@@ -186,14 +185,13 @@ def _number(path: Path, line: int, cell: str, column: int, dialect: Dialect, see
         return value
     if is_stamp(cell):
         raise FileError(
-            f"{where} is a time stamp that bywire cannot read among these cells: times are read "
-            "as 09:12:33.5 or 2026-11-26T09:12:33.5 in all rows; seconds from the start are "
-            "read too"
+            f"{where} is a time stamp that bywire cannot read among these cells: write "
+            "09:12:33.5 or 2026-11-26T09:12:33.5 in all rows, or seconds from the start"
         )
     other = "," if dialect.decimal == "." else "."
     hint = f"; the decimal mark is {dialect.decimal!r} here" if other in cell else ""
     raise FileError(
-        f"{where} is not a finite number{hint}: correct it; where it marks a missing value, write "
+        f"{where} is not a finite number{hint}: correct it; if it marks a missing value, write "
         f"missing = [{cell!r}] in the mapping"
     )
 
@@ -240,9 +238,9 @@ def _require_whole_end(path: Path, block: bytes, last_line: int, dialect: Dialec
         few = f"all but {as_short}" if as_short else "all"
         cell = quoted(cells[-1].decode("utf-8", "replace"))
         raise FileError(
-            f"{path}, line {last_line}: it ends with {cell} and without a line end, and {few} "
-            f"numbers before in that column {more}: remove the row if the recording was cut here, "
-            "or end it with a line end if it is whole"
+            f"{path}, line {last_line}: it ends with {cell} without a line end, but {few} "
+            f"numbers above in that column {more}: remove the row if the recording was cut here, "
+            "or add a line end if it is complete"
         )
 
 
@@ -307,7 +305,7 @@ class TextSource:
                 column += columns[-1]
             elif self._kind(k) in (CLOCK, DIGITS) and (days := over_midnight(column)):
                 self.remarks.append(
-                    f"{self._dialect.label(k)}: it goes on over midnight (passed {days} x)"
+                    f"{self._dialect.label(k)}: it continues past midnight ({days} x)"
                 )
             if self._kind(k) == DIGITS:
                 column -= column[0] if column.size else 0.0
@@ -380,7 +378,7 @@ class TextSource:
         if kind == DAY:
             clocks = [k for k, other in enumerate(self._dialect.kinds) if other == CLOCK]
             is_used = self._day == column and clocks
-            return "its dates go with the times of day" if is_used else "it holds dates"
+            return "its dates belong to the times of day" if is_used else "it holds dates"
         return ""
 
     def _remark(self) -> None:
@@ -394,9 +392,9 @@ class TextSource:
                 f"{self._dialect.label(column)}: missing samples: {marks.total()} ({cells})"
             )
         if self._seen.comments:
-            self.remarks.append(f"lines of comment left out of the table: {self._seen.comments}")
+            self.remarks.append(f"comment lines skipped: {self._seen.comments}")
         if self._seen.empty:
-            self.remarks.append(f"rows of empty cells left out: {self._seen.empty}")
+            self.remarks.append(f"empty rows skipped: {self._seen.empty}")
         self._seen = _Seen(origins=self._seen.origins)
 
 

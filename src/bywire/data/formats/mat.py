@@ -75,7 +75,7 @@ class MatSource:
             numbers = self._inner[array] if array in self._inner else self._variable(array)
             if numbers.dtype.kind not in "iufb":
                 raise FileError(
-                    f"{self._path}: {quoted(array)} holds no real numbers: leave it out"
+                    f"{self._path}: {quoted(array)} contains no real numbers: do not select it"
                 )
             for name in names:
                 part = self._parts[name]
@@ -101,7 +101,7 @@ class MatSource:
     def _walk(self, name: str, struct: NDArray[Any], found: Found, depth: int) -> None:
         """Find arrays and texts in a struct, or in each of an array of structs."""
         if depth > _DEEPEST or struct.size > _MOST_STRUCTS:
-            found.left_out[name] = "it has too many structs, or structs in structs"
+            found.left_out[name] = "it has too many structs, or too deeply nested ones"
             return
         for k, element in enumerate(struct.reshape(-1), 1):
             of_element = name if struct.size == 1 else f"{name}({k})"
@@ -143,7 +143,7 @@ def _write(dataset: xr.Dataset, path: Path, progress: Progress) -> None:
     if large is not None:
         raise FileError(
             f"cannot write {path}: {large!r} has {content[large].nbytes} bytes, more than this "
-            "format can hold: use the format mat73"
+            "format allows: use the format mat73"
         )
     progress(f"writing {path.name}", 0.0)
     savemat(

@@ -147,7 +147,8 @@ class Mat73Source:
         """Refuse numbers that are not in the file: the library would read zeros."""
         if array.is_virtual or array.external:
             raise FileError(
-                f"{self._path}: {name!r} lies in other files, which are not opened: save it whole"
+                f"{self._path}: {name!r} is stored in other files, which bywire does not open: "
+                "save it in one file"
             )
         if array.chunks is None:
             is_whole = array.id.get_storage_size() >= array.nbytes
@@ -156,8 +157,8 @@ class Mat73Source:
             is_whole = array.id.get_num_chunks() >= math.prod(wanted)
         if not is_whole and not np.isnan(float(array.fillvalue)):
             raise FileError(
-                f"{self._path}: of the {array.size} numbers of {name!r} some were never written: "
-                "was the recording stopped? Save those that were"
+                f"{self._path}: some of the {array.size} numbers of {name!r} were never written: "
+                "was the recording stopped? Save the written ones"
             )
 
 
@@ -177,7 +178,7 @@ def _open(path: Path, options: ReadOptions) -> Iterator[Mat73Source]:
     with h5py.File(path, "r") as file:
         if _NETCDF in file.attrs:
             raise FileError(
-                f"{path} is a NetCDF file: rename it with the ending .nc, or say format = 'netcdf'"
+                f"{path} is a NetCDF file: rename it with the ending .nc, or give format = 'netcdf'"
             )
         yield Mat73Source(path, file)
 

@@ -73,9 +73,9 @@ class Mdf4Source:
             of_group = (
                 "its group holds no records"
                 if not length
-                else "its group has no instants"
+                else "its group has no time channel"
                 if master not in names
-                else "its group counts no time"
+                else "its group's master channel is not time"
                 if not _is_time(group.channels[master])
                 else ""
             )
@@ -116,7 +116,9 @@ class Mdf4Source:
             signal = None if index == master else signals[index]
             numbers = instants if signal is None else signal.samples
             if numbers.ndim != 1 or numbers.dtype.kind not in "iufb":
-                raise FileError(f"{self._path}: channel {name!r} holds no numbers: leave it out")
+                raise FileError(
+                    f"{self._path}: channel {name!r} contains no numbers: do not select it"
+                )
             channel = self._channel(group, index)
             if signal is not None and _has_codes(channel):
                 numbers = self._without_codes(name, channel, numbers)
@@ -147,8 +149,8 @@ class Mdf4Source:
         )
         if self._records_read != size:
             raise FileError(
-                f"{self._path} is damaged: group {group} has {size} records from {begin} on as it "
-                f"says, and {self._records_read} could be read: copy it again, or repair it with "
+                f"{self._path} is damaged: group {group} declares {size} records from {begin} on, "
+                f"but {self._records_read} could be read: copy it again, or repair it with "
                 "the program that recorded it"
             )
         return dict(zip(indices, signals, strict=True))
@@ -207,9 +209,9 @@ def _why_not(channel: Any, parts: Any) -> str:
     if channel.data_type not in _NUMBERS:
         return "it holds text or bytes"
     if channel.channel_type not in (_VALUE, _MASTER, _VIRTUAL_MASTER, _VIRTUAL):
-        return "it holds no samples of its own"
+        return "it contains no samples itself"
     if _has_formula(channel.conversion):
-        return "a formula converts it, and nothing that stands in a file is evaluated"
+        return "a formula converts it, and bywire evaluates no formulas of files"
     return ""
 
 
@@ -323,12 +325,12 @@ def _require_mdf4(path: Path) -> None:
         head = stream.read(16)
     if head[:8] != b"MDF     ":
         raise FileError(
-            f"{path} was not finished: the recorder was stopped before it could write how much "
-            "there is; finish it with the program that recorded it"
+            f"{path} was not finished: the recorder stopped before it wrote the number of "
+            "records; finalize it with the program that recorded it"
         )
     if head[8:9] != b"4":
         version = head[8:16].decode("latin-1").strip("\0 ")
-        raise FileError(f"{path} is MDF {version}: convert it to MDF 4, as asammdf does")
+        raise FileError(f"{path} is MDF {version}: convert it to MDF 4, for example with asammdf")
 
 
 def _write(dataset: xr.Dataset, path: Path, progress: Progress) -> None:
