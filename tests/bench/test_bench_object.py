@@ -123,7 +123,7 @@ def test_name_of_a_file_is_the_default(tmp_path):
         ({"name": 3}, ParameterError, "name = 3 .* a text"),
         ({"overrides": {"motor.R_m": -1}}, ParameterError, "must be > 0 ohm"),
         ({"overrides": {"motor.R_m": math.nan}}, ParameterError, "any finite number in ohm"),
-        ({"overrides": {"motor.R_m": "1 bar"}}, UnitError, "bar cannot be ohm"),
+        ({"overrides": {"motor.R_m": "1 bar"}}, UnitError, "bar cannot be converted to ohm"),
         ({"overrides": {"motor.R_m": True}}, UnitError, "must be one number"),
         ({"overrides": {"motor.R_m": None}}, UnitError, "must be one number"),
         ({"overrides": {"motor.R_m": 10**5000}}, ParameterError, "300 digits or more"),

@@ -44,7 +44,7 @@ def test_nodes_come_from_the_file_and_time_from_its_first_row(tmp_path: Path) ->
     ("table", "more", "kind", "words"),
     [
         ("time [s],a [A],b [A]\n0,1,2\n1,1,2\n", "", FileError, "several columns"),
-        ("time [s],a [V]\n0,1\n0.1,1\n", "", UnitError, "it cannot be A"),
+        ("time [s],a [V]\n0,1\n0.1,1\n", "", UnitError, "it cannot be converted to A"),
         ("time [s],a [A]\n0,1\n0.1,1\n", 'times = "0 s"', ParameterError, "either file, or"),
         ("time [s],a [A]\n0,1\n0.1,1\n", 'column = "b"', InputError, "b"),
     ],

@@ -57,7 +57,7 @@ def test_runs_and_benches_are_not_taken_for_each_other() -> None:
     with pytest.raises(ParameterError, match=r"run = Bench.* must be a Run"):
         bywire.simulate(bench)
     (run,) = bench.runs().values()
-    with pytest.raises(ParameterError, match=r"bench = Run.*: a Bench or a text or a path"):
+    with pytest.raises(ParameterError, match=r"bench = Run.* must be a Bench or a text or a path"):
         bywire.run(run)
 
 

@@ -155,7 +155,9 @@ def test_widths_of_a_temperature_are_differences():
         made = read(entry, 623.15, leaf)
         assert (made.low, made.high) == pytest.approx((613.15, 633.15))
         assert "350 degC +- 10 K" in made.text
-    with pytest.raises(InputError, match="degC cannot be a temperature difference in K"):
+    with pytest.raises(
+        InputError, match="degC cannot be converted to a temperature difference in K"
+    ):
         read("+-10 degC", 623.15, leaf)
 
 

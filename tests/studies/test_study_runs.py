@@ -145,7 +145,7 @@ def test_a_folder_of_another_study_is_refused(study, tmp_path):
         assert "varied motor.R_m: normal, mean" in str(refused.value)
         assert "quantiles" not in str(refused.value)
     path.unlink()
-    with pytest.raises(FileError, match="is gone"):
+    with pytest.raises(FileError, match="no longer exists"):
         bywire.resume_study(out)
     with pytest.raises(FileError, match="does not contain a study"):
         bywire.study_report(tmp_path)

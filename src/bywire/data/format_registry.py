@@ -1,4 +1,4 @@
-"""Find the format of a measurement file, by what it holds as well as by its name."""
+"""Detection of a measurement file's format by content and name."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from bywire.data.file_format import FileFormat
 _HEAD = 1024
 
 
-# Files that are told by their first bytes and not read: what they are, and the way out.
+# Known files that bywire does not read, by their first bytes: description and alternative.
 _NOT_READ = (
     (b"TDSm", "a TDMS file of LabVIEW", "export it as CSV or LVM, or as MDF 4 with DIAdem"),
     (b"LOGG", "a BLF file of Vector", "export its signals as MDF 4, which CANoe and CANalyzer do"),
@@ -34,19 +34,19 @@ FORMATS = Kind("file format", ("formats",), instances(FileFormat), "bywire.data.
 
 
 def format_to_read(path: Path, name: str = "") -> FileFormat:
-    """Return the format in which a file is to be read.
+    """Return the format to read a file.
 
     Parameters
     ----------
     path
         The file.
     name
-        Format that the user names; else the ending decides among those that fit the content.
+        Format that the user names; otherwise the ending selects among those that fit the content.
 
     Raises
     ------
     FileError
-        When the file cannot be read, is empty, or is not what its ending or the name says.
+        When the file cannot be read, is empty, or does not match its ending or the name.
     UnknownNameError
         When there is no such format.
     """
@@ -80,7 +80,7 @@ def format_to_read(path: Path, name: str = "") -> FileFormat:
 
 
 def _require_readable(path: Path, head: bytes) -> None:
-    """Refuse what is no measurement that bywire reads, with the way out."""
+    """Reject files that bywire cannot read, with an alternative."""
     for mark, what, way in _NOT_READ:
         if head.startswith(mark):
             raise FileError(f"{path} is {what}, which bywire does not read: {way}", name=str(path))
@@ -93,7 +93,7 @@ def _require_readable(path: Path, head: bytes) -> None:
 
 
 def format_to_write(path: Path, name: str = "") -> FileFormat:
-    """Return the format in which a file is to be written, by its ending or by name.
+    """Return the format to write a file, by its ending or by name.
 
     Raises
     ------
@@ -129,12 +129,12 @@ def _names() -> str:
 
 
 def head_of(path: Path) -> bytes:
-    """Return the first bytes of a file, by which formats are told.
+    """Return the first bytes of a file, to recognize its format.
 
     Raises
     ------
     FileError
-        When it is no file or cannot be read.
+        When it is not a file or cannot be read.
     """
     try:
         if path.exists() and not path.is_file():

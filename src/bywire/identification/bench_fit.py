@@ -28,7 +28,7 @@ from bywire.identification.least_squares import Problem, estimate, solve
 from bywire.identification.measured import (
     FAR,
     NOISE_OF_SAMPLES,
-    is_told,
+    determines_its_noise,
     noise_of,
     outliers,
     robust_scale,
@@ -467,7 +467,7 @@ def _overestimated(
             continue
         left = robust_scale(r)
         even = NOISE_OF_SAMPLES not in runs[trial.label].data[name].attrs
-        if even and not is_told(values):
+        if even and not determines_its_noise(values):
             why = "varies from sample to sample"
         elif left < _LEFT:
             why = f"differs from the model by only {left:.2g} of that"

@@ -21,22 +21,22 @@ _BLOCKS = 10  # per unknown, at least
 _KEPT = 0.9  # of the square of the Jacobian, at least
 _LEVEL = 0.01  # of the test whether residuals are white
 _NEAREST = 3  # lags
-_GROUPS = (8, 16, 64)  # blocks of the record, besides samples one by one
-_FEWEST_GROUPS = 6.0  # that tell a variance
+_GROUPS = (8, 16, 64)  # blocks of the record, in addition to single samples
+_FEWEST_GROUPS = 6.0  # that determine a variance
 
 
 @dataclass(frozen=True)
 class Uncertainty:
-    """How sure a least-squares estimate is.
+    """Uncertainty of a least-squares estimate.
 
     Parameters
     ----------
     covariance
         Shape (p, p).
     freedom
-        Independent residuals less unknowns.
+        Independent residuals minus unknowns.
     colored
-        Whether neighboring residuals go together.
+        Whether neighboring residuals are correlated.
     """
 
     covariance: Array
@@ -49,18 +49,18 @@ def uncertainty(
 ) -> Uncertainty:
     r"""Return the covariance of a least-squares estimate.
 
-    White residuals: :math:`s^2 (J^T J)^{-1}`. Where neighbors go together, the sandwich
+    White residuals: :math:`s^2 (J^T J)^{-1}`. For correlated neighbors, the sandwich
     :math:`(J^T J)^{-1} J^T \Gamma J (J^T J)^{-1}` with the autocovariance :math:`\Gamma` of an
     autoregressive model of the residuals; fewer of them then count as independent. Slow errors
-    may hide below white noise: the same is asked of sums of neighbors, and the largest answer
-    counts.
+    may hide below white noise, so the same is computed for sums of neighbors, and the largest
+    result counts.
 
-    Both take the residuals for a noise that has nothing to do with the Jacobian. Where they are
-    larger just where it is (noise that grows with the signal, a model that is wrong in a part of
-    the range), the scores themselves say it, sample by sample (White 1980) or summed over blocks
-    of the record (Bester, Conley and Hansen 2011): deviations that they refute at 1 % are theirs.
-    Where neighbors go together, the scores are those of what the autoregressive model makes of
-    the residuals, whose neighbors do not.
+    Both assume a noise that is independent of the Jacobian. If the residuals are larger where the
+    Jacobian is (noise that grows with the signal, or a model that is wrong in a part of the
+    range), the scores show it, by sample (White 1980) or summed over blocks of the record (Bester,
+    Conley and Hansen 2011). Deviations that the scores refute at 1 % are replaced by theirs. For
+    correlated neighbors, the scores are those of the residuals after whitening by the
+    autoregressive model.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def uncertainty(
     residuals
         Shape (n,), in the order in which they were measured.
     instruments
-        Of an instrumental-variable estimate, shape (n, p); the Jacobian by default.
+        Instruments of an instrumental-variable estimate, shape (n, p); the Jacobian by default.
     prior_rows
         Last rows that are independent, with a standard deviation of one: prior knowledge.
 
@@ -104,16 +104,16 @@ def uncertainty(
 
 
 def _as_scattered(sure: Uncertainty, influence: Array, r: Array) -> Uncertainty:
-    """Return an uncertainty with the deviations of the scores, where they refute its own.
+    """Return an uncertainty with the deviations of the scores if these refute its own.
 
     Parameters
     ----------
     sure
-        From a noise that has nothing to do with the Jacobian.
+        Uncertainty from a noise that is independent of the Jacobian.
     influence
-        What each residual does to each unknown, shape (n, p).
+        Effect of each residual on each unknown, shape (n, p).
     r
-        Shape (n,).
+        Residuals, shape (n,).
     """
     from scipy import special  # of which stats is made, and takes long to load
 
@@ -143,20 +143,20 @@ def _as_scattered(sure: Uncertainty, influence: Array, r: Array) -> Uncertainty:
 
 
 def _blocks(values: Array, together: int) -> Array:
-    """Return sums of neighbors, scaled so that white noise keeps its size."""
+    """Return sums of neighbors, scaled so that white noise keeps its variance."""
     count = len(values) // together
     parts = values[: count * together].reshape(count, together, *values.shape[1:])
     return np.asarray(parts.sum(axis=1) / np.sqrt(together))
 
 
 def _still_told(r: Array, rows: Array, whole: Array) -> bool:
-    """Return whether blocks are many, and short beside what the Jacobian does."""
+    """Return whether there are many blocks, short relative to changes of the Jacobian."""
     kept = np.sum(rows**2, axis=0) >= _KEPT * np.sum(whole**2, axis=0)
     return bool(r.size >= _BLOCKS * rows.shape[1] and kept.all())
 
 
 def _spread(r: Array, rows: Array, unknowns: int) -> tuple[Array, float, bool]:
-    """Return the scores' covariance, degrees of freedom, and whether neighbors go together."""
+    """Return the scores' covariance, degrees of freedom, and whether neighbors are correlated."""
     n = r.size
     if is_white(r):
         freedom = max(n - unknowns, 1)
@@ -178,7 +178,7 @@ class Autoregression:
     coefficients
         1, a_1, ..., shape (order + 1,).
     variance
-        Of the white noise.
+        Variance of the white noise.
     """
 
     coefficients: Array
@@ -191,7 +191,7 @@ class Autoregression:
 
 
 def autoregression(residuals: Array) -> Autoregression:
-    """Return the autoregressive model of a signal, its order by Schwarz's criterion."""
+    """Return the autoregressive model of a signal, with its order by Schwarz's criterion."""
     from scipy import linalg
 
     n = residuals.size
@@ -225,10 +225,10 @@ def autocorrelation(residuals: Array, lags: int) -> Array:
 
 
 def is_white(residuals: Array, lags: int = 20) -> bool:
-    """Return whether neighbors do not go together (Ljung and Box 1978, level 1 %).
+    """Return whether neighbors are uncorrelated (Ljung and Box 1978, level 1 %).
 
-    Asked twice, of the nearest neighbors and of all lags: over 20 lags that of the nearest one
-    is easily lost.
+    The test runs twice, for the nearest neighbors and for all lags, since over 20 lags the
+    correlation of the nearest one is easily lost.
     """
     from scipy import special  # of which stats is made, and takes long to load
 
@@ -246,10 +246,10 @@ def is_white(residuals: Array, lags: int = 20) -> bool:
 # --- Which unknowns the data determine: singular values, correlations
 
 _DETERMINED = 1.0  # largest standard deviation per scale of a determined unknown
-_FLAT = 1e-7  # singular value per the largest one: below it rounding decides
-_FAR = 10.0  # times the noise: residuals that no noise explains
-_MISFIT = 4.0  # times the noise: sensors whose noise is filtered leave up to 3
-_AS_ASSUMED = (0.5, 1.5)  # times the noise that was assumed: it explains what is left
+_FLAT = 1e-7  # singular value relative to the largest one, below which rounding decides
+_FAR = 10.0  # times the noise: residuals that noise cannot explain
+_MISFIT = 4.0  # times the noise: filtered sensor noise gives up to 3
+_AS_ASSUMED = (0.5, 1.5)  # times the assumed noise, which then explains the residual
 _EXACT = (
     "the residual is only rounding: the record agrees with the model to the last digits, so its "
     "intervals are not valid for a measured record, which has noise"
