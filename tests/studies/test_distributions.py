@@ -94,7 +94,7 @@ def test_a_normal_tolerance_ends_where_it_says():
         ),
         ({"sd": "5 %"}, ["{ sd = '5 %' }: kind is missing", "'normal' or 'log-normal'"]),
         ({"kind": ["normal"], "sd": "5 %"}, ["unknown kind", "'normal'"]),
-        ({"kind": "normal", "sd": True}, ["sd = true: one number"]),
+        ({"kind": "normal", "sd": True}, ["sd = true must be one number"]),
         ({"kind": "uniform", "low": "0.5 ohm", "high": "0.4 ohm"}, ["must be below"]),
         ({"kind": "uniform", "low": "0.5 ohm"}, ["needs 'high'"]),
         ({"kind": "uniform", "low": 0.3, "high": "0.4 ohm"}, ["low = 0.3 has", "ohm"]),
