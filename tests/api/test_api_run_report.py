@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import bywire
+from bywire.core.errors import UnknownNameError
+from raising import raises
 
 QUICK = {"options.duration": "40 ms", "options.settle": "10 ms"}
 
@@ -43,3 +45,13 @@ def test_a_run_of_the_cited_set_says_that_nothing_was_changed():
     result = bywire.run("seal-stribeck", estimate_error=False)
     (said,) = [block.text for block in result.document().page[0].blocks]
     assert said.startswith("Nothing was changed: all parameters are those of dardanelli2010")
+
+
+def test_a_figure_of_the_report_is_drawn_by_its_name():
+    result = bywire.run("hard-braking", estimate_error=False)
+    assert len(result.plot("time-traces").axes) > len(result.plot("step-response").axes) > 0
+    first = result.plot().axes[0].get_ylabel()
+    assert first == result.plot("step-response").axes[0].get_ylabel() != ""
+    with raises(UnknownNameError, name="figure", value="nyquist", valid="time-traces"):
+        result.plot("nyquist")
+    assert bywire.margins("pressure").plot("pressure-nyquist").axes

@@ -30,7 +30,7 @@ def run(tmp_path):
     return tmp_path / "run.csv"
 
 
-def test_alignment_is_told(bywire, run, tmp_path):
+def test_alignment_is_told(bywire, run, tmp_path, monkeypatch):
     out = tmp_path / "run.nc"
     arguments = ("convert", run, out, "--map", tmp_path / "map.toml", "--rate", "50 Hz")
     outcome = bywire(*arguments, "--json")
@@ -50,6 +50,7 @@ def test_alignment_is_told(bywire, run, tmp_path):
     assert int(np.isnan(found["p_mc"]).sum()) == channel["excluded_samples"] > 0
     there = found["p_mc"].dropna("time")
     np.testing.assert_allclose(there, 1e5 * 100.0 * (there["time"] + 0.002), rtol=1e-9, atol=1e-3)
+    monkeypatch.setenv("COLUMNS", "200")
     text = bywire(*arguments, "--force", "--exclude", "nothing")
     assert "1, longest 0.31 s at 0.488 s" in text.out
     assert "excluded: nothing" in text.out

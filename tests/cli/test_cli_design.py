@@ -200,7 +200,7 @@ def test_a_gain_schedule_as_a_bench_file_that_runs(bywire, tmp_path):
     ("arguments", "texts"),
     [
         (("momment", "--require", "bandwidth >= 5 Hz"), ("did you mean 'moment'",)),
-        (("moment",), ("no requirement", "bandwidth >= 10 Hz")),
+        (("moment",), ("needs a requirement", "bandwidth >= 10 Hz")),
         (("moment", "--require", "bandwith >= 5 Hz"), ("bandwidth",)),
         (
             ("moment", "--require", "bandwidth >= 10 Hz", "--require", "bandwidth <= 5 Hz"),
@@ -232,7 +232,7 @@ def test_a_gain_schedule_as_a_bench_file_that_runs(bywire, tmp_path):
                 "--over",
                 "at=5 bar:30 bar:3",
             ),
-            ("what the schedule follows", "--at"),
+            ("the schedule follows pressure", "--at"),
         ),
         (
             ("pressure", "--require", "bandwidth >= 5 Hz", "--over", "motor.R=0.3:0.4:2"),

@@ -32,7 +32,7 @@ def test_the_actuator_is_sized_with_figures_and_numbers(bywire, tmp_path):
     assert found["assumptions"]
     assert {path.suffix for path in out.iterdir()} == {".nc", ".png", ".html"}
     page = (out / "report.html").read_text(encoding="utf-8")
-    assert all(text in page for text in ("optimum_k_g", "Dither is left out"))
+    assert all(text in page for text in ("optimum_k_g", "neglects dither"))
     no_half_files(out)
 
 

@@ -114,7 +114,7 @@ def test_a_graphics_processor_that_is_not_there_is_no_study(bywire, study, tmp_p
     driver.count = 0
     with emulated(driver):
         outcome = bywire("study", "run", study, "--out", tmp_path / "out", "--engine", "cuda")
-    refused(outcome, "finds no graphics processor", "nvidia-smi", status=3)
+    refused(outcome, "finds no NVIDIA graphics processor", "nvidia-smi", status=3)
     assert not (tmp_path / "out").exists()
     refused(bywire("study", "run", study, "--engine", "cudo"), "did you mean 'cuda'")
 

@@ -121,8 +121,8 @@ MISTAKES = {
     ),
     "depends on the type": Mistake(
         "control/pressure_pid",
-        "i = ops.clip(wanted",
-        "i = wanted if isinstance(wanted, float) else ops.clip(wanted",
+        "i = ops.clip(unlimited",
+        "i = unlimited if isinstance(unlimited, float) else ops.clip(unlimited",
         on(check_back_ends, "output"),
     ),
     "floats only": Mistake(

@@ -149,7 +149,7 @@ def test_facts_that_do_not_exist_are_not_drawn(recording: xr.Dataset) -> None:
 
 
 def test_a_step_of_no_height_is_refused() -> None:
-    with pytest.raises(ParameterError, match="no step"):
+    with pytest.raises(ParameterError, match="they must differ"):
         StepLimits(start=0.0, before=1.0, after=1.0)
 
 

@@ -26,7 +26,6 @@ _ROOMS = ("bywire.core.", "bywire.plant", "bywire.control", "bywire.simulation",
 _HARMLESS = {
     f"bywire.core.{name}"
     for name in (
-        "blas",
         "callers",
         "child_process",
         "clean_text",
@@ -34,12 +33,11 @@ _HARMLESS = {
         "errors",
         "interrupts",
         "lazy_names",
-        "machine_memory",
+        "libraries",
+        "machine",
         "scratch",
         "sources",
-        "unneeded",
         "version",
-        "workers",
     )
 }
 

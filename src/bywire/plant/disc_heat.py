@@ -224,7 +224,7 @@ def power_in(u: Input, par: Parameters) -> Power:
 
 
 def power_loss(x: State, u: Input, par: Parameters) -> Cooling:
-    """Return the heat flow to the air; negative if the air is warmer."""
+    """Return the heat flow to the air (signed: negative if the air is warmer)."""
     if par.law == "off":
         return 0.0
     out = flows(x, u, par)

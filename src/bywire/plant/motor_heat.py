@@ -164,7 +164,7 @@ def power_in(u: Input, par: Parameters) -> Power:
 
 
 def power_loss(x: State, par: Parameters) -> Conducted:
-    """Return the heat flow to the air; negative if the air is warmer."""
+    """Return the heat flow to the air (signed: negative if the air is warmer)."""
     return 0.0 if par.law == "off" else par.G_ha * (x.T_housing - par.T_a)
 
 

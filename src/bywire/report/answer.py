@@ -9,15 +9,17 @@ import os
 import sys
 from abc import ABC, abstractmethod
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from bywire.core.arguments import require_kinds
+from bywire.core.errors import unknown_name
 from bywire.report.document import Document, FigureBlock, TableBlock
 from bywire.report.result_folder import ResultFolder, result_folder
 from bywire.report.tables import Table
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.figure import Figure
 
 
 class AnswerWarning(UserWarning):
@@ -74,6 +76,32 @@ class Answer(ABC):
                     name = block.caption.rstrip(".") or section.title
                     frames.setdefault(name, frame_of(block.table))
         return frames
+
+    def plot(self, name: str = "") -> Figure:
+        """Return a figure of the report, which a notebook shows.
+
+        Parameters
+        ----------
+        name
+            Name of its file in the output folder, without the ending; the first one by default.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            The figure, to be changed or saved.
+
+        Raises
+        ------
+        UnknownNameError
+            When the report has no figure of that name, or none at all.
+        """
+        require_kinds(Answer.plot, (self, name), {})
+        drawn = [b for b in self.document().flat() if isinstance(b, FigureBlock) and b.name]
+        named = {block.name: block for block in drawn}
+        if name not in named and (name or not named):
+            raise unknown_name("figure", name, named)
+        figure: Any = (named[name] if name else drawn[0]).figure
+        return cast("Figure", figure)
 
     def write(self, folder: str | Path) -> list[Path]:
         """Write recordings, figures and one self-contained page; each file whole or not at all.

@@ -27,4 +27,4 @@ def test_without_one_it_says_why():
     with emulated(driver):
         for each in graphics_processor.measured():
             assert (each.value, each.holds) == (None, None)
-            assert "no graphics processor" in each.note
+            assert "no NVIDIA graphics processor" in each.note

@@ -90,7 +90,7 @@ def test_other_bits_do_not_hold() -> None:
 
 @needs_compiler
 def test_command_checks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(controller_check, "missing_tools", lambda: "no tools")
+    monkeypatch.setattr(trial, "missing_tools", lambda: "no tools")
     words = ["export", "controller", "moment-pulses", "--out", str(tmp_path), "--vectors", "5"]
     done = CliRunner().invoke(app(), [*words, "--check", "--json"])
     assert done.exit_code == 0, done.output
