@@ -1,4 +1,4 @@
-"""Lines such as ``motor.R_m=0.4 ohm``, as commands and forms take them."""
+"""Parsing of options such as ``motor.R_m=0.4 ohm`` in commands and forms."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ _FORMS = {
 
 
 def named(texts: Iterable[str] | None, flag: str) -> dict[str, str]:
-    """Return what an option ``NAME`` or ``NAME=TEXT`` names, with an empty text by default.
+    """Return names and texts of an option ``NAME`` or ``NAME=TEXT``; texts are empty by default.
 
     Raises
     ------
     ParameterError
-        For what names nothing, and names that are given twice.
+        For an empty name, and for repeated names.
     """
     values: dict[str, str] = {}
     for text in texts or ():
@@ -48,14 +48,14 @@ def named(texts: Iterable[str] | None, flag: str) -> dict[str, str]:
 
 
 def changes(texts: Iterable[str] | None, flag: str = "--set") -> dict[str, str]:
-    """Return what ``--set KEY=VALUE``, or another such option, asks for.
+    """Return keys and values of ``--set KEY=VALUE`` or a similar option.
 
     A stimulus of ``--input`` alone is driven by the measured signal of its name.
 
     Raises
     ------
     ParameterError
-        For what is no KEY=VALUE, and keys that are set twice.
+        For a text without the form KEY=VALUE, and for repeated keys.
     """
     values: dict[str, str] = {}
     for text in texts or ():
@@ -75,7 +75,7 @@ def changes(texts: Iterable[str] | None, flag: str = "--set") -> dict[str, str]:
 
 
 def read_count(text: str) -> int | None:
-    """Return the whole number >= 0 that a text is, of at most `DIGITS` digits; None for another.
+    """Return a text of at most `DIGITS` digits as a whole number >= 0, or None.
 
     Examples
     --------
