@@ -123,9 +123,9 @@ def test_name_of_a_file_is_the_default(tmp_path):
         ({"name": 3}, ParameterError, "name = 3 .* a text"),
         ({"overrides": {"motor.R_m": -1}}, ParameterError, "must be > 0 ohm"),
         ({"overrides": {"motor.R_m": math.nan}}, ParameterError, "any finite number in ohm"),
-        ({"overrides": {"motor.R_m": "1 bar"}}, UnitError, "bar cannot be ohm"),
-        ({"overrides": {"motor.R_m": True}}, UnitError, "one number is wanted"),
-        ({"overrides": {"motor.R_m": None}}, UnitError, "one number is wanted"),
+        ({"overrides": {"motor.R_m": "1 bar"}}, UnitError, "bar cannot be converted to ohm"),
+        ({"overrides": {"motor.R_m": True}}, UnitError, "must be one number"),
+        ({"overrides": {"motor.R_m": None}}, UnitError, "must be one number"),
         ({"overrides": {"motor.R_m": 10**5000}}, ParameterError, "300 digits or more"),
         ({"overrides": {"motor": {}}}, UnknownNameError, "unknown parameter 'motor'"),
         ({"overrides": {"options.p_to": 1}}, UnknownNameError, "unknown parameter"),
@@ -133,7 +133,7 @@ def test_name_of_a_file_is_the_default(tmp_path):
         ({"step": 0}, StepError, "simulation.step = 0 s"),
         ({"step": -1e-6}, StepError, "must be >= 1e-09 s"),
         ({"step": math.inf}, ParameterError, "any finite number in s"),
-        ({"step": "1 bar"}, UnitError, "bar cannot be s"),
+        ({"step": "1 bar"}, UnitError, "bar cannot be converted to s"),
         ({"record": 0}, StepError, "simulation.record = 0 s"),
         ({"record": math.nan}, ParameterError, "any finite number in s"),
         ({"seed": -1}, ParameterError, "simulation.seed = -1"),
@@ -210,7 +210,7 @@ def test_a_bare_name_of_nothing_is_answered_with_the_nearest_experiment():
 def test_numbers_are_si_in_python_and_need_a_unit_in_files(tmp_path):
     content = {"experiment": "hard-braking", "parameters": SET, "options": {"p_to": 30e5}}
     assert bywire.Bench("hard-braking", SET, options=content["options"]).chosen_options.p_to == 30e5
-    with pytest.raises(UnitError, match="a pure number cannot be Pa"):
+    with pytest.raises(UnitError, match="a pure number cannot be converted to Pa"):
         from_mapping(content, tmp_path, "x")
     zero = {**content, "options": {"settle": 0, "smoothing": "0"}}
     assert from_mapping(zero, tmp_path, "x").chosen_options.smoothing == 0.0

@@ -109,7 +109,9 @@ def test_file_that_cannot_be_written_leaves_the_old_one(recording, tmp_path):
 def test_file_that_is_no_recording(tmp_path, content):
     path = tmp_path / "run.nc"
     path.write_bytes(content)
-    refused = r"cannot read recording .*run\.nc|run\.nc is damaged, as a recording"
+    refused = (
+        r"cannot read recording .*run\.nc|run\.nc is damaged: bywire cannot read it as a recording"
+    )
     with pytest.raises(FileError, match=refused):
         bywire.read_recording(path)
 

@@ -59,8 +59,8 @@ def test_share_takes_both_spellings(text):
         ("overshoot", "<= 15", UnitError, "a limit in percent such as '<= 15 %'"),
         ("overshoot", "<= 15 bar", UnitError, "a limit in percent"),
         ("overshoot", "<= x %", UnitError, "is not a quantity"),
-        ("rise_time", "<= 15 %", UnitError, "cannot be s"),
-        ("rise_time", "<= 15", UnitError, "a pure number cannot be s"),
+        ("rise_time", "<= 15 %", UnitError, "cannot be converted to s"),
+        ("rise_time", "<= 15", UnitError, "a pure number cannot be converted to s"),
         ("rise_time", "<=", UnitError, "is not a quantity"),
         ("rise_time", "= 1 s", ParameterError, "a limit such as '<= 1.5 s'"),
         ("rise_time", "1 s", ParameterError, "a limit such as"),
@@ -72,7 +72,7 @@ def test_share_takes_both_spellings(text):
         ("rise_time", ["<= 1 s"], ParameterError, "a limit such as"),
         ("rise_time", True, ParameterError, "a limit such as"),
         ("rise_time", "", ParameterError, "a limit such as"),
-        ("steady_state_error", "<= 1 mm", UnitError, "mm cannot be Pa"),
+        ("steady_state_error", "<= 1 mm", UnitError, "mm cannot be converted to Pa"),
     ],
 )
 def test_what_cannot_be_judged_is_refused(name, text, error, message):

@@ -225,7 +225,7 @@ def test_what_was_killed_goes_on_with_the_same_bits(campaign, file, folder, monk
         (
             'bench = "hard-braking"',
             'bench = "hard-braking"\nresiduals = [["x"]]',
-            "a list of names is wanted",
+            "must be a list of names",
         ),
         ("healthy = 8", "healthy = 1000000", "a whole number from 4 to 10000"),
         ('"0 bar", "50 bar"]', "20]", "wrong unit"),

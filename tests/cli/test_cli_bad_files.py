@@ -35,7 +35,7 @@ def test_folder(bywire, tmp_path):
 
 @pytest.mark.skipif(not os.path.exists("/dev/zero"), reason="POSIX only")
 def test_endless_file(bywire):
-    refused(bywire("run", "/dev/zero"), "too much for a bench file")
+    refused(bywire("run", "/dev/zero"), "too large for a bench file")
 
 
 def test_ten_megabytes(bywire, bench):

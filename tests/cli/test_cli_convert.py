@@ -80,7 +80,7 @@ def test_there_and_back(bywire, run, tmp_path, out):
         (("run.csv", "run.csv", "--map", "map.toml"), "exists already"),
         (("run.csv", "out.csv", "--map", "map.toml"), "different instants"),
         (("run.csv", "out.nc", "--map", "map.toml", "--signals", "p_cm"), "did you mean 'p_mc'"),
-        (("run.csv", "out.nc", "--map", "map.toml", "--rate", "5 ms"), "cannot be Hz"),
+        (("run.csv", "out.nc", "--map", "map.toml", "--rate", "5 ms"), "cannot be converted to Hz"),
         (("run.csv", "out.nc", "--map", "map.toml", "--rate", "0 Hz"), "must be > 0 Hz"),
         (("run.csv", "out.nc", "--map", "map.toml", "--method", "linear"), "also give the rate"),
         (("run.csv", "no/out.nc", "--map", "map.toml"), "cannot write"),

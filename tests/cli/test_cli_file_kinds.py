@@ -26,10 +26,10 @@ WORDS = {kind: f"a {kind}" for kind in FILES} | {"campaign": "a campaign of faul
 def test_a_file_of_another_kind_is_named(bywire, bench, tmp_path, monkeypatch, given, wanted):
     monkeypatch.chdir(tmp_path)
     path = bench(FILES[given], "some.toml")
-    takes = f"'bywire {' '.join(COMMANDS[given])} {path}' takes it"
+    takes = f"use 'bywire {' '.join(COMMANDS[given])} {path}'"
     refused(
         bywire(*COMMANDS[wanted], path),
-        f"{path}: this is {WORDS[given]} and not {WORDS[wanted]}: {takes}",
+        f"{path}: this is {WORDS[given]}, not {WORDS[wanted]}: {takes}",
     )
     assert [each.name for each in tmp_path.iterdir()] == ["some.toml"]
 

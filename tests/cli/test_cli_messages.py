@@ -67,7 +67,9 @@ def test_what_a_library_prints_is_no_result(capsys, monkeypatch, tmp_path, error
 
     monkeypatch.setattr(mdf4, "library", loud)
     data = xr.Dataset({"p": ("time", np.zeros(3), {"units": "Pa"})}, {"time": [0.0, 1.0, 2.0]})
-    with pytest.raises(FileError, match=r"cannot write .*a\.mf4: .*: make room there, or choose"):
+    with pytest.raises(
+        FileError, match=r"cannot write .*a\.mf4: .*: free some space there, or choose"
+    ):
         write_measurement(data, tmp_path / "a.mf4")
     assert capsys.readouterr().out == ""
     assert list(tmp_path.iterdir()) == []

@@ -191,7 +191,7 @@ def test_refusals(bywire: Bywire, bench: Path, tmp_path: Path) -> None:
     current = (*given[:5], "--output", "i", *UNKNOWNS)
     refused(bywire(*current), "no measured signal drives the model", "v_set")
     refused(bywire(*current, "--input", "v_set=i_bat"), "'i_bat'")
-    refused(bywire(*current, "--input", "v_set=pressure"), "pressure is in Pa, and must be in V")
+    refused(bywire(*current, "--input", "v_set=pressure"), "pressure is in Pa, but must be in V")
     refused(bywire(*current, "--loss", "hubert"), "'huber'")
     refused(bywire(*current, "--unknown", "motor.K_e"), "motor.K_e is given twice")
     refused(bywire(*current, "--set", "motor.Rm=1 ohm"), "motor.R_m")

@@ -21,8 +21,8 @@ import bywire as package
         ("options=3", ["options is a section", "options.NAME=VALUE"]),
         ("options.p_to.x=3", ["unknown option of hard-braking 'p_to.x'", "'p_to'"]),
         ("motor.R_n=0.4ohm", ["unknown parameter 'motor.R_n'", "'motor.R_m'"]),
-        ("motor.R_m=0.4", ["a pure number cannot be ohm", "'0.5 ohm'"]),
-        ("motor.R_m=9bar", ["bar cannot be ohm"]),
+        ("motor.R_m=0.4", ["a pure number cannot be converted to ohm", "'0.5 ohm'"]),
+        ("motor.R_m=9bar", ["bar cannot be converted to ohm"]),
         ("motor.R_m=-1ohm", ["motor.R_m = -1.0 ohm", "> 0 ohm"]),
         ("motor.R_m=nan", ["is not a quantity"]),
         ("simulation.stepp=1us", ["unknown key of [simulation] 'stepp'", "'step'"]),
@@ -50,7 +50,10 @@ def test_the_same_key_twice(bywire, bench):
 
 @pytest.mark.parametrize("value", ["0.4", "1e-3"])
 def test_number_without_a_unit_gets_the_same_answer_in_file_and_change(bywire, bench, value):
-    number, said = repr(float(value)), "has the wrong unit: a pure number cannot be ohm"
+    number, said = (
+        repr(float(value)),
+        "has the wrong unit: a pure number cannot be converted to ohm",
+    )
     changed = bywire("run", bench(), "--set", f"motor.R_m={number}")
     written = bywire("run", bench(f"{BRAKING}[set]\nmotor.R_m = {value}\n"))
     refused(changed, f"motor.R_m = '{number}' {said}", "'0.5 ohm'")

@@ -190,7 +190,9 @@ def test_a_derived_value_follows_its_set_into_another_one():
 
 def test_a_formula_that_reads_what_there_is_not_is_refused():
     for formula in (lambda par: par.length, lambda par: par.T_hat):
-        with pytest.raises(ModelError, match=r"length, which the set lacks|T_hat wait for each"):
+        with pytest.raises(
+            ModelError, match=r"length, which is not in the set|T_hat depend on each"
+        ):
             CitedSet("lever", "lever", "2026", "", Lever, {**LEVER, "T_hat": derived(formula, "x")})
 
 

@@ -13,17 +13,17 @@ from bywire.core.errors import ParameterError
 @pytest.mark.parametrize(
     ("call", "said"),
     [
-        (lambda: bywire.run_study("a.toml", cases="64"), "cases = '64': a whole number is wanted"),
-        (lambda: bywire.run_study("a.toml", cases=True), "cases = True: a whole number"),
-        (lambda: bywire.resume_study("a", workers=1.5), r"workers = 1\.5: a whole number"),
-        (lambda: bywire.run_study("a.toml", None, ["x"]), r"overrides = \['x'\]: a mapping"),
-        (lambda: bywire.run_study("a.toml", cluster=None), "cluster = None: a text"),
-        (lambda: bywire.study_report(None), "folder = None: a text or a path is wanted"),
-        (lambda: bywire.run_study("a.toml", 5), "out = 5: a text or a path is wanted"),
-        (lambda: bywire.design("pressure", seed=-1), "seed = -1: a whole number from 0"),
-        (lambda: bywire.run_study("a.toml", progress=True), "progress = True: a function"),
-        (lambda: bywire.design("pressure", require="gain"), "require = .gain.: a list"),
-        (lambda: bywire.trust("friction-ramp", count=2.5), r"count = 2\.5: a whole number"),
+        (lambda: bywire.run_study("a.toml", cases="64"), "cases = '64' must be a whole number"),
+        (lambda: bywire.run_study("a.toml", cases=True), "cases = True must be a whole number"),
+        (lambda: bywire.resume_study("a", workers=1.5), r"workers = 1\.5 must be a whole number"),
+        (lambda: bywire.run_study("a.toml", None, ["x"]), r"overrides = \['x'\] must be a mapping"),
+        (lambda: bywire.run_study("a.toml", cluster=None), "cluster = None must be a text"),
+        (lambda: bywire.study_report(None), "folder = None must be a text or a path"),
+        (lambda: bywire.run_study("a.toml", 5), "out = 5 must be a text or a path"),
+        (lambda: bywire.design("pressure", seed=-1), "seed = -1 must be a whole number from 0"),
+        (lambda: bywire.run_study("a.toml", progress=True), "progress = True must be a function"),
+        (lambda: bywire.design("pressure", require="gain"), "require = .gain. must be a list"),
+        (lambda: bywire.trust("friction-ramp", count=2.5), r"count = 2\.5 must be a whole number"),
     ],
 )
 def test_another_kind_than_the_signature_says_is_refused(call, said):
@@ -39,5 +39,5 @@ def test_what_python_says_of_missing_arguments_stays():
 @pytest.mark.parametrize("value", [True, 0, 11, 2.0, "3", None, 10**400])
 def test_a_whole_number_is_one_within_its_range(value):
     assert whole_number("cases", np.int64(10), 1, 10) == 10
-    with pytest.raises(ParameterError, match=r"cases = .*: a whole number from 1 to 10 is wanted"):
+    with pytest.raises(ParameterError, match=r"cases = .* must be a whole number from 1 to 10"):
         whole_number("cases", value, 1, 10)

@@ -113,7 +113,7 @@ def test_states_are_made_from_those_of_the_parts() -> None:
     assert Screw().at(x, Held(0.0), PAR).gear.x.theta == 1.0
     with pytest.raises(ModelError, match=r"unknown part 'gaer': did you mean 'gear'"):
         Screw.state(gaer=ball_screw_gear.State(1.0, 0.0))
-    with pytest.raises(ModelError, match=r"Screw.gear: State is no state of ball_screw_gear"):
+    with pytest.raises(ModelError, match=r"Screw.gear: State is not a state of ball_screw_gear"):
         Screw.state(gear=dc_motor.State(1.0))
 
 

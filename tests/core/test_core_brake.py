@@ -80,7 +80,7 @@ def test_a_package_keeps_each_kind_in_its_own_module(write: Write) -> None:
             "raises.py",
             f"{HEAD}x = 3\ny = x / 0\n",
             ModelError,
-            ["raises.py, line 3: ZeroDivisionError: division by zero", "mend it and load it again"],
+            ["raises.py, line 3: ZeroDivisionError: division by zero", "fix it and load it again"],
         ),
         (
             "deep.py",
@@ -116,7 +116,7 @@ def test_a_package_keeps_each_kind_in_its_own_module(write: Write) -> None:
             "taken.py",
             declared("motorcycle"),
             ModelError,
-            ["taken.py declares a brake 'motorcycle', and so does", "give it another name"],
+            ["taken.py declares a brake 'motorcycle', and so does", "rename one of them"],
         ),
         (
             "json.py",
@@ -126,7 +126,7 @@ def test_a_package_keeps_each_kind_in_its_own_module(write: Write) -> None:
         ),
         ("numpy.py", declared("numpy"), ModelError, ["there is a module 'numpy' already"]),
         ("my-brake.py", declared("my-brake"), ModelError, ["must be one that Python can import"]),
-        ("brake.txt", declared("txt"), FileError, ["is no brake: give a Python file"]),
+        ("brake.txt", declared("txt"), FileError, ["does not declare a brake: give a Python file"]),
         (
             "half_typed.py",
             f"{HEAD}from typing import NamedTuple\nfrom bywire.core.signals import "
@@ -173,7 +173,7 @@ def test_what_is_wrong_with_a_file_is_said_with_its_line(
 
 
 def test_what_is_not_there_is_said() -> None:
-    with pytest.raises(FileError, match=r"nowhere\.py is no brake"):
+    with pytest.raises(FileError, match=r"nowhere\.py does not declare a brake"):
         load_system("nowhere.py")
 
 
@@ -194,7 +194,7 @@ def test_the_folder_of_a_project_is_its_package(write: Write) -> None:
     project = package.parents[1]
     assert load_system(project) is load_system(package)
     write("project/src/another/__init__.py", declared("another"))
-    with pytest.raises(FileError, match="is no brake: give a Python file"):
+    with pytest.raises(FileError, match="does not declare a brake: give a Python file"):
         load_system(project)
 
 
@@ -312,7 +312,7 @@ def test_what_an_installed_brake_breaks_is_left_out_and_the_others_stay(
         "from bywire.core.parameters import ParameterSet\n"
         'SETS = (CitedSet("roberts2003", "a", "", "", ParameterSet, {}),)\n',
     )
-    with pytest.warns(BrakeWarning, match=r"'clashing' is left out: .*'roberts2003'"):
+    with pytest.warns(BrakeWarning, match=r"'clashing' is skipped: .*'roberts2003'"):
         known = PARAMETER_SETS.all()
     assert known["roberts2003"].assembly == "wedge-brake"
     assert set(brakes()) == OURS | {"clashing"}

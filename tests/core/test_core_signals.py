@@ -117,7 +117,7 @@ def test_drawn_statuses_are_the_real_ones():
     [
         ("brakng", ["braking", "release"], "unknown x 'brakng': did you mean 'braking'?"),
         ("zzz", ["b", "a"], "unknown x 'zzz': known are a, b"),
-        ("zzz", [], "unknown x 'zzz': none is known here"),
+        ("zzz", [], "unknown x 'zzz': there are none here"),
         ("zzz", [f"name{k:02}" for k in range(20)], "and 8 more"),
         ("a" * 10_000, ["b"], "aaa...': known are b"),
     ],

@@ -85,21 +85,21 @@ def test_read_numbers_are_round():
 
 
 WRONG_UNIT = [
-    ("9 bar", "m", "bar cannot be m"),
-    ("9", "m", "a pure number cannot be m"),
-    ("9 mm", "1", "mm cannot be a pure number"),
-    ("60 rpm", "Hz", "rpm cannot be Hz"),
-    ("2 mm", "m/rad", "mm cannot be m/rad"),
-    ("2", "m/rad", "a pure number cannot be m/rad"),
-    ("60 rps", "Hz", "rps cannot be Hz"),
-    ("6 rad/s", "Hz", "rad/s cannot be Hz"),
-    ("6 Hz", "rad/s", "Hz cannot be rad/s"),
-    ("6 1/s", "rad/s", "1/s cannot be rad/s"),
-    ("1 Nm", "N", "Nm cannot be N"),
-    ("1", "rad", "a pure number cannot be rad"),
-    ("5 %", "rad", "% cannot be rad"),
-    ("20 deg", "1", "deg cannot be a pure number"),
-    ("3 %", "K", "% cannot be K"),
+    ("9 bar", "m", "bar cannot be converted to m"),
+    ("9", "m", "a pure number cannot be converted to m"),
+    ("9 mm", "1", "mm cannot be converted to a pure number"),
+    ("60 rpm", "Hz", "rpm cannot be converted to Hz"),
+    ("2 mm", "m/rad", "mm cannot be converted to m/rad"),
+    ("2", "m/rad", "a pure number cannot be converted to m/rad"),
+    ("60 rps", "Hz", "rps cannot be converted to Hz"),
+    ("6 rad/s", "Hz", "rad/s cannot be converted to Hz"),
+    ("6 Hz", "rad/s", "Hz cannot be converted to rad/s"),
+    ("6 1/s", "rad/s", "1/s cannot be converted to rad/s"),
+    ("1 Nm", "N", "Nm cannot be converted to N"),
+    ("1", "rad", "a pure number cannot be converted to rad"),
+    ("5 %", "rad", "% cannot be converted to rad"),
+    ("20 deg", "1", "deg cannot be converted to a pure number"),
+    ("3 %", "K", "% cannot be converted to K"),
 ]
 UNKNOWN = [
     "9 bananas",
@@ -187,7 +187,7 @@ def test_not_finite(value):
 
 @pytest.mark.parametrize("value", [True, None, [1], (1, 2), {"a": 1}, b"9 mm", 1j, object()])
 def test_neither_text_nor_number(value):
-    with pytest.raises(UnitError, match=r"one number is wanted, for instance '1\.5 mm'"):
+    with pytest.raises(UnitError, match=r"must be one number, for instance '1\.5 mm'"):
         units.parse(value, "m", "x")
 
 
@@ -275,5 +275,7 @@ def test_temperatures_and_their_differences_are_told_apart():
     assert units.shown(373.15, "K") == "100 degC"
     assert units.shown(20.0, "delta_degC") == "20 K"
     assert (units.display_factor("K"), units.display_factor("Pa")) == (1.0, 1e-5)
-    with pytest.raises(UnitError, match="degC cannot be a temperature difference in K"):
+    with pytest.raises(
+        UnitError, match="degC cannot be converted to a temperature difference in K"
+    ):
         units.parse("40 degC", "delta_degC", "dT")

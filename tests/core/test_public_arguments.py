@@ -44,20 +44,20 @@ def test_each_argument_of_another_kind_is_refused_with_its_name(name: str) -> No
     for parameter, kinds in wanted.items():
         for value in WRONG:
             if not any(fits(value) for _, fits in kinds):
-                with pytest.raises(ParameterError, match=f"{parameter} = .* is wanted"):
+                with pytest.raises(ParameterError, match=f"{parameter} = .* must be "):
                     function(**{parameter: value})
 
 
 def test_runs_and_benches_are_not_taken_for_each_other() -> None:
     bench = bywire.Bench("hard-braking")
-    with pytest.raises(ParameterError, match=r"run = 'step.toml': a Run or a Bench is"):
+    with pytest.raises(ParameterError, match=r"run = 'step.toml' must be a Run or a Bench"):
         bywire.simulate_ensemble("step.toml", {"motor.R_m": [0.3, 0.4]})
-    with pytest.raises(ParameterError, match=r"run = Bench.*: a Run is wanted"):
+    with pytest.raises(ParameterError, match=r"run = Bench.* must be a Run"):
         bywire.simulate_with_sensitivities(bench, ["motor.R_m"], ["p_mc"])
-    with pytest.raises(ParameterError, match=r"run = Bench.*: a Run is wanted"):
+    with pytest.raises(ParameterError, match=r"run = Bench.* must be a Run"):
         bywire.simulate(bench)
     (run,) = bench.runs().values()
-    with pytest.raises(ParameterError, match=r"bench = Run.*: a Bench or a text or a path"):
+    with pytest.raises(ParameterError, match=r"bench = Run.* must be a Bench or a text or a path"):
         bywire.run(run)
 
 
@@ -65,7 +65,7 @@ def test_runs_and_benches_are_not_taken_for_each_other() -> None:
     ("declared", "text"),
     [
         ('frictions = ("vel",)', "spring-axis: frictions names 'vel'.*did you mean 'v'"),
-        ('frictions = "v"', "spring-axis: frictions = 'v': a tuple of states is wanted"),
+        ('frictions = "v"', "spring-axis: frictions = 'v' must be a tuple of states"),
         ('frictions = ("v",)\n    limits = ("y",)', "spring-axis: limits names 'y'"),
     ],
 )
@@ -89,7 +89,7 @@ def test_a_misspelled_attribute_is_named_with_the_nearest() -> None:
 
 
 def test_declarations_of_another_kind_are_refused() -> None:
-    with pytest.raises(BywireError, match="inputs = 'p_set': a tuple is wanted"):
+    with pytest.raises(BywireError, match="inputs = 'p_set' must be a tuple"):
         authoring.Loop(name="pressure", inputs="p_set")
-    with pytest.raises(BywireError, match="parameter_class = 'Parameters': a class is wanted"):
+    with pytest.raises(BywireError, match="parameter_class = 'Parameters' must be a class"):
         authoring.CitedSet("one", "axis", "", "", "Parameters", {})

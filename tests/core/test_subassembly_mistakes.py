@@ -100,7 +100,7 @@ def declare(**body: Any) -> type[Any]:
 @pytest.mark.parametrize(
     ("body", "message"),
     [
-        (lambda: {"a": Sub(Ram, prefix="2_")}, r"Sub\(Ram\): the prefix '2_' makes no names"),
+        (lambda: {"a": Sub(Ram, prefix="2_")}, r"Sub\(Ram\): the prefix '2_' is not valid"),
         (
             lambda: {"a": Sub(Ram, prefix="a_"), "b": Sub(Ram, prefix="a_")},
             r"Wrong.b: there is a signal 'a_i' already: give it another prefix",
@@ -113,7 +113,7 @@ def declare(**body: Any) -> type[Any]:
             lambda: {"a": Sub(Ram, prefix="a_", feeds={"v_set": "a_vv"})},
             r"Wrong.a: v_set is fed by an unknown signal 'a_vv': did you mean 'a_v'",
         ),
-        (lambda: {"a": Sub(Held, prefix="a_")}, r"Sub\(Held\): it is no assembly"),
+        (lambda: {"a": Sub(Held, prefix="a_")}, r"Sub\(Held\): it is not an assembly"),
     ],
 )
 def test_mistakes_of_a_declaration_are_said(body: Any, message: str) -> None:
@@ -124,6 +124,6 @@ def test_mistakes_of_a_declaration_are_said(body: Any, message: str) -> None:
 def test_a_held_one_is_evaluated_at_the_instant_of_its_holder_alone() -> None:
     x, m = zeros(Pair.State), zeros(Pair.Memory)
     w = Pair().at(x, m, BOTH)
-    with pytest.raises(ModelError, match="asked for another state than its holder's"):
+    with pytest.raises(ModelError, match="evaluated at a state other than its holder's"):
         w.left.at(zeros(Ram.State), zeros(Held), PAR)
     assert ops.fabs(w.left.torque) == 0.0

@@ -133,11 +133,11 @@ def test_jitter_is_the_largest_distance_from_the_median_step():
     [
         ({"interval": "0 s"}, ParameterError, "interval = '0 s' is not valid"),
         ({"interval": 1e-12}, ParameterError, "would make 2e[+]12 samples of each signal"),
-        ({"interval": 2e-9}, ParameterError, r"14.9 GiB, and .* GiB are made at most"),
+        ({"interval": 2e-9}, ParameterError, r"14.9 GiB, and .* GiB are the limit"),
         (
             {"interval": 0.1, "signals": ["high"], "exclude": ["clipped"]},
             ParameterError,
-            "high has no value left after excluding clipped: check its limits",
+            "high has no values left after excluding clipped: check its limits",
         ),
         ({"interval": 1, "max_gap": -1}, ParameterError, "max_gap = -1"),
         ({"interval": 1, "method": "linaer"}, UnknownNameError, "did you mean 'linear'"),

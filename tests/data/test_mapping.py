@@ -66,8 +66,8 @@ def test_a_mapping_file_means_what_it_says(tmp_path):
         ({"signals": {"T": {"unit": "K", "offset": "1 degC"}}}, UnitError, "the difference in K"),
         ({"rate": "0 Hz"}, ParameterError, "rate = '0 Hz' must be > 0 Hz"),
         ({"rate": "5 ms"}, UnitError, "rate = '5 ms' has the wrong unit"),
-        ({"time": {"unit": "s"}}, ParameterError, "give one of them"),
-        ({"time": {"column": "t", "rate": "1 Hz"}}, ParameterError, "give one of them"),
+        ({"time": {"unit": "s"}}, ParameterError, "give exactly one of them"),
+        ({"time": {"column": "t", "rate": "1 Hz"}}, ParameterError, "give exactly one of them"),
         ({"time": {"column": "t", "unit": "mm"}}, UnitError, "is not a unit of time"),
         ({"signals": 3}, ParameterError, r"\[signals\] must be a section"),
         ({"decimal": ";"}, ParameterError, "decimal = ';'"),
@@ -109,12 +109,16 @@ def test_refused_mapping_files(tmp_path, content, text):
         (
             {"signals": {"p_sensor": {"unit": "MPa"}}},
             UnitError,
-            "the file says 'bar' and the mapping 'MPa'",
+            "the file has 'bar' and the mapping 'MPa'",
         ),
         ({"time": {"column": "clock", "unit": "s"}}, FileError, r"no column 'clock' \(time.col"),
         ({"time": {"column": "p_sensor"}}, UnitError, "'bar' is not a unit of time"),
         ({"format": "cvs"}, UnknownNameError, "unknown file format 'cvs': did you mean 'csv'"),
-        ({"format": "mdf4"}, FileError, "holds a text table, not an MDF file as format = 'mdf4'"),
+        (
+            {"format": "mdf4"},
+            FileError,
+            "contains a text table, not an MDF file as format = 'mdf4'",
+        ),
     ],
 )
 def test_mappings_that_do_not_fit_the_file(tmp_path, mapping, kind, text):

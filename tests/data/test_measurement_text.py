@@ -113,7 +113,7 @@ def test_a_rate_replaces_the_instants_of_the_file(tmp_path):
     assert found["time"].values.tolist() == [1.0, 1.5, 2.0]
     path = written(tmp_path, "t [s],x [m]\n0,7\n1,8\n")
     assert list(read_measurement(path, {"rate": "2 Hz"}).data_vars) == ["x"]
-    with pytest.raises(InputError, match="'time' has the name of the instants"):
+    with pytest.raises(InputError, match="'time' has the name of a time axis"):
         read_measurement(path, {"signals": {"time": {"column": "x"}}})
 
 
@@ -130,14 +130,14 @@ def test_a_temperature_is_no_time(tmp_path, header):
     [
         ("t [s],x [m]\n0,1\n1,2\n1,3\n", "line 4: 1 s is repeated: time must increase"),
         ("t [s],x [m]\n0,1\n\n2,2\n1,3\n", "line 5: 1 s comes after 2"),
-        ("t [s],x [m]\n0,1\n,2\n1,3\n", "line 3: nan s is no instant"),
+        ("t [s],x [m]\n0,1\n,2\n1,3\n", "line 3: nan s is not an instant"),
         ("t [s],x [m]\n0,1\n1,fast\n", "line 3, column 'x': 'fast' is not a finite number"),
         ("t [s],x [m]\n0,1\n1,1e999\n", "line 3, column 'x': '1e999' is not a finite number"),
         ("t [s],x [m]\n0,1\n1\n", "line 3: 1 cells, but the first row has 2"),
         ("t [s],x [m]\n0,1\n1,2,3\n", "line 3: 3 cells, but the first row has 2"),
         ('t [s],x [m]\n0,1\n1,"2\n', "line 3: .*quotation marks"),
         ("t [s];x [m]\n0;1.5\n1;2,5\n", "mixes decimal comma and decimal point"),
-        ("t [s],x [m]\n0,1\n", "too few rows, 1"),
+        ("t [s],x [m]\n0,1\n", r"too few rows \(1\)"),
         ("x [m],y [m]\n0,1\n1,2\n", "does not state when it was measured: .* its columns are x, y"),
         (b"t [s],x [m]\n0,1\n1,2\xb5\n", "line 3: it is not UTF-8"),
         (b"", r"is empty \(0 bytes\)"),

@@ -22,5 +22,5 @@ def test_a_small_machine_refuses_early_unless_asked(tmp_path, monkeypatch):
     with pytest.raises(FileError, match="are the limit: choose fewer signals"):
         read_measurement(path)
     run = read_measurement(path, largest=10_000)
-    with pytest.raises(ParameterError, match="are made at most: choose a larger one"):
+    with pytest.raises(ParameterError, match="are the limit: choose a larger one"):
         resample(run, "1 ms")

@@ -161,7 +161,7 @@ def test_the_same_measurement_in_every_layout(tmp_path, layout):
     [
         (
             "# rig\n" + HEADER + rows(),
-            "1 lines before the table are not read, from line 1 .'# rig'",
+            "1 lines before the table are skipped, from line 1 .'# rig'",
         ),
         (
             "t [s],10\n" + rows(),
@@ -169,7 +169,7 @@ def test_the_same_measurement_in_every_layout(tmp_path, layout):
         ),
         (
             HEADER + rows().replace("0.200,", "# x\n0.200,"),
-            "lines of comment left out of the table: 1",
+            "comment lines skipped: 1",
         ),
         ("t [s],note,p [bar]\n" + rows(",a,"), "not read: 'note': it holds text"),
         (

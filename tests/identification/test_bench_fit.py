@@ -202,7 +202,7 @@ def test_a_few_outliers_are_counted_by_a_robust_loss(loss: str) -> None:
     checks = {c.name: c for c in found.checks}
     if loss == "linear":
         assert not checks["residual_over_noise"].holds
-        assert 'take loss="huber"' in checks["residual_over_noise"].note
+        assert 'use loss="huber"' in checks["residual_over_noise"].note
         return
     assert all(check.holds for check in found.checks)
     inside(found, {"motor.R_m": 0.35, "motor.K_e": 0.0304})
@@ -217,7 +217,7 @@ def test_noise_that_the_record_does_not_tell_is_no_proof_of_a_model() -> None:
     check = next(c for c in identified(bench(), data, own).checks if c.name == "noise_not_told")
     assert check.value == 1.0
     assert not check.holds
-    assert "p_mc changes itself from sample to sample" in check.note
+    assert "p_mc varies from sample to sample" in check.note
     assert 'outputs "p_mc=NOISE bar"' in check.note
     assert all(c.holds for c in identified(bench(), record(bench(), 2), own).checks)
     given = identified(bench(), record(bench(), 2)).checks
@@ -228,7 +228,7 @@ def test_a_minimum_that_one_start_of_several_found_is_not_believed() -> None:
     assert not starts_check(1, 3)
     (alone,), (met,) = starts_check(1, 4), starts_check(2, 4)
     assert not alone.holds
-    assert "take more starts" in alone.note
+    assert "use more starts" in alone.note
     assert met.holds
 
 
@@ -261,7 +261,7 @@ def test_ranges_priors_and_starts() -> None:
         ({"states": ("omeg",)}, "omega"),
         ({"unknowns": {}}, "nothing is unknown: give unknowns"),
         ({"unknowns": {"motor.Rm": ""}}, "unknown parameter 'motor.Rm': did you mean 'motor.R_m'"),
-        ({"unknowns": {"adc.law": ""}}, "it is a choice, here 'quantized', and no number"),
+        ({"unknowns": {"adc.law": ""}}, "it is a choice (here 'quantized'), not a number"),
         ({"unknowns": {"ecu.pedal_map.V_nodes": ""}}, "it is a table"),
         ({"unknowns": {"initial.omega": ""}}, "write states omega"),
         ({"unknowns": {"stimulus.v": ""}}, "stimulus.v_set"),

@@ -76,9 +76,9 @@ def test_at_a_bound_is_a_twentieth_of_a_deviation_or_a_millionth_of_the_scale() 
 
 def test_what_means_nothing() -> None:
     """An interval that reaches beyond zero, or a bound; the same with either sign."""
-    assert ESTIMATE.vague() == {"offset.i": "is -3 +- 4.5 A: that may be nothing"}
+    assert ESTIMATE.vague() == {"offset.i": "is -3 +- 4.5 A: it may be zero"}
     at_end = replace(ESTIMATE, values=np.array([50.0, -4.5, 0.8]))
-    assert at_end.vague() == {"motor.R_m": "lies at its bound, 50 ohm"}
+    assert at_end.vague() == {"motor.R_m": "is at its bound, 50 ohm"}
 
 
 def test_values_by_label_and_what_a_bench_takes() -> None:
@@ -99,7 +99,7 @@ def test_table() -> None:
         "motor.R_m                 2.5 +- 0.67       ohm",
         "offset.i                   -3 +- 4.5        A",
         "slow:motor.K_e            0.8 +- 0.22       N*m/A",
-        "seal.c           not told by the data, kept at 0.2 N*s/m: 1e9 of its size",
+        "seal.c           not determined by the data, kept at 0.2 N*s/m: 1e9 of its size",
         "first",
     ]
 

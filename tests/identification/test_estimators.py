@@ -337,7 +337,7 @@ def test_several_starts_of_a_model_of_ones_own(axis: ModuleType, data: xr.Datase
     problem = output_error([bench], parameters_of(axis.TRUTH, ["J", "T_p"], starts={"J": 0.03}))
     found = multistart(problem, 4, seed=3)
     assert found["J"] == pytest.approx(axis.TRUTH.J, rel=1e-3)
-    assert "4 of 4 starts met the lowest minimum" in found.notes
+    assert "4 of 4 starts reached the lowest minimum" in found.notes
 
 
 @pytest.mark.parametrize(

@@ -34,9 +34,9 @@ def joint(masses: dict[str, float], seed: int = 1) -> Estimate:
 
 def test_the_record_and_the_parameter_that_do_not_fit_are_named() -> None:
     masses = {"run_1": 2.0, "run_2": 2.0, "run_3": 2.4}
-    with pytest.warns(MisfitWarning, match=r"records do not agree: m is 2\.[34]\d* kg .* in run_3"):
+    with pytest.warns(MisfitWarning, match=r"records disagree: m is 2\.[34]\d* kg .* in run_3"):
         fit = joint(masses)
-    (note,) = (note for note in fit.notes if "do not agree" in note)
+    (note,) = (note for note in fit.notes if "records disagree" in note)
     assert "no joint interval holds" in note
 
 

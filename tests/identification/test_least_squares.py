@@ -109,7 +109,7 @@ def test_an_unknown_that_nothing_depends_on_is_named_too() -> None:
 
     found = estimate(Problem((*inner.unknowns, Unknown("d", 1.0)), evaluate))
     assert found.kept[0].unknown.name == "d"
-    assert found.kept[0].reason == "nothing measured depends on it"
+    assert found.kept[0].reason == "no measured signal depends on it"
 
 
 def test_a_prior_weighs_like_a_measurement() -> None:
@@ -145,7 +145,7 @@ def test_a_prior_that_the_data_contradicts_is_named() -> None:
     unknown = Unknown("mean", 0.0, prior=(3.0, 0.01), unit="A")
     far = Problem((unknown,), lambda v: ((v[0] - y) / 0.05, np.full((50, 1), 20.0)))
     (note,) = estimate(far).notes
-    assert "deviations of its prior (3 A ± 0.01 A) away" in note
+    assert "deviations from its prior (3 A ± 0.01 A)" in note
     near = replace(far, unknowns=(replace(unknown, prior=(1.0, 1.0)),))
     assert not estimate(near).notes
 
@@ -184,7 +184,7 @@ def test_a_bound_that_is_met_is_said() -> None:
     tight = Problem((Unknown("a", 1.5, high=1.8), problem.unknowns[1]), problem.evaluate)
     found = estimate(tight)
     assert found["a"] == 1.8
-    assert any("a lies at its bound, 1.8" in note for note in found.notes)
+    assert any("a is at its bound, 1.8" in note for note in found.notes)
 
 
 def test_too_few_measurements_are_refused() -> None:

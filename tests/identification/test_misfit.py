@@ -74,13 +74,13 @@ def hardening(t: Array) -> Array:
 
 
 def test_a_barely_damped_model_that_is_wrong_is_warned_of() -> None:
-    with pytest.warns(MisfitWarning, match=r"x: the model leaves .* mm, .* times the noise"):
+    with pytest.warns(MisfitWarning, match=r"x: the residual is .* mm, .* times the noise"):
         fit = fit_of(hardening(T) + noise(1))
     low, high = fit.intervals()[0]
     assert not low < 36.0 < high  # the stiffness of small motion
-    assert any("the intervals do not hold" in note for note in fit.notes)
+    assert any("the intervals are invalid" in note for note in fit.notes)
     assert fit.leftovers()[0].over_noise > 20.0
-    assert "the intervals do not hold" in str(fit)
+    assert "the intervals are invalid" in str(fit)
 
 
 @pytest.mark.parametrize("stored", [float, np.float32], ids=["double", "single"])
@@ -93,11 +93,11 @@ def test_what_rounding_leaves_is_no_misfit(stored: type, rest: float) -> None:
         fit = fit_of(measured, size=1.0 + rest)
     assert fit["k"] == pytest.approx(36.0, rel=1e-5)
     assert fit.is_exact
-    assert any("nothing but rounding is left" in note for note in fit.notes)
+    assert any("the residual is only rounding" in note for note in fit.notes)
 
 
 def test_a_misfit_of_a_millionth_is_still_one() -> None:
-    with pytest.warns(MisfitWarning, match="something is missing in it or wrong"):
+    with pytest.warns(MisfitWarning, match="the model is incomplete or wrong"):
         fit = fit_of(ringing(36.0, 0.1) + 1e-6 * np.sin(T) * T)
     assert not fit.is_exact
 
@@ -109,7 +109,7 @@ def test_what_the_step_of_the_simulation_explains_is_no_misfit(off: float, is_sa
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always", MisfitWarning)
         fit = fit_of(measured, finer=off * np.cos(0.7 * T))
-    assert is_said == any("something is missing" in str(each.message) for each in said)
+    assert is_said == any("the model is incomplete" in str(each.message) for each in said)
     assert fit.leftovers()[0].numerical == pytest.approx(off / np.sqrt(2.0), rel=0.2)
 
 
@@ -129,7 +129,7 @@ def test_what_is_noise_is_not_warned_of(kind: str) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error", MisfitWarning)
         fit = fit_of(measured, noise=0.1 * NOISE if kind == "wrong scale" else NOISE, start=37.0)
-    assert not any("do not hold" in note for note in fit.notes)
+    assert not any("are invalid" in note for note in fit.notes)
 
 
 def test_what_is_left_has_the_unit_of_what_was_measured() -> None:
@@ -139,7 +139,7 @@ def test_what_is_left_has_the_unit_of_what_was_measured() -> None:
     spread = np.std(ringing(36.0, 0.1))
     assert left.fit == pytest.approx(100.0 * (1.0 - NOISE / spread), abs=0.05)
     assert fit.rms == pytest.approx(1.0 / 7.0, rel=0.05)
-    assert "x leaves 0.992 mm, fit 99.8 %" in str(fit)
+    assert "residual of x 0.992 mm, fit 99.8 %" in str(fit)
 
 
 def coverage(kind: str, count: int = 150, n: int = 800) -> tuple[float, float]:
@@ -197,10 +197,12 @@ def slope_of(shift: float, off: float = 0.0) -> Estimate:
 
 
 def test_an_error_from_the_step_beyond_the_interval_is_warned_of() -> None:
-    with pytest.warns(MisfitWarning, match=r"a is off by about 0\.0013 m/s from the step"):
+    with pytest.warns(
+        MisfitWarning, match=r"a has an error of about 0\.0013 m/s from the simulation step"
+    ):
         coarse = slope_of(1e-3)
     assert coarse.step_errors == pytest.approx([4e-3 / 3.0])
-    assert "take a smaller step" in coarse.notes[-1]
+    assert "use a smaller step" in coarse.notes[-1]
     with warnings.catch_warnings():
         warnings.simplefilter("error", MisfitWarning)
         fine = slope_of(1e-7)
@@ -208,7 +210,7 @@ def test_an_error_from_the_step_beyond_the_interval_is_warned_of() -> None:
 
 
 def test_half_steps_that_fail_are_said_to() -> None:
-    with pytest.warns(MisfitWarning, match="is not known: left the numbers"):
+    with pytest.warns(MisfitWarning, match="is unknown: left the numbers"):
         fit = slope_of(0.0, off=1.0)
     assert fit.step_errors is None
 

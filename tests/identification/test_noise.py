@@ -9,7 +9,7 @@ import xarray as xr
 from bywire.identification.measured import (
     NOISE_OF_SAMPLES,
     as_even,
-    is_told,
+    determines_its_noise,
     noise_of,
     outliers,
     robust_scale,
@@ -21,7 +21,7 @@ def test_white_noise_on_a_slow_signal_is_told(count: int) -> None:
     slow = 5.0 * np.sin(np.linspace(0.0, 6.0, count))
     for seed in range(50):
         values = slow + np.random.default_rng(seed).normal(0.0, 0.2, count)
-        assert is_told(values)
+        assert determines_its_noise(values)
     assert noise_of(values) == pytest.approx(0.2, rel=4.0 / np.sqrt(count))
 
 
@@ -29,13 +29,13 @@ def test_a_signal_that_alternates_or_is_coarse_is_no_noise() -> None:
     t, random = np.arange(130), np.random.default_rng(1)
     dither = (-1.0) ** t + random.normal(0.0, 0.1, t.size)
     assert noise_of(dither) > 1.5
-    assert not is_told(dither)
-    assert not is_told(np.sin(0.5 * t) + random.normal(0.0, 1e-4, t.size))
+    assert not determines_its_noise(dither)
+    assert not determines_its_noise(np.sin(0.5 * t) + random.normal(0.0, 1e-4, t.size))
 
 
 def test_what_a_converter_rounded_is_not_judged() -> None:
     steps = np.round(np.linspace(0.0, 40.0, 1000))
-    assert is_told(steps)
+    assert determines_its_noise(steps)
 
 
 def test_outliers_are_told_from_noise_and_from_a_wrong_model() -> None:

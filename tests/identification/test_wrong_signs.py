@@ -16,14 +16,14 @@ def negated(data: xr.Dataset, name: str) -> xr.Dataset:
 
 
 REFUSED = {
-    "seal-friction": {"F": "F goes against p", "p": "F goes against p"},
+    "seal-friction": {"F": "F moves against p", "p": "F moves against p"},
     "friction-model": {
-        "friction": "friction goes against speed",
-        "speed": "friction goes against speed",
+        "friction": "friction moves against speed",
+        "speed": "friction moves against speed",
     },
-    "cogging": {"i_1": "i_1 goes against q_1", "q_1": "i_1 goes against q_1"},
-    "force-calibration": {"y_F": "i_1 - i_2 of the record goes against y_F"},
-    "screw-efficiency": {name: "goes against y_F" for name in ("i_1", "i_2", "q_1", "q_2", "y_F")},
+    "cogging": {"i_1": "i_1 moves against q_1", "q_1": "i_1 moves against q_1"},
+    "force-calibration": {"y_F": "i_1 - i_2 of the record moves against y_F"},
+    "screw-efficiency": {name: "moves against y_F" for name in ("i_1", "i_2", "q_1", "q_2", "y_F")},
 }
 
 
@@ -34,7 +34,9 @@ def test_signs_that_do_not_fit_together_are_refused(name: str) -> None:
     data = method.synthetic(par, method.defaults, 1)
     assert all(c.holds for c in method.identify(data, par, method.defaults, Effort()).checks)
     for signal, words in REFUSED[name].items():
-        with pytest.raises(ParameterError, match=f"{words} .*write sign = -1 for it in the map"):
+        with pytest.raises(
+            ParameterError, match=f"{words} .*write sign = -1 for it in the mapping"
+        ):
             method.identify(negated(data, signal), par, method.defaults, Effort())
 
 
@@ -59,7 +61,7 @@ def test_a_seal_that_drives_is_refused() -> None:
     method = METHODS.all()["seal-friction"]
     data = method.synthetic(None, method.defaults, 1)
     middle = method.defaults.x_low + method.defaults.x_high  # type: ignore[attr-defined]
-    with pytest.raises(ParameterError, match=r"F goes against x \(friction -\S+ N in the mean"):
+    with pytest.raises(ParameterError, match=r"F moves against x \(mean friction -\S+ N"):
         method.identify(data.assign(x=middle - data["x"]), None, method.defaults, Effort())
 
 

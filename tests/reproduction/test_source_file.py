@@ -172,7 +172,7 @@ def test_statements_show_beside_curves_and_key_figures(tmp_path: Path) -> None:
         ('[groups.a]\ngroup = "b"', "groups.a.group: group of values 'b'"),
         ('[tolerances.a]\nwhat = "x"\nunit = "1"\nreason = "y"', "tolerances.a: size is missing"),
         ('[statements.a]\nunit = "1"\nwhere = "x"', "statements.a: value is missing"),
-        ('[statements.a]\nvalue = "1"\nunit = "1"\nwhere = "x"', "value = '1': a number is wanted"),
+        ('[statements.a]\nvalue = "1"\nunit = "1"\nwhere = "x"', "value = '1' must be a number"),
         ('[statements.a]\nvalue = 1\nunit = "1"\nwere = "x"', "'were': did you mean 'where'"),
         (
             '[statements.a]\nvalue = 1\nunit = "1"\nwhere = "x"\nkind = "read"',

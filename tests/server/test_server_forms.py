@@ -63,7 +63,7 @@ BAD = [
     ("faults", {"campaign": ""}, "campaign", "missing"),
     ("faults", {"campaign": "motorcycl"}, "campaign", "motorcycle"),
     ("faults", {"campaign": "wrong.toml"}, "campaign", "motor.hot"),
-    ("faults", {"campaign": "curve.toml"}, "campaign", "this is a bench and not"),
+    ("faults", {"campaign": "curve.toml"}, "campaign", "this is a bench, not"),
     ("faults", {"campaign": "small.toml", "set": "motor.R_m=1 bar"}, "set", "unit"),
     ("life", {"life": "wedge-pad"}, "life", "wedge-pads"),
     ("life", {"life": "pads.toml"}, "life", "stop.gap"),

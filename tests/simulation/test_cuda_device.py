@@ -59,5 +59,5 @@ def test_one_that_is_full_before_it_begins_is_told(driver, monkeypatch):
 def test_what_is_not_installed_is_named_with_the_command(monkeypatch):
     monkeypatch.setitem(sys.modules, "cuda.bindings.driver", None)
     find_device.cache_clear()
-    with pytest.raises(DeviceError, match=r"not installed: pip install 'bywire\[gpu\]', or in a"):
+    with pytest.raises(DeviceError, match=r"not installed; in your clone: pip install -e .\.\[gpu"):
         find_device()

@@ -94,7 +94,7 @@ def test_a_normal_tolerance_ends_where_it_says():
         ),
         ({"sd": "5 %"}, ["{ sd = '5 %' }: kind is missing", "'normal' or 'log-normal'"]),
         ({"kind": ["normal"], "sd": "5 %"}, ["unknown kind", "'normal'"]),
-        ({"kind": "normal", "sd": True}, ["sd = true: one number"]),
+        ({"kind": "normal", "sd": True}, ["sd = true must be one number"]),
         ({"kind": "uniform", "low": "0.5 ohm", "high": "0.4 ohm"}, ["must be below"]),
         ({"kind": "uniform", "low": "0.5 ohm"}, ["needs 'high'"]),
         ({"kind": "uniform", "low": 0.3, "high": "0.4 ohm"}, ["low = 0.3 has", "ohm"]),
@@ -155,7 +155,9 @@ def test_widths_of_a_temperature_are_differences():
         made = read(entry, 623.15, leaf)
         assert (made.low, made.high) == pytest.approx((613.15, 633.15))
         assert "350 degC +- 10 K" in made.text
-    with pytest.raises(InputError, match="degC cannot be a temperature difference in K"):
+    with pytest.raises(
+        InputError, match="degC cannot be converted to a temperature difference in K"
+    ):
         read("+-10 degC", 623.15, leaf)
 
 

@@ -299,7 +299,7 @@ def test_a_share_of_a_whole_number_may_be_whole(study):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ('"options.source" = { values = ["current", "voltage"] }', "A cannot be V"),
+        ('"options.source" = { values = ["current", "voltage"] }', "A cannot be converted to V"),
         ('"options.source" = { values = ["current", "current-loop"] }', "(share_sat_current, "),
         ('"options.add_holding" = { values = [true, 1] }', "known are false, true"),
     ],
@@ -389,7 +389,7 @@ def test_correlated_single_values_rise_however_they_are_listed(study, kind):
         ('bench = "none.toml"', "none.toml"),
         ('bench = "hard-brakin"', "did you mean hard-braking"),
         ('bench = "studi.toml"', "studi.toml: No such file or directory: check the path"),
-        ('bench = "study.toml"', "study.toml: this is a study and not a bench"),
+        ('bench = "study.toml"', "study.toml: this is a study, not a bench"),
     ],
 )
 def test_a_study_needs_a_bench(tmp_path, line, said):

@@ -76,7 +76,7 @@ def test_errors_are_worded_for_their_reader(monkeypatch: pytest.MonkeyPatch, cap
     assert capsys.readouterr().err == "bywire: error: --often = 10: at most 9, for slip too\n"
     with pytest.raises(ParameterError, match=r"^times = 10: at most 9"):
         bywire.count_letters("slip", times=10)
-    with pytest.raises(ParameterError, match=r"^times = 'two': a whole number is wanted"):
+    with pytest.raises(ParameterError, match=r"^times = 'two' must be a whole number"):
         bywire.count_letters("slip", times="two")
 
 

@@ -761,7 +761,7 @@ class Identification(Answer):
         ]
         lines.append(f"identified by {method.name} from {self.source}")
         for estimate in self.identified.estimates.values():
-            lines += [f"not told by the data: {k.unknown.label}" for k in estimate.kept]
+            lines += [f"not determined by the data: {k.unknown.label}" for k in estimate.kept]
             lines += [f"at its bound: {label}" for label in estimate.at_bounds()]
         comment = "\n".join([*lines, *([method.bench_note] if method.bench_note else [])])
         if method.bench is not None:
@@ -810,7 +810,8 @@ class Identification(Answer):
         for name, estimate in self.identified.estimates.items():
             table = estimate_table(estimate, self.start, self.put_in)
             texts = [
-                f"{k.unknown.label} is not told by the data: {k.reason}" for k in estimate.kept
+                f"{k.unknown.label} is not determined by the data: {k.reason}"
+                for k in estimate.kept
             ]
             yield TableBlock(table, f"{name[:1].upper()}{name[1:]}.", title=name)
             if texts or estimate.notes:
@@ -837,7 +838,7 @@ class Identification(Answer):
         blocks: list[Block] = [
             FigureBlock(
                 partial(correlation_matrix, estimate),
-                f"{name}: correlations of the estimates. Near 1 or -1, the data determine a "
+                f"{name}: correlations of the estimates. Near 1 or -1 the data determine a "
                 "combination of the two rather than either.",
                 key,
             )
@@ -865,11 +866,12 @@ class Identification(Answer):
 
     def _banner(self) -> Banner:
         failed = [check.name for check in self.identified.checks if not check.holds]
-        untold = [k.unknown.label for e in self.identified.estimates.values() for k in e.kept]
+        undetermined = [k.unknown.label for e in self.identified.estimates.values() for k in e.kept]
         if failed:
             return Banner(f"Do not use this result: {', '.join(failed)} failed.", "bad")
-        if untold:
-            return Banner(f"All checks hold; not told by the data: {', '.join(untold)}.", "none")
+        if undetermined:
+            names = ", ".join(undetermined)
+            return Banner(f"All checks hold; not determined by the data: {names}.", "none")
         return Banner("All checks hold.", "good")
 
     def _data(self) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Arguments of public functions, by what their signatures say: one clear error for a wrong kind."""
+"""Argument checks of public functions against their annotations, with one clear error each."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from typing import Any, TypeVar, get_args
 from bywire.core.errors import ParameterError, quoted
 
 F = TypeVar("F", bound=Callable[..., Any])
-_ONE = (str, bytes, Mapping)  # of what can be iterated over, what is no list
+_ONE = (str, bytes, Mapping)  # iterable, but not valid as a list
 _LINES = reprlib.Repr()
 _LINES.maxstring = _LINES.maxother = 60  # characters of a value in a message
 
 
 def checked(function: F) -> F:
-    """Have a function, or a data class, refuse arguments of another kind than its signature says.
+    """Make a function, or a data class, reject arguments whose type its signature does not allow.
 
     Examples
     --------
@@ -33,7 +33,7 @@ def checked(function: F) -> F:
     >>> doubled("64")
     Traceback (most recent call last):
         ...
-    bywire.core.errors.ParameterError: value = '64': a number is wanted
+    bywire.core.errors.ParameterError: value = '64' must be a number
     """
     if isinstance(function, type):
         made: Any = function
@@ -51,38 +51,38 @@ def checked(function: F) -> F:
 def require_kinds(
     function: Callable[..., Any], args: tuple[Any, ...], kwargs: Mapping[str, Any]
 ) -> None:
-    """Refuse arguments that are of another kind than a function's signature says.
+    """Reject arguments whose type a function's signature does not allow.
 
-    Ranges, names and units are for the function itself.
+    The function itself checks ranges, names and units.
 
     Parameters
     ----------
     function
-        Function, whose annotations are texts (``from __future__ import annotations``).
+        Function whose annotations are texts (``from __future__ import annotations``).
     args, kwargs
-        What it is called with. Missing and unknown arguments are left to Python.
+        Arguments of the call. Python itself rejects missing and unknown ones.
 
     Raises
     ------
     ParameterError
-        With the argument's name and value, and what is wanted.
+        With the argument's name and value, and the valid types.
 
     Examples
     --------
     >>> def drawn(cases: int | None = None) -> None: ...
-    >>> drawn.__annotations__["cases"] = "int | None"  # as a module has it that postpones them
+    >>> drawn.__annotations__["cases"] = "int | None"   # as in a module that postpones them
     >>> require_kinds(drawn, (), {"cases": "64"})
     Traceback (most recent call last):
         ...
-    bywire.core.errors.ParameterError: cases = '64': a whole number is wanted
+    bywire.core.errors.ParameterError: cases = '64' must be a whole number
     """
-    names, wanted = _signature(function)
+    names, expected = _signature(function)
     for name, value in (*zip(names, args, strict=False), *kwargs.items()):
-        kinds = wanted.get(name)
+        kinds = expected.get(name)
         if kinds and not any(fits(value) for _, fits in kinds):
-            said = " or ".join(dict.fromkeys(text for text, _ in kinds if text))
-            given = _LINES.repr(value)  # as Python has it, and not as a file
-            raise ParameterError(f"{name} = {given}: {said} is wanted")
+            valid = " or ".join(dict.fromkeys(text for text, _ in kinds if text))
+            shown = _LINES.repr(value)  # as Python writes it, not as a file does
+            raise ParameterError(f"{name} = {shown} must be {valid}")
 
 
 def whole_number(name: str, value: object, least: int, most: int) -> int:
@@ -91,20 +91,20 @@ def whole_number(name: str, value: object, least: int, most: int) -> int:
     Parameters
     ----------
     name
-        What it is called.
+        Name of the number in errors.
     value
-        What was given; a truth value is no number.
+        Value to check; a truth value is not valid.
     least, most
-        Ends of the range.
+        Bounds of the range, both valid.
 
     Raises
     ------
     ParameterError
-        For anything else.
+        When the value is not a whole number of the range.
     """
     if not _is_whole(value) or not least <= operator.index(value) <= most:  # type: ignore[arg-type]
         raise ParameterError(
-            f"{name} = {quoted(value)}: a whole number from {least} to {most} is wanted",
+            f"{name} = {quoted(value)} must be a whole number from {least} to {most}",
             name=name,
             value=quoted(value),
             valid=f"from {least} to {most}",
@@ -112,11 +112,11 @@ def whole_number(name: str, value: object, least: int, most: int) -> int:
     return operator.index(value)  # type: ignore[arg-type]
 
 
-_Wanted = tuple[str, Callable[[Any], bool]]
+_Kind = tuple[str, Callable[[Any], bool]]
 
 
 @cache
-def _signature(function: Callable[..., Any]) -> tuple[list[str], dict[str, list[_Wanted]]]:
+def _signature(function: Callable[..., Any]) -> tuple[list[str], dict[str, list[_Kind]]]:
     """Return the names of positional arguments, and the kinds of each that can be checked."""
     parameters = inspect.signature(function).parameters
     positional = [
@@ -138,7 +138,7 @@ def _signature(function: Callable[..., Any]) -> tuple[list[str], dict[str, list[
 
 
 def _parts(annotation: str) -> list[str]:
-    """Return what an annotation allows: the parts between bars that stand in no brackets.
+    """Split an annotation at the bars that are outside of brackets.
 
     Examples
     --------
@@ -155,21 +155,21 @@ def _parts(annotation: str) -> list[str]:
     return parts
 
 
-def _kind(part: str, known: Mapping[str, Any]) -> _Wanted | None:
-    """Return words and test of a part of an annotation; None where anything may be meant.
+def _kind(part: str, known: Mapping[str, Any]) -> _Kind | None:
+    """Return the words and the test for a part of an annotation; None where any value is valid.
 
     Parameters
     ----------
     part
-        Name of a type, perhaps with what it holds in brackets.
+        Name of a type, perhaps with the types of its items in brackets.
     known
-        What names mean where the function stands.
+        Names in the function's module.
     """
     name = part.partition("[")[0]
     if name in _KINDS:
         return _KINDS[name]
     meant = known.get(name)
-    if meant is None:  # of a module that loads what it computes with when it is called
+    if meant is None:  # its module loads that library when it is called
         meant = getattr(sys.modules.get("bywire"), name, None)
     if meant is None and name.startswith("xr."):
         meant = getattr(import_module("xarray"), name[3:], None)
@@ -192,12 +192,12 @@ def _is_whole(value: object) -> bool:
 
 
 def _is_truth_value(value: object) -> bool:
-    numpy = sys.modules.get("numpy")  # where nobody has loaded it, no value is of its kind
+    numpy = sys.modules.get("numpy")  # unless it is loaded, no value is of its type
     return isinstance(value, bool if numpy is None else (bool, numpy.bool_))
 
 
 def _are_numbers(value: object) -> bool:
-    import numpy as np  # takes as long to load as all else that a brake is declared with
+    import numpy as np  # loading it takes as long as all other imports of a declaration
 
     try:
         array = np.asarray(value)

@@ -1,8 +1,8 @@
-"""Models by parts and wires: what follows from the elements is not written a second time.
+"""Models made of parts and wires, whose equations follow from their elements.
 
-An assembly names its elements and writes down, once and in the order of the physics, the inputs of
-each of them. States, masses, balances, contacts, stored energies, plain losses and recorded signals
-follow from the elements. Connections are causal on purpose: acausal ones need index reduction, and
+An assembly names its elements and assigns their inputs, once and in the order of the physics.
+States, masses, balances, contacts, stored energies, plain losses and recorded signals follow from
+the elements. Connections are causal on purpose: acausal ones need index reduction, and
 that does not fit the diagonal mass form of ``core.model``. Models of that form can be written
 without assemblies.
 """
@@ -32,7 +32,7 @@ MemoryT = TypeVar("MemoryT")
 _NAN = float("nan")
 
 
-# --- An assembly at an instant: what its equations read there, and how those within are wired
+# --- An assembly at an instant: the values that its equations read, and the wiring of subassemblies
 
 
 class Evaluated(Generic[ParT, MemoryT]):
@@ -45,7 +45,7 @@ class Evaluated(Generic[ParT, MemoryT]):
     def wire(self, w: Self) -> None:
         """Set every input and every wire once, in the order of the physics."""
 
-    # What it reads at an instant.
+    # Values at an instant.
 
     @property
     def x(self) -> Any:
@@ -59,7 +59,7 @@ class Evaluated(Generic[ParT, MemoryT]):
 
     @property
     def m(self) -> MemoryT:
-        """What the controllers hold."""
+        """Memory of the controllers."""
         return instant_of(self, "m").memory  # type: ignore[no-any-return]
 
     @property
@@ -91,12 +91,12 @@ class Evaluated(Generic[ParT, MemoryT]):
         contact: tuple[float, ...] | None = None,
         **more: Any,
     ) -> Self:
-        """Return the assembly at an instant, wired: its parts, typed, have values there.
+        """Return the wired assembly at an instant, where its parts have values.
 
         Parameters
         ----------
         contact
-            Contact forces; not known by default.
+            Contact forces; unknown by default.
         more
             Further fields of `Instant`: ``xe`` where it is not the state, for instance.
         """
@@ -112,7 +112,7 @@ class Evaluated(Generic[ParT, MemoryT]):
         """Return itself at the instant where its holder is evaluated, wired."""
         if state is not here.x:
             raise ModelError(
-                f"{type(self).__name__} is asked for another state than its holder's: within an "
+                f"{type(self).__name__} is evaluated at a state other than its holder's: within an "
                 "assembly its equations hold at that instant alone"
             )
         here.settle()
@@ -121,7 +121,7 @@ class Evaluated(Generic[ParT, MemoryT]):
     def held_at(
         self, x: Any, memory: Any, par: Any, contact: tuple[float, ...] | None, **more: Any
     ) -> Self:
-        """Return the assembly at the instant of one that holds it; it is wired once it is read."""
+        """Return the assembly at its holder's instant; it is wired when it is first read."""
         w = self._unwired(x, memory, par, contact, is_held=True, **more)
 
         def wire() -> None:
@@ -152,7 +152,7 @@ class Evaluated(Generic[ParT, MemoryT]):
 
 @cache
 def _at_an_instant(cls: type[Any]) -> type[Any]:
-    """Return what stands for an assembly at an instant: it takes wires and no other names."""
+    """Return the object for an assembly at an instant; only its wires can be set."""
     kinds = (Part, Wire, Integral, Shown, Sub)
     every = {k: v for base in cls.__mro__ for k, v in vars(base).items()}
     known = frozenset(name for name, value in every.items() if isinstance(value, kinds))
@@ -174,7 +174,7 @@ def _at_an_instant(cls: type[Any]) -> type[Any]:
 
 
 def _settled(w: Any) -> None:
-    """Wire what an assembly holds, as far as nothing has read it yet, and what nobody has set."""
+    """Wire subassemblies that were not read yet, and set unset ports to their defaults."""
     cls: Any = type(w)
     for name in cls.subs:
         instant_of(getattr(w, name), name).settle()
@@ -191,7 +191,7 @@ class Assembly(Evaluated[ParT, MemoryT], Watching, Generic[ParT, MemoryT]):
     """A model made of parts; see ``docs/modeling.md``.
 
     A subclass declares `Part`, `Wire`, `Integral`, `Shown` and `Sub` objects, ``Memory``,
-    ``Stimulus`` and ``records``, and defines ``wire``, ``tasks``, and as far as it has any
+    ``Stimulus`` and ``records``, and defines ``wire``, ``tasks``, and where needed
     ``friction``, ``power`` and ``record``. Where a mode replaces an equation it overrides ``mass``
     or ``balance``.
     """
@@ -202,39 +202,39 @@ class Assembly(Evaluated[ParT, MemoryT], Watching, Generic[ParT, MemoryT]):
     Memory: ClassVar[Any]
     Stimulus: ClassVar[Any]
     records: ClassVar[tuple[str, ...]] = ()
-    """names of what is recorded, in order; everything by default"""
+    """names of the recorded signals, in order; all by default"""
     shared: ClassVar[tuple[str, ...]] = ()
     """groups of parameters that several elements take by name, such as a fluid"""
     parts: ClassVar[dict[str, AnyPart]]
     subs: ClassVar[dict[str, Sub[Any]]]
     """the assemblies within"""
     ports: ClassVar[tuple[Port, ...]]
-    """the wires that an assembly sets that holds this one"""
+    """wires that the holder of this assembly sets"""
     reaction_places: ClassVar[dict[str, tuple[int, ...]]]
-    """where the reactions of each assembly within stand, and its own under an empty name"""
+    """places of each subassembly's reactions; its own are under an empty name"""
 
     def __init_subclass__(cls, *, at_an_instant: bool = False, **options: Any) -> None:
-        """Gather what follows from the parts."""
+        """Derive signals and equations from the parts."""
         super().__init_subclass__(**options)
         holds = any(isinstance(each, Sub) for base in cls.__mro__ for each in vars(base).values())
         if not at_an_instant and (isinstance(cls.Memory, type) or holds):  # else more is to come
             _gather(cls)
 
-    # What an assembly writes.
+    # Defined by a subclass.
 
     def friction(self, w: Self) -> tuple[Bounds, ...]:
         """Return (low, high) of each friction, as ``bounds`` of the protocol."""
         return ()
 
     def power(self, w: Self) -> Mapping[str, float]:
-        """Return the rates of the integrals that no part gives."""
+        """Return the rates of the integrals that no part defines."""
         return {}
 
     def record(self, w: Self) -> Mapping[str, float]:
-        """Return what is recorded and no part gives, and what replaces what one gives."""
+        """Return recorded signals that no part defines, or that replace those of a part."""
         return {}
 
-    # What follows from the parts.
+    # Derived from the parts.
 
     def mass(self, xe: Any, par: ParT) -> Any:
         """Return the factor of each state's derivative."""
@@ -274,7 +274,7 @@ class Assembly(Evaluated[ParT, MemoryT], Watching, Generic[ParT, MemoryT]):
         return tuple(bounds)
 
     def compliance(self, par: ParT) -> tuple[Matrix, ...]:
-        """Return a compliance matrix per contact group, an empty one where it is left out."""
+        """Return a compliance matrix per contact group; empty if a choice omits it."""
         state = self.State._make(_NAN for _ in self.State._fields)
         w = self._unwired(state, self._nothing(), par, None)
         groups: list[Matrix] = []
@@ -353,7 +353,7 @@ class Assembly(Evaluated[ParT, MemoryT], Watching, Generic[ParT, MemoryT]):
         reaction: tuple[float, ...],
         flow: Any,
     ) -> Any:
-        """Return what is recorded at an instant."""
+        """Return the recorded signals at an instant."""
         w = self.at(x, memory, par, contact, reaction=reaction, flow=flow)
         values: dict[str, Any] = {}
         given: tuple[Any, ...] = (x, memory, flow)
@@ -372,7 +372,7 @@ class Assembly(Evaluated[ParT, MemoryT], Watching, Generic[ParT, MemoryT]):
         return _filled(self, "record", self.Output, values)
 
     def stored(self, w: Self) -> Any:
-        """Return the energy that the parts store at an instant [J]; contacts are added up apart."""
+        """Return the energy that the parts store at an instant [J], without that of contacts."""
         sums: list[Any] = []
         for wanted in (False, True):
             values = [
@@ -385,11 +385,11 @@ class Assembly(Evaluated[ParT, MemoryT], Watching, Generic[ParT, MemoryT]):
         return sum(sums[1:], sums[0]) if sums else 0.0
 
     def tasks(self, par: ParT) -> tuple[Task, ...]:
-        """Return the tasks of the assemblies within; those of its own are added by a subclass."""
+        """Return the tasks of the subassemblies; a subclass adds its own."""
         return tuple(task for sub in self.subs.values() for task in sub.tasks(par))
 
     def rest(self, par: ParT) -> tuple[Any, Any]:
-        """Return zeros, and where the assemblies within rest."""
+        """Return a zero state, with the subassemblies at rest."""
         inner = {name: sub.assembly.rest(sub.parameters(par)) for name, sub in self.subs.items()}
         return (
             self.state(**{name: state for name, (state, _) in inner.items()}),
@@ -398,9 +398,9 @@ class Assembly(Evaluated[ParT, MemoryT], Watching, Generic[ParT, MemoryT]):
 
     @classmethod
     def state(cls, **parts: NamedTuple) -> Any:
-        """Return a State from the states of parts and of assemblies within, by their names.
+        """Return a State from the states of parts and subassemblies, by their names.
 
-        Those left out are zero.
+        Missing ones are zero.
 
         Raises
         ------
@@ -413,9 +413,9 @@ class Assembly(Evaluated[ParT, MemoryT], Watching, Generic[ParT, MemoryT]):
 
     @classmethod
     def memory(cls, own: NamedTuple | None = None, **subs: NamedTuple) -> Any:
-        """Return a Memory from its own fields and from the memories of assemblies within.
+        """Return a Memory from its own fields and the memories of subassemblies.
 
-        Those left out are zero.
+        Missing ones are zero.
 
         Raises
         ------
@@ -432,7 +432,7 @@ class Assembly(Evaluated[ParT, MemoryT], Watching, Generic[ParT, MemoryT]):
     @classmethod
     @cache  # studies begin thousands of runs a second
     def _sources(cls, kinds: tuple[tuple[str, type], ...]) -> tuple[int, ...]:
-        """Return where each entry of the State is found in a zero and the states of parts."""
+        """Return the index of each State entry in the sequence of zero and the parts' states."""
         sources, place = [0] * len(cls.State._fields), 0
         for name, kind in kinds:
             for there in cls._places(name, kind):
@@ -441,23 +441,23 @@ class Assembly(Evaluated[ParT, MemoryT], Watching, Generic[ParT, MemoryT]):
 
     @classmethod
     def _places(cls, name: str, kind: type) -> tuple[int, ...]:
-        """Return where the states of a part, or of an assembly within, stand in the State."""
+        """Return the State indices of a part or a subassembly."""
         fields: tuple[str, ...] = cls.State._fields
         if name in cls.subs:
             sub = cls.subs[name]
             if not issubclass(kind, sub.assembly.State):
-                raise ModelError(f"{sub.where}: {kind.__name__} is no state of {sub.label}")
+                raise ModelError(f"{sub.where}: {kind.__name__} is not a state of {sub.label}")
             return tuple(fields.index(each) for each in sub.signals("State"))
         part = cls.parts.get(name)
         if part is None:
             there = {**cls.parts, **cls.subs}
             raise ModelError(f"{cls.__name__}: {unknown_name('part', name, there)}")
         if not part.has("State") or not issubclass(kind, part.element.State):
-            raise ModelError(f"{part.where}: {kind.__name__} is no state of {part.kind}")
+            raise ModelError(f"{part.where}: {kind.__name__} is not a state of {part.kind}")
         return tuple(fields.index(part.state_name(each)) for each in part.element.State._fields)
 
     def _nothing(self) -> Any:
-        """Return a memory that is not known: where it does not count, nobody must see it."""
+        """Return a memory of NaN, for evaluations that must not depend on it."""
         return self.Memory._make(_NAN for _ in self.Memory._fields)
 
 
@@ -483,7 +483,7 @@ def _row(value: Any) -> tuple[Any, ...]:
 
 
 def _held(w: Any) -> Iterator[tuple[Sub[Any], Any, Instant]]:
-    """Yield the assemblies within one at an instant: as declared, there, and its own instant."""
+    """Yield each subassembly at an instant: its declaration, itself there, and its instant."""
     for name, sub in w.subs.items():
         inner = getattr(w, name)
         yield sub, inner, instant_of(inner, name)
@@ -492,12 +492,12 @@ def _held(w: Any) -> Iterator[tuple[Sub[Any], Any, Instant]]:
 def _known(
     model: Any, method: str, values: Mapping[str, Any], names: tuple[str, ...]
 ) -> dict[str, Any]:
-    """Return what a method gives.
+    """Return a method's result after checking its names.
 
     Raises
     ------
     ModelError
-        When it gives what is none of the names.
+        When the result has an unknown name.
     """
     for name in values:
         if name not in names:
@@ -508,17 +508,17 @@ def _known(
 
 
 def _filled(model: Any, method: str, kind: Any, values: Mapping[str, Any]) -> Any:
-    """Return a signal tuple of what a method and the parts give.
+    """Return a signal tuple from the values of a method and of the parts.
 
     Raises
     ------
     ModelError
-        When a field is given by neither.
+        When neither has a field.
     """
     for name in kind._fields:
         if name not in values:
             raise ModelError(
-                f"{type(model).__name__}.{method} does not return {name!r}, and no part gives it: "
+                f"{type(model).__name__}.{method} does not return {name!r}, and no part has it: "
                 f"add it to what {method} returns"
             )
     return kind(**{name: values[name] for name in kind._fields})
@@ -582,7 +582,7 @@ def _gather(cls: type[Any]) -> None:
 def _take_over(
     cls: type[Any], states: dict[str, Signal], flows: dict[str, Signal], shown: dict[str, Signal]
 ) -> None:
-    """Add the signals, frictions and limits of the assemblies within, by their names there."""
+    """Add signals, frictions and limits of the subassemblies, by their names in the holder."""
     own = {kind: getattr(cls, kind, None) for kind in ("Memory", "Stimulus")}
     own = {kind: getattr(each, "own", each) for kind, each in own.items()}
     own = {kind: each if isinstance(each, type) else _Nothing for kind, each in own.items()}
@@ -624,7 +624,7 @@ class _Nothing(NamedTuple):
 
 
 def _number_reactions(cls: type[Any]) -> None:
-    """Append the frictions and limits of the assemblies within, and say where whose stand."""
+    """Append the frictions and limits of the subassemblies, and store their places."""
     inner = {
         name: [tuple(map(sub.named, _names(type(sub.assembly), kind))) for kind in _REACTING]
         for name, sub in cls.subs.items()
@@ -648,7 +648,7 @@ def _names(cls: type[Any], kind: str) -> tuple[str, ...]:
 
 
 def _derives(kind: Any) -> bool:
-    """Tell whether a signal tuple follows from the parts: the class has none of its own."""
+    """Return whether a signal tuple is derived from the parts, as the class declares none."""
     return not isinstance(kind, type) or hasattr(kind, "derived")
 
 
@@ -673,7 +673,7 @@ def _contacts(cls: type[Any]) -> Iterator[AnyPart]:
 
 
 def contact_count(model: Any, par: Any) -> int:
-    """Return how many contact forces an assembly has, those of assemblies within included."""
+    """Return the number of contact forces of an assembly, including its subassemblies."""
     own = sum(sum(part.group_sizes(par)) for part in _contacts(type(model)))
     return own + sum(
         contact_count(sub.assembly, sub.parameters(par)) for sub in model.subs.values()

@@ -1,4 +1,4 @@
-"""Brakes: how one declares itself, and how the installed and loaded ones are found.
+"""Declarations of brakes, and how bywire finds installed and loaded ones.
 
 A brake is a package or a single file with one declaration::
 
@@ -34,23 +34,23 @@ GROUP = "bywire.brakes"
 
 
 class BrakeWarning(UserWarning):
-    """An installed brake that is left out."""
+    """An installed brake is skipped."""
 
 
 @checked
 @dataclass(frozen=True)
 class Brake:
-    """What makes a package or a file a brake.
+    """Declaration of a brake by a package or a file.
 
     Parameters
     ----------
     name
-        What listings call it.
+        Name in listings.
     summary
         One line for listings.
     module
-        Its ``__name__``: where its models, parameter sets, experiments, loops and the rest stand.
-        Of a package, every kind has a module or a folder of its own; see ``bywire.core.registry``.
+        Its ``__name__``, to find its models, parameter sets, experiments, loops and the rest. In a
+        package, each kind has its own module or folder; see ``bywire.core.registry``.
     """
 
     name: str
@@ -59,15 +59,15 @@ class Brake:
 
     @property
     def file(self) -> str:
-        """Where it is declared."""
+        """File that declares it."""
         return importlib.import_module(self.module).__file__ or self.module
 
     def _repr_html_(self) -> str:
         rows = {
             "brake": self.name,
-            "what it is": self.summary,
+            "summary": self.summary,
             "declared in": self.file,
-            "what it brings": f"bywire.overview(), or bywire.check({self.name!r})",
+            "contents": f"bywire.overview(), or bywire.check({self.name!r})",
         }
         cells = "".join(f"<tr><th>{k}</th><td>{escape(v)}</td></tr>" for k, v in rows.items())
         return f"<table>{cells}</table>"
@@ -86,7 +86,7 @@ def _installed() -> Mapping[str, Brake]:
     brakes: dict[str, Brake] = {}
 
     def order(point: EntryPoint) -> tuple[bool, str]:
-        """Ours first, so that what takes one of our names is what is left out."""
+        """Put our brakes first, so that a brake that takes one of our names is skipped."""
         return not point.module.startswith("bywire."), point.name
 
     for point in sorted(entry_points(group=GROUP), key=order):
@@ -98,7 +98,7 @@ def _installed() -> Mapping[str, Brake]:
         except Exception as error:
             place = _place_of(point.module)
             reason = str(error) if isinstance(error, ModelError) else said_with_line(error, place)
-            text = f"the installed brake {point.name!r} ({point.value}) is left out: {reason}"
+            text = f"the installed brake {point.name!r} ({point.value}) is skipped: {reason}"
             warn_at_line(text, BrakeWarning, error, place)
         else:
             brakes[brake.name] = brake
@@ -106,7 +106,7 @@ def _installed() -> Mapping[str, Brake]:
 
 
 def _place_of(module: str) -> str:
-    """Return the folder of a module's package, or its file; its name where it is nowhere."""
+    """Return the folder of a module's package, or its file; its name where neither exists."""
     root = module.partition(".")[0]
     try:
         spec = importlib.util.find_spec(root)
@@ -117,14 +117,14 @@ def _place_of(module: str) -> str:
 
 
 def is_foreign(brake: Brake) -> bool:
-    """Return whether a brake was installed by somebody else: what it breaks is left out."""
+    """Return whether a brake is from another package; bywire skips its parts that fail."""
     return brake.name not in _loaded and brake.module.partition(".")[0] != "bywire"
 
 
 def foreign_line(error: BaseException) -> str:
-    """Return an error with file and line if a brake that is not ours raised it; else nothing.
+    """Return an error with file and line if a brake that is not ours raised it; otherwise empty.
 
-    The innermost frame counts: what our own code raises for it is told as our own.
+    The innermost line in that brake's files counts.
     """
     folders = [
         str(Path(brake.file).parent if _is_package(brake) else brake.file)
@@ -143,21 +143,21 @@ def _is_package(brake: Brake) -> bool:
 
 
 def loaded_files() -> tuple[str, ...]:
-    """Return the files of the brakes that were loaded by path: what another process has to load."""
+    """Return the files of the brakes that were loaded by path, for another process to load."""
     return tuple(brake.file for brake in _loaded.values())
 
 
 def load_brakes(files: Iterable[str]) -> None:
-    """Load what another process had loaded by path; see `loaded_files`."""
+    """Load the brakes that another process had loaded by path; see `loaded_files`."""
     for file in files:
         load_system(file)
 
 
 @checked
 def load_system(path: str | Path) -> Brake:
-    """Load a brake from a file or a package, and have it known by its names from then on.
+    """Load a brake from a file or a package, so that its names work with every function.
 
-    Its code is run: load only what you trust.
+    This executes its code: load only files that you trust.
 
     Parameters
     ----------
@@ -168,22 +168,22 @@ def load_system(path: str | Path) -> Brake:
     Returns
     -------
     Brake
-        The brake, also where it is loaded already.
+        The brake; the loaded one if it was loaded before.
 
     Raises
     ------
     FileError
         When there is no such file or folder.
     ModelError
-        When it fails on import, declares no brake, or one whose name is taken.
+        When it fails on import, or does not declare a brake with a name that is free.
     """
     place = Path(path).expanduser().resolve()
     place = place.parent if place.name == "__init__.py" else _package_of(place)
     source = place / "__init__.py" if place.is_dir() else place
     if not source.is_file() or source.suffix != ".py":
         raise FileError(
-            f"{path} is no brake: give a Python file, a folder with an __init__.py, or a project "
-            "with one such folder in src, that declares BRAKE = bywire.Brake(...)",
+            f"{path} does not declare a brake: give a Python file, a folder with an __init__.py, "
+            "or a project with one such folder in src, that contains BRAKE = bywire.Brake(...)",
             name=str(path),
         )
     known = next((b for b in _loaded.values() if Path(b.file).resolve() == source), None)
@@ -231,7 +231,7 @@ def _imported(place: Path, source: Path) -> ModuleType:
         if not isinstance(error, (Exception, SystemExit)):
             raise
         message = said_with_line(error, str(source.parent) if place.is_dir() else str(source))
-        raise ModelError(f"{message}; mend it and load it again") from error
+        raise ModelError(f"{message}; fix it and load it again") from error
     return module
 
 
@@ -255,7 +255,7 @@ def _require_new(brake: Brake, known: Mapping[str, Brake]) -> None:
     if brake.name in known:
         raise ModelError(
             f"{brake.file} declares a brake {brake.name!r}, and so does {known[brake.name].file}: "
-            "give it another name"
+            "rename one of them"
         )
 
 
@@ -264,7 +264,7 @@ def _origin(module: ModuleType) -> str:
 
 
 def modules_of(brake: Brake, names: tuple[str, ...]) -> Iterator[ModuleType]:
-    """Yield the modules in which a brake may keep a kind of thing: itself, and those of the names.
+    """Yield the modules of a brake that may declare a kind of thing: its own, and those named.
 
     Parameters
     ----------
@@ -288,7 +288,7 @@ def modules_of(brake: Brake, names: tuple[str, ...]) -> Iterator[ModuleType]:
 
 
 def modules_below(name: str) -> Iterator[ModuleType]:
-    """Yield a module, and of a package the modules in its folder, in alphabetical order.
+    """Yield a module and, if it is a package, the modules in its folder in alphabetical order.
 
     Raises
     ------
@@ -318,7 +318,7 @@ def _attempted(name: str) -> ModuleType:
 
 
 def said_with_line(error: BaseException, *inside: str) -> str:
-    """Return an error with the innermost line at which it happened in files of these folders."""
+    """Return an error with the innermost line in files of these folders at which it was raised."""
     text = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
     text = str(error) if isinstance(error, BywireError) else text
     if isinstance(error, SyntaxError) and error.filename:
@@ -349,24 +349,24 @@ def _of_pydantic(error: Any) -> str:
 
 
 def warn_at_line(text: str, kind: type[Warning], error: BaseException, *inside: str) -> None:
-    """Warn at the line of an author's file that raised an error, and not at one of ours.
+    """Warn at the line of an author's file that raised an error, not at one of ours.
 
     Parameters
     ----------
     text, kind
-        What is said, and its category.
+        Message of the warning, and its category.
     error
-        What went wrong; of an error that was put in other words, what it came from.
+        The error; if it has a cause, the line is that of the cause.
     inside
-        Folders or files of the author's; the first line of the last one where the error came up
-        nowhere in them.
+        Folders or files of the author. If the error was not raised in them, the warning points to
+        line 1 of the last one.
     """
     line = _innermost(error.__cause__ or error, *inside)
     warnings.warn_explicit(text, kind, *(line or (inside[-1], 1)))
 
 
 def _innermost(error: BaseException, *inside: str) -> tuple[str, int] | None:
-    """Return file and line at which an error came up in files of some folders; None for nowhere."""
+    """Return file and line in some folders at which an error was raised; None if outside them."""
     if isinstance(error, SyntaxError) and error.filename:
         return error.filename, error.lineno or 1
     lines = [

@@ -52,7 +52,9 @@ def name_flag(argument: str, flag: str) -> None:
         When the argument has another flag in another command.
     """
     if _flags.setdefault(argument, flag) != flag:
-        raise ValueError(f"argument {argument!r} is {_flags[argument]} already, and not {flag}")
+        raise ValueError(
+            f"argument {argument!r} has the flag {_flags[argument]} already, not {flag}"
+        )
 
 
 def option(argument: str, value: str | bool | dict[str, str] | None = None) -> str:

@@ -1,4 +1,4 @@
-"""Parameter sets by name, every value with its source."""
+"""Named parameter sets with a source for every value."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from bywire.core.registry import Kind, instances
 
 Origin = Literal["paper", "derived", "chosen", "calibrated"]
 Formula = Callable[[Any], Any]
-"""``formula(par)``: a value of a set from others, at their places, ``par.body.h``"""
+"""``formula(par)``: a value of a set from others, such as ``par.body.h``"""
 
 
 @dataclass(frozen=True)
@@ -29,14 +29,14 @@ class Cited:
         Number, table or choice, in SI.
     kind
         ``paper``: printed in the source. ``derived``: follows from printed values.
-        ``chosen``: ours, where the source is silent. ``calibrated``: tuned until a statement of
-        the source comes out; that statement is then no evidence.
+        ``chosen``: our choice, without a source. ``calibrated``: tuned to match a statement of
+        the source, which is then not evidence.
     where
         Place in the source, or the reason.
     formula
-        What a derived value follows from; None where no parameters of the set tell it.
+        Formula of a derived value; None if it does not follow from parameters of the set.
     moved
-        Where groups that the formula names stand instead, by their places there.
+        New places of groups in the formula, by their original places.
     """
 
     value: Any
@@ -48,12 +48,12 @@ class Cited:
     def computed(self, values: Mapping[str, Any]) -> tuple[Any, frozenset[str]]:
         """Return the result of the formula with values by dotted name, and the names that it reads.
 
-        The result is NaN where these values are so far off that it has no finite one.
+        The result is NaN if it is not finite for these values.
 
         Raises
         ------
         ModelError
-            When it reads a parameter that there is not.
+            When it reads an unknown parameter.
         """
         assert self.formula is not None
         read: set[str] = set()
@@ -64,15 +64,15 @@ class Cited:
         return value, frozenset(read)
 
     def moved_to(self, places: Mapping[str, str]) -> Cited:
-        """Return the same in a set in which groups stand at other places, by those here.
+        """Return the value for a set in which groups have other places.
 
-        ``{"": "rear"}``: all of them in a group. Of a set that is put into another one.
+        ``{"": "rear"}``: all of them are in a group, for a set within another one.
         """
         return self if self.formula is None else replace(self, moved=places)
 
 
 class _Values:
-    """Values at their places, as a parameter set has them; notes which are read."""
+    """Values at their places, as in a parameter set, with a record of those that are read."""
 
     def __init__(
         self, values: Mapping[str, Any], moved: Mapping[str, str], read: set[str], place: str = ""
@@ -90,13 +90,13 @@ class _Values:
         groups = (f"{there}.", f"{place}.")
         if not any(each.startswith(groups) for each in (*self._values, *self._moved)):
             raise ModelError(
-                f"a formula of a derived value reads {there}, which the set lacks", name=there
+                f"a formula of a derived value reads {there}, which is not in the set", name=there
             )
         return _Values(self._values, self._moved, self._read, place)
 
 
 def _moved(place: str, moved: Mapping[str, str]) -> str:
-    """Return where a place is found in a set whose groups stand elsewhere."""
+    """Return a place in a set whose groups have moved."""
     if "" in moved:
         return f"{moved['']}.{place}"
     for group, there in moved.items():
@@ -118,11 +118,11 @@ def derived(value: Any, where: str) -> Cited:
     Parameters
     ----------
     value
-        The value, or where it follows from parameters of the set the formula that computes it:
-        ``derived(lambda par: 0.95 * par.body.g, "0.95 g")``. A bench that changes what the formula
-        reads, and not the value, then warns of it.
+        The value, or a formula that computes it from parameters of the set:
+        ``derived(lambda par: 0.95 * par.body.g, "0.95 g")``. bywire warns if a bench changes
+        parameters of the formula but not the value.
     where
-        What it follows from, for people.
+        Its origin, for readers.
     """
     if callable(value):
         return Cited(None, "derived", where, value)
@@ -154,11 +154,11 @@ class CitedSet:
     Parameters
     ----------
     name
-        What bench files and the command line call it.
+        Name in bench files and on the command line.
     assembly
-        Name of the assembly that it is for.
+        Name of its assembly.
     source
-        Full citation; empty where the values have none.
+        Full citation; empty if the values have none.
     summary
         One line for listings.
     parameter_class
@@ -190,12 +190,12 @@ class CitedSet:
 
 
 def _computed_values(values: Mapping[str, Cited]) -> dict[str, Cited]:
-    """Return cited values, the derived ones computed by their formulas.
+    """Return cited values, with derived ones from their formulas.
 
     Raises
     ------
     ModelError
-        When formulas read each other's values in a circle, or what there is not.
+        When formulas depend on each other, or read an unknown parameter.
     """
     known = {name: each.value for name, each in values.items() if each.formula is None}
     waiting = {name: each for name, each in values.items() if each.formula is not None}
@@ -204,17 +204,17 @@ def _computed_values(values: Mapping[str, Cited]) -> dict[str, Cited]:
         for name, each in waiting.items():
             try:
                 ready[name] = each.computed(_Known(known, waiting))[0]
-            except KeyError:  # one of them is still to be computed
+            except KeyError:  # it reads a value that is not computed yet
                 continue
         if not ready:
-            raise ModelError(f"formulas of {', '.join(sorted(waiting))} wait for each other")
+            raise ModelError(f"formulas of {', '.join(sorted(waiting))} depend on each other")
         known |= ready
         waiting = {name: each for name, each in waiting.items() if name not in ready}
     return {name: replace(each, value=known[name]) for name, each in values.items()}
 
 
 class _Known(dict[str, Any]):
-    """Values by name; one that is still to be computed is there, and cannot be read."""
+    """Values by name; a value that is not computed yet exists, but cannot be read."""
 
     def __init__(self, known: Mapping[str, Any], waiting: Mapping[str, Any]) -> None:
         super().__init__({**dict.fromkeys(waiting), **known})
@@ -228,14 +228,14 @@ class _Known(dict[str, Any]):
 
 @dataclass(frozen=True)
 class Outdated:
-    """A derived value that no longer matches what it was derived from.
+    """A derived value that no longer matches its formula.
 
     Parameters
     ----------
     name, where
-        Its name, and what it follows from.
+        Its name and origin.
     now, formula
-        The value that it has, and what its formula gives [SI].
+        Its value, and the result of its formula [SI].
     changed
         Names of the changed parameters that the formula reads.
     """
@@ -250,16 +250,16 @@ class Outdated:
 def outdated_values(
     cited: Mapping[str, Cited], par: ParameterSet, changed: Collection[str]
 ) -> list[Outdated]:
-    """Return the derived values of a set that some changed parameters leave behind.
+    """Return the derived values of a set that no longer match after some changes.
 
     Parameters
     ----------
     cited
-        Values of the set that was changed.
+        Values of the changed set.
     par
-        All parameters, the changed ones among them.
+        All parameters, including the changed ones.
     changed
-        Names of what was changed; a derived value that is among them is meant as it is.
+        Names of changed parameters; a derived value among them is intended.
     """
     found: list[Outdated] = []
     values: dict[str, Any] = {}
@@ -279,14 +279,14 @@ PARAMETER_SETS = Kind("parameter set", ("sets",), instances(CitedSet), declared=
 
 
 def main_set(assembly: str, beside: type | None = None) -> str:
-    """Return the name of the first parameter set that there is for an assembly.
+    """Return the name of the first parameter set for an assembly.
 
     Parameters
     ----------
     assembly
         Name of the assembly.
     beside
-        A class of the brake that is asked first, so that no other brake need be loaded.
+        A class of the brake to search first, so that no other brake needs to be loaded.
 
     Raises
     ------
@@ -295,7 +295,7 @@ def main_set(assembly: str, beside: type | None = None) -> str:
     """
     first = () if beside is None else (PARAMETER_SETS.beside(beside),)
     rest = (PARAMETER_SETS.of(brake.module) for brake in brakes().values())
-    for sets in chain(first, rest):  # as many as it takes: their models are loaded with them
+    for sets in chain(first, rest):  # lazily, since each loads its models
         for name, cited in sets.items():
             if cited.assembly == assembly:
                 return name
@@ -305,9 +305,9 @@ def main_set(assembly: str, beside: type | None = None) -> str:
 
 
 def sets_of_loaded() -> tuple[str, ...]:
-    """Return the names of the parameter sets of all brakes that were loaded by their path.
+    """Return the names of the parameter sets of all brakes that were loaded by path.
 
-    Such a brake is the one that a user means: its set is taken where it is the only one.
+    A user who loads a brake means that brake, so its set is the default if it is the only one.
     """
     files = loaded_files()
     loaded = [brake.module for brake in brakes().values() if brake.file in files]
@@ -321,7 +321,7 @@ def parameters(name: str) -> ParameterSet:
     Parameters
     ----------
     name
-        Of the parameter set, see ``bywire list``.
+        Name of the parameter set, see ``bywire list``.
 
     Returns
     -------

@@ -126,14 +126,14 @@ def processes(
 def processes_with_brakes(
     count: int, advice: str, prepare: Callable[..., object] | None = None, *arguments: Any
 ) -> Iterator[ProcessPoolExecutor]:
-    """Yield `processes` that know the brakes of this one: copies of it where that is safe.
+    """Yield `processes` with the brakes of this one: copies of it where that is safe.
 
     Parameters
     ----------
     count, prepare, arguments
         As of `processes`.
     advice
-        What to do when one of them is killed.
+        Next step when one of them is killed.
 
     Raises
     ------
@@ -150,7 +150,7 @@ def processes_with_brakes(
             yield pool
     except BrokenProcessPool:
         raise RunError(
-            f"a process of the study was killed, most likely for want of memory: {advice}"
+            f"a process of the study was killed, probably out of memory: {advice}"
         ) from None
 
 

@@ -1,6 +1,6 @@
-"""Dimensions in the place of numbers: equations evaluated on them refuse sums of unlike quantities.
+"""Dimensions instead of numbers: equations evaluated on them reject sums of unlike quantities.
 
-They carry no value, so that no operating point can hide a mistake, and need no library of units.
+They have no value, so that no operating point can hide a mistake, and need no unit library.
 """
 
 from __future__ import annotations
@@ -37,13 +37,13 @@ _PURE = frozenset({"exp", "log", "sin", "cos", "arctan", "floor"})
 
 
 class DimensionError(UnitError):
-    """Two quantities that cannot be added or compared, or a function of what is no pure number."""
+    """Quantities that cannot be added or compared, or a function that needs a pure number."""
 
 
 class Dimension:
-    """A quantity of which only the dimension is known.
+    """A quantity with a dimension and no value.
 
-    Plain zero goes with every dimension, times whatever; of a plain NaN nothing is known.
+    Plain zero fits every dimension, also as a factor; a plain NaN has an unknown dimension.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ class Dimension:
         Raises
         ------
         UnitError
-            When nobody knows the unit.
+            When the unit is unknown.
         """
         return _parsed(unit)
 
@@ -119,14 +119,16 @@ class Dimension:
     __hash__ = None  # type: ignore[assignment]
 
     def fits(self, unit: str) -> bool:
-        """Tell whether this is the dimension of a unit."""
+        """Return whether this is the dimension of a unit."""
         return self.powers == Dimension.of(unit).powers
 
     def _bywire_op(self, name: str, *args: Any) -> Any:
         if name in _PURE or name == "power":
             for value in args:
                 if not _unknown(value) and any(_dimension(value).powers):
-                    raise DimensionError(f"ops.{name} of a quantity in {value}: no pure number")
+                    raise DimensionError(
+                        f"ops.{name} needs a pure number, not a quantity in {value}"
+                    )
             return Dimension.of("1")
         if name == "sqrt":
             return self**0.5
@@ -134,7 +136,7 @@ class Dimension:
             return self
         if name in ("fmax", "fmin"):
             return _alike("compared", *args)
-        raise DimensionError(f"ops.{name} says no dimension")
+        raise DimensionError(f"ops.{name} has no dimension")
 
 
 class Condition:
@@ -157,7 +159,7 @@ class Condition:
 
 
 def fits(value: Any, unit: str) -> bool:
-    """Tell whether a result has the dimension of a unit; a plain zero has that of any."""
+    """Return whether a result has the dimension of a unit; a plain zero fits any."""
     if isinstance(value, Dimension):
         return value.fits(unit)
     return bool(value == 0) or _unknown(value) or Dimension.of("1").fits(unit)

@@ -3,16 +3,16 @@
 ::
 
     BywireError
-    ├── InputError                exit status 2: something the user gave is wrong
+    ├── InputError                exit status 2: the user's input is wrong
     │   ├── ParameterError        a value outside its range, a missing or contradictory value
     │   ├── UnitError             a quantity whose unit does not fit
-    │   ├── UnknownNameError      a name that nothing answers to
+    │   ├── UnknownNameError      a name that does not exist
     │   ├── FileError             a file that cannot be read, understood or written
-    │   ├── ModelError            a model that does not give what the protocol asks for
+    │   ├── ModelError            a model that violates the protocol
     │   └── StepError             steps and sample times that do not divide each other
     └── RunError                  exit status 3: the computation failed
-        ├── SolverError           a trajectory that left the numbers or did not settle
-        ├── WorkLimitError        a run that takes more work than it may
+        ├── SolverError           a trajectory that diverged or did not settle
+        ├── WorkLimitError        a run that exceeds its work limit
         ├── CompilerError         a compiler that failed on a generated kernel
         └── DeviceError           a graphics processor that is missing, full or failed
 """
@@ -29,7 +29,7 @@ from typing import Any, Self
 from bywire.core.clean_text import shortened
 
 _SHOWN = 60  # characters of a value in a message
-_NEAR = 0.7  # resemblance of a name that was meant, where all are listed anyway
+_NEAR = 0.7  # least similarity of a suggestion in an error that lists all names
 _BARE_KEY = re.compile(r"[\w-]+", re.ASCII)
 
 
@@ -39,13 +39,13 @@ class BywireError(Exception):
     Parameters
     ----------
     text
-        What is wrong with its value, what is valid, and what to type.
+        What is wrong with the value, what is valid, and what to type.
     name
-        What is wrong, as the user writes it: a parameter, an option, a key, a column, a path.
+        Name as the user writes it: a parameter, an option, a key, a column, a path.
     value
         Its value, as the text shows it.
     valid
-        What would be accepted: a range with its unit, or the nearest names.
+        Valid values: a range with its unit, or the nearest names.
     """
 
     exit_status = 3
@@ -58,7 +58,7 @@ class BywireError(Exception):
         return shortened(super().__str__())
 
     def reworded(self, text: str) -> Self:
-        """Return the same error with another text, for instance with the file in front.
+        """Return the same error with another text, for instance with the file's name in front.
 
         Examples
         --------
@@ -75,7 +75,7 @@ class BywireError(Exception):
 
 
 class InputError(BywireError):
-    """Something the user gave is wrong."""
+    """The user's input is wrong."""
 
     exit_status = 2
 
@@ -85,11 +85,11 @@ class ParameterError(InputError):
 
 
 class UnitError(InputError):
-    """A quantity whose unit does not fit the place where it stands."""
+    """A quantity whose unit does not fit."""
 
 
 class UnknownNameError(InputError):
-    """A name that nothing answers to."""
+    """A name that does not exist."""
 
 
 class FileError(InputError):
@@ -97,7 +97,7 @@ class FileError(InputError):
 
 
 class ModelError(InputError):
-    """A model that does not give what the protocol asks for."""
+    """A model that violates the protocol."""
 
 
 class StepError(InputError):
@@ -109,11 +109,11 @@ class RunError(BywireError):
 
 
 class SolverError(RunError):
-    """A trajectory that left the numbers or did not settle."""
+    """A trajectory that diverged or did not settle."""
 
 
 class WorkLimitError(RunError):
-    """A run that takes more work than it may."""
+    """A run that exceeds its work limit."""
 
 
 class CompilerError(RunError):
@@ -125,7 +125,7 @@ class DeviceError(RunError):
 
 
 def place_of(thing: Any) -> str:
-    """Return file and line of a class or a function, or its name where nobody knows."""
+    """Return file and line of a class or a function, or its name if they are unknown."""
     from inspect import getsourcefile, getsourcelines
 
     try:
@@ -141,18 +141,18 @@ def not_valid(
     advice: str = "",
     kind: type[InputError] = ParameterError,
 ) -> InputError:
-    """Build the error for a value that is out of range, or of another kind than is needed.
+    """Build the error for a value that is out of range or of the wrong type.
 
     Parameters
     ----------
     name
-        What has the value, as the user writes it.
+        Name as the user writes it.
     value
-        The value with its unit, as the user reads it.
+        Value with its unit.
     valid
-        What it must be, to end the sentence "it must be ...".
+        Valid values, to end the sentence "it must be ...".
     advice
-        What to do, where that does not follow.
+        Next step, where it is not obvious.
     kind
         Class of the error.
 
@@ -175,13 +175,13 @@ def unknown_name(
     Parameters
     ----------
     kind
-        What was looked for, for instance ``"experiment"``.
+        Kind of the name, for instance ``"experiment"``.
     name
-        What the user wrote.
+        Name that the user wrote.
     known
-        Every name that would have been accepted.
+        Every valid name.
     first
-        Those of them that a listing begins with.
+        Names that come first in the list.
     """
     every, leading = {*known}, sorted(first)
     candidates = [*leading, *sorted(every.difference(leading))]
@@ -192,7 +192,7 @@ def unknown_name(
 
 
 def unknown_of_few(kind: str, name: str, known: Iterable[str]) -> UnknownNameError:
-    """Build the error for an unknown name among few: the one that is near, and all in their order.
+    """Build the error for an unknown name among few, with the nearest one and all in their order.
 
     ``kind``, ``name``, ``known``: as of `unknown_name`.
 
@@ -210,15 +210,15 @@ def unknown_of_few(kind: str, name: str, known: Iterable[str]) -> UnknownNameErr
     return UnknownNameError(text, name=kind, value=name, valid=", ".join(every))
 
 
-def nearest_first(names: Iterable[str], wanted: Iterable[str]) -> str:
-    """Return names as an error lists them: those that resemble what is wanted first, not all.
+def nearest_first(names: Iterable[str], requested: Iterable[str]) -> str:
+    """Return a short list of names for an error, those most similar to the requested ones first.
 
     Examples
     --------
     >>> nearest_first(["time", "p_caliper", "i_set"], ["p_set", "i_set"])
     'i_set, p_caliper, time'
     """
-    aims = list(wanted)
+    aims = list(requested)
 
     def distance(name: str) -> float:
         return -max((SequenceMatcher(None, name, aim).ratio() for aim in aims), default=0.0)
@@ -227,7 +227,7 @@ def nearest_first(names: Iterable[str], wanted: Iterable[str]) -> str:
 
 
 def quoted(value: object) -> str:
-    """Return a value as an error quotes it: as a TOML file has it, on one line, cut off where long.
+    """Return a value for an error in TOML notation, on one line, shortened if long.
 
     Examples
     --------
@@ -246,7 +246,7 @@ def quoted(value: object) -> str:
 
 
 def _as_toml(value: object) -> str:
-    """Return a value as a TOML file has it; what TOML has not, as Python has it."""
+    """Return a value in TOML notation; in Python's if TOML has none for it."""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, (date, time)):
@@ -264,7 +264,7 @@ def _key(name: str) -> str:
 
 
 def _listing(candidates: list[str]) -> str:
-    return f"known are {_shown(candidates)}" if candidates else "none is known here"
+    return f"known are {_shown(candidates)}" if candidates else "there are none here"
 
 
 def _shown(names: list[str]) -> str:

@@ -1,9 +1,9 @@
-"""Fault modes: what may fail, as elements and brakes declare it.
+"""Fault modes that elements and brakes declare.
 
-There are three mechanisms and nothing else in the equations: parameters that change at an instant,
-signals between plant and controllers that are falsified, and controllers that miss their ticks.
-An element names the parameters that a failure of it changes; a brake names the signals, in a module
-``faults`` of its package, and what takes several changes together.
+The equations know three mechanisms: parameters that change at an instant, falsified signals between
+plant and controllers, and controllers that miss their ticks. An element names the parameters that
+its failure changes. A brake names the signals and the failures with several changes, in a module
+``faults`` of its package.
 """
 
 from __future__ import annotations
@@ -19,24 +19,24 @@ Side = Literal["reading", "demand", "drive"]
 
 @dataclass(frozen=True)
 class ParameterFault:
-    """A failure of an element that changes parameters of it; in its module, in ``FAULTS``.
+    """A failure that changes parameters of an element; declared in ``FAULTS`` of its module.
 
     Parameters
     ----------
     name
         Of the mode, for instance ``"demagnetized"``.
     summary
-        What happens, in one line.
+        Description in one line.
     scaled
-        Parameters that are multiplied by the fault's value.
+        Parameters that the fault multiplies by its value.
     value
-        That factor, as it is unless given.
+        Default of that factor.
     replaced
-        Parameter that takes the fault's value; instead of ``scaled``.
+        Parameter that the fault sets to its value; instead of ``scaled``.
     with_it
-        Choices and further parameters that change as well.
+        Choices and other parameters that also change.
     needs
-        Choices of the assembly without which there is nothing to fail, by dotted name.
+        Choices of the assembly that this failure requires, by dotted name.
     """
 
     name: str
@@ -50,29 +50,29 @@ class ParameterFault:
 
 @dataclass(frozen=True)
 class Channel:
-    """A signal between plant and controllers, which may be falsified.
+    """A signal between plant and controllers that faults can falsify.
 
     Parameters
     ----------
     name
-        What faults of it are called after: ``"pressure"`` has ``pressure.stuck``.
+        Prefix of its faults' names: ``"pressure"`` has ``pressure.stuck``.
     summary
-        What it carries.
+        Description of the signal.
     unit
-        SI unit in which values and offsets are given.
+        SI unit of values and offsets.
     signal
-        State that controllers read, field of their memory that the plant feels, or stimulus.
+        State that controllers read, field of their memory that acts on the plant, or stimulus.
     side
         ``"reading"`` of a sensor, ``"drive"`` from controller to actuator, or ``"demand"``: a field
-        of the stimulus, of which those that are not declared are channels under their own names.
+        of the stimulus. Undeclared demands are channels under their own names.
     seen
         ``seen(value, par)``: the signal at a value; affine in it. The value itself by default.
     stuck
-        Value of ``stuck`` unless given, in ``unit``.
+        Default value of ``stuck``, in ``unit``.
     offset
-        Value of ``offset``, per second of ``drift``, standard deviation of ``noise``.
+        Default of ``offset``, of ``drift`` per second, and of the standard deviation of ``noise``.
     task
-        Of a drive: the task that renews it, where that may be late.
+        Of a drive: the task that updates it, if that task may be late.
     """
 
     name: str
@@ -88,22 +88,22 @@ class Channel:
 
 @dataclass(frozen=True)
 class Fault:
-    """A failure that takes several changes of parameters together; of a brake.
+    """A failure of a brake that changes several parameters together.
 
     Parameters
     ----------
     name
         Place and mode, for instance ``"battery.lost"``.
     summary
-        What happens, in one line.
+        Description in one line.
     changes
         ``changes(par, value)``: parameters and choices that change, by dotted name.
     assembly
-        Name of the assembly that has it, or of several.
+        Name of its assembly, or names of several.
     unit
-        SI unit of its value; empty where it has none.
+        SI unit of its value; empty if it has none.
     value
-        Its value unless given.
+        Default value.
     """
 
     name: str
@@ -114,7 +114,7 @@ class Fault:
     value: float = 0.0
 
     def is_of(self, assembly: str) -> bool:
-        """Return whether an assembly of a name has it."""
+        """Return whether the assembly of a name has this failure."""
         return assembly in ((self.assembly,) if isinstance(self.assembly, str) else self.assembly)
 
 
@@ -127,7 +127,7 @@ class Channels:
     name
         Of the assembly.
     channels
-        Those of its signals that may be falsified, beside its demands.
+        Signals that faults can falsify, in addition to its demands.
     """
 
     name: str
@@ -137,4 +137,4 @@ class Channels:
 CHANNELS = Kind("channel", ("faults",), instances(Channels))
 """the channels of every assembly, by its name"""
 FAULTS = Kind("fault", ("faults",), instances(Fault))
-"""failures of brakes that take several changes"""
+"""failures of brakes that change several parameters"""

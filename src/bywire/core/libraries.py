@@ -129,11 +129,11 @@ def silence_matplotlib() -> None:
 
 
 def how_to_install(extra: str) -> str:
-    """Return the commands that install an extra, for an installed package and for a clone.
+    """Return the command that installs an extra: in a clone, since the package is on no index.
 
     Examples
     --------
     >>> how_to_install("measurements")
-    "pip install 'bywire[measurements]', or in a clone pip install -e '.[measurements]'"
+    "in your clone: pip install -e '.[measurements]'"
     """
-    return f"pip install 'bywire[{extra}]', or in a clone pip install -e '.[{extra}]'"
+    return f"in your clone: pip install -e '.[{extra}]'"

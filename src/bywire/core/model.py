@@ -1,7 +1,7 @@
-"""The model protocol: all that the engine asks of a brake, a rig or any other system.
+"""The model protocol: everything the engine needs from a brake, a rig or another system.
 
 A model is written as pure functions of named tuples. The engine evaluates them once on symbols
-and knows nothing else about the system. What a model gives:
+and needs nothing else. A model has:
 
 * smooth dynamics in mass form, ``mass_k(xe) dx_k/dt = balance_k(x, xe, ...)``;
 * dry *frictions*: a velocity state whose equation carries a set-valued force between two bounds
@@ -37,12 +37,12 @@ class Task:
     Parameters
     ----------
     name
-        What recordings and messages call it.
+        Name in recordings and messages.
     period
         Sample time [s]; a whole number of substeps.
     tick
         ``tick(x, memory, stimulus, par) -> memory``: reads the plant at the sampling instant
-        and returns the memory with the fields that this task owns renewed.
+        and returns the memory with this task's fields updated.
     """
 
     name: str
@@ -51,7 +51,7 @@ class Task:
 
 
 class Model(Protocol):
-    """What the engine integrates. All methods are pure and symbolic-ready.
+    """A system that the engine integrates. All methods are pure and accept symbols.
 
     A model may inherit from this class; frictions, limits and contacts then default to none.
     """
@@ -68,7 +68,7 @@ class Model(Protocol):
 
     @property
     def Memory(self) -> type[NamedTuple]:
-        """What the tasks hold between their ticks: controller states and outputs."""
+        """Memory of the tasks between ticks: controller states and outputs."""
         ...
 
     @property
@@ -83,7 +83,7 @@ class Model(Protocol):
 
     @property
     def Output(self) -> type[NamedTuple]:
-        """What a recording holds."""
+        """Signals of a recording."""
         ...
 
     @property
@@ -100,7 +100,7 @@ class Model(Protocol):
     def usually_open(self) -> tuple[bool, ...]:
         """Per contact group, whether it rarely touches, as end stops do; none by default.
 
-        Speed only: an open group costs nothing but its check, a touching one the exact pass.
+        This affects speed only: an open group costs one check, a touching one the exact solution.
         """
         return ()
 
@@ -128,7 +128,7 @@ class Model(Protocol):
     def compliance(self, par: Any) -> tuple[Matrix, ...]:
         """Return one positive definite compliance matrix per contact group.
 
-        An empty one where a choice leaves the group out: it has no overlaps and no forces then.
+        It is empty if a choice omits the group, which then has no overlaps and no forces.
         """
         return ()
 
@@ -165,33 +165,33 @@ class Model(Protocol):
         reaction: tuple[float, ...],
         flow: Any,
     ) -> Any:
-        """Return what is recorded at an instant; ``reaction`` is that of the last substep."""
+        """Return the recorded signals at an instant; ``reaction`` is that of the last substep."""
         ...
 
     def rest(self, par: Any) -> tuple[Any, Any]:
         """Return a State and a Memory in which the system rests without stimulus.
 
-        Where generic experiments and checks start; all zeros by default, which is right where
-        nothing is preloaded, filled or held.
+        Generic experiments and checks start here. The default, all zeros, is right if nothing is
+        preloaded, filled or held.
         """
         return zeros(self.State), zeros(self.Memory)
 
     def watch(self, recording: Any, par: Any) -> list[str]:
-        """Return what the user should know of a recording: validity left, stops met, none here.
+        """Return warnings about a recording, such as exceeded validity or touched stops; none here.
 
         Parameters
         ----------
         recording
-            An xarray.Dataset of at least one row; it may hold a selection of the signals.
+            An xarray.Dataset of at least one row; it may contain only some of the signals.
         par
             The run's parameters.
         """
         return []
 
     def remarks(self, recording: Any, par: Any) -> list[str]:
-        """Return what stands above the key figures of a run: how its controllers fit it; nothing.
+        """Return notes above the key figures of a run, such as on its controllers; none here.
 
-        Unlike what ``watch`` says it is no warning, and studies do not ask for it.
+        Unlike the texts of ``watch``, they are not warnings, and studies do not need them.
 
         Parameters
         ----------
@@ -203,27 +203,27 @@ class Model(Protocol):
         return []
 
     def watched(self, par: Any) -> tuple[str, ...] | None:
-        """Return the recorded signals that ``watch`` looks at; None where that is not known.
+        """Return the recorded signals that ``watch`` reads; None if they are unknown.
 
-        Studies record no others, beside those of key figures and of the books of energy.
+        Studies record only these and the signals of key figures and of the energy balance.
         """
         return None
 
     def silent(self, rows: Any, pars: Any) -> frozenset[str]:
-        """Return what ``watch`` need not look at in any of several cases; see `Assembly.silent`."""
+        """Return parts that ``watch`` can skip in several cases; see `Assembly.silent`."""
         return frozenset()
 
     def may_warn(self, rows: Any, pars: Any) -> Sequence[int]:
-        """Return the cases of several of which ``watch`` may say something; all by default.
+        """Return the cases for which ``watch`` may return warnings; all by default.
 
-        ``rows``: signals of shape (cases, rows), ``rows.silent`` what is `silent` in all of them;
+        ``rows``: signals of shape (cases, rows), ``rows.silent`` the parts `silent` in all of them;
         ``pars``: parameters of each case.
         """
         return range(len(pars))
 
 
 def require_states(model: Any) -> None:
-    """Refuse frictions and limits of a model that are none of its states.
+    """Reject frictions and limits of a model that are not among its states.
 
     Parameters
     ----------
@@ -243,13 +243,11 @@ def require_states(model: Any) -> None:
         cls = model if isinstance(model, type) else type(model)
         where = f"{place_of(cls)}: {model.name}: {kind}"
         if not isinstance(names, tuple):
-            raise ModelError(
-                f"{where} = {names!r}: a tuple of states is wanted, as ({fields[0]!r},)"
-            )
+            raise ModelError(f"{where} = {names!r} must be a tuple of states, as ({fields[0]!r},)")
         for name in names:
             if name not in fields:
                 error = unknown_name("state", str(name), fields)
-                raise ModelError(f"{where} names {name!r}, which is no field of State: {error}")
+                raise ModelError(f"{where} names {name!r}, which is not a field of State: {error}")
 
 
 def _declared(module: ModuleType) -> Iterator[type[Any]]:
@@ -275,12 +273,12 @@ else:
 
 
 class Wrapping(_Protocol):
-    """A model around another one, with another memory where a subclass says so.
+    """A model around another one; a subclass may declare another memory.
 
     Parameters
     ----------
     inner
-        The model inside; every member of the protocol that is not defined here is its own.
+        The model inside, which provides every protocol member that is not defined here.
     """
 
     def __init__(self, inner: Model) -> None:
@@ -321,7 +319,7 @@ class Wrapping(_Protocol):
         return self.inner.mass(xe, par)
 
     def memory_inside(self, memory: Any) -> Any:
-        """Return the memory as the plant inside feels it."""
+        """Return the memory that acts on the plant inside."""
         return memory
 
     def balance(self, x: Any, xe: Any, memory: Any, par: Any, contact: tuple[float, ...]) -> Any:
@@ -357,5 +355,5 @@ class Wrapping(_Protocol):
         reaction: tuple[float, ...],
         flow: Any,
     ) -> Any:
-        """Return what is recorded."""
+        """Return the recorded signals."""
         return self.inner.output(x, self.memory_inside(memory), par, contact, reaction, flow)

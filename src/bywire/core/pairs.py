@@ -1,4 +1,4 @@
-"""Lines such as ``motor.R_m=0.4 ohm``, as commands and forms take them."""
+"""Parsing of options such as ``motor.R_m=0.4 ohm`` in commands and forms."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _INPUT = ("--input", "Inputs")  # of a command, and of a form
 _CHANGE = "KEY=VALUE, for instance motor.R_m=0.4ohm"
 _FORMS = {
     **dict.fromkeys(
-        _INPUT, "STIMULUS=SIGNAL, what drives the model and what was measured: p_set=p_ref"
+        _INPUT, "STIMULUS=SIGNAL, a stimulus of the model and the measured signal: p_set=p_ref"
     ),
     "--option": "NAME=VALUE, an option of the method ('bywire list METHOD')",
     "--prior": "NAME=VALUE +- DEVIATION, for instance 'motor.R_m=0.35 +- 0.02 ohm'",
@@ -20,12 +20,12 @@ _FORMS = {
 
 
 def named(texts: Iterable[str] | None, flag: str) -> dict[str, str]:
-    """Return what an option ``NAME`` or ``NAME=TEXT`` names, with an empty text by default.
+    """Return names and texts of an option ``NAME`` or ``NAME=TEXT``; texts are empty by default.
 
     Raises
     ------
     ParameterError
-        For what names nothing, and names that are given twice.
+        For an empty name, and for repeated names.
     """
     values: dict[str, str] = {}
     for text in texts or ():
@@ -39,7 +39,7 @@ def named(texts: Iterable[str] | None, flag: str) -> dict[str, str]:
             )
         if name in values:
             raise ParameterError(
-                f"{flag} {text}: {name} is given twice: leave one of them out",
+                f"{flag} {text}: {name} is given twice: remove one of them",
                 name=flag,
                 value=text,
             )
@@ -48,14 +48,14 @@ def named(texts: Iterable[str] | None, flag: str) -> dict[str, str]:
 
 
 def changes(texts: Iterable[str] | None, flag: str = "--set") -> dict[str, str]:
-    """Return what ``--set KEY=VALUE``, or another such option, asks for.
+    """Return keys and values of ``--set KEY=VALUE`` or a similar option.
 
     A stimulus of ``--input`` alone is driven by the measured signal of its name.
 
     Raises
     ------
     ParameterError
-        For what is no KEY=VALUE, and keys that are set twice.
+        For a text without the form KEY=VALUE, and for repeated keys.
     """
     values: dict[str, str] = {}
     for text in texts or ():
@@ -68,14 +68,14 @@ def changes(texts: Iterable[str] | None, flag: str = "--set") -> dict[str, str]:
             )
         if key in values:
             raise ParameterError(
-                f"{flag} {text}: {key} is set twice: leave one of them out", name=flag, value=text
+                f"{flag} {text}: {key} is set twice: remove one of them", name=flag, value=text
             )
         values[key] = value
     return values
 
 
 def read_count(text: str) -> int | None:
-    """Return the whole number >= 0 that a text is, of at most `DIGITS` digits; None for another.
+    """Return a text of at most `DIGITS` digits as a whole number >= 0, or None.
 
     Examples
     --------

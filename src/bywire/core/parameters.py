@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Leaf:
-    """What is known about one number of a parameter set."""
+    """Description of one number of a parameter set."""
 
     name: str
     unit: Unit
@@ -50,20 +50,20 @@ class Leaf:
     low_open: bool
     high_open: bool
     is_whole: bool = False
-    """whether only whole numbers are admissible"""
+    """whether only whole numbers are valid"""
 
     def admits(self, value: float) -> bool:
-        """Return whether a value [SI] lies in the admissible range."""
+        """Return whether a value [SI] is in the valid range."""
         above = value > self.low if self.low_open else value >= self.low
         return above and (value < self.high if self.high_open else value <= self.high)
 
     @property
     def range_text(self) -> str:
-        """Admissible range as a user reads it, for instance ``> 0 ohm``."""
+        """Valid range as a text, for instance ``> 0 ohm``."""
         return self.range_in(self.unit.symbol)
 
     def range_in(self, symbol: str) -> str:
-        """Return the admissible range in a unit of the same dimension."""
+        """Return the valid range in a unit of the same dimension."""
         unit = "" if symbol == "1" else f" {symbol}"
         low, high = self.low, self.high
         if low == high:
@@ -81,18 +81,18 @@ class Leaf:
 # --- Parameter sets
 # A *leaf* is a number with a unit; its dotted name (``motor.R_m``) is the same in Python, in
 # bench files, in recordings and on the command line. A *choice* is a field that selects
-# equations (``gear.law = "directional"``); it takes part in what is compiled, never in a value.
+# equations (``gear.law = "directional"``); it affects the compiled code, never a value.
 #
 # Studies and searches make thousands of sets a second that differ from one in the same few names.
 
 S = TypeVar("S", bound=BaseModel)
 
 KNOWN = "_known"
-"""where a set keeps by name what it holds, beside its fields"""
+"""attributes in which a set caches its content by name"""
 
 
 def fields_of(node: BaseModel) -> dict[str, Any]:
-    """Return the fields of a set by name, in order, without what it has worked out beside them."""
+    """Return the fields of a set by name, in order, without cached values."""
     kept, names = node.__dict__.copy(), _field_names(type(node))
     kept.pop(KNOWN, None)
     return kept if len(kept) == len(names) else {name: kept[name] for name in names}
@@ -104,7 +104,7 @@ def _field_names(cls: type[BaseModel]) -> tuple[str, ...]:
 
 
 def read(node: BaseModel, names: tuple[str, ...]) -> dict[str, Any]:
-    """Return what stands at dotted names."""
+    """Return the values at dotted names."""
     return dict(zip(names, _reader(names)(node), strict=True))
 
 
@@ -115,16 +115,16 @@ def _reader(names: tuple[str, ...]) -> Callable[[Any], tuple[Any, ...]]:
 
 
 class Places(NamedTuple):
-    """Where values of dotted names go: fields of a set itself, and places in its groups."""
+    """Places of dotted names: fields of a set itself, and places in its groups."""
 
     fields: tuple[tuple[str, str], ...]
     """field and dotted name"""
     groups: tuple[tuple[str, Places], ...]
-    """field, and what goes into the group there"""
+    """field, and the places within its group"""
 
     @classmethod
     def of(cls, names: Sequence[str], prefix: str = "") -> Places:
-        """Return where values of names go that begin with the prefix of a group."""
+        """Return the places of names with the prefix of a group."""
         own: list[tuple[str, str]] = []
         groups: dict[str, list[str]] = {}
         for name in names:
@@ -137,14 +137,14 @@ class Places(NamedTuple):
         return cls(tuple(own), tuple(inner))
 
     def filled(self, node: S, values: Mapping[str, Any]) -> S:
-        """Return a set with other values; of a set whose groups alone change, its rules are asked.
+        """Return a set with other values; if only groups change, check the set's rules alone.
 
         Raises
         ------
         ValueError
             When a value or a rule does not fit; pydantic's `ValidationError` is one.
         AssertionError
-            When a rule of an author says so.
+            When a rule of an author fails.
         """
         fields = fields_of(node)
         for name, inner in self.groups:
@@ -163,7 +163,7 @@ class Places(NamedTuple):
 
 @cache
 def _rules(cls: type[BaseModel]) -> tuple[str, ...] | None:
-    """Return the methods by which a class judges a set of valid groups; None where it does more."""
+    """Return the rules of a class for a set of valid groups; None if it validates more."""
     known, groups = cls.__pydantic_decorators__, cls.model_fields.values()
     judges = known.model_validators
     does_more = (
@@ -184,7 +184,7 @@ def _is_group(annotation: Any) -> bool:
     return isinstance(annotation, type) and issubclass(annotation, BaseModel)
 
 
-# --- What is said of values that are refused: one line each, in the user's words
+# --- Errors for values that are not valid: one line each
 
 _BOOL, _TEXT = "it must be true or false", "it must be a text"
 _PLAIN_WORDS = {"bool_parsing": _BOOL, "bool_type": _BOOL, "string_type": _TEXT}
@@ -198,17 +198,17 @@ def refusal(
     Parameters
     ----------
     error
-        What pydantic found.
+        Error of pydantic.
     owner
         Name of the class of the parameter set.
     leaves
         Its numbers by dotted name.
     texts
-        How numbers were written, by dotted name, where they came as texts.
+        Original texts of numbers, by dotted name.
     """
     details: list[dict[str, Any]] = [dict(detail) for detail in error.errors()]
     places = {detail["loc"][:-1] for detail in details}
-    # A table with a wrong node also counts as too short: the node alone is worth a line.
+    # A table with a wrong node also counts as too short; only the node gets a line.
     details = [d for d in details if not (_is_length(d) and d["loc"] in places)]
     each = [_explain(detail, owner, leaves, texts) for detail in details]
     if len(each) == 1:
@@ -231,8 +231,8 @@ def _explain(
     leaf = leaves.get(name) or leaves.get(name.rpartition(".")[0])
     if leaf is not None and kind != "value_error" and not _is_length(detail):
         is_broken = leaf.is_whole and (kind.startswith("int") or kind == "multiple_of")
-        wanted = "a whole number, " if is_broken else ""
-        return _out_of_range(name, value, leaf, wanted, texts.get(name, ""))
+        kind_text = "a whole number, " if is_broken else ""
+        return _out_of_range(name, value, leaf, kind_text, texts.get(name, ""))
     if _is_length(detail):
         return _wrong_count(name, detail, texts)
     message = _PLAIN_WORDS.get(kind, str(detail["msg"]).removeprefix("Value error, "))
@@ -240,24 +240,24 @@ def _explain(
     return ParameterError(f"{name or owner}: {message}{given}", name=name or owner)
 
 
-def _out_of_range(name: str, value: Any, leaf: Leaf, wanted: str, text: str) -> InputError:
+def _out_of_range(name: str, value: Any, leaf: Leaf, kind: str, text: str) -> InputError:
     symbol = leaf.unit.symbol
     number, written = split(text)
     if symbol == "rad" and written not in ("", symbol):  # drawings have angles in degrees
-        return not_valid(name, f"{number} {written}", wanted + leaf.range_in(written))
+        return not_valid(name, f"{number} {written}", kind + leaf.range_in(written))
     unit = "" if symbol == "1" else f" {symbol}"
     got = "" if written in ("", symbol) else f"got {quoted(text)}"
-    return not_valid(name, f"{value}{unit}", wanted + leaf.range_text, got)
+    return not_valid(name, f"{value}{unit}", kind + leaf.range_text, got)
 
 
 def _wrong_count(name: str, detail: Mapping[str, Any], texts: Mapping[str, str]) -> InputError:
     """Return the error for a table with too few or too many nodes."""
     context, value = detail["ctx"], detail["input"]
     short = detail["type"] == "too_short"
-    wanted = f"at least {context['min_length']}" if short else f"at most {context['max_length']}"
+    valid = f"at least {context['min_length']}" if short else f"at most {context['max_length']}"
     written = [texts.get(f"{name}.{k}", "") for k in range(len(value))]
     got = quoted(", ".join(written)) if written and all(written) else quoted(value)
-    return ParameterError(f"{name}: {wanted} wanted, got {got}", name=name, valid=wanted)
+    return ParameterError(f"{name} must have {valid} values, got {got}", name=name, valid=valid)
 
 
 def _is_length(detail: Mapping[str, Any]) -> bool:
@@ -267,7 +267,7 @@ def _is_length(detail: Mapping[str, Any]) -> bool:
 def _unknown_choice(name: str, value: Any, expected: str) -> InputError:
     near = get_close_matches(quoted(value), re.findall(r"'[^']*'", expected), n=1, cutoff=0.6)
     hint = f": did you mean {near[0]}?" if near else ""
-    text = f"{name}: it must be {expected}, got {quoted(value)}{hint}"
+    text = f"{name} must be {expected}, got {quoted(value)}{hint}"
     return ParameterError(text, name=name, value=quoted(value), valid=expected)
 
 
@@ -276,7 +276,7 @@ def _unknown_choice(name: str, value: Any, expected: str) -> InputError:
 T = TypeVar("T", bound="ParameterSet")
 
 
-_SIMPLE = {float, str}  # what is itself whatever it was written as
+_SIMPLE = {float, str}  # types that do not depend on the notation
 _OBJECTS = "_carries_objects"  # in the dictionary of a set whose leaves need not be numbers
 
 
@@ -292,22 +292,22 @@ class ParameterSet(BaseModel):
 
     @classmethod
     def create(cls, values: Mapping[str, Any]) -> Self:
-        """Build the set from dotted names; of numbers that are `Written`, errors say how.
+        """Build the set from dotted names; errors quote the text of `Written` numbers.
 
         Raises
         ------
         ParameterError
-            With field, value, unit and admissible range.
+            With field, value, unit and valid range.
         UnknownNameError
             With the nearest known names.
         """
         return _validated(cls, {}, values)
 
     def replace(self, values: Mapping[str, Any]) -> Self:
-        """Return a copy with other values at dotted names; groups that hold them are validated.
+        """Return a copy with other values at dotted names; the affected groups are validated.
 
-        It is the set itself where it has these numbers and choices. Of a set that carries other
-        objects than numbers (`with_leaves`) nothing is validated.
+        If nothing changes, it is the set itself. A set of other objects than numbers
+        (`with_leaves`) is not validated.
         """
         if _OBJECTS in self.__dict__:
             return cast(Self, _as_given(self, "", values))
@@ -315,7 +315,7 @@ class ParameterSet(BaseModel):
         if _are_there(values, numbers, choices):
             return self
         made = _exchanged(self, values)
-        # All others are known: thousands of sets a second differ from one in few values.
+        # All others are cached: thousands of sets per second differ from one in few values.
         given = read(made, tuple(values))
         new = {name: value for name, value in given.items() if type(value) is float}
         chosen = {name: value for name, value in given.items() if type(value) is str}
@@ -343,12 +343,12 @@ class ParameterSet(BaseModel):
         return dict(self._by_name("choices"))
 
     def has_choices_of(self, other: ParameterSet) -> bool:
-        """Return whether the structural choices are those of another set of this class."""
+        """Return whether another set of this class has the same structural choices."""
         here, there = self._by_name("choices"), other._by_name("choices")
         return here is there or here == there
 
     def value(self, name: str) -> Any:
-        """Return a leaf or choice of a dotted name that there is; ``name.0`` of a table's nodes."""
+        """Return the leaf or choice of an existing dotted name; ``name.0`` for a table's nodes."""
         value: Any = self
         for step in name.split("."):
             value = value[int(step)] if isinstance(value, tuple) else getattr(value, step)
@@ -359,9 +359,9 @@ class ParameterSet(BaseModel):
         return {}
 
     def _by_name(self, kind: str, prefix: str = "") -> dict[str, Any]:
-        """Return what is of a kind, ``values``, ``numbers`` or ``choices``, by dotted name.
+        """Return ``values``, ``numbers`` or ``choices`` by dotted name.
 
-        ``prefix``: what goes before the names. Groups that several sets share look theirs up once.
+        ``prefix``: prefix of the names. Groups that several sets share cache theirs.
         """
         known = self._known
         if (kind, prefix) not in known:
@@ -377,8 +377,8 @@ class ParameterSet(BaseModel):
     def with_leaves(self, values: Mapping[str, Any]) -> Self:
         """Return a set of the same structure that carries other objects as its numbers.
 
-        What is not named stays. The objects (symbols, quantities with units) are not validated: for
-        evaluating equations, not for building parameter sets.
+        Other values are unchanged. The objects (symbols, quantities with units) are not validated:
+        they are for evaluating equations, not for building parameter sets.
         """
         return cast(Self, _with_objects(_rebuilt(self, "", values)))
 
@@ -389,7 +389,7 @@ def leaf_table(pars: Sequence[ParameterSet]) -> NDArray[np.float64]:
     Raises
     ------
     TypeError, ValueError
-        Where they carry other objects than numbers.
+        When they contain other objects than numbers.
     """
     each = [par._by_name("numbers").values() for par in pars]
     shape = (len(each), len(each[0]))
@@ -427,9 +427,9 @@ def choice_fields(cls: type[ParameterSet], prefix: str = "") -> tuple[str, ...]:
 
 
 def choices_of(cls: type[ParameterSet], name: str) -> tuple[Any, ...]:
-    """Return what a structural choice of a dotted name may be; nothing where any text will do.
+    """Return the valid values of a structural choice; empty if any text is valid.
 
-    Texts, or of a field that is true or false these two.
+    They are texts, or true and false.
     """
     *groups, last = name.split(".")
     for group in groups:
@@ -439,12 +439,12 @@ def choices_of(cls: type[ParameterSet], name: str) -> tuple[Any, ...]:
 
 
 def require_units(cls: type[ParameterSet], prefix: str = "") -> None:
-    """Refuse a class with numbers that have no unit: they would count as structural choices.
+    """Reject a class with numbers without a unit, which would count as structural choices.
 
     Raises
     ------
     ModelError
-        Naming the first one, and its place.
+        With the first one and its place.
     """
     for name, info in cls.model_fields.items():
         inner = info.annotation
@@ -459,7 +459,7 @@ def require_units(cls: type[ParameterSet], prefix: str = "") -> None:
 
 
 def leaf_of(dotted: str, unit: Unit, info: FieldInfo) -> Leaf:
-    """Return what the constraints of a field say of a number."""
+    """Return the description of a number from a field's constraints."""
     low, high, low_open, high_open = -math.inf, math.inf, False, False
     is_whole = info.annotation is int
     for note in (*info.metadata, *_node_notes(info.annotation)):
@@ -484,7 +484,7 @@ def _node_notes(annotation: Any) -> Iterator[Any]:
 
 
 def _entries(kind: str, name: str, value: Any) -> dict[str, Any]:
-    """Return what a field is of a kind, see `ParameterSet._by_name`."""
+    """Return a field's content of a kind, see `ParameterSet._by_name`."""
     if kind == "values":
         return {name: value}
     if isinstance(value, tuple):
@@ -500,7 +500,7 @@ def _is_number(value: Any) -> bool:
 
 
 def _rebuilt(node: ParameterSet, prefix: str, values: Mapping[str, Any]) -> ParameterSet:
-    """Return a set of objects; groups of which none is given are those that there are."""
+    """Return a set of objects; groups without new ones are unchanged."""
     fields = fields_of(node)
     for name, value in fields.items():
         dotted = f"{prefix}{name}"
@@ -539,7 +539,7 @@ def _require_known(cls: type[ParameterSet], name: str) -> None:
 
 
 def _plain(name: str, value: Any, texts: dict[str, str]) -> Any:
-    """Return a value without the texts that it was written as, which are put aside by name."""
+    """Return a value without its original texts, which are stored by name."""
     if isinstance(value, tuple):
         return tuple(_plain(f"{name}.{k}", node, texts) for k, node in enumerate(value))
     if isinstance(value, Written):
@@ -551,7 +551,7 @@ def _plain(name: str, value: Any, texts: dict[str, str]) -> Any:
 def _are_there(
     values: Mapping[str, Any], numbers: Mapping[str, float], choices: Mapping[str, Any]
 ) -> bool:
-    """Return whether plain numbers and texts are what stands at these names."""
+    """Return whether the values at these names are plain numbers and texts."""
     for name, value in values.items():
         known = numbers if type(value) is float else choices if type(value) is str else {}
         if name not in known or known[name] != value:
@@ -559,9 +559,9 @@ def _are_there(
     return True
 
 
-@lru_cache(maxsize=256)  # the cases of a study all differ in the same ones
+@lru_cache(maxsize=256)  # all cases of a study differ in the same names
 def _places(cls: type[ParameterSet], names: tuple[str, ...]) -> Places:
-    """Return where values of dotted names go, or refuse a name that the class does not know."""
+    """Return the places of dotted names, or raise an error for an unknown name."""
     for name in names:
         _require_known(cls, name)
     return Places.of(names)
@@ -572,7 +572,7 @@ def _exchanged(node: T, values: Mapping[str, Any]) -> T:
     if _SIMPLE.issuperset(map(type, values.values())):
         try:
             return _places(type(node), tuple(values)).filled(node, values)
-        except (ValueError, AssertionError):  # all that is refused is said at once, below
+        except (ValueError, AssertionError):  # full validation below reports all errors together
             pass
     return _validated(type(node), fields_of(node), values)
 
@@ -580,8 +580,8 @@ def _exchanged(node: T, values: Mapping[str, Any]) -> T:
 def _validated(cls: type[T], tree: dict[str, Any], values: Mapping[str, Any]) -> T:
     """Return a set of a tree with other values at dotted names.
 
-    Groups of the tree that are sets stay as they are, unless a value in them changes: searches and
-    studies make thousands of sets a second.
+    Groups without changes are reused, since searches and studies build thousands of sets per
+    second.
     """
     texts: dict[str, str] = {}
     for name, value in values.items():
@@ -600,8 +600,8 @@ def _validated(cls: type[T], tree: dict[str, Any], values: Mapping[str, Any]) ->
 
 
 # --- Notes: the texts below the fields of a class
-# Read when somebody asks and not when a class is built: reading sources took a tenth of the
-# start-up of every command.
+# They are read on demand and not when a class is built, since reading sources took a tenth of every
+# command's start-up.
 
 
 @cache
@@ -611,9 +611,9 @@ def field_notes(cls: type[ParameterSet], prefix: str = "") -> Mapping[str, str]:
     Parameters
     ----------
     cls
-        Its fields carry a string right below them; a field without one has the note ``""``.
+        A string below a field is its note; a field without one has the note ``""``.
     prefix
-        Put before every name.
+        Prefix of every name.
     """
     written: dict[str, str] = {}
     for base in reversed(cls.__mro__):
@@ -639,9 +639,9 @@ def _written_under_fields(cls: type) -> Mapping[str, str]:
 
 @cache
 def _written_in(source: str) -> Mapping[str, Mapping[str, str]]:
-    """Return what stands under the fields of all classes of a file, by qualified name.
+    """Return the notes below the fields of all classes in a file, by qualified name.
 
-    Read at once: `inspect` parses a whole file for the source of each class.
+    All are read together, since `inspect` parses the whole file for each class.
     """
     return {name: _texts(definition) for name, definition in _classes(ast.parse(source))}
 
@@ -654,7 +654,7 @@ def _classes(node: ast.AST, prefix: str = "") -> Iterator[tuple[str, ast.ClassDe
             yield from _classes(child, f"{prefix}{child.name}.")
         elif isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef):
             yield from _classes(child, f"{prefix}{child.name}.<locals>.")
-        elif not isinstance(child, ast.expr):  # a class may stand in a condition
+        elif not isinstance(child, ast.expr):  # a class may be inside a condition
             yield from _classes(child, prefix)
 
 

@@ -1,4 +1,4 @@
-"""Parts of an assembly: elements by their modules, and assemblies within it."""
+"""Parts of an assembly: elements by their modules, and subassemblies."""
 
 from __future__ import annotations
 
@@ -60,32 +60,32 @@ class _Plain(Protocol[P_co]):
 
 
 class PartOptions(TypedDict, total=False):
-    """What may be said of a part beside its element.
+    """Options of a part.
 
     Parameters
     ----------
     par
-        Where its parameters stand in those of the assembly; its own name by default.
+        Place of its parameters in those of the assembly; its own name by default.
     suffix
-        Put behind the names of its states, for the second of a kind: ``"_2"``.
+        Suffix of its states' names, for the second part of a kind: ``"_2"``.
     state
-        Names of its states in the assembly, where they are others.
+        Names of its states in the assembly, if they differ.
     labels
-        Labels of its states, where they are others.
+        Labels of its states, if they differ.
     fixed
         States that enter the element's own equations value-only: periodic terms, slow geometry.
     output
         Its outputs and contact forces that are signals of the assembly, by their names there; or
-        the names alone, where they are the same.
+        only the names if they are equal.
     loss
         Name of the energy that its ``power_loss`` adds up to; or names, by function of the element.
-        Of a contact: what its work exceeds its stored energy by.
+        Of a contact: its work minus its stored energy.
     work
         Of a contact: name of the energy that its ``power_in`` adds up to.
     rarely
-        Of a contact: whether it rarely touches, as end stops do. Speed only.
+        Of a contact: whether it rarely touches, like an end stop. This affects speed only.
     outside
-        Whether what it stores stands in no book: it lies beyond the border of the balance.
+        Whether the energy balance excludes its stored energy.
     """
 
     par: str
@@ -106,7 +106,7 @@ OPTIONS = tuple(PartOptions.__annotations__)
 def _parameters_at(path: str, par: Any, where: str, declaration: str) -> Any:
     """Return the parameters at a dotted path of those of an assembly.
 
-    ``where``: whose they are; ``declaration``: how one says where they stand.
+    ``where``: their owner; ``declaration``: how to declare their place.
 
     Raises
     ------
@@ -118,7 +118,7 @@ def _parameters_at(path: str, par: Any, where: str, declaration: str) -> Any:
         value = getattr(value, name, None)
     if value is None:
         raise ModelError(
-            f"{where}: the parameters have no {path!r}: say where they stand, {declaration}"
+            f"{where}: the parameters have no {path!r}: give their place, {declaration}"
         )
     return value
 
@@ -178,7 +178,7 @@ class Part(Generic[X, U, F, P]):
     @overload
     def __get__(self, instance: Any, owner: type) -> Wired[X, U, F, P]: ...
     def __get__(self, instance: Any, owner: type) -> Any:
-        """Return the part, or of an assembly at an instant what its equations see of it."""
+        """Return the part; for an assembly at an instant, its values in the equations."""
         if instance is None:
             return self
         instant = instant_of(instance, self.where)
@@ -190,7 +190,7 @@ class Part(Generic[X, U, F, P]):
         raise ModelError(f"{self.where} is a part: assign its input, w.{self.name}.u")
 
     def has(self, function: str) -> bool:
-        """Tell whether the element defines a function."""
+        """Return whether the element defines a function."""
         return hasattr(self.element, function)
 
     def function(self, name: str) -> Callable[..., Any]:
@@ -199,7 +199,7 @@ class Part(Generic[X, U, F, P]):
         Raises
         ------
         ModelError
-            When it has none of that name.
+            When it has no function of that name.
         """
         value = getattr(self.element, name, None)
         if not callable(value):
@@ -256,26 +256,26 @@ class Part(Generic[X, U, F, P]):
 
     @cached_property
     def kept(self) -> dict[str, Signal]:
-        """Return the loss of a contact, which follows from its work and what it stores."""
+        """Return the loss of a contact, from its work and its stored energy."""
         if not self.has("Forces"):
             return {}
         return {name: self._energy(function, name) for name, function in self.losses.items()}
 
     def _energy(self, function: str, name: str) -> Signal:
-        """Return the integral of a power, with the label and the role that the element gives it."""
+        """Return the integral of a power, with the element's label and role."""
         hints = typing.get_type_hints(self.function(function), include_extras=True)
         power = signal_in(hints.get("return"))
         if power is None:
             raise ModelError(
-                f"{self.where}: {self.kind}.{function} says no unit: annotate its result with "
+                f"{self.where}: {self.kind}.{function} has no unit: annotate its result with "
                 "Annotated[float, Signal('W', label)]"
             )
         return Signal("J", power.label, role=power.role)
 
     def group_sizes(self, par: Any) -> tuple[int, ...]:
-        """Return how many forces each of its contact groups has, 0 where a choice leaves them out.
+        """Return the number of forces in each contact group; 0 if a choice omits the group.
 
-        Those of an element with ``exists(par)`` are there only where that says so.
+        Groups of an element with ``exists(par)`` exist only if that function returns true.
         """
         if not self.has("Forces"):
             return ()
@@ -285,17 +285,17 @@ class Part(Generic[X, U, F, P]):
         return sizes if there else (0,) * len(sizes)
 
     def parameters(self, par: Any) -> Any:
-        """Return its parameters, of those of the assembly.
+        """Return its parameters from those of the assembly.
 
         Raises
         ------
         ModelError
-            When there are none where it looks for them.
+            When there are none at its place.
         """
         return _parameters_at(self.path, par, self.where, f"Part({self.kind}, par='...')")
 
     def state_at(self, instant: Instant, fixed: tuple[str, ...] | None) -> Any:
-        """Return its state; ``fixed`` are those taken value-only, None for all."""
+        """Return its state; ``fixed`` names value-only states, None for all."""
         if not self.has("State"):
             raise ModelError(f"{self.where}: {self.kind} has no state")
         state_class: type[Any] = self.element.State
@@ -305,30 +305,29 @@ class Part(Generic[X, U, F, P]):
         )
 
     def forces_at(self, instant: Instant, par: Any) -> Any:
-        """Return its contact forces, as its element bends them if it does."""
+        """Return its contact forces, modified by its element if that defines it."""
         if not self.has("Forces"):
             raise ModelError(f"{self.where}: {self.kind} has no contact forces")
         forces = self.element.Forces(*instant.contact[self.name])
         return self.element.bent(forces, par) if self.has("bent") else forces
 
 
-# --- Assemblies within another one: names get a prefix, equations never see it
-# What an assembly holds is evaluated where the holder is, by slices of the holder's state, memory
-# and forces; its parameters stand in a group of the holder's. So the same assembly can be held
-# twice.
+# --- Subassemblies: their names get a prefix, which their equations do not contain
+# A subassembly is evaluated with slices of its holder's state, memory and forces. Its parameters
+# are a group of the holder's, so that a holder can contain the same assembly twice.
 
 
 class Seen:
-    """What an assembly recorded within another one, by its own names.
+    """Recording of a subassembly by its own names.
 
     Parameters
     ----------
     recording
-        The holder's: an xarray.Dataset, or what stands for one.
+        Recording of the holder: an xarray.Dataset, or a similar object.
     names
-        Names in there by own names.
+        Names in the recording by own names.
     place
-        What stands before its parts where those that are silent are named.
+        Prefix of its parts in the names of silent parts.
     """
 
     def __init__(self, recording: Any, names: Mapping[str, str], place: str) -> None:
@@ -349,7 +348,7 @@ class Seen:
         return self._recording[self._names.get(name, name)]
 
     def __getattr__(self, name: str) -> Any:
-        """Return what a Dataset has: it is made when it is asked for."""
+        """Return an attribute of the Dataset, which is built on first use."""
         if name.startswith("_"):
             raise AttributeError(name)
         there = self._recording[list(self._names.values())]
@@ -358,32 +357,32 @@ class Seen:
 
 A = TypeVar("A")
 KINDS = ("State", "Memory", "Flow", "Output", "Stimulus")
-"""signal tuples of an assembly, which the holder takes over"""
-_HEADS = ("E_", "W_", "t_", "noise_")  # say what a signal is, and stay in front
+"""signal tuples of an assembly that its holder includes"""
+_HEADS = ("E_", "W_", "t_", "noise_")  # kinds of signals, which stay in front of the prefix
 
 
 class Sub(Generic[A]):
-    """An assembly within another one, with all it has, tasks included.
+    """A subassembly: an assembly within another one, including its tasks.
 
     Parameters
     ----------
     assembly
-        Its class; or what makes one with options of its own, such as ``partial(Rig, side=2)``.
+        Its class, or a function that builds it with options, such as ``partial(Rig, side=2)``.
     prefix
-        Put before the names of its signals and tasks: ``"rear_"`` makes ``rear_i`` of ``i``.
-        What their beginning tells stays in front: ``E_rear_copper``, ``noise_rear_p``.
+        Prefix of its signals and tasks: with ``"rear_"``, ``i`` becomes ``rear_i``. Kinds of
+        signals stay in front: ``E_rear_copper``, ``noise_rear_p``.
     par
-        Where its parameters stand in those of the holder; the name of the attribute by default.
+        Place of its parameters in those of the holder; the name of the attribute by default.
     label
-        What labels, books and warnings call it; the prefix in words by default.
+        Its name in labels, energy balances and warnings; the prefix in words by default.
     feeds
-        Fields of its stimulus that the holder gives, with where these come from: fields of the
-        holder's memory or stimulus. The others become fields of the holder's stimulus.
+        Fields of its stimulus -> fields of the holder's memory or stimulus that feed them. Other
+        fields become fields of the holder's stimulus.
 
     Raises
     ------
     ModelError
-        For what is no assembly, a prefix that makes no names, and unknown fields.
+        For anything but an assembly, a prefix that is not valid, and unknown fields.
     """
 
     name: str
@@ -405,12 +404,12 @@ class Sub(Generic[A]):
         self.feeds = dict(feeds or {})
         if not hasattr(kind, "parts"):
             raise ModelError(
-                f"Sub({kind.__name__}): it is no assembly with a memory: hold a class that "
+                f"Sub({kind.__name__}): it is not an assembly with a memory: hold a class that "
                 "inherits from Assembly and declares Memory"
             )
         if not f"{prefix}x".isidentifier() or prefix.startswith("_"):
             raise ModelError(
-                f"Sub({kind.__name__}): the prefix {prefix!r} makes no names: take a word and an "
+                f"Sub({kind.__name__}): the prefix {prefix!r} is not valid: use a word and an "
                 "underscore, like 'rear_'"
             )
         for name in self.feeds:
@@ -430,7 +429,7 @@ class Sub(Generic[A]):
     @overload
     def __get__(self, instance: Any, owner: type) -> A: ...
     def __get__(self, instance: Any, owner: type) -> Any:
-        """Return what is declared, or of a holder at an instant the assembly at that instant."""
+        """Return the declaration; for a holder at an instant, the assembly at that instant."""
         if instance is None:
             return self
         instant = instant_of(instance, self.where)
@@ -478,7 +477,7 @@ class Sub(Generic[A]):
 
     @property
     def records(self) -> tuple[str, ...]:
-        """What it records, by the names in the holder."""
+        """Its recorded signals, by the names in the holder."""
         return tuple(map(self.named, type(self.assembly).Output._fields))
 
     def _signal(self, name: str, signal: Signal) -> Signal:
@@ -496,7 +495,7 @@ class Sub(Generic[A]):
         )
 
     def _role(self, name: str, signal: Signal) -> Role | None:
-        """Return the role of a signal; that which its name tells, where books go by names."""
+        """Return the role of a signal; derived from its name where balances use names."""
         if signal.role is not None or not name.startswith("E_"):
             return signal.role
         others = signals_of(type(self.assembly).Output).values()
@@ -513,7 +512,7 @@ class Sub(Generic[A]):
         return {kind: tuple(map(self.named, names)) for kind, names in kinds.items()}
 
     def inside(self, kind: str, values: Any) -> Any:
-        """Return its own tuple of one of `KINDS` out of the holder's; None where that is None."""
+        """Return its own tuple of one of `KINDS` from the holder's; None if that is None."""
         if values is None:
             return None
         tuple_type = getattr(type(self.assembly), kind)
@@ -524,12 +523,12 @@ class Sub(Generic[A]):
         return dict(zip(self._places[kind], values, strict=True))
 
     def parameters(self, par: Any) -> Any:
-        """Return its parameters, of those of the holder.
+        """Return its parameters from those of the holder.
 
         Raises
         ------
         ModelError
-            When there are none where it looks for them.
+            When there are none at its place.
         """
         declaration = f"Sub({type(self.assembly).__name__}, par='...')"
         return _parameters_at(self.path, par, self.where, declaration)
@@ -561,6 +560,6 @@ class Sub(Generic[A]):
     # Recordings.
 
     def seen(self, recording: Any) -> Seen:
-        """Return a recording, or rows of one, as the assembly knows it: by its own names."""
+        """Return a recording, or rows of one, by the assembly's own names."""
         names = dict(zip(type(self.assembly).Output._fields, self.records, strict=True))
         return Seen(recording, names, f"{self.name}.")

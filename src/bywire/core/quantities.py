@@ -1,7 +1,7 @@
-"""Physical quantities: unit and admissible range, declared once, read by everything else.
+"""Physical quantities: unit and valid range, declared once.
 
-A parameter's type says all there is to know about it: ``R_m: Resistance`` carries the unit
-``ohm`` and the range ``> 0``. SI and radians inside; the edges show ``display`` units.
+A parameter's type defines unit and range: ``R_m: Resistance`` has the unit ``ohm`` and the range
+``> 0``. Values inside are SI with radians; files, commands and figures show ``display`` units.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class Unit:
     nominal: float = 1.0
 
 
-# How the edges (files, command line, figures) show a quantity that is SI inside.
+# Units of files, command line and figures for quantities that are SI inside.
 DISPLAY_UNITS = {
     "Pa": "bar",
     "Pa/A": "bar/A",
@@ -45,7 +45,7 @@ DISPLAY_UNITS = {
 
 
 def display_unit(symbol: str) -> str:
-    """Return the unit in which the edges show an SI unit."""
+    """Return the display unit of an SI unit."""
     return DISPLAY_UNITS.get(symbol, symbol)
 
 

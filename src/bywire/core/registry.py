@@ -1,9 +1,8 @@
-"""The registry: everything that has a name, of whatever kind, and where it is found.
+"""The registry: all named things by kind, with their places.
 
-The room that knows a kind of thing declares the `Kind`; a file declares a thing. The general
-ones stand in a package of that room, those of a brake in the module or folder of its package
-that the kind names (``experiments``, ``loops``, ...), or in the brake's single file. So a new
-file is all that a new thing takes.
+A package declares each `Kind`, and a file declares each thing. General things are in that package.
+Those of a brake are in the module or folder of its package that the kind names (``experiments``,
+``loops``, ...), or in the brake's single file. So a new thing needs only a new file.
 """
 
 from __future__ import annotations
@@ -36,12 +35,12 @@ from bywire.core.errors import ModelError, UnknownNameError, unknown_name
 
 
 def _declared_at(module: ModuleType, thing: object) -> str:
-    """Return file and line of what a module declares; the file alone where nobody knows the line.
+    """Return file and line of a declaration in a module; the file alone if the line is unknown.
 
     Parameters
     ----------
     module
-        Module that holds it, by a name of its own or in a tuple; what it imports has no line there.
+        Module that declares it, as a variable or in a tuple; its imports have no line there.
     thing
         Object, or class.
     """
@@ -51,7 +50,7 @@ def _declared_at(module: ModuleType, thing: object) -> str:
 
 
 def _declared_line(module: ModuleType, thing: object) -> int:
-    """Return the line on which a module declares a thing; 0 where nobody knows."""
+    """Return the line on which a module declares a thing; 0 if unknown."""
     try:
         tree = ast.parse(inspect.getsource(module))
     except (OSError, TypeError, SyntaxError):  # typed into a console, or changed since
@@ -69,7 +68,7 @@ def _declared_line(module: ModuleType, thing: object) -> int:
 
 
 def _line(node: ast.Assign | ast.AnnAssign, held: object, thing: object) -> int:
-    """Return the line of a thing in an assignment whose name holds it; 0 where it does not."""
+    """Return the line of the assignment that contains a thing; 0 if there is none."""
     if held is thing:
         return node.lineno
     if type(held) is not tuple or not any(each is thing for each in held):
@@ -88,7 +87,7 @@ class Named(Protocol):
 
     @property
     def name(self) -> str:
-        """What users call it."""
+        """Name in commands and files."""
         ...
 
 
@@ -104,20 +103,20 @@ class Kind(Generic[T]):
     Parameters
     ----------
     name
-        What messages call it, for instance ``"experiment"``.
+        Name of the kind in messages, for instance ``"experiment"``.
     folders
-        Modules or folders of a brake's package in which such things stand.
+        Modules or folders of a brake's package that declare such things.
     read
-        ``read(module)``: those that a module declares.
+        ``read(module)``: the things that a module declares.
     home
-        Dotted name of the package of general ones; empty where all belong to a brake.
+        Dotted name of the package of general things; empty if all belong to brakes.
     declared
-        How a brake declares one, for instance ``"a Loop"``: said where a name is unknown and a
-        brake has none of them.
+        Object that declares one, for instance ``"a Loop"``. The error for an unknown name gives it
+        if a brake has none.
 
     Notes
     -----
-    Kinds that are called alike share their names: a name means one thing of all of them.
+    Kinds of the same name share their things' names: each name is unique among them.
     """
 
     name: str
@@ -130,7 +129,7 @@ class Kind(Generic[T]):
         _KINDS.append(self)
 
     def all(self) -> Mapping[str, T]:
-        """Return every thing of this kind by its name: the general ones, then brake by brake."""
+        """Return all things of this kind by name: general ones first, then those of each brake."""
         return {thing.name: thing for thing, _ in _all(self)}
 
     def find(self, name: str) -> T:
@@ -145,14 +144,14 @@ class Kind(Generic[T]):
         return thing
 
     def get(self, name: str) -> T | None:
-        """Return the thing of a name; None where there is none. See `guess`."""
+        """Return the thing of a name, or None. See `guess`."""
         return self.guess(name) or self.all().get(name)
 
     def unknown(self, name: str, *others: Kind[Any]) -> UnknownNameError:
-        """Return the error of a name that nothing of this kind, nor of the others, answers to.
+        """Return the error for an unknown name.
 
-        It names the nearest known ones, those of brakes that were loaded from files before ours,
-        and the brakes that declare none, with how that is done.
+        It lists the nearest known names (brakes loaded from files first) and the brakes that
+        declare none, with instructions.
         """
         kinds = (self, *others)
         title = " or ".join(dict.fromkeys(kind.name for kind in kinds))
@@ -177,9 +176,9 @@ class Kind(Generic[T]):
         return error.reworded("; ".join([str(error), *hints]).replace("?; ", "? "))
 
     def guess(self, name: str) -> T | None:
-        """Return the thing of a name if a file that is called so, or that quotes it, declares it.
+        """Return the thing of a name if a file with that name, or one that quotes it, declares it.
 
-        No folder is loaded for it: that takes a second where there are many things.
+        This avoids loading whole folders, which takes a second if there are many things.
         """
         stem = name.replace("-", "_")
         if not stem.isidentifier():
@@ -197,12 +196,12 @@ class Kind(Generic[T]):
         return None
 
     def of(self, module: str) -> Mapping[str, T]:
-        """Return the things that the brake of a module brings."""
+        """Return the things of a module's brake."""
         owner = next((brake for brake in brakes().values() if brake.module == module), None)
         return {thing.name: thing for thing, _ in _declared(self, owner)} if owner else {}
 
     def own(self, module: str, name: str) -> T | None:
-        """Return the thing of a name that the brake of a module brings; None where it has none.
+        """Return the thing of a name from a module's brake, or None.
 
         Raises
         ------
@@ -218,18 +217,18 @@ class Kind(Generic[T]):
         return None
 
     def beside(self, cls: type) -> Mapping[str, T]:
-        """Return the things of the brake in which a class stands; all, if it stands in none.
+        """Return the things of a class's brake; all things if the class is in no brake.
 
-        Nothing of other brakes is loaded for it.
+        Other brakes are not loaded.
         """
         where = cls.__module__ + "."
         homes = [b.module for b in brakes().values() if where.startswith(f"{b.module}.")]
         return self.of(max(homes, key=len)) if homes else self.all()
 
     def owner(self, name: str) -> str:
-        """Return the module of the brake that brings a thing; empty for a general one.
+        """Return the module of the brake that declares a thing; empty for a general one.
 
-        Brakes are asked in turn, and the rest is not loaded.
+        The search stops at the first match, so that other brakes are not loaded.
         """
         for brake in brakes().values():
             try:
@@ -241,7 +240,7 @@ class Kind(Generic[T]):
         return ""
 
     def place(self, name: str) -> tuple[str, int]:
-        """Return file and line where the thing of a name is declared; line 0 where nobody knows."""
+        """Return file and line of the declaration of a name; line 0 if unknown."""
         module = self.owner(name)
         brake = next((each for each in brakes().values() if each.module == module), None)
         things = [(t, where) for t, where in _declared(self, brake) if t.name == name]
@@ -250,7 +249,7 @@ class Kind(Generic[T]):
 
 
 def _is_folder(module: str) -> bool | None:
-    """Tell whether a module is a package; None where there is none of that name."""
+    """Return whether a module is a package; None if there is no such module."""
     spec = _spec(module)
     return None if spec is None else spec.submodule_search_locations is not None
 
@@ -263,7 +262,7 @@ def _spec(module: str) -> ModuleSpec | None:
 
 
 def _quoting(name: str, home: str) -> Iterator[str]:
-    """Yield the modules of a file or a folder whose text quotes a name; none is loaded for it."""
+    """Yield the modules of a file or a folder whose source quotes a name, loading no others."""
     spec = _spec(home)
     folders = spec.submodule_search_locations if spec is not None else None
     if folders is None:
@@ -278,7 +277,7 @@ def _quoting(name: str, home: str) -> Iterator[str]:
 
 
 def instances(kind: type[Thing]) -> Callable[[ModuleType], Iterable[Thing]]:
-    """Return a reader of the objects of a type that a module holds, alone or in a tuple."""
+    """Return a function that lists a module's objects of a type, single or in tuples."""
 
     def read(module: ModuleType) -> Iterator[Thing]:
         for name, value in vars(module).items():
@@ -303,7 +302,7 @@ def _all(kind: Kind[Any]) -> tuple[tuple[Any, str], ...]:
 
 @cache
 def _found(kind: Kind[Any], name: str, known: tuple[Brake, ...]) -> Any:
-    """Return the thing of a name among some brakes; studies ask for the same ones ten times a case.
+    """Return the thing of a name among some brakes, cached since studies look up names per case.
 
     Raises
     ------
@@ -330,7 +329,7 @@ def _gathered(kind: Kind[Any], known: tuple[Brake, ...]) -> tuple[tuple[Any, str
         except ModelError as error:
             if owner is None or not is_foreign(owner):
                 raise
-            text = f"the {kind.name} of the installed brake {owner.name!r} is left out: {error}"
+            text = f"the {kind.name} of the installed brake {owner.name!r} is skipped: {error}"
             warn_at_line(text, BrakeWarning, error, str(Path(owner.file).parent), owner.file)
             continue
         brake = owner.module if owner is not None else ""
@@ -340,7 +339,7 @@ def _gathered(kind: Kind[Any], known: tuple[Brake, ...]) -> tuple[tuple[Any, str
 
 
 def _of_others(kind: Kind[Any], *owners: Brake) -> dict[str, tuple[Any, str, ModuleType]]:
-    """Return what kinds of the same name declare, generally and in some brakes, by name."""
+    """Return all things of kinds with the same name, general ones and those of some brakes."""
     return {
         thing.name: (thing, "", module)
         for other in _KINDS
@@ -355,7 +354,7 @@ def _require_new(
     new: tuple[tuple[Any, ModuleType], ...],
     known: Mapping[str, tuple[Any, str, ModuleType]],
 ) -> None:
-    """Refuse things whose name another one has, in the same brake or in an earlier one."""
+    """Reject things whose name is taken, in the same brake or in an earlier one."""
     seen = {name: (thing, module) for name, (thing, _, module) in known.items()}
     for thing, module in new:
         first, place = seen.setdefault(thing.name, (thing, module))
@@ -382,7 +381,7 @@ def pick(known: Mapping[str, Thing], name: str, kind: str) -> Thing:
     Raises
     ------
     UnknownNameError
-        With the nearest known names; ``kind`` says what they are names of.
+        With the nearest known names; ``kind`` is their kind.
     """
     if name not in known:
         raise unknown_name(kind, name, known)

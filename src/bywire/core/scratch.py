@@ -1,8 +1,8 @@
-"""Files that appear whole or not at all, and temporary folders that no killed process leaves.
+"""Atomic writing of files, and temporary folders that are removed even after a killed process.
 
-A folder of temporary files is locked by the process that made it. The next one that works at the
-same place removes those without a lock: their process was killed. Where a file system has no
-locks (Windows, some network drives), they go when they are a day old.
+A process locks its folder of temporary files. The next process at the same place removes folders
+without a lock, whose process was killed. On file systems without locks (Windows, some network
+drives), folders are removed after a day.
 """
 
 from __future__ import annotations
@@ -26,23 +26,23 @@ if sys.platform != "win32":
     import fcntl
 
 PREFIX = ".bywire-"
-"""what the names of temporary folders begin with"""
+"""prefix of temporary folders' names"""
 
 NULL_CHARACTER = "a path cannot hold a null character"
-"""what is wrong where Python raises ValueError for a path, in words that differ by its version"""
+"""message for a path with which Python raises ValueError, independent of its version"""
 
 UNFINISHED = "unfinished"
-"""file of a folder whose result was not written to its end"""
+"""file that marks a folder with an incomplete result"""
 
 _OLD = 86400.0  # seconds; without locks, younger ones may be in use
 
 
 @contextmanager
 def replacing(target: Path) -> Iterator[Path]:
-    """Yield where to write a file, which takes the place of another when the block has ended.
+    """Yield a path to write, which replaces the target file at the end of the block.
 
-    Where the block fails, or the process is killed, the other file stays as it was. The name is
-    the same, in a hidden folder beside it.
+    If the block fails, or the process is killed, the target is unchanged. The path has the same
+    name, in a hidden folder next to the target.
 
     Raises
     ------
@@ -136,14 +136,14 @@ def process_folder() -> Path:
     Raises
     ------
     FileError
-        When there is no room for temporary files.
+        When there is no space for temporary files.
     """
     try:
         return _folder_of(os.getpid())
     except OSError as error:
         raise FileError(
-            f"a temporary folder cannot be made ({error.strerror or error}): make room where "
-            "temporary files go, or set TMPDIR to another folder"
+            f"a temporary folder cannot be made ({error.strerror or error}): free some space "
+            "there, or set TMPDIR to another folder"
         ) from None
 
 
@@ -162,23 +162,22 @@ def _folder_of(process: int) -> Path:
 
 
 def require_finished(folder: Path) -> None:
-    """Refuse a folder whose result was not written to its end.
+    """Reject a folder with an incomplete result.
 
     Raises
     ------
     FileError
-        When it was not.
+        When the result is incomplete.
     """
     if (folder / UNFINISHED).exists():
         raise FileError(
-            f"{folder} holds a result that was not written to its end: run the command that wrote "
-            "it again",
+            f"{folder} holds a result that is incomplete: run the command that wrote it again",
             name=str(folder),
         )
 
 
 def sweep(parent: Path) -> None:
-    """Remove what killed processes left in a folder, as far as that is possible."""
+    """Remove leftovers of killed processes in a folder, as far as possible."""
     with contextlib.suppress(OSError), os.scandir(parent) as entries:
         for each in entries:
             if each.name.startswith(PREFIX) and each.is_dir(follow_symlinks=False):
@@ -204,7 +203,7 @@ def _remove_left(folder: Path) -> None:
 
 
 def _locked(parent: Path) -> tuple[Path, int | None]:
-    """Return a fresh folder and what holds its lock; None where there are no locks."""
+    """Return a new folder and the holder of its lock; None without locks."""
     while True:
         folder = Path(tempfile.mkdtemp(prefix=PREFIX, dir=parent))
         try:

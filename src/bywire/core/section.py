@@ -1,8 +1,7 @@
-"""Tables of files: each key is stated once, as a typed field of a section.
+"""Sections of files: each key is declared once, as a typed field.
 
-A section is read from what a file holds: texts with units become numbers [SI], and what does not
-fit is refused in one sentence with key, value, what is valid and the nearest match. No message of
-pydantic's own reaches a user.
+Reading a section converts texts with units to numbers [SI]. An error is one sentence with the key,
+its value, what is valid and the nearest match. No message of pydantic itself reaches a user.
 """
 
 from __future__ import annotations
@@ -26,42 +25,42 @@ Name = Annotated[str, Field(pattern=r"\S")]
 Names = tuple[str, ...]
 """a list of names"""
 Table = Annotated[Mapping[str, Any], Field(default_factory=dict)]
-"""a section whose keys name parameters, faults or figures, and are no fields; empty by default"""
+"""a section whose keys are names of parameters, faults or figures, not fields; empty by default"""
 
-_WANTED: Mapping[Any, str] = {str: "a text", bool: "true or false", tuple: "a list of names"}
+_VALID: Mapping[Any, str] = {str: "a text", bool: "true or false", tuple: "a list of names"}
 
 
 @dataclass(frozen=True)
 class Hint:
-    """What to write for a field, where that says more than its type."""
+    """A hint on how to write a field's value, where its type alone does not explain it."""
 
     text: str
 
 
 class Section(BaseModel):
-    """Base of all sections: immutable, no unknown keys; a model is built when it is first used."""
+    """Base of all sections: immutable, no unknown keys. The model is built on first use."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, defer_build=True)
 
     @classmethod
     def read(cls, content: Any, where: str) -> Self:
-        """Return the section that a table of a file is.
+        """Read a section from a table of a file.
 
         Parameters
         ----------
         content
-            What the file holds there.
+            The table's content.
         where
-            What errors call it: ``"[design]"``; of a whole file, ``"a study file"``.
+            Its name in errors: ``"[design]"``, or for a whole file ``"a study file"``.
 
         Raises
         ------
         UnknownNameError
-            For an unknown key, or a choice that there is not.
+            For an unknown key or choice.
         UnitError
-            For a number without its unit, or with another one.
+            For a number without its unit, or with a unit that does not fit.
         ParameterError
-            For what is missing, of another kind, or out of range.
+            For a value that is missing, of the wrong type, or out of range.
         """
         fields = cls.model_fields
         place, within = (f"{where} ", f"{where[1:-1]}.") if where.startswith("[") else ("", "")
@@ -81,12 +80,12 @@ class Section(BaseModel):
 
     @classmethod
     def written_out(cls, content: Any) -> Any:
-        """Return the table that a short form stands for; here, there is none."""
+        """Expand a short form to its table; a plain section has no short form."""
         return content
 
     @property
     def given(self) -> dict[str, Any]:
-        """What the file says, by key."""
+        """Values of the keys that the file contains."""
         return {
             key: getattr(self, key)
             for key in type(self).model_fields
@@ -95,7 +94,7 @@ class Section(BaseModel):
 
 
 def _value(info: FieldInfo, value: Any, name: str, key: str) -> Any:
-    """Return what a field is validated with: numbers in SI, sections for tables."""
+    """Convert a field's value for validation: numbers to SI, tables to sections."""
     kind, unit = _kind(info.annotation), _unit(info)
     if _is_section(kind):
         return kind.read(value, f"[{key}]")
@@ -113,7 +112,7 @@ def _value(info: FieldInfo, value: Any, name: str, key: str) -> Any:
 
 
 def table_of(value: Any, where: str) -> dict[str, Any]:
-    """Return the keys and values of a section, or refuse what is none."""
+    """Return the keys and values of a section; raise an error for anything else."""
     if not isinstance(value, Mapping):
         raise ParameterError(f"{where} must be a section with key = value lines", name=where)
     return dict(value)
@@ -121,16 +120,16 @@ def table_of(value: Any, where: str) -> dict[str, Any]:
 
 def _sections(kind: type[Section], value: Any, where: str) -> tuple[Section, ...]:
     if not isinstance(value, list) or not all(isinstance(each, Mapping) for each in value):
-        raise ParameterError(f"write {where} with two brackets, once for each of them", name=where)
+        raise ParameterError(f"write {where} with double brackets, once for each entry", name=where)
     return tuple(kind.read(each, where) for each in value)
 
 
 def _refused(
     info: FieldInfo, content: Mapping[str, Any], place: str, key: str, inner: Sequence[Any]
 ) -> InputError:
-    """Return the error of a value that is not what its field is declared as, or is missing.
+    """Return the error for a field's value that is not valid or is missing.
 
-    ``inner``: where it stands in the field's value.
+    ``inner``: the value's place within the field.
     """
     hint = _hint(info)
     if key not in content:
@@ -141,25 +140,26 @@ def _refused(
     if unit is not None:
         leaf = leaf_of(name, unit, info)
         in_percent = isinstance(value, str) and value.rstrip().endswith("%")
-        wanted = leaf.range_in("%") if in_percent else leaf.range_text
+        valid = leaf.range_in("%") if in_percent else leaf.range_text
         return ParameterError(
-            f"{name} = {quoted(value)} must be {wanted}",
+            f"{name} = {quoted(value)} must be {valid}",
             name=name,
             value=quoted(value),
-            valid=wanted,
+            valid=valid,
         )
     if kind is int and not hint:
         least = next(note.ge for note in info.metadata if isinstance(note, Ge))
         most = next(note.le for note in info.metadata if isinstance(note, Le))
         return ParameterError(
-            f"{name} = {quoted(value)}: a whole number from {least} to {most} is wanted",
+            f"{name} = {quoted(value)} must be a whole number from {least} to {most}",
             name=name,
             value=quoted(value),
             valid=f"from {least} to {most}",
         )
     if kind is Literal and not hint:
         return unknown_name(name, str(value), get_args(info.annotation))
-    return ParameterError(f"{name} = {quoted(value)}: {hint or f'{_WANTED[kind]} is wanted'}")
+    reason = f": {hint}" if hint else f" must be {_VALID[kind]}"
+    return ParameterError(f"{name} = {quoted(value)}{reason}")
 
 
 def _unit(info: FieldInfo) -> Unit | None:
@@ -171,7 +171,7 @@ def _hint(info: FieldInfo) -> str:
 
 
 def _kind(annotation: Any) -> Any:
-    """Return what a value is where it is not None."""
+    """Return the type of a value that is not None."""
     if get_origin(annotation) in (Union, UnionType):
         kinds = [each for each in get_args(annotation) if each is not NoneType]
         annotation = kinds[0] if len(kinds) == 1 else Union

@@ -1,4 +1,4 @@
-"""Signals: what the fields of a State, Input, Output or Memory tuple mean."""
+"""Signals: unit, label and role of the fields of State, Input, Output and Memory tuples."""
 
 from __future__ import annotations
 
@@ -15,32 +15,32 @@ from bywire.core.arguments import checked
 from bywire.core.errors import ModelError, place_of
 
 T = TypeVar("T", bound=tuple[Any, ...])
-_NOISE = "noise_"  # what the name of a stimulus that is noise begins with
+_NOISE = "noise_"  # prefix of stimuli that are noise
 
 
 @dataclass(frozen=True)
 class Role:
-    """What an energy is in the books of a run.
+    """Role of an energy in the balance of a run.
 
     Parameters
     ----------
     side
-        Whether it is given (``"source"``) or taken (``"sink"``: losses and stores). A time in which
-        all stands still is ``"standstill"``.
+        ``"source"`` of energy, or ``"sink"`` (losses and stores). A time at standstill has
+        ``"standstill"``.
     returns
-        Of a sink: what it may give back. A loss gives nothing back, and a run in which one does
-        warns of it; ``"taken"``: at most what it took, like a spring that begins slack; ``"any"``:
-        like a store that begins full, or air that may be warmer.
+        Of a sink: energy that it may return. A loss returns none, and bywire warns if one does.
+        ``"taken"``: at most the energy taken, like a spring that starts slack. ``"any"``: like a
+        store that starts full, or air that may be warmer.
     label
-        What the books call it.
+        Name in the balance.
     split
-        Of a sink: whether what it takes during the standstill is booked apart, as holding.
+        Of a sink: whether its energy during standstill is listed separately, as holding.
     whole
-        Of a source: the one in whose place it stands where it is recorded.
+        Of a source: the source that it replaces if it is recorded.
     rest, rest_label
-        The sink that takes what it gives more than that one.
+        Sink of the difference between the two.
     book
-        Name of the further book in which it stands; empty for the actuator's own.
+        Name of the separate balance that contains it; empty for that of the actuator.
     """
 
     side: Literal["source", "sink", "standstill"]
@@ -62,17 +62,17 @@ class Signal:
     unit
         SI unit; ``"1"`` for a pure number.
     label
-        What an axis of a figure says.
+        Axis label in figures.
     nominal
         Usual magnitude in that unit.
     set_point_of
-        Name of the signal whose set point this is, for figures; empty for none.
+        Name of the signal for which this is the set point, for figures; may be empty.
     role
-        What it is in the books, of an energy or of a power whose integral is one.
+        Role in the energy balance, of an energy or of a power whose integral is one.
     low, high
-        Ends of its admissible range, in that unit: a gauge pressure is not below the vacuum, an
-        opening not negative. `bywire.check` tries nothing beyond. ``Ge(0)`` behind the Signal of
-        an annotation says the same.
+        Bounds of its valid range, in that unit: a gauge pressure is not below vacuum, an opening is
+        not negative. `bywire.check` stays within. ``Ge(0)`` after the Signal of an annotation has
+        the same effect.
     """
 
     unit: str
@@ -84,7 +84,7 @@ class Signal:
     high: float = math.inf
 
     def within(self, value: float) -> float:
-        """Return a value, or the end of the range that is nearest to it."""
+        """Clip a value to the range."""
         return min(max(value, self.low), self.high)
 
 
@@ -137,7 +137,7 @@ def signals_of(tuple_type: type[NamedTuple]) -> dict[str, Signal]:
 
 
 def signal_in(annotation: Any) -> Signal | None:
-    """Return the Signal of an annotation, with the bounds that stand behind it; None for none."""
+    """Return the Signal of an annotation with the bounds after it, or None."""
     signal = next((n for n in _notes(annotation) if isinstance(n, Signal)), None)
     if signal is None:
         return None
@@ -150,11 +150,11 @@ def signal_in(annotation: Any) -> Signal | None:
 
 @cache
 def ranges_of(tuple_type: type[NamedTuple]) -> dict[str, tuple[float, float]]:
-    """Return the ranges that are declared beside a Signal, both ends included.
+    """Return the ranges that are declared next to a Signal, bounds included.
 
-    Controllers and runs take nothing beyond them.
-    ``Annotated[float, Signal(...), Ge(0), Le(1)]`` declares one. What a unit alone says, such as
-    that no gauge pressure is below the vacuum, is not part of it.
+    Controllers and runs reject values outside.
+    ``Annotated[float, Signal(...), Ge(0), Le(1)]`` declares one. Bounds that follow from the unit
+    alone, such as vacuum for a gauge pressure, are not included.
     """
     hints = typing.get_type_hints(tuple_type, include_extras=True)
     ends = {name: _ends(hint) for name, hint in hints.items()}
@@ -166,7 +166,7 @@ def _notes(annotation: Any) -> tuple[Any, ...]:
 
 
 def _ends(annotation: Any) -> tuple[float, float]:
-    """Return the bounds that stand in an annotation, both included."""
+    """Return the bounds in an annotation, both included."""
     low, high = -math.inf, math.inf
     for note in _notes(annotation):
         if isinstance(note, Ge):
@@ -182,7 +182,7 @@ def _ends(annotation: Any) -> tuple[float, float]:
 
 @cache
 def limits_of(tuple_type: type[NamedTuple]) -> dict[str, Limited]:
-    """Return what limits the commands among the signals of a NamedTuple class."""
+    """Return the limits of the commands among the signals of a NamedTuple class."""
     hints = typing.get_type_hints(tuple_type, include_extras=True)
     return {
         name: note
@@ -197,7 +197,7 @@ def _number(end: Any) -> float:
 
 
 def without_noise(stimuli: Iterable[str]) -> list[str]:
-    """Return the names of stimuli that can be driven: all but the noise, which is drawn.
+    """Return the names of stimuli that a user can drive: all except noise, which is drawn.
 
     Examples
     --------
@@ -208,7 +208,7 @@ def without_noise(stimuli: Iterable[str]) -> list[str]:
 
 
 def places_of(model: Any) -> dict[str, type[NamedTuple]]:
-    """Return the signal tuples of a model by what they are in it."""
+    """Return the signal tuples of a model by their role."""
     return {
         "recording": model.Output,
         "state": model.State,
@@ -221,7 +221,7 @@ def places_of(model: Any) -> dict[str, type[NamedTuple]]:
 def merged_signals(
     tuples: Iterable[tuple[str, type[NamedTuple]]],
 ) -> list[tuple[str, Signal, tuple[str, ...]]]:
-    """Return one row per name, unit and label, with all places where such a signal stands.
+    """Return one row per name, unit and label, with all places of such a signal.
 
     Parameters
     ----------
@@ -238,14 +238,14 @@ def merged_signals(
 
 
 def joined(module: str, name: str, *tuples: type[Any]) -> Any:
-    """Return a signal tuple with the fields of several, which that module keeps under the name.
+    """Join signal tuples into one that the module exports under the name.
 
-    For one memory of several controllers.
+    It serves as one memory for several controllers.
 
     Raises
     ------
     ModelError
-        When two of them have a field of one name.
+        When two of them have a field of the same name.
     """
     fields: list[tuple[str, Any]] = []
     for each in tuples:

@@ -1,4 +1,4 @@
-"""Files whose code shapes what is computed: their state, and whether this process runs just that.
+"""State of the source files that affect results, and whether this process runs exactly them.
 
 What was made of them can be kept for a later process as long as they stay as they are. Times of
 change tell that only with care: a file that is saved after it was loaded, or twice within the
@@ -76,7 +76,7 @@ class SourceState:
 
     @property
     def is_running(self) -> bool:
-        """Whether this process is sure to run what the files say."""
+        """Whether this process certainly runs the code in the files."""
         return bool(_started) and self.newest < _started[0] - TICK
 
 

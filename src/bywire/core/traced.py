@@ -14,14 +14,14 @@ import numpy as np
 
 
 class Traced:
-    """A number, known by its name or by how it is computed.
+    """A number that is defined by its name or by its computation.
 
     Parameters
     ----------
     operation
-        What computes it; None for one that is given by name.
+        Operation that computes it; None for a named number.
     inputs
-        What it is computed from; the name of one that is given.
+        Operands; the name of a named number.
     """
 
     __slots__ = ("inputs", "operation")
@@ -34,7 +34,7 @@ class Traced:
         return Traced(getattr(np, name), *inputs)
 
     def __bool__(self) -> bool:
-        raise TypeError("what a traced number is shows only on rows")
+        raise TypeError("a traced number has a value only on rows")
 
 
 def _forward(operation: Callable[..., Any]) -> Callable[..., Traced]:
@@ -54,7 +54,7 @@ for _name in (*_BOTH, "neg", "pos", "abs", "lt", "le", "gt", "ge", "eq", "ne"):
 
 
 def names_in(values: Any, marks: Mapping[int, Any] | None = None) -> Iterator[Any]:
-    """Yield the names that a value, or a tuple of values, is computed from.
+    """Yield the names that a value, or a tuple of values, depends on.
 
     ``marks``: by the identity of a traced number, what is yielded of it in place of its names.
     """
@@ -74,7 +74,7 @@ def names_in(values: Any, marks: Mapping[int, Any] | None = None) -> Iterator[An
 
 
 def computed(values: Any, given: Mapping[str, Any]) -> Any:
-    """Return what a value, or a tuple of values, is where its names are given."""
+    """Evaluate a value, or a tuple of values, for given names."""
     return _computed(values, given, {})
 
 

@@ -17,7 +17,7 @@ from functools import cache, lru_cache
 from bywire.core.errors import UnitError, quoted
 
 BASES = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
-"""base units; the radian is one, so that a speed of rotation is no frequency"""
+"""base units, including the radian, so that an angular speed is not a frequency"""
 
 _LONGEST = 100  # characters of a unit
 _NEAR = 0.75  # resemblance of a spelling that was meant
@@ -184,8 +184,8 @@ _REFERENCES = {
     "gauge": ("(g)", "~g", "g", "_g", "~rel", "(rel)", "_rel", "~gauge", "(ü)", "ü", "~ü"),
     "absolute": ("(a)", "~a", "a", "_a", "~abs", "(abs)", "_abs", "~absolute"),
 }
-# Which of two quantities such a letter stands for, only the quantity that is wanted tells. The
-# first one is what it stands for in units that are declared.
+# Only the requested quantity decides between the two meanings of such a letter. Declared units use
+# the first one.
 _TWO_MEANINGS = {
     "g": ("gram", "g_n"),
     "mg": ("milligram", "mg_n"),
@@ -197,7 +197,7 @@ _LOGARITHMIC = frozenset(
     ["dB", "dBA", "dB(A)", "dBm", "dBV", "dBu", "dBW", "dBFS", "dBc", "Np", "pH", "oct", "dec"]
 )
 _IN_QUOTIENTS = {"U": "rev", "r": "rev"}
-"""as in U/min and mm/r; alone, they are no unit"""
+"""as in U/min and mm/r; alone, they are not units"""
 
 _PLAIN = str.maketrans(
     {  # signs that look alike, or that mean the same
@@ -226,16 +226,16 @@ _POWER = re.compile(rf"(?:\*\*|\^)({_EXPONENT})")
 
 
 class UnknownUnitError(UnitError):
-    """A text that is no unit of the list and no product of them; its message says why."""
+    """A text that is neither a listed unit nor a product of them; its message gives the reason."""
 
 
 class UnreadableUnitError(UnknownUnitError):
-    """A text that is not even written like a unit."""
+    """A text without the form of a unit."""
 
 
 @dataclass(frozen=True)
 class Scale:
-    """What a unit is in SI: value = factor * number + zero.
+    """Scale of a unit in SI: value = factor * number + zero.
 
     Parameters
     ----------
@@ -244,11 +244,11 @@ class Scale:
     powers
         Exponents of the base units, see `BASES`.
     terms
-        SI units of which it is a product, with their exponents.
+        SI units in its product, with their exponents.
     zero
-        What its zero is in SI: 273.15 K of degC.
+        Its zero in SI: 273.15 K for degC.
     reference
-        ``"gauge"`` or ``"absolute"``, where a unit of pressure says so.
+        ``"gauge"`` or ``"absolute"``, if a unit of pressure defines it.
     """
 
     ratio: Fraction
@@ -292,13 +292,13 @@ _ONE = Scale(Fraction(1), 0, (0,) * len(BASES), ())
 
 
 def scale_of(text: str) -> Scale:
-    """Return what a unit is in SI.
+    """Return the scale of a unit in SI.
 
     Raises
     ------
     UnknownUnitError
-        When it is no unit of the list nor a product of them, when it has two meanings, and when it
-        is logarithmic.
+        When it is neither a listed unit nor a product of them, when it has two meanings, and when
+        it is logarithmic.
 
     Examples
     --------
@@ -322,7 +322,7 @@ def meanings_of(text: str) -> tuple[Scale, ...]:
     Raises
     ------
     UnknownUnitError
-        When it is no unit of the list nor a product of them, or logarithmic.
+        When it is neither a listed unit nor a product of them, or logarithmic.
     """
     if len(text) > _LONGEST:
         raise UnreadableUnitError(f"{quoted(text)} is longer than any unit")
@@ -334,7 +334,7 @@ def meanings_of(text: str) -> tuple[Scale, ...]:
 
 
 def spellings() -> Iterator[str]:
-    """Yield every unit of the list as it may be written, products apart."""
+    """Yield all spellings of the listed units, without products."""
     yield from _spellings()
     yield from _TWO_MEANINGS
 
@@ -442,7 +442,7 @@ class _Reader:
         inside = "" if name == self._plain else f" in {whole}"
         if name in _LOGARITHMIC:
             return (
-                f"the unit {quoted(name)}{inside} is logarithmic, so that no factor converts it: "
+                f"the unit {quoted(name)}{inside} is logarithmic, so no factor converts it: "
                 "convert the values to a linear unit first"
             )
         whole_word = _squeezed(self._plain)
@@ -452,7 +452,7 @@ class _Reader:
 
     def _ambiguous(self) -> UnknownUnitError:
         return UnknownUnitError(
-            f"the unit {quoted(self._text)} can be read in two ways: put what divides in brackets, "
+            f"the unit {quoted(self._text)} can be read in two ways: put the divisor in brackets, "
             "as in J/(kg*K), or write it last"
         )
 

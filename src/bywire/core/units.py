@@ -1,4 +1,4 @@
-"""Quantities at the edges: text with units to SI numbers and back."""
+"""Conversion of texts with units to SI numbers and back."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ F = TypeVar("F")
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*(.*?)\s*", re.DOTALL)
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _SIGNS = {"ohm": "Ω", "percent": "%", "degree": "°", "deg": "°", "degC": "°C"}
-_LONGEST = 100  # characters: no quantity is longer, and patterns stay quick on hostile text
+_LONGEST = 100  # characters; keeps patterns fast on hostile text
 _WORDS = {"1": "a pure number", "delta_degC": "a temperature difference in K"}
 ICE = 273.15
 """0 degC [K]"""
@@ -40,7 +40,7 @@ class Written(float):
     value
         The number, SI.
     text
-        What it was read from, for instance ``"-0.02mm"``.
+        Text that it was read from, for instance ``"-0.02mm"``.
     """
 
     text: str
@@ -52,7 +52,7 @@ class Written(float):
         return written
 
     def __getnewargs__(self) -> tuple[float, str]:  # type: ignore[override]
-        """Return what a copy is made of."""
+        """Return the arguments of a copy."""
         return float(self), self.text
 
 
@@ -64,17 +64,17 @@ def parse(value: str | float, symbol: str, name: str, nominal: float = 1.0) -> f
     value
         Text with a unit such as ``"9 mm"``, or a plain number, which is taken as SI.
     symbol
-        SI unit wanted, ``"1"`` for a pure number.
+        Requested SI unit, ``"1"`` for a pure number.
     name
-        What to call the value in an error.
+        Name of the value in errors.
     nominal
-        Its usual magnitude in that unit, for the example that an error gives.
+        Its usual magnitude in that unit, for the example in errors.
 
     Raises
     ------
     UnitError
-        When the text is no quantity, or its unit measures something else. Texts are not
-        evaluated: a number and a product of unit names, nothing more.
+        When the text is not a quantity, or its unit has another dimension. A text may only contain
+        a number and a product of unit names; it is never evaluated.
     ParameterError
         When the number is not finite.
 
@@ -85,7 +85,7 @@ def parse(value: str | float, symbol: str, name: str, nominal: float = 1.0) -> f
     """
     if isinstance(value, bool) or not isinstance(value, (str, int, float)):
         raise UnitError(
-            f"{name} = {quoted(value)}: one number is wanted, for instance "
+            f"{name} = {quoted(value)} must be one number, for instance "
             f"{example(symbol, nominal)!r}",
             name=name,
             value=quoted(value),
@@ -115,24 +115,24 @@ def _number(text: str, symbol: str, name: str, nominal: float) -> float:
     if scale is None:
         raise UnitError(
             f"{name} = {text!r} has the wrong unit: {unit or 'a pure number'} cannot be "
-            f"{_wanted(symbol)}; {write}"
+            f"converted to {_words(symbol)}; {write}"
         )
     if scale.reference == "absolute":
         raise UnitError(
             f"{name} = {text!r}: bywire cannot tell whether {name} is absolute or relative to "
-            f"ambient pressure: convert it to that of the two which is wanted, and {write}"
+            f"ambient pressure: convert it to the one that the bench needs, and {write}"
         )
     return _converted(size, _in_si(size, scale))
 
 
 def _measures(scale: Scale, symbol: str) -> bool:
-    """Return whether a unit can be that of a quantity with an SI unit."""
-    wanted = _of_symbol(symbol)
-    if scale.zero and symbol != "K":  # 20 degC are no difference of temperatures
+    """Return whether a unit fits a quantity whose SI unit is the symbol."""
+    target = _of_symbol(symbol)
+    if scale.zero and symbol != "K":  # 20 degC is not a temperature difference
         return False
     if symbol in _NO_MATTER_OF_RAD:
-        return scale.powers == wanted.powers
-    return scale.powers[:-1] == wanted.powers[:-1]
+        return scale.powers == target.powers
+    return scale.powers[:-1] == target.powers[:-1]
 
 
 def _in_si(number: float, scale: Scale) -> float:
@@ -182,21 +182,21 @@ def has_own_zero(unit: str, symbol: str) -> bool:
 
 
 def _of_symbol(symbol: str) -> Scale:
-    """Return what an SI unit is, or a unit that is declared: C is coulomb there."""
+    """Return the scale of an SI unit or of a declared unit, in which C is coulomb."""
     return meanings_of(symbol)[0]
 
 
 def _converted(size: float, number: float) -> float:
-    """Return 0.009 for 9 mm, and not 0.009000000000000001; what is in SI already as it is."""
+    """Round a converted number, so that 9 mm is 0.009, not 0.009000000000000001; keep SI values."""
     return size if number == size else float(f"{number:.15g}")
 
 
-def _wanted(symbol: str) -> str:
+def _words(symbol: str) -> str:
     return _WORDS.get(symbol, symbol)
 
 
 def unit_text(symbol: str) -> str:
-    """Return a unit as people write it; empty for a pure number.
+    """Return a unit in common notation; empty for a pure number.
 
     Examples
     --------
@@ -211,7 +211,7 @@ def unit_text(symbol: str) -> str:
 
 
 def shown(value: float, symbol: str, unit: str = "") -> str:
-    """Return a value as the edges show it, for instance ``25 bar``, or in another unit.
+    """Return a value in its display unit, for instance ``25 bar``, or in another unit.
 
     Examples
     --------
@@ -246,7 +246,7 @@ def convert(value: F, symbol: str, unit: str) -> F:
 
 
 def difference_unit(symbol: str) -> str:
-    """Return the SI unit of differences: of temperatures one whose zero is no temperature.
+    """Return the SI unit of differences; for temperatures, a unit without an offset.
 
     Examples
     --------
@@ -257,9 +257,9 @@ def difference_unit(symbol: str) -> str:
 
 
 def display_factor(symbol: str) -> float:
-    """Return what a difference of one SI unit is in the unit in which the edges show it.
+    """Return the factor from a difference in the SI unit to one in the display unit.
 
-    Of values themselves it is the scale only where both have the same zero, see `convert`.
+    For values themselves it is valid only where both units have the same zero, see `convert`.
 
     Examples
     --------
@@ -271,7 +271,7 @@ def display_factor(symbol: str) -> float:
 
 
 def example(symbol: str, nominal: float = 1.0) -> str:
-    """Return a quantity that would be accepted: of its usual magnitude, where one is known.
+    """Return a valid example of a quantity, with its usual magnitude where one is declared.
 
     Examples
     --------

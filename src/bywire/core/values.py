@@ -18,16 +18,16 @@ def parsed(cls: type[ParameterSet], values: Mapping[str, Any], kind: str) -> dic
     """Return values by dotted name, numbers in SI.
 
     ``cls``: class of the parameter set that they are for; ``values``: numbers (SI), texts with
-    units, sequences of these for tables, or choices; ``kind``: what the names are called in errors.
+    units, sequences of these for tables, or choices; ``kind``: what errors call the names.
 
     Raises
     ------
     UnknownNameError
         With the nearest known names.
     UnitError
-        When a text is no quantity or its unit measures something else.
+        When a text is not a quantity or its unit has another dimension.
     ParameterError
-        When several values stand where one is wanted, or a number is not finite.
+        When several values are given for a single number, or a number is not finite.
     """
     leaves, choices = leaf_fields(cls), choice_fields(cls)
     accepted: dict[str, Any] = {}
@@ -47,7 +47,7 @@ def number(value: Any, symbol: str, name: str, nominal: float = 1.0) -> float:
     """Return one value in an SI unit; see `bywire.core.units.parse`. Zero needs no unit."""
     if isinstance(value, (Mapping, Sequence)) and not isinstance(value, str):
         raise ParameterError(
-            f"{name} = {quoted(value)}: one value is wanted, not several",
+            f"{name} = {quoted(value)} must be one value, not several",
             name=name,
             value=quoted(value),
         )
@@ -55,13 +55,13 @@ def number(value: Any, symbol: str, name: str, nominal: float = 1.0) -> float:
 
 
 def written(value: Any, symbol: str, name: str, nominal: float = 1.0) -> float:
-    """Return one value of a file, where a plain number is refused if a unit is wanted."""
+    """Return one value of a file; reject a plain number where a unit is required."""
     require_unit(value, symbol, name, nominal)
     return number(value, symbol, name, nominal)
 
 
 def nodes(value: Any, symbol: str, name: str, nominal: float = 1.0) -> tuple[float, ...]:
-    """Return the nodes of a table: of a sequence, or of one text with commas, each with its unit.
+    """Return the nodes of a table from a sequence, or from a text with commas, each with its unit.
 
     Examples
     --------
@@ -79,7 +79,7 @@ def nodes(value: Any, symbol: str, name: str, nominal: float = 1.0) -> tuple[flo
 
 
 def _listed(text: str, symbol: str, name: str, nominal: float) -> tuple[float, ...]:
-    """Return the nodes of a table that one text holds."""
+    """Return the nodes of a table from one text."""
     parts = [part.strip() for part in text.split(",")]
     try:
         return tuple(
@@ -91,21 +91,21 @@ def _listed(text: str, symbol: str, name: str, nominal: float) -> tuple[float, .
 
 
 def require_units(cls: type[ParameterSet], values: Mapping[str, Any], level_unit: str = "") -> None:
-    """Refuse plain numbers, as a file holds them, where a unit is wanted; zero needs none.
+    """Reject plain numbers of a file where a unit is required; zero needs none.
 
     Parameters
     ----------
     cls
         Class of the parameter set that the values are for.
     values
-        Values by dotted name; unknown names and what is no number are left to others.
+        Values by dotted name. Unknown names and values that are not numbers are skipped.
     level_unit
-        What stands for the unit ``level`` of a stimulus.
+        Unit that replaces ``level`` in the unit of a stimulus.
 
     Raises
     ------
     UnitError
-        The one that the same number as a text gets.
+        The same error as for the number as a text.
     """
     leaves = leaf_fields(cls)
     for name in values.keys() & leaves.keys():
@@ -119,7 +119,7 @@ def require_units(cls: type[ParameterSet], values: Mapping[str, Any], level_unit
 
 
 def require_unit(value: Any, symbol: str, name: str, nominal: float = 1.0) -> None:
-    """Refuse a plain number where a unit is wanted; see `require_units`."""
+    """Reject a plain number where a unit is required; see `require_units`."""
     if isinstance(value, (bool, units.Written)) or not isinstance(value, (int, float)):
         return
     try:
@@ -140,9 +140,9 @@ class _Unquoted(str):
 
 
 def _plain_text(value: float) -> str:
-    """Return a plain number of a file as a text, which errors quote as it stands there.
+    """Return a plain number of a file as a text, which errors quote as the file has it.
 
-    Texts are refused where a unit is missing, and numbers are taken as SI.
+    A text without a required unit is an error, whereas a number would be taken as SI.
 
     Examples
     --------

@@ -1,7 +1,7 @@
-"""What the elements of an assembly say of a recording, each of what it felt in every row.
+"""Warnings of an assembly's elements about a recording, evaluated in every row.
 
-What an element feels follows from few states: the assembly's equations are traced once a
-structure, and on a recording only what leads to those elements is computed.
+The inputs of an element depend on few states. The assembly's equations are traced once per
+structure, and only those that lead to watching elements are evaluated on a recording.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ _PARAMETER = "."  # before the name of one, among names of signals
 
 
 class Watching(Model):
-    """What an assembly says of recordings: its elements, and the assemblies within."""
+    """Warnings of an assembly about recordings, from its elements and subassemblies."""
 
     parts: ClassVar[dict[str, Any]]
     subs: ClassVar[dict[str, Any]]
 
     def watch(self, recording: Any, par: Any) -> list[str]:
-        """Return what the elements say of a recording, each of what it felt in every row.
+        """Return the warnings of the elements about a recording, evaluated in every row.
 
-        Of signals that are not recorded nothing is known, and nothing said.
+        Signals that are not recorded cause no warnings.
         """
         within = (
             f"{sub.label}: {text}"
@@ -39,7 +39,7 @@ class Watching(Model):
         return [*_warnings_of(self, recording, par), *within]
 
     def watched(self, par: Any) -> tuple[str, ...] | None:
-        """Return the signals that ``watch`` looks at; None where it is written by hand."""
+        """Return the signals that ``watch`` reads; None if it is written by hand."""
         if type(self).watch is not Watching.watch:
             return None
         names = [*watched_by_elements(self, par)]
@@ -51,7 +51,7 @@ class Watching(Model):
         return tuple(names)
 
     def silent(self, rows: Any, pars: Sequence[Any]) -> frozenset[str]:
-        """Return the parts whose elements say nothing of any of several cases, by name.
+        """Return the names of parts whose elements have no warnings in any of several cases.
 
         ``rows``: signals of shape (cases, rows); ``pars``: parameters of each case.
         """
@@ -63,9 +63,9 @@ class Watching(Model):
         return silent_parts(self, rows, pars) | frozenset(within)
 
     def may_warn(self, rows: Any, pars: Sequence[Any]) -> Sequence[int]:
-        """Return the cases of which ``watch`` may say something: none where all parts are silent.
+        """Return the cases for which ``watch`` may warn; none if all parts are silent.
 
-        All where ``watch`` is written by hand, unless this is too.
+        It returns all cases if ``watch`` is written by hand, unless this method is too.
         """
         if type(self).watch is not Watching.watch or not self.are_silent(rows):
             return range(len(pars))
@@ -76,7 +76,7 @@ class Watching(Model):
         return tuple(sorted({case for cases in within for case in cases}))
 
     def are_silent(self, rows: Any) -> bool:
-        """Return whether no part has anything to say of cases of which ``rows.silent`` is known."""
+        """Return whether no part has a warning, by ``rows.silent`` of the cases."""
         watching = (part.name for part in self.parts.values() if part.has("watch"))
         return all(name in rows.silent for name in watching)
 
@@ -95,10 +95,10 @@ def _warnings_of(model: Any, recording: Any, par: Any) -> list[str]:
 
 
 def silent_parts(model: Any, rows: Any, pars: Sequence[Any]) -> frozenset[str]:
-    """Return the parts of an assembly whose elements say nothing of any of several cases.
+    """Return the parts of an assembly whose elements have no warnings in any of several cases.
 
-    ``rows``: signals of shape (cases, rows). Only elements that are watched row by row can be told.
-    Parameters that differ between the cases are arrays of shape (cases, 1) to them.
+    ``rows``: signals of shape (cases, rows). Only elements that are watched row by row can be
+    evaluated. Parameters that differ between the cases are arrays of shape (cases, 1).
     """
     felt = tuple(
         (part, each)
@@ -110,7 +110,7 @@ def silent_parts(model: Any, rows: Any, pars: Sequence[Any]) -> frozenset[str]:
     for each in felt:
         try:
             ((part, texts),) = _said(model, (each,), rows, joined, len(pars) > 1)
-        except (TypeError, ValueError):  # it asks or says something that is not one number here
+        except (TypeError, ValueError):  # it needs or returns something other than a single number
             continue
         if not texts:
             silent.add(part.name)
@@ -118,7 +118,7 @@ def silent_parts(model: Any, rows: Any, pars: Sequence[Any]) -> frozenset[str]:
 
 
 def _joined(pars: Sequence[Any]) -> Any:
-    """Return sets of one structure as a single one: where they differ, with an array of all."""
+    """Join sets of one structure; where they differ, the result has an array of all values."""
     if len(pars) == 1:
         return pars[0]
     names, table = tuple(pars[0].leaves()), leaf_table(pars)
@@ -129,9 +129,9 @@ def _joined(pars: Sequence[Any]) -> Any:
 def _said(
     model: Any, felt: _Felt, rows: Any, par: Any, is_joined: bool = False
 ) -> Iterator[tuple[Any, list[str]]]:
-    """Yield parts that watch and what they say of rows.
+    """Yield the parts that watch, with their warnings about rows.
 
-    ``is_joined``: whether ``par`` is the sets of several runs as one.
+    ``is_joined``: whether ``par`` joins the sets of several runs.
     """
     with np.errstate(all="ignore"):
         given = _Given(rows, par, is_joined)
@@ -143,14 +143,14 @@ def _said(
 
 
 def watched_by_elements(model: Any, par: Any) -> tuple[str, ...]:
-    """Return the signals from which follows what the elements of an assembly watch."""
+    """Return the signals that determine the watched inputs of an assembly's elements."""
     felt = tuple(value for _, each in _felt(model, par) for value in each.values())
     return tuple(name for name in names_in(felt) if not name.startswith(_PARAMETER))
 
 
 def _felt(model: Any, par: Any) -> _Felt:
-    """Return the parts that watch, and how what each looks at follows from signals."""
-    # What an instance holds of its own may stand in the equations.
+    """Return the parts that watch, with the functions from signals to their inputs."""
+    # Attributes of an instance may appear in the equations.
     key = None if vars(model) else (type(model), tuple(par.choices().items()))
     if key in _KNOWN:
         return _KNOWN[key]
@@ -171,7 +171,7 @@ def _felt(model: Any, par: Any) -> _Felt:
 
 
 class _Given(dict[str, Any]):
-    """Rows of signals and values of parameters by name; of what is not recorded NaN."""
+    """Rows of signals and values of parameters by name; NaN for signals not recorded."""
 
     def __init__(self, recording: Any, par: Any, is_joined: bool) -> None:
         self._recording, self._par, self._is_joined = recording, par, is_joined

@@ -1,4 +1,4 @@
-"""Wires: signals that an assembly declares, and what its equations see at an instant."""
+"""Wires: signals that an assembly declares, and values of its equations at an instant."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ class Wired(Generic[X, U, F, P]):
     Parameters
     ----------
     part
-        What is declared.
+        The declared part.
     instant
-        Where the model is evaluated.
+        Instant of the evaluation.
     """
 
     def __init__(self, part: Any, instant: Instant) -> None:
@@ -52,10 +52,10 @@ class Wired(Generic[X, U, F, P]):
         return self._part.parameters(self._instant.par)  # type: ignore[no-any-return]
 
     def vary(self, **values: Any) -> None:
-        """Let some of its parameters follow the state: what they are at this instant, by name.
+        """Make some of its parameters depend on the state, by their values at this instant.
 
-        In ``wire``, above what reads them. They may follow what is taken value-only (``xe``); what
-        ``mass`` and ``matrix`` read stays what it is.
+        Call it in ``wire``, above all reads of them. They may depend on value-only states (``xe``).
+        ``mass`` and ``matrix`` still read the original values.
 
         Raises
         ------
@@ -77,7 +77,7 @@ class Wired(Generic[X, U, F, P]):
 
     @property
     def u(self) -> U:
-        """Input, as it was wired."""
+        """Wired input."""
         if self._input is None:
             self._instant.settle()
         if self._input is None:
@@ -104,7 +104,7 @@ class Wired(Generic[X, U, F, P]):
         self._instant.note(f"{self._part.name}.u")
 
     def call(self, function: Callable[..., Any], **more: Any) -> Any:
-        """Return what a function of the element gives, its arguments taken by their names."""
+        """Call a function of the element with arguments by their names."""
         return function(
             *(
                 more[name] if name in more else self._argument(name, function)
@@ -113,7 +113,7 @@ class Wired(Generic[X, U, F, P]):
         )
 
     def felt(self, function: Callable[..., Any]) -> dict[str, Any]:
-        """Return those arguments of a function of the element that are no parameters, by name."""
+        """Return the arguments of an element's function that are not parameters, by name."""
         wanted = [name for name in arguments(function) if name in ("x", "xe", "u", "f")]
         return {name: self._argument(name, function) for name in wanted}
 
@@ -125,15 +125,15 @@ class Wired(Generic[X, U, F, P]):
         if name in self._instant.shared:
             return getattr(self._instant.par, name)
         raise ModelError(
-            f"{self._part.where}: {self._part.kind}.{function.__name__} takes {name!r}, which no "
-            f"assembly knows: x, u, f and par are, and parameters that it names in shared "
-            f"({', '.join(self._instant.shared) or 'none now'})"
+            f"{self._part.where}: {self._part.kind}.{function.__name__} takes {name!r}, which is "
+            f"not available: use x, u, f, par or a parameter that the assembly names in shared "
+            f"({', '.join(self._instant.shared) or 'none so far'})"
         )
 
 
 @dataclass
 class Instant:
-    """Where and with what a model is evaluated.
+    """Instant and values of a model's evaluation.
 
     Parameters
     ----------
@@ -142,22 +142,22 @@ class Instant:
     shared
         Groups of parameters that elements take by name.
     contact
-        Contact forces by part, and by assembly within it.
+        Contact forces by part, and by subassembly.
     lines
-        File and line in which every wire and input was set, where that is wanted.
+        File and line of every assignment of a wire or input, if requested.
     mark
-        ``mark(name, value)``: what takes the place of every wire and input as it is set, where
-        connections are followed.
+        ``mark(name, value)``: replacement for every assigned wire and input, to follow
+        connections.
     held
-        Assemblies within it, at the same instant.
+        Subassemblies at the same instant.
     forces
-        Contact forces in the order of the protocol; None where they are not known.
+        Contact forces in the order of the protocol; None if unknown.
     wiring
-        Wires it, once, as soon as something of it is read; None where that is done.
+        Wires it once, at the first read; None afterward.
     is_held
         Whether another assembly holds it, and sets its ports.
     ports
-        What ports carry that nobody sets; 0 by default.
+        Values of ports that are not set; 0 by default.
     """
 
     x: Any
@@ -180,17 +180,17 @@ class Instant:
     ports: Mapping[str, Any] = field(default_factory=dict)
 
     def settle(self) -> None:
-        """Wire the assembly unless that is done, or under way."""
+        """Wire the assembly unless this is done or in progress."""
         wiring, self.wiring = self.wiring, None
         if wiring is not None:
             wiring()
 
     def marked(self, name: str, value: Any) -> Any:
-        """Return a wire or an input as it is kept."""
+        """Return a wire or an input with its mark, if any."""
         return value if self.mark is None else self.mark(name, value)
 
     def note(self, name: str) -> None:
-        """Remember where a signal was set."""
+        """Store the line in which a signal was set."""
         if self.lines is not None:
             self.lines[name] = line()
 
@@ -201,7 +201,7 @@ def instant_of(instance: Any, where: str) -> Instant:
     Raises
     ------
     ModelError
-        When it is not: its parts have values at an instant only.
+        When there is none, since parts have values only at an instant.
     """
     instant = vars(instance).get("_instant")
     if instant is None:
@@ -219,14 +219,14 @@ def arguments(function: Callable[..., Any]) -> tuple[str, ...]:
 
 
 def line() -> str:
-    """Return file and line of the equation that is being evaluated: the first beyond this room."""
+    """Return file and line of the current equation: the first frame outside this package."""
     frame = inspect.currentframe()
     while frame is not None and frame.f_globals.get("__package__") == __package__:
         frame = frame.f_back
     return f"{frame.f_code.co_filename}, line {frame.f_lineno}," if frame else ""
 
 
-# --- What an assembly declares: wires, integrals, and what is only recorded
+# --- Declarations of an assembly: wires, integrals, and recorded signals
 
 
 class _Named:
@@ -252,7 +252,7 @@ class Wire(_Named):
     @overload
     def __get__(self, instance: Any, owner: type) -> float: ...
     def __get__(self, instance: Any, owner: type) -> Any:
-        """Return the wire, or of an assembly at an instant its value."""
+        """Return the wire; for an assembly at an instant, its value."""
         if instance is None:
             return self
         instant = instant_of(instance, self.where)
@@ -264,7 +264,7 @@ class Wire(_Named):
         return wires[self.name]
 
     def unset(self, instant: Instant) -> None:
-        """Refuse to be read before it is set."""
+        """Raise the error for a read before the assignment."""
         raise ModelError(
             f"{self.where} is read before it is set: assign w.{self.name} = ... in wire, above that"
         )
@@ -278,13 +278,13 @@ class Wire(_Named):
 
 
 class Port(Wire):
-    """A wire by which an assembly feels what holds it; where nothing does, 0 or what ``wire`` sets.
+    """A wire that the holder of an assembly sets; without a holder 0, or the value from ``wire``.
 
-    The holder sets it, ``w.brake.PORT = ...``, above what it reads of that assembly's wires.
+    The holder sets it, ``w.brake.PORT = ...``, above all reads of that assembly's wires.
     """
 
     def unset(self, instant: Instant) -> None:
-        """Take what an assembly feels that nothing holds; refuse where something does."""
+        """Use the default without a holder; with one, raise the error."""
         if instant.is_held:
             raise ModelError(
                 f"{self.where} is read before the holder sets it: assign w.NAME.{self.name} = ... "
@@ -294,8 +294,8 @@ class Port(Wire):
 
 
 class Integral(_Named):
-    """What is integrated along with the states; ``power`` returns its rate."""
+    """A quantity that is integrated along with the states; ``power`` returns its rate."""
 
 
 class Shown(_Named):
-    """What is recorded and is no state, wire or integral; ``record`` returns it."""
+    """A recorded signal that is not a state, wire or integral; ``record`` returns it."""

@@ -1,4 +1,4 @@
-"""Wiring of an assembly, read off its equations: is it complete, and which part feels which."""
+"""Wiring of an assembly, derived from its equations: completeness, and connections of parts."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ _AnyAssembly = Assembly[Any, Any]
 
 
 def check_wiring(model: _AnyAssembly, par: ParameterSet) -> None:
-    """Evaluate an assembly on dimensions and check what it sets and returns.
+    """Evaluate an assembly on dimensions and check the units of its assignments and results.
 
     Raises
     ------
     ModelError
-        Naming class, file and line, part, signal, both units and what to do.
+        With class, file and line, part, signal, both units and the next step.
     """
     at = _Operands(model, par)
     w = at.wired("wire")
@@ -46,7 +46,7 @@ def check_wiring(model: _AnyAssembly, par: ParameterSet) -> None:
 
 
 class _Operands:
-    """What an assembly is evaluated on, and how."""
+    """Evaluation of an assembly on dimensions."""
 
     def __init__(self, model: _AnyAssembly, par: ParameterSet) -> None:
         self.model = model
@@ -75,7 +75,7 @@ class _Operands:
         )
 
     def forces(self, model: Any, par: Any) -> Iterator[Any]:
-        """Yield the dimensions of an assembly's contact forces, of those within included."""
+        """Yield the dimensions of an assembly's contact forces, including its subassemblies."""
         for part in model.parts.values():
             if any(part.group_sizes(par)):
                 yield from self.tuple(part.element.Forces)
@@ -83,7 +83,7 @@ class _Operands:
             yield from self.forces(sub.assembly, sub.parameters(par))
 
     def dimension(self, unit: str, what: str) -> Dimension:
-        """Return the dimension of a unit; the error names what it belongs to."""
+        """Return the dimension of a unit; an error names its owner."""
         try:
             if not unit:
                 raise UnitError("it has no unit: write '1' for a pure number")
@@ -109,13 +109,13 @@ class _Operands:
         return wired
 
     def evaluated(self, method: str, function: Callable[..., Any], *arguments: Any) -> Any:
-        """Return what an equation gives, its errors with their lines."""
+        """Return the result of an equation; an error gives its line."""
         try:
             return function(*arguments)
         except UnitError as error:
             where = _line_of(error, self.model)
             raise ModelError(
-                f"{type(self.model).__name__}.{method}, {where}: {error}: mend the equation or "
+                f"{type(self.model).__name__}.{method}, {where}: {error}: correct the equation or "
                 "the unit that one of its quantities is declared with"
             ) from None
 
@@ -152,7 +152,7 @@ def _check_inputs(model: _AnyAssembly, at: _Operands, w: _AnyAssembly) -> None:
 
 
 def _check_held(model: _AnyAssembly, par: ParameterSet) -> None:
-    """Check that the assemblies within get what feeds them, and that their tasks run."""
+    """Check that the subassemblies' stimuli have sources, and that their tasks run."""
     known = signals_of(model.Stimulus) | signals_of(model.Memory)
     running = {task.name for task in model.tasks(par)}
     for sub in model.subs.values():
@@ -187,12 +187,12 @@ def _check_contacts(model: _AnyAssembly, at: _Operands) -> None:
             if isinstance(overlap, Dimension) and not fits(overlap, str(wanted)):
                 raise ModelError(
                     f"{_place(model)}: an overlap in {overlap} meets a compliance times a force in "
-                    f"{wanted}: they must be alike"
+                    f"{wanted}: the units must match"
                 )
 
 
 def _protocol(model: _AnyAssembly, at: _Operands, method: str) -> Iterator[Any]:
-    """Yield the function of the protocol that a method is a part of, and its arguments."""
+    """Yield the protocol functions that call a method, with their arguments."""
     if method == "power":
         yield from (
             model.powers,
@@ -232,12 +232,13 @@ def _require(
     meaning = f" ({label})" if label else ""
     raise ModelError(
         f"{type(model).__name__}.{method}, {where or _place(model, method)}: {name}{meaning} is in "
-        f"{unit}, but is given a quantity in {shown}: mend what is assigned or the declared unit"
+        f"{unit}, but is given a quantity in {shown}: correct "
+        "the assigned value or the declared unit"
     )
 
 
 def _assigned(name: str) -> str:
-    """Return what is assigned: of a part's input all at once."""
+    """Yield the assigned values; a part's input is one item."""
     return name.rpartition(".")[0] if ".u." in name else name
 
 
@@ -270,14 +271,14 @@ def _line_of(error: BaseException, model: _AnyAssembly) -> str:
     return f"{frames[-1].filename}, line {frames[-1].lineno}" if frames else _place(model)
 
 
-# --- Which part feels which
+# --- Connections of parts
 # ``wire`` and the tasks are run once on numbers that remember how they are computed; wires and
-# inputs are marked as they are set. What a value is computed from, up to the next mark, is what it
-# is connected to.
+# inputs are marked as they are set. A value is connected to everything it is computed from, up to
+# the next mark.
 
 Kind = Literal["part", "wire", "task", "stimulus"]
 FRICTION = "friction"
-"""what the port is called at which a part feels the dry friction on its state"""
+"""port of a part for the dry friction on its state"""
 
 
 class Node(NamedTuple):
@@ -288,12 +289,12 @@ class Node(NamedTuple):
 
 
 STIMULUS = Node("stimulus", "demand")
-"""what the bench or a driver asks for"""
+"""demand of the bench or a driver"""
 
 
 @dataclass(frozen=True)
 class Connection:
-    """What a node gives to another one.
+    """Connection from a node to another one.
 
     ``port``: input of a part, signal that a task reads; empty where the target is a wire.
     """
@@ -312,14 +313,13 @@ class Network:
     name
         Of the assembly.
     nodes
-        Parts, wires and tasks in the order in which they are declared, the stimulus first where
-        a task reads it.
+        Parts, wires and tasks in the order of declaration; first the stimulus if a task reads it.
     labels
-        What each is: the kind of a part's element, what a wire carries.
+        Description of each: the kind of a part's element, or a wire's label.
     ports
-        What each part and task feels, by node, in order; nothing for wires.
+        Inputs of each part and task, by node, in order; wires have none.
     connections
-        Each once, in the order of their targets.
+        Connections without duplicates, in the order of their targets.
     """
 
     name: str
@@ -329,19 +329,19 @@ class Network:
     connections: tuple[Connection, ...]
 
     def sources(self, node: Node, port: str = "") -> list[Node]:
-        """Return what a node is connected to at one of its ports."""
+        """Return the sources that are connected to a node's port."""
         return [c.source for c in self.connections if (c.target, c.port) == (node, port)]
 
 
 def network(model: Assembly[Any, Any], par: Any) -> Network:
-    """Return the parts of an assembly and what connects them.
+    """Return the parts of an assembly and their connections.
 
     Parameters
     ----------
     model
         An assembly.
     par
-        Parameters, whose choices say which equations hold.
+        Parameters, whose choices select the equations.
     """
     trace = _Trace(model, par)
     ports: dict[Node, tuple[str, ...]] = {}
@@ -385,7 +385,7 @@ class _Trace:
     def __init__(self, model: Assembly[Any, Any], par: Any) -> None:
         self.model = model
         self._marks: dict[int, tuple[Node, Any]] = {}
-        self._kept: list[Traced] = []  # a mark is known by its object, which must live on
+        self._kept: list[Traced] = []  # keeps marks alive, whose identity counts
         self.owners = {
             part.state_name(state): Node("part", part.name)
             for part in model.parts.values()
@@ -443,7 +443,7 @@ class _Trace:
         }
 
     def memory_of(self, name: str) -> dict[str, Node]:
-        """Return the memory that an assembly within feels, by its own names, with who renews it."""
+        """Return a subassembly's memory by its own names, with the tasks that update it."""
         sub, node = self.model.subs[name], Node("part", name)
         own = dict(zip(sub.signals("Memory"), sub.assembly.Memory._fields, strict=True))
         raw = tuple(value for at, value in self._marks.values() if at == node)
@@ -453,7 +453,7 @@ class _Trace:
         }
 
     def _mark(self, name: str, value: Any) -> Any:
-        """Return a value that is known by the wire or input that carries it."""
+        """Return a value that is marked with its wire or input."""
         within = name.partition("/")[0]
         if within != name:
             node, is_one = Node("part", within), not isinstance(value, tuple)
@@ -491,7 +491,7 @@ class _Trace:
             yield node, read, {name.removeprefix("m.") for name in leaves if name[:2] == "m."}
 
     def sources(self, values: Any) -> list[Node]:
-        """Return the nodes that a value follows from, each once."""
+        """Return the nodes that a value depends on, without duplicates."""
         marks = {key: node for key, (node, _) in self._marks.items()}
         nodes = [self._node(each) for each in names_in(values, marks)]
         return list(dict.fromkeys(node for node in nodes if node is not None))
@@ -511,13 +511,13 @@ class _Trace:
         return self.owners.get(leaf)
 
     def nodes(self, connections: Iterable[Connection]) -> tuple[Node, ...]:
-        """Return all nodes, the stimulus where anything is connected to it."""
+        """Return all nodes; the stimulus only if something is connected to it."""
         asked = [STIMULUS] if any(c.source == STIMULUS for c in connections) else []
         parts = (Node("part", name) for name in (*self.model.parts, *self.model.subs))
         return (*asked, *self.ticks, *(Node("wire", name) for name in self.wires), *parts)
 
     def labels(self) -> dict[Node, str]:
-        """Return what every node is, in words."""
+        """Return a description of every node."""
         cls = type(self.model)
         labels = {Node("wire", name): getattr(cls, name).signal.label for name in self.wires}
         labels |= {

@@ -24,12 +24,12 @@ from bywire.data.channel_quality import (
 from bywire.data.file_format import room
 
 METHODS = ("linear", "previous", "nearest", "average")
-"""how values between samples are found"""
+"""methods for values between samples"""
 
 _Values = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 
-_BLOCK = 1 << 20  # instants that are found together: what it takes beside the result
-_SLACK = 1e-9  # intervals: rounding of instants that are meant to be the same
+_BLOCK = 1 << 20  # instants per chunk, which limits memory beside the result
+_SLACK = 1e-9  # intervals: tolerance for rounding of equal instants
 
 
 def resampled(
@@ -46,7 +46,7 @@ def resampled(
     time, values
         Increasing instants [s] and values there, shape ``(sample,)``; none is NaN.
     axis
-        Instants wanted [s], within those of the signal, shape ``(instant,)``.
+        Requested instants [s], within those of the signal, shape ``(instant,)``.
     step
         Their distance [s].
     method
@@ -65,14 +65,14 @@ def resampled(
 def _samples(
     time: NDArray[np.float64], values: NDArray[np.float64], step: float, method: str
 ) -> _Values:
-    """Return the function that finds the values at instants between samples."""
+    """Return the interpolation between samples as a function."""
 
     def at(axis: NDArray[np.float64]) -> NDArray[np.float64]:
         before = np.searchsorted(time, axis + _SLACK * step, side="right") - 1
         before = np.clip(before, 0, time.size - 1)
         if method == "linear":
             line = np.asarray(np.interp(axis, time, values))
-            # A sample that lies on the axis, but for rounding, is kept to its last digit.
+            # A sample on the axis (except for rounding) keeps its exact value.
             return np.where(np.abs(time[before] - axis) <= _SLACK * step, values[before], line)
         if method == "nearest":
             after = np.minimum(before + 1, time.size - 1)
@@ -83,8 +83,8 @@ def _samples(
 
 
 def _means(time: NDArray[np.float64], values: NDArray[np.float64], step: float) -> _Values:
-    """Return the function that finds the mean of the line through the samples over a step."""
-    # The mean is taken off first: what is summed up stays small, and so does its rounding.
+    """Return the mean over a step of the line through the samples, as a function."""
+    # Without the mean, sums stay small, and so does their rounding.
     middle = float(values.mean())
     areas = np.diff(time) * (0.5 * (values[1:] + values[:-1]) - middle)
     total = np.concatenate([[0.0], np.cumsum(areas)])
@@ -103,12 +103,12 @@ def _means(time: NDArray[np.float64], values: NDArray[np.float64], step: float) 
 # --- Alignment
 
 FLAWS = ("gaps", "missing", "clipped")
-"""what may be excluded"""
+"""flaws that can be excluded"""
 
 
 @dataclass(frozen=True)
 class Aligned:
-    """Signals on one time axis, and the report of how they came there."""
+    """Signals on one time axis, with a report."""
 
     dataset: xr.Dataset
     report: AlignmentReport
@@ -126,25 +126,25 @@ def resample(
 ) -> Aligned:
     """Bring signals to one time axis.
 
-    The axis has its instants at whole multiples of the interval, as far as every signal reaches.
+    The axis has instants at whole multiples of the interval, in the overlap of all signals.
 
     Parameters
     ----------
     measurement
-        What `read_measurement` returns: variables with one dimension each, instants in s.
+        Result of `read_measurement`: variables with one dimension each, instants in s.
     interval
         Step of the axis, text with a unit or [s].
     signals
-        Which ones; all by default.
+        Names of the signals; all by default.
     method
         ``"linear"`` or ``"previous"`` (the value holds until the next sample) or ``"nearest"``,
         between samples; or ``"average"``, the mean of the line through the samples over an
         interval around each instant, which keeps fast content from folding into slow.
     exclude
         Flaws in which the result is NaN: ``"gaps"``, ``"missing"`` (NaN in the file),
-        ``"clipped"``. Those that are not named are used: the method bridges gaps.
+        ``"clipped"``. Other flaws are not excluded: the method bridges gaps.
     max_gap
-        Longest pause that is no gap, text with a unit or [s]; ten median steps by default.
+        Longest pause that is not a gap, text with a unit or [s]; ten median steps by default.
 
     Returns
     -------
@@ -154,8 +154,8 @@ def resample(
     Raises
     ------
     ParameterError
-        When interval or pause is not positive, the result would be too large, a signal has too
-        few values or none that is not excluded, or signals do not overlap.
+        When interval or pause is not positive, the result would be too large, a signal has too few
+        usable values, or signals do not overlap.
     UnknownNameError
         For an unknown signal, method or flaw.
     """
@@ -224,7 +224,7 @@ def _quality(measurement: xr.Dataset, name: str, longest: float | None) -> Chann
 
 
 def _axis(qualities: dict[str, ChannelQuality], step: float, method: str) -> NDArray[np.float64]:
-    """Return the multiples of the step that lie in all channels."""
+    """Return the multiples of the step within all channels."""
     margin = step / 2.0 if method == "average" else 0.0
     if not qualities:
         raise ParameterError("no signal was chosen: name at least one", name="signals")
@@ -244,7 +244,7 @@ def _axis(qualities: dict[str, ChannelQuality], step: float, method: str) -> NDA
     if size > room():
         raise ParameterError(
             f"interval = {step:g} s would make {last - first + 1:.3g} samples of each signal, "
-            f"{size / 2**30:.3g} GiB, and {room() / 2**30:.3g} GiB are made at most: choose a "
+            f"{size / 2**30:.3g} GiB, and {room() / 2**30:.3g} GiB are the limit: choose a "
             "larger one, or fewer signals",
             name="interval",
             value=f"{step:g} s",
@@ -263,7 +263,7 @@ def _on_axis(
     method: str,
     left_out: tuple[str, ...],
 ) -> tuple[NDArray[np.float64], int]:
-    """Return a signal on the axis, and how many of its values are NaN there."""
+    """Return a signal on the axis, and the number of its NaN values."""
     time, values = _instants_of(measurement, name), measurement[name].values
     there = ~np.isnan(values)
     if not there.all():
@@ -276,7 +276,7 @@ def _on_axis(
             flawed[_inside(stretch, axis, step, reach, ends=flaw == "clipped")] = True
     if flawed.all():
         raise ParameterError(
-            f"{name} has no value left after excluding {', '.join(left_out)}: check its limits, "
+            f"{name} has no values left after excluding {', '.join(left_out)}: check its limits, "
             "or exclude less",
             name=name,
         )
@@ -287,7 +287,7 @@ def _on_axis(
 def _inside(
     stretch: Stretch, axis: NDArray[np.float64], step: float, reach: float, *, ends: bool
 ) -> slice:
-    """Return the part of the axis whose values would come from a stretch."""
+    """Return the part of the axis whose values depend on a stretch."""
     slack = -_SLACK * step if ends else _SLACK * step  # of a gap, the samples at its ends are good
     begin = stretch.start - reach + slack
     end = stretch.start + stretch.length + reach - slack

@@ -1,6 +1,6 @@
-"""What a measured channel is like: rate, jitter, gaps, missing values, clipped stretches.
+"""Quality of measured channels: rate, jitter, gaps, missing values, clipped stretches.
 
-And the report of what was done to bring channels to one time axis.
+Also the report of their alignment to one time axis.
 """
 
 from __future__ import annotations
@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 GAP = 10.0
-"""median steps: a longer pause is a gap, unless a length is given"""
+"""median steps; a longer pause is a gap by default"""
 
 CLIPPED = 10
-"""samples in a row at the highest or lowest value: as many count as clipped, where the range of
-the sensor is not known; where it is known, one at its end does"""
+"""consecutive samples at the highest or lowest value that count as clipped if the range of the
+sensor is unknown; if it is known, one sample at its end counts"""
 
 
 @dataclass(frozen=True)
@@ -26,11 +26,11 @@ class Stretch:
     Parameters
     ----------
     start
-        Where it begins [s].
+        Its start [s].
     length
-        How long it is [s].
+        Its duration [s].
     samples
-        How many samples lie in it.
+        Number of its samples.
     """
 
     start: float
@@ -40,22 +40,22 @@ class Stretch:
 
 @dataclass(frozen=True)
 class ChannelQuality:
-    """What a channel is like.
+    """Quality of a channel.
 
     Parameters
     ----------
     samples
-        How many measured values there are, NaN left out.
+        Number of measured values, without NaN.
     rate
         One over the median step [Hz].
     jitter
-        Largest distance of a step from the median step [s]; gaps left out.
+        Largest deviation of a step from the median step [s], without gaps.
     start, stop
         First and last measured instant [s].
     gaps
-        Pauses that are longer than the longest allowed; from the sample before to that after.
+        Pauses longer than the limit, from the sample before to the sample after.
     missing
-        Stretches of NaN, from the measured sample before to that after.
+        Stretches of NaN, from the measured sample before to the one after.
     clipped
         Stretches at the end of the sensor's range, or at the highest or lowest value.
     """
@@ -77,23 +77,23 @@ def quality(
     max_gap: float | None = None,
     limits: tuple[float, float] | None = None,
 ) -> ChannelQuality:
-    """Return what a channel is like.
+    """Return the quality of a channel.
 
     Parameters
     ----------
     time
         Increasing instants [s], shape ``(sample,)``.
     values
-        Values, NaN where nothing was measured, shape ``(sample,)``.
+        Values, NaN where missing, shape ``(sample,)``.
     max_gap
-        Longest pause that is no gap [s]; ``GAP`` median steps by default.
+        Longest pause that is not a gap [s]; ``GAP`` median steps by default.
     limits
         Range of the sensor, in the unit of the values.
 
     Raises
     ------
     ValueError
-        When fewer than two values were measured.
+        For fewer than two measured values.
     """
     there = ~np.isnan(values)
     missing = _missing(time, there)
@@ -135,7 +135,7 @@ def _clipped(
 ) -> list[Stretch]:
     low, high = (float(values.min()), float(values.max())) if limits is None else limits
     least = CLIPPED if limits is None else 1
-    if low == high:  # a channel that never moves says nothing of its range
+    if low == high:  # a constant channel does not show its range
         return []
     runs = [*_runs(values <= low), *_runs(values >= high)]
     return [
@@ -158,16 +158,16 @@ _FASTER = 0.01  # clocks of the same nominal rate differ by less
 
 @dataclass(frozen=True)
 class AlignedChannel:
-    """What was found in a channel, and what was done with it.
+    """Quality and alignment of a channel.
 
     Parameters
     ----------
     name
         Name of the signal.
     quality
-        What it is like.
+        Its quality.
     delay
-        By how much its instants had been moved back [s].
+        Shift of its instants to earlier times [s].
     excluded
         Number of samples of the common axis that are NaN because of its flaws.
     """
@@ -180,7 +180,7 @@ class AlignedChannel:
 
 @dataclass(frozen=True)
 class AlignmentReport:
-    """What was done to bring signals to one time axis.
+    """Report of an alignment to one time axis.
 
     Parameters
     ----------
@@ -189,13 +189,13 @@ class AlignmentReport:
     start, stop
         Its first and last instant [s].
     samples
-        How many there are.
+        Number of its instants.
     method
-        How values between samples were found.
+        Method for values between samples.
     exclude
-        Which flaws were excluded; the others were used.
+        Excluded flaws.
     channels
-        What was found and done, for each signal.
+        Quality and alignment of each signal.
     """
 
     interval: float
@@ -208,7 +208,7 @@ class AlignmentReport:
 
     @property
     def folded(self) -> tuple[str, ...]:
-        """Signals that are faster than the axis, so that their fast content folds into slow."""
+        """Signals sampled faster than the axis, whose fast content aliases."""
         if self.method == "average":
             return ()
         limit = (1.0 + _FASTER) / self.interval

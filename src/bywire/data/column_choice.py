@@ -1,4 +1,4 @@
-"""Which columns of a file become which signals, with which units and instants."""
+"""Assignment of a file's columns to signals, with units and instants."""
 
 from __future__ import annotations
 
@@ -20,22 +20,22 @@ from bywire.data.mapping import Clock, MeasurementMapping, SignalMapping
 _CLOCKS = ("time", "t", "zeit", "timestamp", "time stamp", "date time", "datetime", "x_value")
 _SHOWN = 12
 _NO_VALUE = (9.9e37, -9.9e37, 9.91e37)
-"""what instruments send where they have no value, by SCPI: infinite, and not a number"""
+"""numbers of SCPI instruments for missing values: infinity, and not a number"""
 
 
 class MissingUnitsError(UnitError):
-    """Columns that have no unit, all of those that are to be read.
+    """All requested columns that have no unit.
 
     Parameters
     ----------
     text
-        What is wrong, and what to do about it.
+        Problem and next step.
     lacking
-        What is wrong alone.
+        Problem alone.
     signals
         Name of the signal -> its column.
     clock
-        Column of the instants, where it has none either.
+        Column of the instants, if it has no unit either.
     """
 
     def __init__(
@@ -50,14 +50,14 @@ class MissingUnitsError(UnitError):
 
 
 class NoClockError(FileError):
-    """A file that does not state when it was measured.
+    """A file without instants.
 
     Parameters
     ----------
     text
-        What to do about it.
+        Next step.
     signals
-        Name of the signal -> its column, of those to be read that have no unit either.
+        Name of the signal -> its column, for requested signals without a unit.
     """
 
     def __init__(self, text: str, signals: Mapping[str, str] | None = None) -> None:
@@ -77,8 +77,8 @@ def _missing_units(file: Path, signals: Mapping[str, str], clock: str = "") -> M
     for name, column in signals.items():
         title, inside = f"{column} [mm]", f"[signals.{name}] unit = 'mm'"
     text = (
-        f"{lacking}: write it behind the title, as '{title}', or in a mapping, as "
-        f"{inside}, or '1' for none"
+        f"{lacking}: write it after the title, as '{title}', or in a mapping, as "
+        f"{inside}; write '1' for a pure number"
     )
     return MissingUnitsError(text, lacking, signals, clock)
 
@@ -90,11 +90,11 @@ class Chosen:
     Parameters
     ----------
     mapping
-        What its column means.
+        Mapping of its column.
     column
         Name of the column.
     clock
-        Where its instants come from; a column with its unit, or a rate.
+        Source of its instants: a column with its unit, or a rate.
     unit
         Unit of the scaled numbers.
     symbol
@@ -102,9 +102,9 @@ class Chosen:
     label
         Description.
     meanings
-        What its numbers stand for, where they are numbers of something.
+        Texts for its numbers, if the numbers are codes.
     missing
-        Numbers in the file that say that nothing was measured.
+        Numbers in the file that mark missing values.
     """
 
     mapping: SignalMapping
@@ -117,7 +117,7 @@ class Chosen:
     missing: tuple[float, ...] = ()
 
     def to_si(self, values: NDArray[np.float64]) -> list[str]:
-        """Turn numbers of the file into the signal, where they lie; return what to note of it."""
+        """Convert the file's numbers to the signal in place, and return notes."""
         notes = self._without_marks(values)
         factor = self.mapping.sign * (1.0 if self.mapping.scale is None else self.mapping.scale)
         if factor != 1.0:
@@ -127,14 +127,14 @@ class Chosen:
             values += self.mapping.offset
         if unit_of(self.unit).reference == "absolute":
             notes.append(
-                f"{self.mapping.name}: its unit {self.unit!r} says absolute pressure, while "
+                f"{self.mapping.name}: its unit {self.unit!r} means absolute pressure, but "
                 "pressures of brakes are relative to ambient: offset = '-1.013 bar' in the mapping "
                 "subtracts a usual one"
             )
         return notes
 
     def _without_marks(self, values: NDArray[np.float64]) -> list[str]:
-        """Have NaN where a number says that nothing was measured, and return a note on it."""
+        """Replace numbers that mark missing values by NaN, and return a note."""
         found, total = [], 0
         for mark in dict.fromkeys((*_NO_VALUE, *self.missing)):
             is_mark = (values == mark) | (values == np.float32(mark))
@@ -151,7 +151,7 @@ class Chosen:
         return [f"{name}: missing samples: {total} ({', '.join(found)})"] if found else []
 
     def attributes(self) -> dict[str, Any]:
-        """Return what a dataset says of the signal."""
+        """Return the signal's attributes in a dataset."""
         attributes: dict[str, Any] = {
             "units": self.symbol,
             "long_name": self.label,
@@ -176,7 +176,7 @@ def choose(
     UnknownNameError
         For a signal that the mapping or the file does not have.
     FileError
-        For a column that is not there, or when the file does not say its instants.
+        For a missing column, or a file without instants.
     UnitError
         When a unit is missing, unknown or contradicts that of the file.
     """
@@ -213,7 +213,7 @@ def choose(
 
 
 def _title_unit(source: Source, column: str) -> str:
-    """Return the unit that stands in brackets behind the name of a column, if it is not its own."""
+    """Return the unit in brackets after a column's name, unless they are part of the name."""
     columns = source.columns
     is_name = column in columns or any(column == each.path for each in columns.values())
     return "" if is_name else split_title(column)[1]
@@ -222,7 +222,7 @@ def _title_unit(source: Source, column: str) -> str:
 def every_signal(
     file: Path, source: Source, meaning: MeasurementMapping
 ) -> dict[str, SignalMapping]:
-    """Return every column that is no clock under its own name."""
+    """Return all columns that are not clocks, under their own names."""
     clocks = {c.clock for c in source.columns.values()}
     if meaning.clock is not None and meaning.clock.column:
         clocks |= {_column(file, source, meaning.clock.column, "time.column").name}
@@ -275,14 +275,14 @@ def _known_unit(unit: str, where: str) -> Scale:
 
 
 def _require_same(signal: SignalMapping, column: Column, where: str) -> None:
-    """Refuse a mapping whose unit is another one than the file's."""
+    """Reject a mapping whose unit differs from the file's."""
     unit = _known_unit(column.unit, where)
     said = unit_of(signal.unit)
     if (unit.factor, unit.zero, unit.powers) == (said.factor, said.zero, said.powers):
         return
     raise UnitError(
-        f"{where}: the file says {column.unit!r} and the mapping {signal.unit!r}: leave "
-        f"signals.{signal.name}.unit out, or give signals.{signal.name}.scale, which tells how "
+        f"{where}: the file has {column.unit!r} and the mapping {signal.unit!r}: remove "
+        f"signals.{signal.name}.unit, or give signals.{signal.name}.scale, which states how "
         f"many {signal.unit} the number 1 is",
         name=signal.name,
         value=str(signal.unit),
@@ -300,11 +300,11 @@ def _clock(file: Path, source: Source, column: Column, given: Clock | None) -> C
         name = column.clock or _usual_clock(source)
         if name is None:
             before = (
-                "; where other lines stand before the table, a mapping's skip_lines tells how many"
+                "; if other lines precede the table, give their number as skip_lines in a mapping"
             )
             why = "; ".join(("", *left_out_note(source.left_out)))
             raise NoClockError(
-                f"{file} does not state when it was measured: call a column 'time [s]', or write "
+                f"{file} does not state when it was measured: name a column 'time [s]', or write "
                 "in a mapping "
                 'time = { column = "t", unit = "ms" } or rate = "1 kHz"; '
                 + _listing(source.columns)
@@ -329,7 +329,7 @@ def _clock(file: Path, source: Source, column: Column, given: Clock | None) -> C
 
 
 def _usual_clock(source: Source) -> str | None:
-    """Return the column that is called time or t; T in kelvin is no time."""
+    """Return the column named time or t; T in kelvin is not a time."""
     columns = source.columns
     for usual in _CLOCKS:
         for name, column in columns.items():
@@ -346,7 +346,7 @@ def _is_time(unit: str) -> bool:
 
 
 def _column(file: Path, source: Source, name: str, key: str, number: int = 0) -> Column:
-    """Return a column by its name, by its title with the unit behind it, or by its number."""
+    """Return a column by name, by title with unit, or by number."""
     columns, order = source.columns, source.order
     title = split_title(name)[0]
     if not number and title.isdecimal() and not {name, title} & {*columns, *source.left_out}:
@@ -382,7 +382,7 @@ def _column(file: Path, source: Source, name: str, key: str, number: int = 0) ->
 
 
 def left_out_note(left_out: Mapping[str, str]) -> list[str]:
-    """Return a note for each reason for which something in a file is not read."""
+    """Return one note for each reason to skip something in a file."""
     by_reason: dict[str, list[str]] = {}
     for name, reason in left_out.items():
         by_reason.setdefault(reason, []).append(quoted(name))

@@ -11,11 +11,11 @@ from bywire.core.unit_list import Scale, meanings_of, scale_of
 
 _PAIRS = {"]": "[", ")": "("}
 _PURE = ("-", "--", "[-]")
-"""what a column of pure numbers may have in the place of a unit"""
+"""texts that columns of pure numbers may have instead of a unit"""
 
 
 def split_title(title: str) -> tuple[str, str]:
-    """Return name and unit of a column's title; the unit is empty where none is written.
+    """Return name and unit of a column's title; the unit may be empty.
 
     Examples
     --------
@@ -33,18 +33,18 @@ def split_title(title: str) -> tuple[str, str]:
 
 @cache
 def unit_of(text: str) -> Scale:
-    """Return the unit that a text names: of the list, or a product of such units.
+    """Return the unit of a text: one of the list, or a product of such units.
 
     Raises
     ------
     UnknownUnitError
-        When it is no such unit, or one of two meanings; the message says why.
+        When it is not such a unit, or has two meanings; the message gives the reason.
     """
     return scale_of("1" if text in _PURE else text)
 
 
 def unit_of_symbol(symbol: str) -> Scale:
-    """Return the unit of a symbol that is declared to be one; ``"1"`` is a pure number's."""
+    """Return the unit of a declared symbol; ``"1"`` is for a pure number."""
     return meanings_of(symbol)[0]
 
 
@@ -54,12 +54,12 @@ def si_symbol(unit: Scale) -> str:
 
 
 def measures(unit: Scale, symbol: str) -> bool:
-    """Return whether a unit measures the quantity of an SI unit; radians count."""
+    """Return whether a unit has the dimension of an SI unit; radians count."""
     return unit.powers == unit_of_symbol(symbol).powers
 
 
 def convert_in_place(values: NDArray[np.float64], unit: Scale, symbol: str) -> None:
-    """Turn values into an SI unit where they lie, for arrays of which there is no room for two."""
+    """Convert values to an SI unit in place, since a second array may not fit into memory."""
     slope = unit.factor / unit_of_symbol(symbol).factor
     if slope != 1.0:
         values *= slope

@@ -1,4 +1,4 @@
-"""File formats: how one is recognized, read and written, and how much memory data may take."""
+"""File formats: recognition, reading, writing, and the limit of memory for data."""
 
 from __future__ import annotations
 
@@ -29,19 +29,19 @@ class Column:
     Parameters
     ----------
     name
-        What the file calls it.
+        Name in the file.
     unit
-        Its unit as the file writes it; empty where it says none.
+        Unit as written in the file; may be empty.
     length
-        How many numbers it holds; None where only reading would tell.
+        Count of its numbers; None if it is known only after reading.
     clock
-        Column that holds its instants, where the file says so.
+        Column of its instants, if the file defines it.
     label
-        Description, where the file gives one.
+        Description, if the file has one.
     meanings
-        What its numbers 0, 1, ... stand for, blank between them, where the file says so.
+        Texts for its numbers 0, 1, ..., separated by blanks, if the file has them.
     path
-        Where it lies in the file, as in ``ScopeData.signals(1).values``: another name of it.
+        Its place in the file, such as ``ScopeData.signals(1).values``; it is also valid as a name.
     """
 
     name: str
@@ -58,26 +58,26 @@ class Source(Protocol):
 
     @property
     def columns(self) -> Mapping[str, Column]:
-        """Every column of numbers by its name, clocks among them."""
+        """All columns of numbers by name, including clocks."""
         ...
 
     @property
     def order(self) -> Sequence[str]:
-        """Names by the number of a column, from 1, those of `left_out` among them."""
+        """Names by column number from 1, including those of `left_out`."""
         ...
 
     @property
     def left_out(self) -> Mapping[str, str]:
-        """What the file holds beside the columns, by its name, and why it is not read."""
+        """Skipped content of the file: name -> reason."""
         ...
 
     @property
     def remarks(self) -> Sequence[str]:
-        """What the user should know of the file, as far as it was read."""
+        """Notes on the part of the file that was read."""
         ...
 
     def read(self, names: Sequence[str], progress: Progress) -> dict[str, NDArray[np.float64]]:
-        """Return the numbers of some columns, each of shape ``(row,)`` and free to be changed.
+        """Return new arrays of the numbers of some columns, each of shape ``(row,)``.
 
         Raises
         ------
@@ -87,45 +87,45 @@ class Source(Protocol):
         ...
 
     def place(self, name: str, row: int) -> str:
-        """Return where a row of a column stands, as errors say it."""
+        """Return the place of a row in a column, for errors."""
         ...
 
 
 class PieceSource(Protocol):
-    """An open file of columns as a library reads it in a child process, piece by piece.
+    """An open file of columns that a library reads in pieces in a child process.
 
-    It may have ``left_out`` and ``remarks``, as a `Source` has them.
+    It may have ``left_out`` and ``remarks``, like a `Source`.
     """
 
     @property
     def columns(self) -> Mapping[str, Column]:
-        """Every column of numbers by its name, each with its length."""
+        """All columns of numbers by name, each with its length."""
         ...
 
     def pieces(self, names: Sequence[str]) -> Iterator[tuple[str, int, NDArray[Any]]]:
-        """Yield numbers of some columns: name, first row, and so many that memory stays small.
+        """Yield numbers of some columns as name, first row, and a piece of limited size.
 
-        The pieces of a column come in the order of its rows. What is missing is NaN.
+        The pieces of a column come in the order of its rows. Missing values are NaN.
         """
         ...
 
 
 @dataclass(frozen=True)
 class ReadOptions:
-    """How to read a file that does not say it itself.
+    """Options to read a file that does not define them itself.
 
     Parameters
     ----------
     decimal
-        Decimal mark of a text table, ``"."`` or ``","``; found out where it is empty.
+        Decimal mark of a text table, ``"."`` or ``","``; detected if empty.
     skip_lines
         Lines before the header of a text table.
     titles
-        Whether the first row of a text table holds titles; found out where it is None.
+        Whether the first row of a text table contains titles; detected if None.
     encoding
-        How a text table writes characters; UTF-8, or as its byte-order mark says, where empty.
+        Encoding of a text table; if empty, UTF-8 or that of the byte-order mark.
     missing
-        Cells of a text table that say that nothing was measured, beside the usual ones.
+        Cells of a text table that mark missing values, in addition to the usual ones.
     """
 
     decimal: str = ""
@@ -142,29 +142,29 @@ class FileFormat:
     Parameters
     ----------
     name
-        What users call it.
+        Name in commands and mappings.
     title
-        What errors call a file of it, with its article.
+        Description of such a file in errors, with its article.
     endings
-        Endings of its files, in lower case with the dot.
+        File endings, in lower case with the dot.
     recognizes
-        Tells a file by its first 1024 bytes.
+        Recognizes a file by its first 1024 bytes.
     open
-        Opens a file for reading; raises FileError for one that is damaged. With libraries it runs
-        in the child and may raise whatever they do.
+        Opens a file for reading; raises FileError if it is damaged. With libraries it runs in the
+        child process and may raise their errors.
     write
-        Writes a dataset whole to a path that is moved into place afterwards.
+        Writes a complete dataset to a path that is moved into place afterwards.
     has_many_axes
-        Whether its files hold signals on different instants.
+        Whether its files can contain signals on different instants.
     libraries
-        Modules of libraries that read it, in a child process; none where our code reads it here.
-        A module that names some declares its format as ``FORMAT``.
+        Modules of libraries that read it in a child process; empty if our own code reads it. A
+        module that names some declares its format as ``FORMAT``.
     counts
-        What a library calls a row, and the number of its first one.
+        Name of a row in the library, and the number of the first one.
     also_reads
-        Endings of files that are read and never written.
+        File endings that bywire reads but does not write.
     opening
-        Seconds of a processor that a library may take to open a file.
+        Limit of processor time to open a file [s].
     """
 
     name: str
@@ -186,13 +186,13 @@ def library(name: str, what: str, extra: str = "measurements") -> ModuleType:
     Raises
     ------
     FileError
-        When it is not installed; names the extra that brings it.
+        When it is not installed, with the extra that contains it.
     """
     try:
         return importlib.import_module(name)
     except ImportError:
         raise FileError(
-            f"{what} need the library {name.partition('.')[0]}, which is not installed: "
+            f"{what} need the library {name.partition('.')[0]}, which is not installed; "
             f"{how_to_install(extra)}"
         ) from None
 
@@ -200,30 +200,30 @@ def library(name: str, what: str, extra: str = "measurements") -> ModuleType:
 # --- Limit of memory
 
 _MOST = 8 * 2**30  # bytes
-_SHARE = 0.5  # of the machine's memory: what is read is turned over once
+_SHARE = 0.5  # of the machine's memory, since data are copied once
 
 
 def room() -> int:
-    """Return the bytes of numbers that are held at most: 8 GiB, or half the machine's memory."""
+    """Return the limit for the bytes of numbers: 8 GiB, or half the machine's memory."""
     return min(_MOST, int(_SHARE * machine_memory()))
 
 
 def require_room(
     file: Path, source: Source, names: Collection[str] | None = None, largest: int | None = None
 ) -> None:
-    """Refuse what would not fit, before anything is read.
+    """Reject data that would not fit into memory, before reading.
 
     Parameters
     ----------
     names
-        Columns that are to be read; all by default.
+        Columns to read; all by default.
     largest
-        Most bytes of numbers; `room` by default.
+        Limit for the bytes of numbers; `room` by default.
 
     Raises
     ------
     FileError
-        When the columns say that they hold more.
+        When the columns declare more.
     """
     wanted = source.columns if names is None else names
     most = room() if largest is None else largest

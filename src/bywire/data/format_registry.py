@@ -1,4 +1,4 @@
-"""Find the format of a measurement file, by what it holds as well as by its name."""
+"""Detection of a measurement file's format by content and name."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from bywire.data.file_format import FileFormat
 _HEAD = 1024
 
 
-# Files that are told by their first bytes and not read: what they are, and the way out.
+# Known files that bywire does not read, by their first bytes: description and alternative.
 _NOT_READ = (
     (b"TDSm", "a TDMS file of LabVIEW", "export it as CSV or LVM, or as MDF 4 with DIAdem"),
     (b"LOGG", "a BLF file of Vector", "export its signals as MDF 4, which CANoe and CANalyzer do"),
@@ -20,12 +20,12 @@ _NOT_READ = (
     (b"|CF,", "a FAMOS file of imc", "export it as CSV or MDF 4 with FAMOS"),
     (b"\xd0\xcf\x11\xe0", "an Excel workbook (.xls)", "save its sheet as 'CSV UTF-8'"),
     (b"PK\x03\x04", "a ZIP archive, as .xlsx and .ods are", "save its sheet as 'CSV UTF-8'"),
-    (b"\x1f\x8b", "packed by gzip", "unpack it first"),
-    (b"7z\xbc\xaf", "packed by 7-Zip", "unpack it first"),
+    (b"\x1f\x8b", "compressed with gzip", "unpack it first"),
+    (b"7z\xbc\xaf", "compressed with 7-Zip", "unpack it first"),
     (b"#ROSBAG", "a bag of ROS", "export its topics as CSV"),
     (b"\x89MCAP", "an MCAP file of ROS 2", "export its topics as CSV"),
     (b"SQLite format 3", "an SQLite database", "export its table as CSV"),
-    (b"%PDF", "a PDF file", "ask for the data it was made from"),
+    (b"%PDF", "a PDF file", "ask for its source data"),
 )
 _ASC_OF_VECTOR = (b"date ", b"base ")  # how an ASC log of a bus begins
 
@@ -34,19 +34,19 @@ FORMATS = Kind("file format", ("formats",), instances(FileFormat), "bywire.data.
 
 
 def format_to_read(path: Path, name: str = "") -> FileFormat:
-    """Return the format in which a file is to be read.
+    """Return the format to read a file.
 
     Parameters
     ----------
     path
         The file.
     name
-        Format that the user names; else the ending decides among those that fit the content.
+        Format that the user names; otherwise the ending selects among those that fit the content.
 
     Raises
     ------
     FileError
-        When the file cannot be read, is empty, or is not what its ending or the name says.
+        When the file cannot be read, is empty, or does not match its ending or the name.
     UnknownNameError
         When there is no such format.
     """
@@ -67,19 +67,20 @@ def format_to_read(path: Path, name: str = "") -> FileFormat:
         )
     said = f"format = {name!r}" if name else f"its ending {path.suffix!r}"
     if holds:
-        content, hint = holds[0].title, f"rename it, or say format = {holds[0].name!r}"
+        content, hint = holds[0].title, f"rename it, or give format = {holds[0].name!r}"
     else:
         content = f"something else (it begins with {quoted(head[:8])})"
-        hint = "export it again from the program that measured"
+        hint = "export it again from the program that recorded it"
         if wanted[0].name == "mat":
             hint = "if it is a MAT file of version 4, save it with '-v7' in MATLAB"
     raise FileError(
-        f"{path} holds {content}, not {wanted[0].title} as {said} says: {hint}", name=str(path)
+        f"{path} contains {content}, not {wanted[0].title} as {said} declares: {hint}",
+        name=str(path),
     )
 
 
 def _require_readable(path: Path, head: bytes) -> None:
-    """Refuse what is no measurement that bywire reads, with the way out."""
+    """Reject files that bywire cannot read, with an alternative."""
     for mark, what, way in _NOT_READ:
         if head.startswith(mark):
             raise FileError(f"{path} is {what}, which bywire does not read: {way}", name=str(path))
@@ -92,7 +93,7 @@ def _require_readable(path: Path, head: bytes) -> None:
 
 
 def format_to_write(path: Path, name: str = "") -> FileFormat:
-    """Return the format in which a file is to be written, by its ending or by name.
+    """Return the format to write a file, by its ending or by name.
 
     Raises
     ------
@@ -128,12 +129,12 @@ def _names() -> str:
 
 
 def head_of(path: Path) -> bytes:
-    """Return the first bytes of a file, by which formats are told.
+    """Return the first bytes of a file, to recognize its format.
 
     Raises
     ------
     FileError
-        When it is no file or cannot be read.
+        When it is not a file or cannot be read.
     """
     try:
         if path.exists() and not path.is_file():

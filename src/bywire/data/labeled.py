@@ -1,4 +1,4 @@
-"""Datasets whose variables say their unit and what they are."""
+"""Datasets whose variables have units and labels."""
 
 from __future__ import annotations
 
@@ -54,16 +54,16 @@ def over(
     Parameters
     ----------
     x
-        Name, values, unit and label of what they are over.
+        Name, values, unit and label of the horizontal axis.
     columns
         The columns by name, all in the same unit.
     unit, label
         Of the quantity.
     branches
-        Dimension and labels of several curves, of which the columns then have a row each.
+        Dimension and labels of several curves; the columns then have a row for each.
     along
-        Dimension of the other side where every curve has places of its own, so that ``x`` has a
-        row for each as well.
+        Dimension of the points if every curve has its own abscissae; ``x`` then also has a row for
+        each curve.
     """
     name, places, *attributes = x
     if branches is None:
@@ -80,18 +80,18 @@ def over(
 
 
 def at_own_places(places: Sequence[Array], rows: Sequence[Array]) -> tuple[Array, Array]:
-    """Return curves at the places where each was read, in ascending order.
+    """Return curves at their own abscissae, in ascending order.
 
-    Nothing is interpolated: what is shown as measured was measured there.
+    Nothing is interpolated: all shown points are measured points.
 
-    ``places``: where each curve was read, shape (n_k,), in any order; ``rows``: what was read
-    there, shape (..., n_k).
+    ``places``: abscissae of each curve, shape (n_k,), in any order; ``rows``: values there, shape
+    (..., n_k).
 
     Returns
     -------
     tuple
-        Places, shape (curves, n), and curves, shape (..., curves, n), with n the most places that
-        a curve has; NaN beyond those of a shorter one.
+        Abscissae, shape (curves, n), and curves, shape (..., curves, n), with n the largest number
+        of points; shorter curves are filled with NaN.
     """
     count = max(place.size for place in places)
 

@@ -1,6 +1,6 @@
-"""Files of columns that a child process reads, with limits of memory and time.
+"""Column files read in a child process, with limits of memory and time.
 
-The memory of the child is limited on Linux alone; its time everywhere.
+The memory of the child is limited on Linux only, its time everywhere.
 """
 
 from __future__ import annotations
@@ -35,15 +35,15 @@ from bywire.data.file_format import Column, FileFormat
 from bywire.data.reading_child import NUMBERS, fill, receive, send
 
 SECONDS = 60.0
-"""how long a library may take to open a file, and from one piece of it to the next"""
+"""time limit of a library to open a file, and between pieces [s]"""
 
 MOST_MEMORY = 4 * 2**30
-"""bytes that a library may take to read a file, or half the machine's memory"""
+"""limit of a library's memory in bytes to read a file; also half the machine's memory"""
 
 _IS_LINUX = sys.platform == "linux"
-_PIPE = 2**20  # bytes that wait in a pipe: fewer turns from one process to the other
+_PIPE = 2**20  # bytes of a pipe's buffer; a larger one needs fewer process switches
 _State = Literal["idle", "open", "busy"]
-"""a child waits for a file, or for a question about the open one, or works on its answer"""
+"""state of a child: waiting for a file, waiting for a request on the open file, or working"""
 
 _idle: dict[tuple[int, str], list[Child]] = {}
 _numbers = count()
@@ -59,7 +59,7 @@ class Child:
     """
 
     def __init__(self, module: str) -> None:
-        # asammdf writes a temporary file; with its folder it goes, whatever becomes of the child.
+        # asammdf writes a temporary file, which is removed with its folder in any case.
         self._folder = mkdtemp(dir=process_folder())
         self._process = start_python(
             "bywire.data.reading_child",
@@ -82,19 +82,19 @@ class Child:
 
     @property
     def stream(self) -> IO[bytes]:
-        """What the child says."""
+        """Messages of the child."""
         assert self._process.stdout is not None
         return self._process.stdout
 
     def ask(self, message: Mapping[str, Any]) -> None:
         """Send a message."""
         assert self._process.stdin is not None
-        with contextlib.suppress(OSError):  # it has ended, which the answer will show
+        with contextlib.suppress(OSError):  # it has ended; reading the answer will show it
             send(self._process.stdin, message)
 
     @contextmanager
     def within(self, seconds: float) -> Iterator[None]:
-        """End the child where what follows takes longer."""
+        """End the child if the block takes longer."""
         watch = threading.Timer(seconds, self._end_late)
         watch.start()
         try:
@@ -103,7 +103,7 @@ class Child:
             watch.cancel()
 
     def reason(self) -> str:
-        """Return why it ended."""
+        """Return the reason why it ended."""
         status = self._process.wait()
         return "" if self.is_late else _ending(status)
 
@@ -114,7 +114,7 @@ class Child:
     def _kill(self) -> None:
         if os.name == "posix":
             with contextlib.suppress(OSError):
-                os.killpg(self._process.pid, signal.SIGKILL)  # with those that it forked
+                os.killpg(self._process.pid, signal.SIGKILL)  # with its own children
         else:
             self._process.kill()
 
@@ -136,11 +136,11 @@ class LimitedSource:
     path, kind
         The file and its format.
     child
-        Who reads it.
+        Process that reads it.
     memory
-        Bytes that it may take to read it.
+        Limit of its memory in bytes.
     seconds
-        How long it may take from one piece to the next.
+        Time limit between pieces [s].
     """
 
     def __init__(
@@ -168,9 +168,9 @@ class LimitedSource:
         self.notes: Mapping[str, Any] = answer["notes"]
 
     def read(self, names: Sequence[str], progress: Progress) -> dict[str, NDArray[np.float64]]:
-        """Return the numbers of some columns, piece by piece as the child sends them."""
+        """Return the numbers of some columns, received in pieces from the child."""
         answer = self._answer({"names": list(names)})
-        # Only now: what was never written is refused before there is room made for it.
+        # Only now, since the child rejects unwritten numbers before memory is allocated.
         columns = [np.empty(self.columns[name].length or 0) for name in names]
         filled = [0] * len(names)
         total = sum(column.size for column in columns)
@@ -196,18 +196,18 @@ class LimitedSource:
         return dict(zip(names, columns, strict=True))
 
     def place(self, name: str, row: int) -> str:
-        """Return where a number stands, as the format counts."""
+        """Return the place of a number, as the format counts."""
         word, first = self._kind.counts
         return f"{word} {row + first}"
 
     def _answer(self, question: Mapping[str, Any] | None) -> dict[str, Any]:
-        """Return the next message of the child, which waits for the next question after some."""
+        """Return the next message of the child; after some, it waits for the next request."""
         if question is not None:
             self._child.ask(question)
         self._child.state = "busy"
         with self._child.within(self._seconds):
             answer = receive(self._child.stream)
-            # How the child of an earlier file ended is of no interest any more.
+            # The end of an earlier file's child no longer matters.
             while answer is not None and answer.get("request", self._request) != self._request:
                 answer = receive(self._child.stream)
         if answer is None:
@@ -224,7 +224,7 @@ class LimitedSource:
                 raise self._too_small(limit)
             raise FileError(
                 f"{self._path} takes more than {self._memory / 2**30:.3g} GiB of memory to read: "
-                "it is damaged or was made to exhaust it; where it is sound, choose fewer signals, "
+                "it is damaged or malicious; if it is intact, choose fewer signals, "
                 "or write it again in smaller pieces",
                 name=str(self._path),
             )
@@ -237,9 +237,9 @@ class LimitedSource:
             is_quick = not (self._is_open or self._child.is_late)
             most = min(self._seconds, self._kind.opening) if is_quick else self._seconds
             return FileError(
-                f"{self._path}: {'reading' if self._is_open else 'opening'} it took longer than "
-                f"{most:g} s without getting further: it is damaged or was made to take so long; "
-                "where it is sound, copy it to a local disk or choose fewer signals",
+                f"{self._path}: {'reading' if self._is_open else 'opening'} made no progress for "
+                f"{most:g} s: it is damaged or malicious; "
+                "if it is intact, copy it to a local disk or choose fewer signals",
                 name=str(self._path),
             )
         if limit := address_space():
@@ -259,8 +259,8 @@ class LimitedSource:
 
     def _torn(self, name: str, size: int, declared: int) -> FileError:
         return FileError(
-            f"{self._path} is damaged: {name!r} has {declared} numbers by its own count, and "
-            f"{size} were read: copy it again, or export it again from where it was made",
+            f"{self._path} is damaged: {name!r} declares {declared} numbers, but {size} "
+            "were read: copy it again, or export it again from its source",
             name=name,
         )
 
@@ -268,12 +268,12 @@ class LimitedSource:
 def _limited_to(limit: int) -> str:
     return (
         f"; the address space of this process is limited to {limit / 2**30:.3g} GiB (ulimit -v): "
-        "where the file is sound, raise that limit, as by ulimit -v unlimited"
+        "if the file is intact, raise that limit, for example with ulimit -v unlimited"
     )
 
 
 def _ending(status: int) -> str:
-    """Return how a process ended, in words; nothing where it used up its time."""
+    """Describe the end of a process; empty if it used up its time."""
     if status >= 0:
         return f"exit status {status}"
     with contextlib.suppress(ValueError):
@@ -289,25 +289,25 @@ def limited(path: Path, kind: FileFormat, seconds: float | None = None) -> Itera
     Raises
     ------
     FileError
-        When the library is not installed, the file is damaged, or a limit is passed.
+        When the library is not installed, the file is damaged, or a limit is exceeded.
     """
     for name in kind.libraries:
         library = name.partition(".")[0]
         if find_spec(library) is None:
             raise FileError(
-                f"{path}: {kind.title} needs the library {library}, which is not installed: "
+                f"{path}: {kind.title} needs the library {library}, which is not installed; "
                 f"{how_to_install('measurements')}",
                 name=library,
             )
     memory = min(MOST_MEMORY, int(machine_memory() / 2))
     if not _IS_LINUX:
         warnings.warn(
-            f"on this system the memory that reading {kind.title} takes is not limited, only its "
-            "time: read files of strangers on Linux",
+            f"on this system bywire limits only the time to read {kind.title}, not the memory: "
+            "open untrusted files on Linux only",
             stacklevel=2,
         )
     module = kind.open.__module__
-    # The process is part of the key: one that was forked from this one must not share children.
+    # The process is part of the key, since a forked process must not share children.
     idle = _idle.setdefault((os.getpid(), module), [])
     child = idle.pop() if idle else Child(module)
     try:

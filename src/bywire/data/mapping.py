@@ -1,4 +1,4 @@
-"""What the columns of a measurement file mean, and mapping files (TOML) that say it."""
+"""Meaning of a measurement file's columns, and mapping files (TOML) that define it."""
 
 from __future__ import annotations
 
@@ -28,20 +28,20 @@ from bywire.data.toml_file import read_toml
 
 @dataclass(frozen=True)
 class Clock:
-    """Where the instants of signals come from: a column, or a sample rate.
+    """Source of the instants of signals: a column, or a sample rate.
 
     Parameters
     ----------
     column
-        Column of the instants; empty where a rate is given.
+        Column of the instants; empty for a rate.
     unit
-        Its unit; empty where the file says it.
+        Its unit; empty if the file contains it.
     rate
-        Sample rate [Hz]; 0 where there is a column.
+        Sample rate [Hz]; 0 for a column.
     start
-        Instant of the first sample [s], of a rate.
+        Instant of the first sample [s], for a rate.
     number
-        Number of the column, from 1; 0 where its name tells it.
+        Number of the column, from 1; 0 if it is given by name.
     """
 
     column: str = ""
@@ -53,7 +53,7 @@ class Clock:
 
 @dataclass(frozen=True)
 class SignalMapping:
-    """What a column means: value = sign * scale * number [unit] + offset.
+    """Meaning of a column: value = sign * scale * number [unit] + offset.
 
     Parameters
     ----------
@@ -62,23 +62,23 @@ class SignalMapping:
     column
         Column of the file.
     unit
-        Unit of the scaled number; empty where the file says it.
+        Unit of the scaled number; empty if the file contains it.
     scale, sign
-        Factors of the number in the file; ``scale`` is None where the file's unit is to hold.
+        Factors of the number in the file; ``scale`` is None if the file's unit applies.
     offset
         Added to the value, in SI.
     delay
-        How much later than the quantity the column shows it [s]: instants are moved back by it.
+        Delay of the column behind the quantity [s]; instants are shifted back by it.
     limits
-        Range of the sensor in SI, at whose ends it is clipped; None where it is not known.
+        Range of the sensor in SI, at whose ends it clips; None if unknown.
     label
         Description, for figures.
     clock
-        Where its instants come from; None for those of the whole file.
+        Source of its instants; None for that of the whole file.
     number
-        Number of the column, from 1; 0 where its name tells it.
+        Number of the column, from 1; 0 if it is given by name.
     missing
-        Numbers and texts in the file that say that nothing was measured.
+        Numbers and texts in the file that mark missing values.
     """
 
     name: str
@@ -97,20 +97,20 @@ class SignalMapping:
 
 @dataclass(frozen=True)
 class MeasurementMapping:
-    """What a measurement file means.
+    """Meaning of a measurement file.
 
     Parameters
     ----------
     signals
-        The columns that are wanted; empty for all of them, under their own names and units.
+        Requested columns; empty for all, under their own names and units.
     clock
-        Where the instants come from; None where the file says it.
+        Source of the instants; None if the file defines it.
     format
-        Name of the file's format; empty where ending and content tell it.
+        Name of the file's format; empty to recognize it by ending and content.
     decimal, skip_lines, titles, encoding
         See `ReadOptions`.
     missing
-        Numbers and texts in the file that say that nothing was measured, beside the usual ones.
+        Numbers and texts in the file that mark missing values, in addition to the usual ones.
     """
 
     signals: Mapping[str, SignalMapping] = field(default_factory=dict)
@@ -124,7 +124,7 @@ class MeasurementMapping:
 
     @property
     def marks(self) -> tuple[str, ...]:
-        """Every cell of a text table that says that nothing was measured."""
+        """All cells of a text table that mark missing values."""
         every = (*self.missing, *(mark for s in self.signals.values() for mark in s.missing))
         return tuple(mark for mark in every if isinstance(mark, str))
 
@@ -155,7 +155,7 @@ class TimeSection(Section):
 
     @classmethod
     def written_out(cls, content: Any) -> Any:
-        """Return the table that a column alone stands for."""
+        """Expand a column's name to its table."""
         return {"column": content} if isinstance(content, (str, int)) else content
 
 
@@ -204,16 +204,16 @@ class MappingFile(_Marked):
 
 
 def mapping_from(content: Mapping[str, Any]) -> MeasurementMapping:
-    """Return the mapping that tables of keys and values describe, as a mapping file holds them.
+    """Return the mapping from tables of keys and values, as in a mapping file.
 
     Raises
     ------
     UnknownNameError
         For an unknown key, with the nearest known one.
     UnitError
-        For a unit that is not known or does not fit.
+        For a unit that is unknown or does not fit.
     ParameterError
-        For a value that is out of range.
+        For a value out of range.
     """
     file = MappingFile.read(content, "a mapping")
     return MeasurementMapping(
@@ -229,7 +229,7 @@ def mapping_from(content: Mapping[str, Any]) -> MeasurementMapping:
 
 
 def signal_mapping(name: str, content: Mapping[str, Any], place: str) -> SignalMapping:
-    """Return the mapping of a signal that a section of another file describes.
+    """Return the mapping of a signal from a section of another file.
 
     ``place``: the section as errors call it, ``"[stimulus]"``. Raises: as `mapping_from`.
     """
@@ -263,7 +263,7 @@ def _signal(name: str, section: SignalSection, place: str) -> SignalMapping:
         text = f"{where}{needs_unit[0]} needs a unit: give the unit of the signal"
         raise UnitError(text, name="unit")
     if section.scale == 0.0:
-        raise not_valid(f"{where}scale", "0", "another number", "or every value is the same")
+        raise not_valid(f"{where}scale", "0", "another number", "or all values are equal")
     if section.sign == 0:
         raise not_valid(f"{where}sign", "0", _SIGNS)
     number, column = _numbered(section.column)
@@ -309,7 +309,7 @@ def _difference(value: Any, symbol: str, where: str) -> float:
 def _clock(
     time: TimeSection | None, rate: float | None, start: float | None, where: str
 ) -> Clock | None:
-    """Return the clock that a table ``time``, or ``rate`` and ``start`` beside it, are."""
+    """Return the clock from a table ``time``, or from ``rate`` and ``start``."""
     time = time or TimeSection()
     rate = time.rate if rate is None else rate
     start = time.start if start is None else start
@@ -318,7 +318,7 @@ def _clock(
     number, column = _numbered(time.column)
     if bool(column) == (rate is not None):
         raise ParameterError(
-            f"{where}time.column or {where}rate: give one of them, as "
+            f"{where}time.column or {where}rate: give exactly one of them, as "
             'time = { column = "t", unit = "ms" } or rate = "1 kHz"',
             name="time",
         )
@@ -331,7 +331,7 @@ def _clock(
         )
     if column and start is not None:
         raise ParameterError(
-            f"{where}start goes with a rate: a column has its own instants", name="start"
+            f"{where}start needs a rate: a time column has its own instants", name="start"
         )
     return Clock(column, unit, rate or 0.0, start or 0.0, number)
 
@@ -349,7 +349,7 @@ def _unit(text: str, where: str) -> str:
 
 
 def _numbered(column: str | int) -> tuple[int, str]:
-    """Return the number of a column, 0 where its title is given, and its title or number."""
+    """Return the number of a column (0 if given by title), and its title or number."""
     return (column, str(column)) if isinstance(column, int) else (0, column.strip())
 
 
@@ -364,9 +364,9 @@ def read_mapping(path: str | Path) -> MeasurementMapping:
     Raises
     ------
     FileError
-        When the file cannot be read or is no TOML.
+        When the file cannot be read or is not valid TOML.
     InputError
-        For anything in it that does not fit, with the file's name in front.
+        For content that is not valid, with the file's name in front.
     """
     file = Path(path)
     content = read_toml(file, "mapping")

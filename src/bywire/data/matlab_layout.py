@@ -1,7 +1,7 @@
-"""How signals lie in MAT files of both kinds: columns of arrays, and structs that describe them.
+"""Layout of signals in MAT files of both kinds: columns of arrays, and structs with their meaning.
 
-Beside the arrays, ``units`` holds the unit of each, ``clocks`` the name of its instants, and
-``labels`` a description. In files of others these structs may be absent: a mapping then says it.
+In addition to the arrays, ``units`` contains the unit of each, ``clocks`` the name of its instants,
+and ``labels`` a description. Other files may lack these structs and then need a mapping.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 NOTES = {"units": "units", "labels": "long_name"}
-"""structs of texts, and the attributes of a signal that they hold"""
+"""structs of texts, and the attributes of a signal in them"""
 
 CLOCKS = "clocks"
 """struct with the name of the instants of each signal"""
@@ -31,12 +31,12 @@ _SIMULINK = re.compile(_SIGNAL.format("signals", "values"))
 _DSPACE = re.compile(_SIGNAL.format("Y", "Data"))
 _SERIES = re.compile(r"(?P<scope>.+)\.(?:Data|data)(?P<column>\(:,[0-9]+\)|\([0-9]+,:\))?")
 OBJECT = (
-    "it is an object of MATLAB, such as a timeseries or a Dataset, which only MATLAB reads: save "
-    "its times and values as arrays, as t = ts.Time; y = ts.Data"
+    "it is an object of MATLAB, such as a timeseries or a Dataset, which only MATLAB can read: "
+    "save its times and values as arrays, as t = ts.Time; y = ts.Data"
 )
-"""why an object is not read"""
+"""reason to skip an object"""
 
-_MOST_COLUMNS = 64  # of a table: a wider one is no table of signals
+_MOST_COLUMNS = 64  # of a table: a wider one is not a table of signals
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,62}")
 
 
@@ -47,11 +47,11 @@ class Part:
     Parameters
     ----------
     array
-        Name of the array, with those of the structs around it.
+        Name of the array, with the names of its structs.
     index
-        Which column of a table, from 0, or which row; None for a vector.
+        Index of the column, or row, in a table; None for a vector.
     length
-        How many numbers it has.
+        Count of its numbers.
     is_row
         Whether it is a row of a wide table, as Simulink's To File writes its signals.
     """
@@ -64,7 +64,7 @@ class Part:
 
 @dataclass
 class Found:
-    """What a MAT file holds.
+    """Content of a MAT file.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ class Found:
     texts, scalars
         Texts and single numbers in structs by dotted name, for instance ``units.p_mc``.
     left_out
-        What is not read, and why.
+        Skipped content with the reason.
     """
 
     parts: dict[str, Part] = field(default_factory=dict)
@@ -103,18 +103,18 @@ class Found:
 def columns_of(
     found: Found, is_increasing: Callable[[Part], bool], remarks: list[str]
 ) -> tuple[dict[str, Column], dict[str, Part]]:
-    """Return the columns with what structs say of them, and where each is.
+    """Return the columns with their descriptions from structs, and their places.
 
-    Signals of Simulink and of dSPACE get the names that these programs gave them.
+    Signals of Simulink and of dSPACE keep the names from these programs.
 
     Parameters
     ----------
     found
-        What the file holds.
+        Content of the file.
     is_increasing
-        Tells whether the numbers of a part increase, as instants do.
+        Returns whether the numbers of a part increase, like instants.
     remarks
-        What the user should know is added to it.
+        List to which notes are added.
     """
     columns, parts = {}, {}
     recorded = dict(_recorded(found))
@@ -150,7 +150,7 @@ class _Recorded:
 
 
 def _recorded(found: Found) -> Iterator[tuple[str, _Recorded]]:
-    """Yield the signals that Simulink and dSPACE describe in structs beside their numbers."""
+    """Yield the signals that Simulink and dSPACE describe in structs."""
     for name in found.parts:
         if match := _SIMULINK.fullmatch(name):
             clock, text = f"{match['scope']}.time", found.texts.get(f"{match['signal']}.label", "")
@@ -178,7 +178,7 @@ def _recorded(found: Found) -> Iterator[tuple[str, _Recorded]]:
 
 
 def _short(recorded: _Recorded) -> str:
-    """Return the last part of a signal's name, behind the blocks that hold it."""
+    """Return the last part of a signal's name, without its blocks."""
     brief = recorded.name.rpartition("/")[2].strip().strip('"')
     return brief + recorded.suffix if brief else ""
 
@@ -192,8 +192,8 @@ def _of_row(
         return "", ""
     if name == first:
         remarks.append(
-            f"{part.array} has a signal in each row: its first one increases, and is read as the "
-            "time in s, as Simulink's To File writes it"
+            f"{part.array} has a signal in each row. The first one increases, so bywire reads it "
+            "as time in s, as Simulink's To File writes it"
         )
     return ("", "s") if name == first else (first, "")
 
@@ -204,15 +204,15 @@ def described(dataset: xr.Dataset, path: Path) -> dict[str, dict[str, str]]:
     Raises
     ------
     FileError
-        When a name is none in MATLAB.
+        When a name is not valid in MATLAB.
     """
     axes = list(dict.fromkeys(str(signal.dims[0]) for signal in dataset.data_vars.values()))
     signals = [str(name) for name in dataset.data_vars]
     for name in (*signals, *axes):
         if not _NAME.fullmatch(name) or name in (*NOTES, CLOCKS):
             raise FileError(
-                f"cannot write {path}: {quoted(name)} is no name of a variable in MATLAB: letters, "
-                "digits and _ after a letter; choose another name in a mapping"
+                f"cannot write {path}: {quoted(name)} is not a valid variable name in MATLAB "
+                "(letters, digits and _ after a letter): choose another name in a mapping"
             )
     structs = {
         struct: {n: str(dataset[n].attrs.get(key, "")) for n in (*signals, *axes)}

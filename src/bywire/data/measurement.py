@@ -2,7 +2,7 @@
 
 Signals that were measured at the same instants share a dimension. The dimension of most signals
 is ``time``; others have ``time_NAME``, with the name of their first signal. Nothing is resampled
-here: `bywire.data.alignment.resample` brings signals to one time axis, and says what it did.
+here: `bywire.data.alignment.resample` brings signals to one time axis, with a report.
 """
 
 from __future__ import annotations
@@ -32,21 +32,21 @@ from bywire.data.format_registry import FORMATS, format_to_read, head_of
 from bywire.data.limited_source import limited
 from bywire.data.mapping import Clock, MeasurementMapping, SignalMapping, mapping_from, read_mapping
 
-_BLOCK = 1 << 20  # instants that are looked at together: their differences take memory
+_BLOCK = 1 << 20  # instants per chunk, since their differences take memory
 
 
 @dataclass(frozen=True)
 class _AxisKey:
-    """What tells one time axis from another.
+    """Properties that distinguish time axes.
 
     Parameters
     ----------
     clock
-        Where the instants come from.
+        Source of the instants.
     length
-        How many samples there are.
+        Number of samples.
     delay
-        By how much the instants are moved back [s].
+        Shift of the instants to earlier times [s].
     """
 
     clock: Clock
@@ -62,17 +62,17 @@ def instants(
     Parameters
     ----------
     file, source
-        What errors name.
+        File and open source, for errors.
     key
-        The axis.
+        Key of the axis.
     column
-        Numbers of the clock's column as read, which become the instants; None for a rate.
+        Numbers of the clock's column, converted to the instants in place; None for a rate.
 
     Raises
     ------
     FileError
         When instants are missing or do not increase, with the place; when they are too few or
-        not as many as samples.
+        their number differs from that of the samples.
     """
     clock = key.clock
     if column is None:
@@ -91,7 +91,7 @@ def instants(
             time -= key.delay
     if time.size < 2:
         raise FileError(
-            f"{file} has too few rows, {time.size}: two at least are needed",
+            f"{file} has too few rows ({time.size}): it needs at least two",
             name=str(file),
             value=str(time.size),
         )
@@ -101,7 +101,7 @@ def instants(
 def _measured(
     file: Path, source: Source, clock: Clock, column: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    # A slower clock beside a faster one ends earlier; what follows is blank.
+    # In a table, the column of a slower clock ends earlier; the cells below are blank.
     time = column[: _filled(column)]
     bad = _first_not_increasing(time)
     if bad is not None:
@@ -111,14 +111,14 @@ def _measured(
             what = "is repeated" if now == before else f"comes after {before:.10g}"
             fix = "time must increase: sort the rows, remove repeated ones"
         else:
-            what, fix = "is no instant", "remove the row"
+            what, fix = "is not an instant", "remove the row"
         raise FileError(f"{where}: {now:.10g} {clock.unit} {what}: {fix}")
     convert_in_place(time, unit_of(clock.unit), "s")
     return time
 
 
 def _filled(column: NDArray[np.float64]) -> int:
-    """Return how many numbers there are up to the last one that is not NaN."""
+    """Return the count of numbers up to the last one that is not NaN."""
     end = column.size
     while end:
         begin = max(0, end - _BLOCK)
@@ -130,7 +130,7 @@ def _filled(column: NDArray[np.float64]) -> int:
 
 
 def _first_not_increasing(time: NDArray[np.float64]) -> int | None:
-    """Return the first index whose instant does not come after the one before, None if all do."""
+    """Return the first index whose instant is not later than the previous one, or None."""
     if time.size and not np.isfinite(time[0]):
         return 0
     for begin in range(0, time.size - 1, _BLOCK):
@@ -145,7 +145,7 @@ def _first_not_increasing(time: NDArray[np.float64]) -> int | None:
 
 
 class MeasurementWarning(UserWarning):
-    """What the user should know of how a measurement file was read."""
+    """A note on how a measurement file was read."""
 
 
 @checked
@@ -164,32 +164,32 @@ def read_measurement(
     path
         CSV, TSV, Parquet, MAT (5 or 7.3), ASAM MDF 4 or NetCDF file.
     mapping
-        What its columns mean: a mapping, its tables, or the path of a mapping file. Without it
-        every column is read under its own name; the file then has to say units and instants.
+        Meaning of its columns: a mapping, its tables, or the path of a mapping file. Without it
+        bywire reads every column under its own name; the file must then contain units and instants.
     signals
         Names of the signals to read; all of the mapping by default.
     progress
-        Called with a label and the finished share.
+        Callback with a label and the finished share.
     largest
-        Most bytes of numbers to read; more is refused before anything is read. 8 GiB by default,
-        or half the machine's memory. Of a text table only reading tells how many there are.
+        Limit for the bytes of numbers, checked before reading: 8 GiB by default, or half the
+        machine's memory. The size of a text table is known only after reading.
 
     Returns
     -------
     xarray.Dataset
         Variables of shape ``(time,)``, or ``(time_NAME,)`` for signals on other instants, with
         ``units`` (SI), ``long_name``, ``column`` and, where known, ``delay`` [s], ``valid_min``
-        and ``valid_max``; attributes ``source`` and ``format``. What was not measured is NaN.
-        A `MeasurementWarning` tells what is left out, counts as missing, or was guessed.
+        and ``valid_max``; attributes ``source`` and ``format``. Missing values are NaN.
+        A `MeasurementWarning` reports skipped, missing and guessed items.
 
     Raises
     ------
     FileError
-        When the file cannot be read, is damaged, or is not what its name says.
+        When the file cannot be read, is damaged, or does not match its name.
     UnknownNameError
-        For a column, signal or format that is not there, with the nearest.
+        For an unknown column, signal or format, with the nearest names.
     UnitError
-        When a unit is missing, unknown or contradicts that of the file.
+        When a unit is missing or unknown, or contradicts that of the file.
     ParameterError
         When an entry of the mapping is not valid.
     """
@@ -209,9 +209,9 @@ def read_with_notes(
     progress: Progress = silent,
     largest: int | None = None,
 ) -> tuple[xr.Dataset, tuple[str, ...]]:
-    """Read a measurement file, and return what the user should know of it too.
+    """Read a measurement file, and also return notes on it.
 
-    Everything else as of `read_measurement`, which warns of it.
+    Otherwise like `read_measurement`, which issues the notes as warnings.
     """
     file = Path(path)
     meaning = mapping_of(mapping)
@@ -242,13 +242,13 @@ def dataset_of(
 
 @contextmanager
 def opened(file: Path, meaning: MeasurementMapping) -> Iterator[Source]:
-    """Open a measurement file, in a child process where a library reads it.
+    """Open a measurement file, in a child process if a library reads it.
 
     Raises
     ------
     FileError
-        When the file cannot be read, is damaged, or is not what its name says; also of what is
-        done with it as long as it is open.
+        When the file cannot be read, is damaged, or does not match its name; also from operations
+        on the open file.
     """
     kind = format_to_read(file, meaning.format)
     try:
@@ -277,7 +277,7 @@ def opened(file: Path, meaning: MeasurementMapping) -> Iterator[Source]:
 def mapping_of(
     mapping: MeasurementMapping | Mapping[str, Any] | str | Path | None,
 ) -> MeasurementMapping:
-    """Return the mapping that is meant: itself, of its tables, or of a mapping file."""
+    """Return a mapping from itself, its tables, or a mapping file."""
     if isinstance(mapping, MeasurementMapping):
         return mapping
     if isinstance(mapping, Mapping):
@@ -293,7 +293,7 @@ def _dataset(
     values = source.read(names, progress)
     keys = [_AxisKey(c.clock, len(values[c.column]), c.mapping.delay) for c in chosen]
     dims = _dimensions(chosen, keys)
-    # Numbers are turned into SI where they lie, unless they are needed once more as they are.
+    # Numbers are converted to SI in place, unless they are needed again unconverted.
     uses = Counter([c.column for c in chosen] + [k.clock.column for k in dims])
     axes = {}
     for key in dims:
@@ -305,7 +305,7 @@ def _dataset(
         numbers = _timed(file, signal, _taken(values, uses, signal.column), axes[key].size)
         notes += signal.to_si(numbers)
         variables[signal.mapping.name] = (dims[key], numbers, signal.attributes())
-    # Indexes of pandas that share the array: from the array, xarray would copy it.
+    # Indexes of pandas share the array; from the array itself, xarray would make a copy.
     coords: dict[str, Any] = {
         dims[key]: (
             dims[key],
@@ -320,7 +320,7 @@ def _dataset(
 def _taken(
     values: dict[str, NDArray[np.float64]], uses: Counter[str], name: str
 ) -> NDArray[np.float64]:
-    """Return numbers that may be changed: themselves at their last use, before that a copy."""
+    """Return numbers that may be changed: a copy, or at the last use the numbers themselves."""
     uses[name] -= 1
     return values[name].copy() if uses[name] else values.pop(name)
 
@@ -328,7 +328,7 @@ def _taken(
 def _timed(
     file: Path, signal: Chosen, numbers: NDArray[np.float64], count: int
 ) -> NDArray[np.float64]:
-    """Return the numbers that have instants; those behind a shorter clock must be blank."""
+    """Return the numbers that have instants; numbers after the end of a clock must be blank."""
     if not np.isnan(numbers[count:]).all():
         raise FileError(
             f"{file}, column {signal.column!r}: it has numbers after the last instant of "
@@ -347,7 +347,7 @@ def _dimensions(chosen: Sequence[Chosen], keys: Sequence[_AxisKey]) -> dict[_Axi
     for signal in chosen:
         if signal.mapping.name in dimensions.values():
             raise ParameterError(
-                f"signal {quoted(signal.mapping.name)} has the name of the instants of signals: "
+                f"signal {quoted(signal.mapping.name)} has the name of a time axis: "
                 "give it another one in a mapping",
                 name=signal.mapping.name,
             )
@@ -355,14 +355,14 @@ def _dimensions(chosen: Sequence[Chosen], keys: Sequence[_AxisKey]) -> dict[_Axi
 
 
 # --- A single trace, for instance of a rider's pedal
-# A trace drives a model, so it has to be whole: where nothing was measured, or for longer than a
-# pause that is allowed, it is refused, never bridged in silence. In a text table a first row
-# ``time [s], pedal [mm]`` says names and units; a mapping says them for other files.
+# A trace drives a model, so it must be complete: missing values and long pauses raise an error and
+# are never bridged silently. In a text table, a first row ``time [s], pedal [mm]`` contains names
+# and units; for other files, a mapping contains them.
 
 _GAP = 10.0  # median steps: a pause must be longer to count as a gap
 
 Meaning = MeasurementMapping | Mapping[str, Any] | str | Path | None
-"""what columns mean: a mapping, its tables, the path of a mapping file, or nothing"""
+"""meaning of columns: a mapping, its tables, the path of a mapping file, or None"""
 
 
 def read_trace(
@@ -379,26 +379,26 @@ def read_trace(
     path
         The file.
     signals
-        Needed signals and the SI unit of each, for instance ``{"pedal": "m"}``: those of the
-        mapping, or else columns, capitals or not. Without it all are read, each in the SI unit of
-        its quantity.
+        Required signals and their SI units, for instance ``{"pedal": "m"}``: signals of the
+        mapping, or columns, ignoring case. Without it all are read, each in the SI unit of its
+        quantity.
     max_gap
-        Longest pause between two instants, text with a unit or [s]. A longer one is refused when
-        it is longer than ten median steps too.
+        Longest pause between two instants, text with a unit or [s]. A longer one is an
+        error if it also exceeds ten median steps.
     mapping
-        What the columns mean, where the file does not say it.
+        Meaning of the columns, if it is not in the file.
 
     Returns
     -------
     xarray.Dataset
-        As of `read_measurement`; every number is there.
+        As from `read_measurement`, but without missing numbers.
 
     Raises
     ------
     FileError
-        When the file cannot be read or understood: with file, line, column, value, next step.
+        When the file cannot be read or parsed, with file, line, column, value and next step.
     UnitError
-        When a unit is missing, unknown, or measures something else.
+        When a unit is missing, unknown, or of another dimension.
     ParameterError
         When ``max_gap`` is not a positive duration.
     """
@@ -424,7 +424,7 @@ def read_trace(
 
 
 def trace_names(path: str | Path, mapping: Meaning = None) -> tuple[str, ...]:
-    """Return the names of a trace's signals, time left out; numbers are not looked at.
+    """Return the names of a trace's signals except time, without reading numbers.
 
     Raises
     ------
@@ -438,7 +438,7 @@ def trace_names(path: str | Path, mapping: Meaning = None) -> tuple[str, ...]:
 
 
 def _meaning(file: Path, mapping: Meaning) -> MeasurementMapping:
-    """Return what a mapping says; a trace may be a text table whatever its name ends with."""
+    """Return the mapping of a trace, which may be a text table with any ending."""
     meaning = mapping_of(mapping)
     if not meaning.format and FORMATS.find("csv").recognizes(head_of(file)):
         return replace(meaning, format="csv")
@@ -456,21 +456,22 @@ def _names(file: Path, source: Source, meaning: MeasurementMapping) -> tuple[str
         there = ", ".join(source.columns)
         raise FileError(
             f"{file}: none of its columns {quoted(there)} beside time has a name: add a first row, "
-            "as 'time [s], pedal [mm]', or say in a mapping what they are",
+            "as 'time [s], pedal [mm]', or name them in a mapping",
             name=str(file),
         )
     return names
 
 
 def _chosen(file: Path, source: Source, meaning: MeasurementMapping, name: str) -> SignalMapping:
-    """Return what a signal's column means, whose name may be in other capitals."""
+    """Return the mapping of a signal's column, ignoring case."""
     said = meaning.signals.get(name) or SignalMapping(name, name.strip())
     if said.column in source.columns and meaning.signals:
         return said
     near = [c for c in source.columns if c.casefold() == said.column.casefold()]
     if len(near) > 1:
         raise FileError(
-            f"{file}, column {quoted(said.column)}: the name occurs twice, capitals or not: rename "
+            f"{file}, column {quoted(said.column)}: the name occurs twice (upper and lower "
+            "case count as equal): rename "
             "one of them",
             name=said.column,
         )
@@ -483,7 +484,7 @@ def _require_quantity(file: Path, source: Source, signal: xr.DataArray, symbol: 
         unit = source.columns[column].unit or signal.attrs["units"]
         raise UnitError(
             f"{file}, column {quoted(column)}: {quoted(unit)} has the wrong unit, it cannot be "
-            f"{symbol}: choose a column in {display_unit(symbol)} or a unit like it",
+            f"converted to {symbol}: choose a column in {display_unit(symbol)} or a unit like it",
             name=column,
             value=unit,
             valid=symbol,
@@ -492,7 +493,7 @@ def _require_quantity(file: Path, source: Source, signal: xr.DataArray, symbol: 
 
 
 def _require_whole(file: Path, source: Source, signal: xr.DataArray, longest: float) -> None:
-    """Refuse numbers that are missing, and pauses that are too long."""
+    """Reject missing numbers, and pauses that are too long."""
     column = signal.attrs["column"]
     missing = np.flatnonzero(np.isnan(signal.values))
     if missing.size:
@@ -509,7 +510,7 @@ def _require_whole(file: Path, source: Source, signal: xr.DataArray, longest: fl
         raise FileError(
             f"{file}, {source.place(column, k + 1)}: a gap of {steps[k]:.4g} s after "
             f"{time[k]:.6g} s ({gaps.size} in the file, the longest {most:.4g} s; max_gap is "
-            f"{longest:g} s): fill it in, or, if a straight line across it is what you want, allow "
+            f"{longest:g} s): fill it in, or, to bridge it with a straight line, allow "
             f'it with max_gap="{1.01 * most:.3g} s"',
             name=column,
         )

@@ -1,4 +1,4 @@
-"""Columns as a user names them, ``Pressure [psi]``, beside or in place of a mapping file."""
+"""Columns given on the command line, ``Pressure [psi]``, with or without a mapping file."""
 
 from __future__ import annotations
 
@@ -25,25 +25,25 @@ from bywire.data.file_format import room
 from bywire.data.mapping import Clock, MeasurementMapping, SignalMapping
 from bywire.data.measurement import dataset_of, opened
 
-_BRACKETS = "each with the unit of its own column in the brackets, or 1 for a pure number"
+_BRACKETS = "each with its column's unit in the brackets, or 1 for a pure number"
 
 
 @dataclass(frozen=True)
 class NamedColumns:
-    """What a user says of a file's columns beside, or in place of, a mapping file.
+    """Columns that a user names in addition to a mapping file, or instead of it.
 
     Parameters
     ----------
     signals
-        Name of the signal -> its column, with a unit in brackets where the file has none; or the
+        Name of the signal -> its column, with a unit in brackets if the file has none; or the
         name of a signal of the mapping file.
     time
         Column of the instants, likewise; or a sample rate such as ``"1 kHz"``.
     units
-        SI unit of every signal that matters, by name. A column of another name that has no unit
-        is left out. None where all columns matter.
+        SI unit of every required signal, by name. Other columns without a unit are skipped. None
+        if all columns are required.
     driving
-        Name of the signal -> stimulus that it drives, of those that were given as inputs.
+        Name of the signal -> stimulus that it drives, for inputs.
     """
 
     signals: Mapping[str, str] = field(default_factory=dict)
@@ -55,21 +55,21 @@ class NamedColumns:
 def read_named(
     file: Path, meaning: MeasurementMapping, named: NamedColumns, progress: Progress
 ) -> tuple[xr.Dataset, tuple[str, ...]]:
-    """Read the signals of a measurement file that a user names, all others, and notes on them.
+    """Read the named signals of a measurement file, all others, and notes.
 
     Parameters
     ----------
     file, meaning
-        The file, and what a mapping file says of it.
+        The file, and its mapping.
     named
-        What the user says.
+        Columns that the user names.
     progress
         Called with a label and the finished share.
 
     Raises
     ------
     InputError
-        As of `bywire.read_measurement`.
+        As from `bywire.read_measurement`.
     """
     with opened(file, meaning) as source, _shown_units(named):
         meaning = _timed(meaning, named.time)
@@ -87,12 +87,12 @@ def read_named(
 def read_wanted(
     file: Path, meaning: MeasurementMapping, wanted: Sequence[str], time: str, progress: Progress
 ) -> tuple[xr.Dataset, tuple[str, ...]]:
-    """Read the signals that a user wants of a measurement file, and notes on them.
+    """Read the requested signals of a measurement file, with notes.
 
     Parameters
     ----------
     file, meaning
-        The file, and what a mapping file says of it.
+        The file, and its mapping.
     wanted
         ``SIGNAL``, ``COLUMN``, ``COLUMN [unit]`` or ``SIGNAL=COLUMN [unit]``; all where empty.
     time
@@ -103,7 +103,7 @@ def read_wanted(
     Raises
     ------
     InputError
-        As of `bywire.read_measurement`.
+        As from `bywire.read_measurement`.
     """
     with opened(file, meaning) as source, _shown_units(None):
         meaning = _timed(meaning, time)
@@ -117,19 +117,17 @@ def read_wanted(
 
 
 def renamed(data: xr.Dataset, named: NamedColumns) -> xr.Dataset:
-    """Return signals in memory under the names that a user gives them.
+    """Return signals in memory under the user's names.
 
     Raises
     ------
     UnknownNameError
-        When a signal is not there, with the nearest.
+        When a signal is missing, with the nearest names.
     ParameterError
-        When instants are named, which signals in memory have already.
+        When a time column is named, since signals in memory already have instants.
     """
     if named.time:
-        raise ParameterError(
-            f"{option('time')} is for measurement files: leave it out", name="time"
-        )
+        raise ParameterError(f"{option('time')} is for measurement files: remove it", name="time")
     for name, column in named.signals.items():
         if column not in data:
             raise unknown_name("signal", column, [str(each) for each in data.data_vars])
@@ -138,7 +136,7 @@ def renamed(data: xr.Dataset, named: NamedColumns) -> xr.Dataset:
 
 
 def _named(text: str, known: Mapping[str, object]) -> tuple[str, str]:
-    """Return name and column of a signal that is wanted."""
+    """Return name and column of a requested signal."""
     if text in known:
         return text, text
     name, equals, column = (part.strip() for part in text.partition("="))
@@ -153,7 +151,7 @@ def _signal(meaning: MeasurementMapping, name: str, column: str) -> SignalMappin
 
 
 def _timed(meaning: MeasurementMapping, time: str) -> MeasurementMapping:
-    """Return a mapping whose instants come from a column, or follow a sample rate."""
+    """Return a mapping with instants from a column or a sample rate."""
     if not time:
         return meaning
     try:

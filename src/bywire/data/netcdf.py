@@ -1,7 +1,7 @@
-"""Recordings as NetCDF files: written whole or not at all, and read in a child process.
+"""Recordings as NetCDF files, written completely or not at all, and read in a child process.
 
-The library that reads them believes what a file says of itself: a damaged one has it crash, or run
-without an end, where not even Ctrl-C is heard.
+The library trusts a file's own declarations: a damaged file may crash it, or make it run forever
+without reacting to Ctrl-C.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from bywire.data.limited_source import limited
 if TYPE_CHECKING:
     from bywire.data.limited_source import LimitedSource
 
-_VALUES = 1 << 22  # that are handed over at a time
+_VALUES = 1 << 22  # numbers per message
 
 
 @checked
@@ -40,7 +40,7 @@ def write_recording(recording: xr.Dataset, path: str | Path) -> Path:
     recording
         Signals with ``units`` among their attributes.
     path
-        NetCDF file; one that is there is replaced.
+        NetCDF file; an existing one is replaced.
 
     Returns
     -------
@@ -55,14 +55,13 @@ def write_recording(recording: xr.Dataset, path: str | Path) -> Path:
     path = Path(path)
     encoding = {str(name): {"zlib": True, "complevel": 1} for name in recording.data_vars}
     try:
-        # Ctrl-C within xarray's locks would leave one locked, on which the closing waits for ever.
+        # Ctrl-C within xarray's locks would leave one locked, and closing would wait forever.
         with replacing(path) as fresh, interrupts_deferred():
             recording.to_netcdf(fresh, engine="netcdf4", encoding=encoding)
     except (OSError, RuntimeError, ValueError) as error:  # RuntimeError: from the HDF library
         reason = getattr(error, "strerror", None) or str(error)
         raise FileError(
-            f"cannot write {path}: {reason}: make room there, or choose a folder that you may "
-            "write to",
+            f"cannot write {path}: {reason}: free some space there, or choose a writable folder",
             name=str(path),
         ) from None
     return path
@@ -85,13 +84,13 @@ def read_recording(path: str | Path) -> xr.Dataset:
     Raises
     ------
     FileError
-        When the file cannot be read, is damaged, or is no NetCDF file.
+        When the file cannot be read, is damaged, or is not a NetCDF file.
     """
     file = Path(path)
     if not NETCDF.recognizes(head_of(file)):
         raise FileError(
-            f"cannot read recording {file}: it is not a NetCDF file: bywire convert, or "
-            "read_measurement, reads other formats",
+            f"cannot read recording {file}: it is not a NetCDF file; bywire convert and "
+            "read_measurement read other formats",
             name=str(file),
         )
     with limited(file, FORMAT) as source:
@@ -100,16 +99,16 @@ def read_recording(path: str | Path) -> xr.Dataset:
 
 
 class RecordingSource:
-    """An open recording: numbers of any shape as columns, what else it holds as notes.
+    """An open recording: numbers of any shape as columns, other content as notes.
 
     Parameters
     ----------
     variables
-        What the file holds, decoded.
+        Decoded content of the file.
     attributes
-        Of the whole file.
+        Attributes of the file.
     coords
-        Names of coordinates besides those of the dimensions.
+        Names of coordinates that are not dimensions.
     """
 
     def __init__(
@@ -139,7 +138,7 @@ class RecordingSource:
         }
 
     def pieces(self, names: Sequence[str]) -> Iterator[tuple[str, int, NDArray[Any]]]:
-        """Yield numbers row by row; those of eight bytes as they lie in memory."""
+        """Yield numbers row by row; those of eight bytes without conversion."""
         for name in names:
             flat = np.ascontiguousarray(self._variables[name].values).reshape(-1)
             plain = flat.view(np.float64) if flat.itemsize == 8 else flat
@@ -148,7 +147,7 @@ class RecordingSource:
 
 
 def _plain(attributes: Mapping[Any, Any]) -> dict[str, Any]:
-    """Return attributes as JSON holds them: texts, and numbers with their type."""
+    """Return attributes as JSON data: texts, and numbers with their type."""
     return {
         str(name): value
         if isinstance(value, str)
@@ -158,7 +157,7 @@ def _plain(attributes: Mapping[Any, Any]) -> dict[str, Any]:
 
 
 def _attributes(plain: Mapping[str, Any]) -> dict[str, Any]:
-    """Return attributes as xarray has them."""
+    """Return attributes in xarray's types."""
     return {
         name: value if isinstance(value, str) else np.array(value["values"], value["kind"])[()]
         for name, value in plain.items()
@@ -183,8 +182,8 @@ def _dataset(source: LimitedSource) -> xr.Dataset:
 
 @contextmanager
 def _open(path: Path, options: ReadOptions) -> Iterator[RecordingSource]:
-    # Not open_dataset: for the indexes that it makes, which nobody asks here, it loads libraries of
-    # other kinds of arrays, after the fork and so for each file anew: half a second.
+    # Not open_dataset: its indexes, not needed here, load libraries for other array types. After
+    # the fork that happens for each file, and takes half a second.
     store = xr.backends.NetCDF4DataStore.open(path)  # type: ignore[no-untyped-call]
     try:
         stored, attributes = store.load()
@@ -206,4 +205,4 @@ FORMAT = FileFormat(
     libraries=("netCDF4",),
     counts=("index", 0),
 )
-"""how the child reads a recording; measurement files have the format ``netcdf``"""
+"""format for recordings in the child process; measurement files have the format ``netcdf``"""

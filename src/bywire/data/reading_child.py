@@ -1,11 +1,11 @@
-"""What runs in the child process: a library reads a measurement file, under limits.
+"""The child process, in which a library reads a measurement file under limits.
 
-Libraries believe what a file says of itself: a damaged one, or one that was made to, has them
-crash, run without an end, or ask for all memory. Here that ends a child, and nothing else.
+Libraries trust a file's own declarations: a damaged or malicious file may crash them, make them run
+forever, or request all memory. Here this ends only the child.
 
-Both ways messages go as a length, a JSON object, and for a piece of a column its numbers as they
-lie in memory: nothing is unpickled. The reader asks ``{path, folder, memory, seconds, opening}``;
-the answer is ``{columns, left_out, remarks, notes}``. It asks for ``{names}`` as often as it likes,
+Messages in both directions consist of a length, a JSON object, and for a piece of a column its raw
+numbers: nothing is unpickled. The reader sends ``{path, folder, memory, seconds, opening}``;
+the answer is ``{columns, left_out, remarks, notes}``. It may then send ``{names}`` repeatedly,
 and ends with none; the answers are pieces ``{column, begin, count, kind}`` and ``{end, remarks}``.
 ``{error}`` and ``{memory}`` end it early.
 
@@ -35,13 +35,13 @@ from bywire.core.errors import FileError
 from bywire.data.file_format import FileFormat, PieceSource, ReadOptions
 
 NUMBERS = ("float64", "float32", "int32", "int16", "uint32", "uint16", "int8", "uint8")
-"""types of numbers that pass from one process to the other"""
+"""types of numbers in messages"""
 
 _LENGTH = struct.Struct("<I")
 
 
 def send(stream: IO[bytes], message: Mapping[str, Any], numbers: Any = b"") -> None:
-    """Write a message, and numbers behind it."""
+    """Write a message, followed by numbers."""
     text = json.dumps(message).encode()
     for part in (_LENGTH.pack(len(text)) + text, memoryview(numbers).cast("B")):
         left = part
@@ -50,7 +50,7 @@ def send(stream: IO[bytes], message: Mapping[str, Any], numbers: Any = b"") -> N
 
 
 def receive(stream: IO[bytes]) -> dict[str, Any] | None:
-    """Return the next message; None where the other side has ended."""
+    """Return the next message; None if the other side has ended."""
     head = bytearray(_LENGTH.size)
     if not fill(stream, head):
         return None
@@ -59,7 +59,7 @@ def receive(stream: IO[bytes]) -> dict[str, Any] | None:
 
 
 def fill(stream: IO[bytes], buffer: Any) -> bool:
-    """Read as many bytes as a buffer has; return whether they came."""
+    """Fill a buffer; return whether all bytes arrived."""
     left = memoryview(buffer).cast("B")
     while left:
         count = cast(RawIOBase, stream).readinto(left)
@@ -70,9 +70,9 @@ def fill(stream: IO[bytes], buffer: Any) -> bool:
 
 
 def main(module: str, is_forking: bool) -> None:
-    """Read the files that are asked for, until nobody asks any more."""
+    """Read the requested files until the requests end."""
     requests, answers = open(0, "rb", buffering=0), open(os.dup(1), "wb", buffering=0)  # noqa: SIM115
-    os.dup2(2, 1)  # what a library prints is no message
+    os.dup2(2, 1)  # output of libraries is not a message
     kind: FileFormat = importlib.import_module(module).FORMAT
     try:
         for name in kind.libraries:
@@ -82,7 +82,7 @@ def main(module: str, is_forking: bool) -> None:
         missing = str(error) or "out of memory"
     while (request := receive(requests)) is not None:
         if missing:
-            what = f"{request['path']}: the library that reads {kind.title} does not load"
+            what = f"{request['path']}: the library that reads {kind.title} cannot be loaded"
             text = f"{what} ({missing}): install it again"
             send(answers, {"error": text, "is_of_library": True})
         elif not is_forking:
@@ -106,7 +106,7 @@ def main(module: str, is_forking: bool) -> None:
 def _serve(
     kind: FileFormat, request: Mapping[str, Any], requests: IO[bytes], answers: IO[bytes]
 ) -> None:
-    """Answer the questions about one file."""
+    """Answer the requests for one file."""
     path = Path(request["path"])
     try:
         os.chdir(request["folder"])
@@ -121,7 +121,7 @@ def _serve(
             while names := (receive(requests) or {"names": []})["names"]:
                 for name, begin, part in source.pieces(names):
                     _allow(request["seconds"])
-                    # As they are stored: single precision takes half the way through the pipe.
+                    # In the stored type: single precision halves the traffic in the pipe.
                     is_plain = part.dtype.isnative and part.dtype.name in NUMBERS
                     numbers = np.ascontiguousarray(part, None if is_plain else np.float64)
                     place = {
@@ -139,17 +139,17 @@ def _serve(
     except Exception as error:  # libraries fail in as many ways as files can be damaged
         reason = getattr(error, "strerror", None) or " ".join(str(error).split())[:200]
         if isinstance(error, LookupError) or not reason:
-            reason = "its parts do not fit together"
-        what = f"{path} is damaged, as {kind.title} it cannot be read ({reason})"
-        hint = "copy it again, or export it again from where it was made"
+            reason = "its parts are inconsistent"
+        what = f"{path} is damaged: bywire cannot read it as {kind.title} ({reason})"
+        hint = "copy it again, or export it again from its source"
         if getattr(error, "errno", None) == errno.ENOSPC:
-            what = f"{path} cannot be read: the library's temporary files have no room"
-            hint = "make room where they go, or set TMPDIR to another folder"
+            what = f"{path} cannot be read: there is no space for the library's temporary files"
+            hint = "free some space there, or set TMPDIR to another folder"
         send(answers, {"error": f"{what}: {hint}", "is_of_library": True})
 
 
 def _limit(memory: int) -> None:
-    """Limit the memory of this process to what it has and some bytes, and files that it writes."""
+    """Limit this process to its current memory plus some bytes, and limit files that it writes."""
     import resource
 
     pages = int(Path("/proc/self/statm").read_text().split()[0])
@@ -165,7 +165,7 @@ def _limit(memory: int) -> None:
 
 
 def _allow(seconds: float) -> None:
-    """Allow the time of a processor up to the next piece, for a child whose reader is gone."""
+    """Limit the processor time until the next piece, in case the reader has ended."""
     if sys.platform == "linux":
         import resource
 

@@ -1,6 +1,6 @@
-"""Filters of past samples: low-passes, lags, colored noise.
+"""Recursive filters: low-passes, lags, colored noise.
 
-SciPy's own come with a package that takes longer to load than a short run takes.
+SciPy's filters are in a package that takes longer to load than a short run takes.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import numpy as np
 
 from bywire.core.typing import Array
 
-_BLOCK = 4096  # samples that are solved for at once: a band of many rows takes memory
+_BLOCK = 4096  # samples per solution, since a band matrix of many rows takes memory
 
 
 def filtered(
@@ -22,18 +22,18 @@ def filtered(
     *,
     settled: bool = False,
 ) -> Array:
-    r"""Return signals behind a filter.
+    r"""Filter signals.
 
     .. math:: y_k + a_1 y_{k-1} + \dots + a_p y_{k-p} = b_0 x_k + \dots + b_q x_{k-q}
 
     Parameters
     ----------
     numerator, denominator
-        b and a, shapes (q + 1,) and (p + 1,); a begins with 1.
+        b and a, shapes (q + 1,) and (p + 1,); a starts with 1.
     x
         One row per sample, shape (n, ...).
     settled
-        Whether the filter has long seen the first sample; at rest at zero otherwise.
+        Whether the filter starts in steady state at the first sample; otherwise at zero.
 
     Returns
     -------
@@ -54,19 +54,19 @@ def filtered(
 
 
 def low_passed(x: Array, f_c: float, interval: float) -> Array:
-    """Return samples behind a first-order low-pass that has long seen the first of them.
+    """Filter samples by a first-order low-pass in steady state at the first one.
 
     Parameters
     ----------
     x
         Samples, shape (n,).
     f_c
-        Corner frequency in Hz; the lower it is, the closer the result stays to the first sample.
+        Corner frequency in Hz; for a low one, the result stays close to the first sample.
     interval
         Sample time in s.
     """
     decay = math.exp(-2.0 * math.pi * f_c * interval)
-    # Off the first sample: its gain at rest would be 0 / 0 where the decay rounds to 1.
+    # Relative to the first sample, since the static gain would be 0 / 0 if the decay rounds to 1.
     return np.asarray(x[0] + filtered([1.0 - decay], [1.0, -decay], x - x[0]))
 
 

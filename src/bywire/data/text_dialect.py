@@ -1,4 +1,4 @@
-"""Layout of a text table: separator, decimal mark, header, units; from its head."""
+"""Layout of a text table, detected from its head: separator, decimal mark, header, units."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from bywire.data.text_encoding import head_text
 from bywire.data.time_stamps import DIGITS, is_stamp, kind_of_stamps
 
 SEPARATORS = {"\t": "tab", ";": "semicolon", ",": "comma", " ": "blanks"}
-"""what may stand between two cells, in the order in which it is looked for"""
+"""separators of cells, in the order of the search"""
 
 HEAD = 1 << 18
-"""bytes that are looked at; a header must end before"""
+"""bytes of the head; a header must end within"""
 
 _MARKS = (
     "- -- --- nan -nan nan(ind) -nan(ind) 1.#qnan 1.#ind -1.#ind 1.#inf -1.#inf na n/a n.a. #n/a "
@@ -27,15 +27,15 @@ _MARKS = (
     "overload overrange missing invalid sna"
 )
 MARKS = frozenset(("", *_MARKS.split()))
-"""cells of what was not measured, in small letters"""
+"""cells that mark missing values, in lower case"""
 
 COMMENTS = ("#", "%", "//", "!")
-"""what a line of comment begins with"""
+"""first characters of a comment line"""
 
-NUMBER, TEXT, UNCLEAR = "number", "text", "time of no clear order"
-"""kinds of columns, beside those of time stamps"""
+NUMBER, TEXT, UNCLEAR = "number", "text", "time in an ambiguous order"
+"""kinds of columns, in addition to those of time stamps"""
 
-_ROWS = 200  # rows that are looked at for the decimal mark and the kinds of columns
+_ROWS = 200  # rows used to detect the decimal mark and the kinds of columns
 _LINES = 2000  # in which the first row of numbers is looked for
 _NUMBER = re.compile(r"[+-]?([0-9]+([.,][0-9]*)?|[.,][0-9]+)([eE][+-]?[0-9]+)?")
 _BEGINS_LIKE_ONE = re.compile(r"[+-]?[.,]?[0-9]")  # then it is an error, and no text
@@ -45,18 +45,18 @@ _SPACED_UNIT = re.compile(r" +(?=[\[(][^\])]*[\])])")  # "t [s]  p [bar]" has tw
 
 @dataclass(frozen=True)
 class Dialect:
-    """How a text table is written.
+    """Dialect of a text table.
 
     Parameters
     ----------
     separator
-        What stands between two cells.
+        Separator of cells.
     decimal
-        ``"."`` or ``","``; empty where the cells tell it, see `with_mark`.
+        ``"."`` or ``","``; empty if the cells determine it, see `with_mark`.
     titles
-        Titles of the columns; empty where there is no header.
+        Titles of the columns; empty without a header.
     units
-        Their units as written; empty texts where there are none.
+        Their units as written; empty texts if there are none.
     width
         Number of cells in a row.
     first_line
@@ -66,19 +66,19 @@ class Dialect:
     rows
         First rows of numbers.
     kinds
-        What the cells of each column are: `NUMBER`, `TEXT`, or a kind of time stamps.
+        Kind of each column's cells: `NUMBER`, `TEXT`, or a kind of time stamps.
     encoding
-        How the file writes characters.
+        Encoding of the file.
     marks
-        Further cells of what was not measured.
+        Additional cells that mark missing values.
     raster
-        First instant and step [s], where no column has the instants.
+        First instant and step [s], if no column contains the instants.
     clocks
-        Columns with the instants of others, by the column from 0, where the file says so.
+        Columns with the instants of others, by column from 0, if the file defines them.
     is_ragged
-        Whether cells may be left away at the end of a row.
+        Whether cells may be missing at the end of a row.
     notes
-        What the user should know of how the table is read.
+        Notes on how the table is read.
     """
 
     separator: str
@@ -98,11 +98,11 @@ class Dialect:
     notes: tuple[str, ...] = ()
 
     def label(self, column: int) -> str:
-        """Return what errors call a column, counted from 0."""
+        """Return the name of a column, counted from 0, in errors."""
         return self.titles[column] if column < len(self.titles) else str(column + 1)
 
     def is_mark(self, cell: str) -> bool:
-        """Return whether a cell says that nothing was measured."""
+        """Return whether a cell marks a missing value."""
         return cell.casefold() in MARKS or cell in self.marks
 
 
@@ -113,13 +113,13 @@ class Head:
     Parameters
     ----------
     path
-        What errors call the file.
+        Path of the file, for errors.
     lines
         Its complete lines, with their ends.
     encoding
-        How it writes characters.
+        Its encoding.
     options
-        How it is to be read.
+        Options of the user.
     """
 
     path: Path
@@ -136,7 +136,7 @@ class Head:
         return self.lines[line].rstrip("\r\n")
 
     def is_blank(self, line: int) -> bool:
-        """Return whether a line holds nothing."""
+        """Return whether a line is blank."""
         return not self.lines[line].strip()
 
     def cells(self, line: int, separator: str) -> list[str]:
@@ -145,7 +145,7 @@ class Head:
         Raises
         ------
         FileError
-            When its quotation marks do not fit.
+            When its quotation marks are not valid.
         """
         try:
             return cells_of(self.plain(line), separator)
@@ -182,22 +182,22 @@ def head_of_table(path: Path, options: ReadOptions) -> Head:
     Raises
     ------
     FileError
-        When they are not text in the encoding that is named, or in UTF-8.
+        When they are not text in the given encoding, or in UTF-8.
     """
     lines, encoding, _ = head_text(path, options.encoding, HEAD)
     return Head(path, lines, encoding, options)
 
 
 def dialect_of(head: Head) -> Dialect:
-    """Return how a text table is written.
+    """Detect the dialect of a text table.
 
-    The table begins with the first row of numbers, and the row of titles and that of units before
-    it. What stands before those is left out with a note, unless it holds numbers too.
+    The table consists of the rows from the first row of numbers on, and the rows of titles and
+    units before it. Earlier lines are skipped with a note, unless they contain numbers too.
 
     Raises
     ------
     FileError
-        When it has no row, or is not clear.
+        When it has no row, or is ambiguous.
     """
     options, path = head.options, head.path
     at, chosen = options.skip_lines, ""
@@ -210,7 +210,7 @@ def dialect_of(head: Head) -> Dialect:
     while begin < len(head.lines) and (head.is_blank(begin) or _is_comment(head.plain(begin))):
         begin += 1
     if begin >= len(head.lines):
-        raise FileError(f"{path} holds no row after {options.skip_lines} lines that are skipped")
+        raise FileError(f"{path} has no rows after {options.skip_lines} skipped lines")
     if chosen and chosen not in SEPARATORS:
         raise FileError(f"{path}: its first line names the separator {quoted(chosen)}: use ';'")
     dialect = None
@@ -220,11 +220,13 @@ def dialect_of(head: Head) -> Dialect:
         separator = chosen or (first[0] if first else _separator_of(head, begin))
         dialect = _headed(head, begin, separator, options.titles)
     if dialect.separator == "," and options.decimal == ",":
-        raise FileError(f"{path}: a comma cannot separate columns and mark decimals: decimal = '.'")
+        raise FileError(
+            f"{path}: a comma cannot be both column separator and decimal mark: write decimal = '.'"
+        )
     before = [k for k in range(at, begin) if not head.is_blank(k)]
     if before:
         note = (
-            f"{len(before)} lines before the table are not read, from line {before[0] + 1} "
+            f"{len(before)} lines before the table are skipped, from line {before[0] + 1} "
             f"({quoted(head.plain(before[0]).strip())}) to {before[-1] + 1}"
         )
         dialect = replace(dialect, notes=(note, *dialect.notes))
@@ -232,7 +234,7 @@ def dialect_of(head: Head) -> Dialect:
 
 
 def _separator_of(head: Head, at: int) -> str:
-    """Return the separator of a line that is no row of numbers; quotes do not count."""
+    """Return the separator of a line other than a row of numbers, ignoring quotes."""
     bare = re.sub(r'"[^"]*"', "", head.plain(at))
     found = next((mark for mark in "\t;," if mark in bare), "")
     if found:
@@ -243,7 +245,7 @@ def _separator_of(head: Head, at: int) -> str:
 
 
 def cells_of(line: str, separator: str) -> list[str]:
-    """Return the cells of a line; csv.Error where its quotation marks do not fit."""
+    """Return the cells of a line; raise csv.Error if its quotation marks are not valid."""
     if separator == " ":
         line = _SPACED_UNIT.sub("", " ".join(line.split()))
     rows = list(
@@ -258,7 +260,7 @@ def with_mark(path: Path, dialect: Dialect, indices: Sequence[int]) -> Dialect:
     Raises
     ------
     FileError
-        When they have both: one may be a mark of thousands.
+        When they have both, since one may be a thousands separator.
     """
     if dialect.decimal:
         return dialect
@@ -276,7 +278,7 @@ def with_mark(path: Path, dialect: Dialect, indices: Sequence[int]) -> Dialect:
             f"{path}, line {number}, column {quoted(dialect.label(k))}: {quoted(cell)} mixes "
             f"decimal comma and decimal point ({quoted(before[2])} in line {before[0]}), columns "
             f"separated by {SEPARATORS[dialect.separator]}: write all numbers with one of them, "
-            "and none with a separator of thousands"
+            "without a thousands separator"
         )
     return replace(dialect, decimal=next(iter(first), "."))
 
@@ -292,7 +294,7 @@ def _first_row_of_numbers(head: Head, at: int, separators: list[str]) -> tuple[s
             except csv.Error:
                 if _is_comment(head.plain(line)):
                     continue
-                break  # the reader of rows finds the place
+                break  # the row reader reports the place
             if _are_numbers(cells, head.options.missing) and len(_bare_row(cells)) > 1:
                 return separator, line
     return None
@@ -320,8 +322,8 @@ def _from_numbers(
 ) -> tuple[Dialect | None, int]:
     """Return the dialect of a table by its first row of numbers, and the line of its titles.
 
-    None where a row of as many cells, with a number among them, stands before: it may belong to
-    the table.
+    None if there is an earlier row with the same number of cells and a number among them, which may
+    belong to the table.
     """
     row = head.cells(first, separator)
     width = len(_bare_row(row))
@@ -341,15 +343,15 @@ def _from_numbers(
         titles, units = _titles_of(rows[start], rows[alike[-1]] if has_units else [])
         notes += _doubtful_titles(titles, start)
         if _is_comment(head.plain(start)):
-            notes.append(f"line {start + 1} is a comment, and is read as titles")
+            notes.append(f"line {start + 1} is a comment, but read as titles")
     elif above and above[-1] == begin:
-        return None, begin  # a header of other cells than the rows
+        return None, begin  # a header that does not match the rows
     elif above and start > begin:
         notes.append(
-            f"the columns have no titles, since line {above[-1] + 1} has other cells than the rows "
-            "below it: they are called 1, 2, ..."
+            f"the columns have no titles, since line {above[-1] + 1} does not match the rows "
+            "below it: they are named 1, 2, ..."
         )
-    # Between words of a sentence stand blanks too: there, a row begins with its number.
+    # Sentences contain blanks too; with this separator, a row must start with its number.
     first_ones = 1 if separator == " " else None
     mixed = (k for k in above if len(rows[k]) == len(row) and _has_number(rows[k][:first_ones]))
     if any(k < start or k == start != begin for k in mixed):
@@ -366,7 +368,7 @@ def _loose_cells(head: Head, line: int, separator: str) -> list[str]:
 
 
 def _doubtful_titles(titles: list[str], line: int) -> list[str]:
-    """Return a note on titles that are numbers."""
+    """Return a note on numbers among the titles."""
     number = next((title for title in titles if _has_number([title])), None)
     if number is None:
         return []
@@ -395,7 +397,7 @@ def _headed(head: Head, at: int, separator: str, titles: bool | None) -> Dialect
 
 
 def _titles_of(first: list[str], below: list[str]) -> tuple[list[str], list[str]]:
-    """Return titles and units of a row of titles and one of units, which may be none."""
+    """Return titles and units from a row of titles and an optional row of units."""
     names = [split_title(cell.lstrip("#% ") if k == 0 else cell) for k, cell in enumerate(first)]
     titles, units = [name for name, _ in names], [unit for _, unit in names]
     for k, cell in enumerate(below[: len(units)]):
@@ -419,7 +421,7 @@ def _are_units(cells: list[str]) -> bool:
 
 
 def _known_units(cells: list[str]) -> int:
-    """Return how many cells of a row are units."""
+    """Return the number of units in a row."""
     return sum(bool(cell) and _is_unit(_bare(cell)) for cell in cells)
 
 
@@ -437,7 +439,7 @@ def _is_unit(text: str) -> bool:
 
 
 def _kinds(dialect: Dialect) -> tuple[str, ...]:
-    """Return what the cells of each column are, by the first rows."""
+    """Return the kind of each column's cells from the first rows."""
     columns: list[list[str]] = [[] for _ in range(dialect.width)]
     for line in dialect.rows:
         if _is_comment(line):
@@ -479,16 +481,16 @@ _VBOX_UNITS = {
     "heading": "deg",
     "height": "m",
 }
-"""units of the columns that every VBOX writes, by the manufacturer's description of its files"""
+"""units of the standard columns of a VBOX, by the manufacturer's file description"""
 
 
 def layout_of(head: Head) -> Dialect | None:
-    """Return the dialect of a file of LabVIEW or of a VBOX; None of other files.
+    """Return the dialect of a LabVIEW or VBOX file; None for other files.
 
     Raises
     ------
     FileError
-        When its description does not fit together.
+        When its description is inconsistent.
     """
     if head.lines and head.lines[0].startswith(_LVM_MARK):
         return _lvm(head)
@@ -599,7 +601,7 @@ def _vbox(head: Head) -> Dialect:
 
 
 def _vbox_unit(name: str, description: str) -> str:
-    """Return the unit behind a description such as ``velocity kmh``, or the usual one."""
+    """Return the unit at the end of a description such as ``velocity kmh``, or the usual one."""
     word = description.rpartition(" ")[2] if " " in description else ""
     try:
         unit_of(word)

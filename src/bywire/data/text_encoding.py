@@ -1,4 +1,4 @@
-"""How a text file writes its characters, and its bytes as UTF-8 whatever they are."""
+"""Encoding of text files, and their conversion to UTF-8."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ ENCODINGS = (
 )
 """encodings of text files that a mapping may name"""
 
-_BLOCK = 1 << 22  # bytes that are read at a time
+_BLOCK = 1 << 22  # bytes per block
 _MARKS = {
     codecs.BOM_UTF8: "utf-8",
     codecs.BOM_UTF16_LE: "utf-16-le",
@@ -38,14 +38,14 @@ _SHARE = 0.4  # of null bytes among every other one: text in two bytes for each 
 
 
 def encoding_of(head: bytes, named: str = "") -> str:
-    """Return how a file writes characters, by its first bytes.
+    """Return the encoding of a file from its first bytes.
 
     Parameters
     ----------
     head
         Its first bytes.
     named
-        The encoding that the user names; a byte-order mark goes before it.
+        Encoding that the user names; a byte-order mark takes precedence.
 
     Examples
     --------
@@ -65,17 +65,17 @@ def encoding_of(head: bytes, named: str = "") -> str:
 
 
 def is_text(head: bytes) -> bool:
-    """Return whether the first bytes of a file are those of a text."""
+    """Return whether the first bytes of a file are text."""
     return b"\0" not in head or encoding_of(head).startswith("utf-16")
 
 
 def blocks_of(path: Path, encoding: str, size: int = _BLOCK) -> Iterator[bytes]:
-    """Yield a text file as UTF-8, without a byte-order mark, block by block.
+    """Yield a text file as UTF-8 blocks, without a byte-order mark.
 
     Raises
     ------
     FileError
-        When it is not text of this encoding, with the line; of UTF-8 only where it is decoded.
+        When it is not text of this encoding, with the line. UTF-8 is checked only when decoded.
     """
     with path.open("rb") as stream:
         head = stream.read(3)
@@ -94,7 +94,7 @@ def blocks_of(path: Path, encoding: str, size: int = _BLOCK) -> Iterator[bytes]:
             except UnicodeDecodeError as error:
                 line = lines + 1 + block[: error.start].count(b"\n")
                 raise FileError(
-                    f"{path}, line {line}: it is not text in {encoding}: name the right encoding "
+                    f"{path}, line {line}: it is not text in {encoding}: give the right encoding "
                     "in the mapping, as encoding = 'cp1252'"
                 ) from None
             lines += text.count("\n")
@@ -105,7 +105,7 @@ def blocks_of(path: Path, encoding: str, size: int = _BLOCK) -> Iterator[bytes]:
 
 
 def head_text(path: Path, named: str, size: int) -> tuple[list[str], str, bool]:
-    """Return the first lines of a text file with their ends, its encoding, and whether it goes on.
+    """Return the first lines of a text file with line ends, its encoding, and whether more follow.
 
     Raises
     ------
@@ -133,7 +133,7 @@ def head_text(path: Path, named: str, size: int) -> tuple[list[str], str, bool]:
 def not_utf8(path: Path, line: int) -> FileError:
     """Return the error for a line that is not UTF-8."""
     return FileError(
-        f"{path}, line {line}: it is not UTF-8: name its encoding in a mapping, as "
+        f"{path}, line {line}: it is not UTF-8: give its encoding in a mapping, as "
         "encoding = 'cp1252' (Windows) or 'latin-1', or save it as UTF-8 (in spreadsheets: "
         "'CSV UTF-8')"
     )

@@ -1,7 +1,7 @@
 """Times of day and dates in the cells of text tables, as nanoseconds.
 
-A time of day goes on over midnight, see `over_midnight`. Of dates, only those are read that mean
-one day whoever writes them: 2026-11-26 and 26.11.2026, but not 11/26/2026.
+Times of day continue past midnight, see `over_midnight`. Only unambiguous formats of dates are
+read: 2026-11-26 and 26.11.2026, but not 11/26/2026.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ _UNCLEAR = re.compile(r"[0-9]{1,2}[/-][0-9]{1,2}[/-](?:[0-9]{4}|[0-9]{2})(?:[T ,
 
 
 def nanoseconds(cell: str, kind: str) -> int | None:
-    """Return a stamp as nanoseconds since midnight, or since the year 1; None where it is none.
+    """Return a stamp as nanoseconds since midnight, or since the year 1; None if it is not valid.
 
     Examples
     --------
@@ -61,7 +61,7 @@ def nanoseconds(cell: str, kind: str) -> int | None:
 
 
 def kind_of_stamps(cells: Sequence[str]) -> str:
-    """Return the kind of the stamps in all of some cells; empty where they are none."""
+    """Return the common kind of stamps in some cells; empty if there is none."""
     for kind in (CLOCK, MOMENT, DAY):
         if cells and all(nanoseconds(cell, kind) is not None for cell in cells):
             return kind
@@ -69,7 +69,7 @@ def kind_of_stamps(cells: Sequence[str]) -> str:
 
 
 def is_stamp(cell: str) -> bool:
-    """Return whether a cell is a time or a date, also one of which the day is not clear."""
+    """Return whether a cell is a time or a date, including ambiguous dates."""
     return bool(
         _UNCLEAR.fullmatch(cell)
         or any(p.fullmatch(cell) for p in (_CLOCK, _MINUTES, _MOMENT, _DAY_ALONE))
@@ -77,7 +77,7 @@ def is_stamp(cell: str) -> bool:
 
 
 def over_midnight(seconds: NDArray[np.float64]) -> int:
-    """Have times of day go on over midnight, where they lie; return how often they pass it."""
+    """Make times of day continue past midnight, in place; return the number of midnights."""
     there = np.flatnonzero(np.isfinite(seconds))
     steps = np.diff(seconds[there])
     passed = np.flatnonzero(steps < -43200.0)  # a jump back by more than half a day

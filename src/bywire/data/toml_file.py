@@ -1,4 +1,4 @@
-"""TOML files from outside: limits of size and time, their kinds, and which file was meant."""
+"""TOML files of users: limits of size and time, kinds, and suggestions for missing files."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from bywire.core.errors import FileError, ParameterError, quoted
 from bywire.core.scratch import NULL_CHARACTER
 
 LARGEST = 1_000_000
-"""size of a file in bytes; a larger one is refused before it is parsed"""
+"""largest file size in bytes, checked before parsing"""
 
 # The time to read a dotted key grows with the square of its parts, so long ones are not read.
 _KEY_PARTS = 16
@@ -30,23 +30,24 @@ def _no_idea(_: Path) -> str:
 def read_toml(
     file: Path, kind: str, *, missing: Callable[[Path], str] = _no_idea, too_large: str = ""
 ) -> dict[str, Any]:
-    """Return what a TOML file holds; a mark of the byte order is let pass.
+    """Return the content of a TOML file, with or without a byte-order mark.
 
     Parameters
     ----------
     file
-        Where it is.
+        Path of the file.
     kind
-        What errors call it, for instance ``"bench file"``.
+        Its name in errors, for instance ``"bench file"``.
     missing
-        Returns what to do about a file that is not there.
+        Returns the next step for a missing file.
     too_large
-        What to do about one that is too large, with a semicolon in front.
+        Next step for a file that is too large, with a semicolon in front.
 
     Raises
     ------
     FileError
-        When the file cannot be read or is no TOML, and for whole numbers beyond all others.
+        When the file cannot be read, is not valid TOML, or contains an integer beyond the range of
+        floating point.
     """
     text = _text(file, kind, missing, too_large)
     if _LONG_KEY.search(text):
@@ -67,7 +68,7 @@ def read_toml(
 
 
 def _require_numbers(value: Any, file: Path, key: str) -> None:
-    """Refuse whole numbers that no floating-point number is as large as, wherever they stand."""
+    """Reject integers beyond the range of floating point, at any depth."""
     if isinstance(value, dict):
         for name, each in value.items():
             _require_numbers(each, file, f"{key}.{name}" if key else name)
@@ -93,7 +94,7 @@ def _text(file: Path, kind: str, missing: Callable[[Path], str], too_large: str)
         raise FileError(f"cannot read {kind} {file}: {reason}: {hint}", name=str(file)) from None
     if len(data) > LARGEST:
         raise FileError(
-            f"{file} has more than {LARGEST // 1000} kB, too much for a {kind}{too_large}",
+            f"{file} has more than {LARGEST // 1000} kB, too large for a {kind}{too_large}",
             name=str(file),
         )
     try:
@@ -115,14 +116,14 @@ _COMMANDS = {
 }
 _WORDS = {BENCH: "a bench", STUDY: "a study", LIFE: "a life", CAMPAIGN: "a campaign of faults"}
 HEADS = {BENCH: "experiment", STUDY: "bench", LIFE: "life", CAMPAIGN: "bench"}
-"""the key that each cannot do without"""
+"""required key of each kind"""
 _OF_CAMPAIGNS = ("campaign", "criteria")
 _NEVER_IN_STUDIES = {*_OF_CAMPAIGNS, "values", "residuals", "rates", "reaction"}
 _NEVER_IN_CAMPAIGNS = {"design", "correlation", "requirements"}
 
 
 def kind_of(content: Mapping[str, Any]) -> str:
-    """Return what the content of a file is, by its keys; nothing where they do not tell.
+    """Return the kind of a file's content by its keys; empty if undecided.
 
     Examples
     --------
@@ -141,7 +142,7 @@ def kind_of(content: Mapping[str, Any]) -> str:
 
 
 def kind_of_file(file: Path) -> str:
-    """Return what a file is, see `kind_of`; nothing of one that cannot be read."""
+    """Return the kind of a file, see `kind_of`; empty if it cannot be read."""
     try:
         return kind_of(read_toml(file, "file"))
     except FileError:
@@ -149,16 +150,16 @@ def kind_of_file(file: Path) -> str:
 
 
 def require_kind(content: Mapping[str, Any], wanted: str, file: Path) -> None:
-    """Refuse the content of a file that is of another kind, and say which command takes it.
+    """Reject the content of another kind of file, and name the command that accepts it.
 
     Parameters
     ----------
     content
-        What the file holds.
+        Content of the file.
     wanted
         `BENCH`, `STUDY`, `LIFE` or `CAMPAIGN`.
     file
-        Where it is.
+        Path of the file.
 
     Raises
     ------
@@ -170,20 +171,20 @@ def require_kind(content: Mapping[str, Any], wanted: str, file: Path) -> None:
     if not kind or kind == wanted or (head in content and head != HEADS[kind]):
         return
     raise ParameterError(
-        f"this is {_WORDS[kind]} and not {_WORDS[wanted]}: '{_COMMANDS[kind]} {file}' takes it",
+        f"this is {_WORDS[kind]}, not {_WORDS[wanted]}: use '{_COMMANDS[kind]} {file}'",
         name=str(file),
         value=kind,
         valid=wanted,
     )
 
 
-# --- Which file was meant where another is named: in a usual folder, or the nearest of its kind
+# --- Suggestions for a missing file: in a usual folder, or the most similar name of its kind
 
 _ENDING = ".toml"
 
 
 def first_there(places: Iterable[Path]) -> Path | None:
-    """Return the first of several places at which there is a file; None where none has one."""
+    """Return the first path at which there is a file, or None."""
     try:
         return next((place for place in places if place.is_file()), None)
     except (OSError, ValueError):  # ValueError: a null character in the path
@@ -198,18 +199,18 @@ def near_files(
     *,
     with_ending: bool = False,
 ) -> Iterator[tuple[float, Path]]:
-    """Yield the files that a name resembles, each with how much, the likest first.
+    """Yield files with similar names and their similarity, the most similar first.
 
     Parameters
     ----------
     file
-        What was named; the folder that it names does not count.
+        The given path; its folder does not count.
     kinds
-        Kinds of files that are wanted, see `bywire.data.toml_file.kind_of`.
+        Requested kinds of files, see `bywire.data.toml_file.kind_of`.
     folders
-        Where to look; of two files of one name, the one in the later folder goes before.
+        Folders to search; of two files with the same name, the one in the later folder comes first.
     least
-        Resemblance from which on a file counts, up to 1.
+        Least similarity, up to 1.
     with_ending
         Whether names are compared with their endings.
     """

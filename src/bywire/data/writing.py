@@ -1,4 +1,4 @@
-"""Datasets of signals to measurement files, whole or not at all."""
+"""Writing of datasets as measurement files, complete or not at all."""
 
 from __future__ import annotations
 
@@ -28,32 +28,31 @@ def write_measurement(
     overwrite: bool = False,
     progress: Progress = silent,
 ) -> Path:
-    """Write signals as a measurement file, in SI, every number exactly.
+    """Write signals as a measurement file, in SI, with exact numbers.
 
     Parameters
     ----------
     dataset
-        Variables with one dimension each, whose coordinate holds the instants [s]; ``units``
-        are SI, a pure number's where there are none.
+        Variables with one dimension each, whose coordinate contains the instants [s]; ``units``
+        are SI, and a variable without them is a pure number.
     path
-        Where to; the ending chooses the format.
+        Target file; its ending selects the format.
     format
-        Name of the format, in place of the ending's: ``"mat73"`` for MAT 7.3.
+        Name of the format, if not that of the ending: ``"mat73"`` for MAT 7.3.
     overwrite
-        Whether a file that is there may be replaced.
+        Whether to replace an existing file.
     progress
         Called with a label and the finished share.
 
     Returns
     -------
     pathlib.Path
-        The file; it appears when it is complete.
+        The file, which appears only when it is complete.
 
     Raises
     ------
     FileError
-        When the format cannot hold the signals, a file exists already, or it cannot be
-        written.
+        When the format does not support the signals, the file exists, or it cannot be written.
     UnknownNameError
         When there is no such format.
     """
@@ -63,7 +62,7 @@ def write_measurement(
     _require_fit(dataset, target, kind)
     ready = _with_units(dataset)
     try:
-        # What a library prints is no result of ours.
+        # Output of a library is not ours.
         with replacing(target) as fresh, redirect_stdout(StringIO()):
             kind.write(ready, fresh, progress)
     except InputError:
@@ -78,8 +77,7 @@ def write_measurement(
         reason = getattr(error, "strerror", None) or " ".join(str(error).split())[:200]
         reason = reason or type(error).__name__
         raise FileError(
-            f"cannot write {target}: {reason}: make room there, or choose a folder that you may "
-            "write to",
+            f"cannot write {target}: {reason}: free some space there, or choose a writable folder",
             name=str(target),
         ) from None
     return target
@@ -95,15 +93,14 @@ def _with_units(dataset: xr.Dataset) -> xr.Dataset:
 
 
 def require_free(target: Path, *, overwrite: bool) -> None:
-    """Refuse a path where there is something already, unless it may be replaced.
+    """Reject a path that exists already, unless it may be replaced.
 
     Raises
     ------
     FileError
-        When there is a file that may not be replaced, or a folder; when its folder is not
-        there.
+        When a file exists that may not be replaced, the path is a folder, or its folder is missing.
     """
-    with contextlib.suppress(OSError, ValueError):  # writing to it will say what is wrong
+    with contextlib.suppress(OSError, ValueError):  # writing will raise the error
         if target.is_dir():
             raise FileError(f"{target} is a folder: name a file in it", name=str(target))
         if target.exists() and not overwrite:
@@ -113,7 +110,7 @@ def require_free(target: Path, *, overwrite: bool) -> None:
             )
         if not target.parent.is_dir():
             raise FileError(
-                f"cannot write {target}: there is no folder {target.parent}: make it",
+                f"cannot write {target}: there is no folder {target.parent}: create it",
                 name=str(target),
             )
 
@@ -126,12 +123,12 @@ def _require_fit(dataset: xr.Dataset, target: Path, kind: FileFormat) -> None:
             dims = ", ".join(map(str, signal.dims)) or "none"
             raise FileError(
                 f"cannot write {target}: {name} has the dimensions {dims}: a measurement file "
-                "holds signals over time; choose one case of each",
+                "contains signals over time; choose one case of each",
                 name=str(name),
             )
         if not np.issubdtype(signal.dtype, np.number) and signal.dtype != np.bool_:
             raise FileError(
-                f"cannot write {target}: {name} contains {signal.dtype} and not numbers",
+                f"cannot write {target}: {name} contains {signal.dtype}, not numbers",
                 name=str(name),
             )
         unit = dataset[signal.dims[0]].attrs.get("units", "s")
@@ -154,7 +151,7 @@ def _require_fit(dataset: xr.Dataset, target: Path, kind: FileFormat) -> None:
         )
     raise FileError(
         f"cannot write {target}: the signals were measured at different instants "
-        f"({', '.join(axes)}), and a {kind.name} file has one time: bring them to one time axis "
+        f"({', '.join(axes)}), and a {kind.name} file has one time: resample them to one time axis "
         "(bywire convert --rate, or resample), or write mat, mdf4 or netcdf",
         name=str(target),
     )

@@ -1,4 +1,4 @@
-"""Output error on a bench: the question, the fit of unknowns to measured outputs, its checks."""
+"""Output error on a bench: the fit of unknowns to measured outputs, and its checks."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from bywire.identification.least_squares import Problem, estimate, solve
 from bywire.identification.measured import (
     FAR,
     NOISE_OF_SAMPLES,
-    is_told,
+    determines_its_noise,
     noise_of,
     outliers,
     robust_scale,
@@ -55,12 +55,12 @@ _OWN = ("initial.", "start.")  # what each record has for itself
 
 @dataclass(frozen=True)
 class Prediction:
-    """A record beside the model with the estimates.
+    """A record and the model's outputs with the estimates.
 
     Parameters
     ----------
     label
-        Of the record; empty where there is one alone.
+        Label of the record; empty if there is only one.
     pairs
         ``measured`` and ``modeled`` over ``time`` [s], by output.
     """
@@ -76,15 +76,15 @@ class Prediction:
 
 
 def predict(trial: Trial, estimate: Estimate) -> Prediction:
-    """Return a record beside the model with the estimates, without fitting anything.
+    """Compare a record with the model at the estimates, without a fit.
 
     Parameters
     ----------
     trial
-        A record and its model. Unknowns of a record's own, such as where it begins, are taken
-        from the estimate only where they carry this trial's label.
+        A record and its model. Unknowns of a single record, such as its start, are taken
+        from the estimate only if they carry this trial's label.
     estimate
-        Of this or of other records; what the data does not tell stays where it was.
+        Of this or of other records; undetermined unknowns keep their start values.
 
     Raises
     ------
@@ -123,23 +123,23 @@ def computed(
     return {name: run[name] + values.get(f"offset.{name}", 0.0) for name in names}, run.time
 
 
-# --- What the fit is worth
+# --- Quality of the fit
 
-_EXPLAINED = 0.5  # of the variance: what is explained outweighs what is left
+_EXPLAINED = 0.5  # of the variance: more than the residual
 _BETWEEN = (
-    "; outputs were measured at uneven instants and interpolated: where they move fast from sample "
-    "to sample, that leaves errors of its own"
+    "; outputs were measured at uneven instants and interpolated: this adds errors where "
+    "they move fast from sample to sample"
 )
-_FEW = 0.02  # of the residuals: as many as may be outliers
-_SEVERAL, _MET = 4, 2  # starts: so many are to tell whether one alone found a minimum
+_FEW = 0.02  # largest share of residuals that may be outliers
+_SEVERAL, _MET = 4, 2  # starts: least number for the check, and of those at the minimum
 _CAPTIONS = {
     "fit": "measured and modeled with the estimates",
-    "validation": "a record that was not fitted: measured, and modeled with the estimates",
+    "validation": "held-out record: measured, and modeled with the estimates",
 }
 
 
 def _curves_of(prediction: Prediction, role: str) -> tuple[Curve, ...]:
-    """Return measured beside modeled, a curve for each output."""
+    """Return measured and modeled curves, one for each output."""
     label = prediction.label
     suffix = f"-{_file_name(label)}" if label else ""
     said = f" in {label}" if label else ""
@@ -150,14 +150,14 @@ def _curves_of(prediction: Prediction, role: str) -> tuple[Curve, ...]:
 
 
 def _compared(measured: MeasuredRun, trial: Trial, fit: Estimate) -> Prediction:
-    """Return a record beside the model with the estimates; settling is left out.
+    """Compare a record with the model at the estimates, without the settling time.
 
     Parameters
     ----------
     measured, trial
-        The record; unknowns of its own carry its label, which is empty where it was fitted alone.
+        The record. Its own unknowns carry its label, which is empty if it was fitted alone.
     fit
-        The estimates; what the data does not tell stays where it was.
+        The estimates; undetermined unknowns keep their start values.
     """
     modeled, _ = computed(trial, fit, measured.compared)
     return Prediction(
@@ -172,15 +172,15 @@ def _compared(measured: MeasuredRun, trial: Trial, fit: Estimate) -> Prediction:
 def _checks_of(
     trials: Sequence[Trial], fit: Estimate, options: Options, resampled: bool = False
 ) -> tuple[Check, ...]:
-    """Return whether the model explains the records, and whether the values mean something.
+    """Return the checks whether the model explains the records and the values are meaningful.
 
-    Noise alone is no proof of a model: where a record is nothing but noise, noise is what any
-    model leaves. What a robust loss sets aside is left out of the residual, and counted.
+    A residual of pure noise does not prove a model: if the record is only noise, so is the residual
+    of any model. Outliers under a robust loss are excluded from the residual, and counted.
 
     Parameters
     ----------
     trials, fit
-        What was fitted, and how.
+        Fitted trials, and the estimate.
     options
         Loss and limits.
     resampled
@@ -188,7 +188,7 @@ def _checks_of(
     """
     vague = {n: why for n, why in fit.vague().items() if _of_bench(fit, n)}
     said = "; ".join(f"{label} {reason}" for label, reason in vague.items())
-    untold = [k.unknown.label for k in fit.kept]
+    undetermined = [k.unknown.label for k in fit.kept]
     far = outliers(fit.residuals)
     robust = options.loss != "linear"
     counted = ~far if robust else np.ones_like(far)
@@ -198,7 +198,7 @@ def _checks_of(
             "residual_over_noise",
             left,
             limit=options.most_residual,
-            note="1 where nothing but the sensors' noise is left"
+            note="1 if only the sensors' noise remains"
             + _few(fit.residuals, far, robust)
             + (_BETWEEN if resampled else ""),
             next_step=_missing(fit),
@@ -210,47 +210,47 @@ def _checks_of(
             limit=_EXPLAINED,
             at_least=True,
             note="share of the outputs' variance, over their noise, that the model predicts",
-            next_step=f"check that {option('inputs')} is what drove the record, its unit and its "
-            "sign; 'bywire replay' draws both",
+            next_step=f"check that {option('inputs')} drove the record, and its unit and "
+            "sign; 'bywire replay' plots both",
         ),
         Check(
             "parameters_without_meaning",
             float(len(vague)),
             limit=0.0,
             note=said or "none at its bound, none with a 95 % interval wider than +-100 %",
-            next_step=f"leave these {option('unknowns')} out, give a {option('priors')}, or record "
-            "a motion that they change",
+            next_step=f"remove these {option('unknowns')}, add a {option('priors')}, or record "
+            "a motion that depends on them",
         ),
         Check(
             "not_told",
-            float(len(untold)),
-            note=", ".join(untold) or "the data tells all that was asked for",
+            float(len(undetermined)),
+            note=", ".join(undetermined) or "the data determine every unknown",
         ),
     )
 
 
 def _missing(fit: Estimate) -> str:
-    """Return what to try at the output of which most is left."""
+    """Return the next step for the output with the largest residual."""
     left = [each for each in fit.leftovers() if each.noise]
     if not left:
         return ""
     worst = max(left, key=lambda each: each.rms / (each.noise or 1.0))
     name = worst.label.rpartition(":")[2]
     return (
-        f"look at {worst.label}, of which most is left: if its curves are shifted, add "
-        f"{option('unknowns')} offset.{name}; if they part at the beginning, "
-        f"{option('states')}; if another parameter shapes what is left, make it an "
+        f"look at {worst.label}, which has the largest residual: if its curves are shifted, add "
+        f"{option('unknowns')} offset.{name}; if they differ at the beginning, "
+        f"{option('states')}; if another parameter explains the residual, add it as "
         f"{option('unknowns')}; if it only scatters, give its noise with "
         f"{option('outputs')} '{name}=...'"
     )
 
 
 def _few(r: Array, far: NDArray[np.bool_], robust: bool) -> str:
-    """Return what stands behind residuals without a robust loss: perhaps a few outliers."""
+    """Return a note on a few outliers, for a fit without a robust loss."""
     if robust or not 0.0 < float(far.mean()) < _FEW or robust_scale(r) > FAR:
         return ""
-    advice = f"if they are outliers, take {option('loss', 'huber')}"
-    return f"; {far.sum()} of {far.size} stand out: {advice}"
+    advice = f"if they are outliers, use {option('loss', 'huber')}"
+    return f"; {far.sum()} of {far.size} are far off: {advice}"
 
 
 def _outliers(far: NDArray[np.bool_], options: Options) -> Check:
@@ -258,14 +258,14 @@ def _outliers(far: NDArray[np.bool_], options: Options) -> Check:
         "outliers",
         float(far.mean()),
         limit=options.most_outliers,
-        note=f"{far.sum()} of {far.size} residuals stand out by {FAR:g} times the noise or more: "
-        "beyond the limit they are the model's",
-        next_step="look where they stand: a stretch of them is a motion that the model lacks",
+        note=f"{far.sum()} of {far.size} residuals are at least {FAR:g} times the noise; "
+        "a share above the limit points to the model",
+        next_step="look where they occur: a cluster means a motion that the model lacks",
     )
 
 
 def _noise_check(doubtful: Mapping[str, str], given: Mapping[str, str]) -> tuple[Check, ...]:
-    """Return whether each output's noise is one, where the record itself had to tell it.
+    """Return the check of noise levels that were estimated from the record.
 
     Parameters
     ----------
@@ -276,26 +276,26 @@ def _noise_check(doubtful: Mapping[str, str], given: Mapping[str, str]) -> tuple
     """
     if all(given.values()):
         return ()
-    note = "; ".join(doubtful.values()) or "what scatters in the record is noise"
+    note = "; ".join(doubtful.values()) or "the scatter in the record is noise"
     return (
         Check(
             "noise_not_told",
             float(len(doubtful)),
             limit=0.0,
             note=note,
-            next_step="record it at rest, and give its standard deviation",
+            next_step="record it at rest and give its standard deviation",
         ),
     )
 
 
 def starts_check(reached: int, starts: int) -> tuple[Check, ...]:
-    """Return whether another start met the lowest minimum too, where several were made."""
+    """Return the check whether another start reached the lowest minimum, if there were several."""
     if starts < _SEVERAL:
         return ()
-    note = "starts that met the lowest minimum"
+    note = "starts that reached the lowest minimum"
     if reached < _MET:
         note += (
-            f": there may be a lower one; take more {option('starts')}, narrower ranges "
+            f": there may be a lower one; use more {option('starts')}, narrower ranges "
             f"({option('unknowns')} "
             "NAME=LOW..HIGH), or fewer unknowns"
         )
@@ -306,7 +306,7 @@ def starts_check(reached: int, starts: int) -> tuple[Check, ...]:
             limit=_MET,
             at_least=True,
             note=note,
-            next_step=f"take {option('starts')} 16, or a range for each {option('unknowns')}",
+            next_step=f"use {option('starts')} 16, or a range for each {option('unknowns')}",
         ),
     )
 
@@ -318,7 +318,7 @@ def _of_bench(fit: Estimate, label: str) -> bool:
 
 
 def _believable(fit: Estimate) -> dict[str, float]:
-    """Return the parameters by name, less those whose values mean nothing."""
+    """Return the parameters by name, without those whose values are meaningless."""
     vague = fit.vague()
     return {
         u.name: float(v)
@@ -328,7 +328,7 @@ def _believable(fit: Estimate) -> dict[str, float]:
 
 
 def _validation_of(held: Prediction, options: Options) -> tuple[Check, ...]:
-    """Return how much of a held-out record is accounted for, signal by signal."""
+    """Return the variance accounted for in a held-out record, by signal."""
     checks = []
     for name in held.pairs:
         figures = held.figures(name)
@@ -340,13 +340,13 @@ def _validation_of(held: Prediction, options: Options) -> tuple[Check, ...]:
                 vaf,
                 limit=options.least_vaf,
                 at_least=True,
-                note=f"variance accounted for in the record that was not fitted{still}",
-                next_step="fit a record that covers what the held-out one does, or fewer unknowns",
+                note=f"variance accounted for in the held-out record{still}",
+                next_step="fit a record with the motions of the held-out one, or fewer unknowns",
             ),
             Check(
                 f"validation.{name}.nrmse",
                 figures["nrmse"] / 100.0,
-                note="root mean square of the error there, over the range",
+                note="root mean square error of the held-out record, relative to the range",
             ),
         ]
     return tuple(checks)
@@ -390,7 +390,7 @@ def noise_given(name: str, text: str, unit: str) -> float:
     Raises
     ------
     UnitError, ParameterError
-        When it is no quantity of that unit, or not > 0.
+        When it is not a quantity of that unit, or not > 0.
     """
     noise = number(text, unit, f"noise of {name}")
     if not noise > 0.0:
@@ -399,7 +399,7 @@ def noise_given(name: str, text: str, unit: str) -> float:
 
 
 def _output_noise(measured: MeasuredRun, name: str, text: str) -> float:
-    """Return the standard deviation of an output's noise, as given or of the record.
+    """Return the standard deviation of an output's noise, as given or estimated from the record.
 
     Parameters
     ----------
@@ -413,7 +413,7 @@ def _output_noise(measured: MeasuredRun, name: str, text: str) -> float:
     Raises
     ------
     ParameterError
-        When the record does not tell it: too short, or at rest.
+        When the record is too short or at rest, so that it does not determine the noise.
     """
     if text:
         return noise_given(name, text, signals_of(measured.case.model.Output)[name].unit)
@@ -426,7 +426,7 @@ def _output_noise(measured: MeasuredRun, name: str, text: str) -> float:
     span = float(np.ptp(there))
     if not span > 0.0:
         raise ParameterError(
-            f"{name} does not move: an output at rest determines nothing; leave it out, or "
+            f"{name} does not move: an output at rest determines nothing; remove it, or "
             "excite the system",
             name=name,
         )
@@ -436,7 +436,7 @@ def _output_noise(measured: MeasuredRun, name: str, text: str) -> float:
 
 
 def _resampled(measured: MeasuredRun) -> bool:
-    """Return whether a record's outputs lie between the samples that were measured."""
+    """Return whether a record's outputs are interpolated between measured samples."""
     return any(NOISE_OF_SAMPLES in measured.data[name].attrs for name in measured.compared)
 
 
@@ -446,16 +446,16 @@ def _overestimated(
     residuals: Array,
     given: Mapping[str, str],
 ) -> dict[str, str]:
-    """Return the outputs whose noise is not told by their record, with the reason.
+    """Return the outputs whose noise is not determined by their record, with the reason.
 
-    Any model passes beside a noise that is too large.
+    If the noise is too large, any model passes.
 
     Parameters
     ----------
     records, trials
         Records, in the order of the residuals.
     residuals
-        What the model leaves, over the noise.
+        Residuals over the noise.
     given
         Noise by output, where it was given.
     """
@@ -467,17 +467,17 @@ def _overestimated(
             continue
         left = robust_scale(r)
         even = NOISE_OF_SAMPLES not in runs[trial.label].data[name].attrs
-        if even and not is_told(values):
-            why = "changes itself from sample to sample"
+        if even and not determines_its_noise(values):
+            why = "varies from sample to sample"
         elif left < _LEFT:
-            why = f"is met by the model within {left:.2g} of that"
+            why = f"differs from the model by only {left:.2g} of that"
         else:
             continue
         unit = difference_unit(signals_of(runs[trial.label].case.model.Output)[name].unit)
         size = shown(float(f"{trial.noise[name]:.3g}"), unit)
         key = f"{trial.label}:{name}" if trial.label else name
         doubtful[key] = (
-            f"{key} {why}, {size} is not its noise alone: give it, "
+            f"{key} {why}, so {size} is more than its noise: give the noise, "
             f'{option("outputs")} "{name}=NOISE {display_unit(unit)}"'
         )
     return doubtful
@@ -502,9 +502,9 @@ class BenchFit:
     Parameters
     ----------
     bench
-        What was measured, with the values that are known.
+        Bench of the measurement, with the known values.
     question
-        What is measured and what is unknown.
+        Measured signals and unknowns.
     """
 
     bench: Bench
@@ -513,7 +513,7 @@ class BenchFit:
     def identify(
         self, data: xr.Dataset, par: ParameterSet, options: Options, effort: Effort
     ) -> Identified:
-        """Return the unknowns from one or several records.
+        """Estimate the unknowns from one or several records.
 
         Parameters
         ----------
@@ -525,7 +525,7 @@ class BenchFit:
         Raises
         ------
         InputError
-            When a record does not fit the bench, or tells none of the unknowns.
+            When a record does not fit the bench, or determines none of the unknowns.
         """
         bench = self.moved(par)
         records = {
@@ -589,7 +589,7 @@ class BenchFit:
         )
 
     def moved(self, par: ParameterSet) -> Bench:
-        """Return the bench with other values of what is unknown."""
+        """Return the bench with other values of the unknowns."""
         leaves, known = par.leaves(), self.bench.par.leaves()
         return self.bench.with_overrides(
             {
@@ -600,7 +600,7 @@ class BenchFit:
         )
 
     def record(self, bench: Bench, data: xr.Dataset, options: Options) -> MeasuredRun:
-        """Return a record with the run that stands beside it."""
+        """Return a record with its run."""
         return measured_run(
             bench,
             data,
@@ -612,7 +612,7 @@ class BenchFit:
         )
 
     def trial(self, measured: MeasuredRun, label: str) -> Trial:
-        """Return a record beside its run; while the run settles nothing is compared."""
+        """Return the trial of a record, which excludes the settling time."""
         before = np.full(measured.settled, np.nan)
         smooth = _exact_laws(type(measured.case.par))
         values = {name: measured.data[name].values for name in measured.compared}
@@ -627,7 +627,7 @@ class BenchFit:
         )
 
     def starts(self, measured: MeasuredRun, trial: Trial) -> tuple[Unknown, ...]:
-        """Return a record's own unknowns: initial states, and a start told by a noisy sample."""
+        """Return a record's own unknowns: initial states, and a start from a noisy sample."""
         fields = leaf_fields(measured.bench.definition.options)
         unknowns = []
         for name, signal in measured.begun_at.items():
@@ -645,7 +645,7 @@ class BenchFit:
             return None
         if not isinstance(data, xr.Dataset):
             raise ParameterError(
-                f"holdout = {data}: read it first, bywire.read_measurement does", name="holdout"
+                f"holdout = {data}: read it first with bywire.read_measurement", name="holdout"
             )
         held = self.record(bench, data, options)
         # A label that no record has: only what all records share is known of it.
@@ -653,19 +653,19 @@ class BenchFit:
 
 
 def _nearer(problem: Problem, start: Array) -> Array:
-    """Return where a start leads with losses that have no minima of their own."""
+    """Return the end of a search with losses that have no far minima."""
     return solve(problem, solve(problem, start, share=_ROUGH).values, "huber", share=_ROUGH).values
 
 
 def _reached(led: Search, fit: Estimate) -> int:
-    """Return how many starts came within 1 % of the lowest minimum, or of what noise leaves."""
+    """Return the number of starts within 1 % of the lowest minimum, or of the noise's cost."""
     size = 0.5 * fit.residuals.size
     lowest = led.best.cost
     return sum(solution.cost <= lowest + 0.01 * max(lowest, size) for solution in led.solutions)
 
 
 def _begun(bench: Bench, case: Any, values: Mapping[str, float]) -> tuple[Any, Any]:
-    """Return where the experiment begins with other parameters and options of the start."""
+    """Return the start of the experiment with other parameters and start options."""
     options = {n.removeprefix("start."): v for n, v in values.items() if n.startswith("start.")}
     parameters = {n: v for n, v in values.items() if not n.startswith("start.")}
     par, chosen = bench.par.replace(parameters), bench.chosen_options.replace(options)
@@ -675,7 +675,7 @@ def _begun(bench: Bench, case: Any, values: Mapping[str, float]) -> tuple[Any, A
 
 
 def _exact_laws(cls: type[ParameterSet]) -> dict[str, str]:
-    """Return the laws of a parameter class that leave rounding out, by dotted name.
+    """Return the laws of a parameter class without rounding, by dotted name.
 
     Rounding has no derivative, closed loops would look open. What rounds chooses between a law
     that is ``"quantized"`` and one that is ``"ideal"``.
@@ -691,12 +691,12 @@ def _smoothed(bench: Bench) -> tuple[str, ...]:
     known, exact = bench.par.choices(), _exact_laws(type(bench.par))
     changed = [name for name, law in exact.items() if known.get(name, law) != law]
     return tuple(
-        f"{name} = {exact[name]} in the fit: rounding has no derivative" for name in changed
+        f"{name} = {exact[name]} in the fit, because rounding has no derivative" for name in changed
     )
 
 
 def _said(records: Mapping[str, MeasuredRun], options: Options, coarse: bool) -> list[str]:
-    """Return what the user should know of the records, and of coarse inputs where asked."""
+    """Return notes on the records and, if requested, on coarse inputs."""
     said = [
         f"{label}: {note}" if label else note
         for label, record in records.items()
@@ -709,7 +709,7 @@ def _said(records: Mapping[str, MeasuredRun], options: Options, coarse: bool) ->
     if coarse and options.between == "held" and period < 0.5 * interval:
         said.append(
             f"inputs are held for {1e3 * interval:.4g} ms from sample to sample, but act every "
-            f"{1e3 * period:.4g} ms: if they are smooth, take "
+            f"{1e3 * period:.4g} ms: if they are smooth, use "
             f"{option('options', {'between': 'linear'})}"
         )
     return said

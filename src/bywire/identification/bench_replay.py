@@ -1,4 +1,4 @@
-"""A bench's model driven by measured demands, and its answer beside the measured one."""
+"""Replay: a bench's model driven by measured demands, compared with the measured response."""
 
 from __future__ import annotations
 
@@ -31,27 +31,27 @@ from bywire.identification.measured import RECORD, as_even, require_signals
 from bywire.identification.output_error import Between, even_interval
 from bywire.simulation.run import Run, Trajectory, simulate
 
-_ACCUMULATED = ("J", "s")  # errors of which say when something went wrong, not how well it fits
+_ACCUMULATED = ("J", "s")  # accumulated quantities, whose errors do not show the quality of fit
 
 
 def _compared_outputs(
     case: Case, data: xr.Dataset, wanted: Sequence[str] | None, driven: Mapping[str, str]
 ) -> tuple[list[str], tuple[str, ...]]:
-    """Return which outputs are compared, and what the user should know of it.
+    """Return the compared outputs, with notes.
 
     Parameters
     ----------
     case, data
-        Run of the model, and what was measured.
+        Run of the model, and measured signals.
     wanted
-        Outputs; by default all that are measured and that tell how well the model fits.
+        Outputs; by default all measured ones that show the quality of fit.
     driven
-        Stimulus -> measured signal; none of these is compared by default.
+        Stimulus -> measured signal; these are not compared by default.
 
     Raises
     ------
     UnknownNameError, UnitError, ParameterError
-        When the model has no such output, it is not measured, or there is none.
+        When an output is not in the model or not measured, or nothing can be compared.
     """
     signals, there = signals_of(case.model.Output), [str(name) for name in data.data_vars]
     notes: tuple[str, ...] = ()
@@ -60,10 +60,10 @@ def _compared_outputs(
         wanted = [n for n in known if _tells(data[n].values, signals[n].unit)] or known
         passed = [n for n in known if n not in wanted]
         if passed:
-            notes = (f"left out as flags, sums or constants: {', '.join(passed)}",)
+            notes = (f"not compared (flags, sums or constants): {', '.join(passed)}",)
     if not wanted:
         raise ParameterError(
-            "no measured signal is an output of the model: name signals as the model does "
+            "no measured signal is an output of the model: use the model's signal names "
             f"({option('mapping')}), "
             f"for instance {', '.join(list(signals)[:6])}; measured are "
             f"{nearest_first(there, signals)}",
@@ -78,7 +78,7 @@ def _compared_outputs(
 
 
 def _tells(values: Array, unit: str) -> bool:
-    """Return whether a signal moves and is neither a flag nor accumulated."""
+    """Return whether a signal varies and is neither a flag nor accumulated."""
     there = values[np.isfinite(values)]
     if unit in _ACCUMULATED or not there.size or np.ptp(there) == 0.0:
         return False
@@ -90,20 +90,20 @@ def _missed_samples(data: xr.Dataset, compared: Sequence[str]) -> list[str]:
     counts = {name: int(np.isnan(data[name].values).sum()) for name in compared}
     total = data.sizes["time"]
     return [
-        f"{name} misses {count} of {total} samples ({100.0 * count / total:.2g} %), where nothing "
-        "is compared"
+        f"{name} misses {count} of {total} samples ({100.0 * count / total:.2g} %), which are "
+        "not compared"
         for name, count in counts.items()
         if count
     ]
 
 
 def _require_measured(data: xr.Dataset, name: str, signal: Signal) -> None:
-    """Refuse a signal that is not measured, or in a unit of something else."""
+    """Reject a signal that is not measured, or whose unit has another dimension."""
     require_signals(data, [name])
     unit = str(data[name].attrs.get("units", "1"))
     if unit != signal.unit and not measures(unit_of_symbol(unit), signal.unit):
         raise UnitError(
-            f"{name} is measured in {unit}, and must be in {signal.unit}: check the map",
+            f"{name} is measured in {unit}, but must be in {signal.unit}: check the mapping",
             name=name,
             value=unit,
             valid=signal.unit,
@@ -111,19 +111,18 @@ def _require_measured(data: xr.Dataset, name: str, signal: Signal) -> None:
 
 
 # --- The run, before it is computed
-# Any assembly and any experiment: one of the experiment's runs gives model, parameters, start and
-# what is not measured; measured signals take the place of the stimulus signals that they are given
-# for. Sensor noise stays off.
+# This works for any assembly and experiment. A run of the experiment defines model, parameters,
+# start and unmeasured stimuli; measured signals replace their stimuli. Sensor noise is off.
 
 
 @dataclass(frozen=True)
 class MeasuredRun:
-    """A run with its measured inputs, and what its outputs are compared with.
+    """A run with its measured inputs and outputs.
 
     Parameters
     ----------
     bench
-        With the start that was measured.
+        Bench with the measured start.
     case
         Its run, aligned to the record.
     data
@@ -133,13 +132,13 @@ class MeasuredRun:
     compared
         Outputs, measured under the same names.
     run
-        What is to be computed; its first ``settled`` rows lie before the record.
+        Run to compute; its first ``settled`` rows are before the record.
     settled
         Rows of the settling time.
     begun_at
-        Option of the experiment -> signal whose first sample it was taken from.
+        Option of the experiment -> signal whose first sample sets it.
     notes
-        What the user should know.
+        Notes for the user.
     """
 
     bench: Bench
@@ -168,29 +167,29 @@ def measured_run(
     Parameters
     ----------
     bench
-        Its experiment gives model, start, and what is not measured.
+        Its experiment defines model, start, and unmeasured stimuli.
     data
-        Measured signals over ``time`` [s], SI; resampled where the model's steps want it. The
-        run begins with the record; a time that begins before zero is taken as the experiment's.
+        Measured signals over ``time`` [s], SI; resampled if the model's steps require it. The
+        run starts with the record; a negative start time is that of the experiment.
     inputs
         Stimulus of the model -> measured signal; by default all of the same name.
     outputs
-        Outputs of the model, measured under the same names; by default all that are but flags,
-        what accumulates (energies, times) and what does not move.
+        Outputs of the model, measured under the same names; by default all except flags,
+        accumulated signals (energies, times) and constant ones.
     case
         Label of the experiment's run; the first one by default.
     settle
-        Whether the run settles before the record as the experiment does.
+        Whether the run settles before the record, as in the experiment.
     between
-        What inputs do between samples: demands of a controller are held, what is smooth and
-        read faster than it was measured is better joined by straight lines.
+        Inputs between samples: demands of a controller are held. Smooth inputs that are read
+        faster than they were measured are better interpolated linearly.
 
     Raises
     ------
     UnknownNameError
         When a signal is not measured, or the model has none of that name.
     ParameterError
-        When nothing drives the model, nothing is compared, or an input has gaps.
+        When no signal drives the model, none is compared, or an input has gaps.
     """
     chosen = case_of(bench, case)
     driven = _inputs(chosen, data, inputs)
@@ -199,7 +198,7 @@ def measured_run(
     chosen = case_of(bench, case)
     if not settle and chosen.settle > 0.0:
         chosen = replace(chosen, settle=0.0)
-        notes = (*notes, "begins with the record: the experiment's settling is left out")
+        notes = (*notes, "starts with the record, without the experiment's settling")
     data, chosen, said = _on_grid(bench, data, chosen)
     for signal in driven.values():
         missing = np.flatnonzero(np.isnan(data[signal].values))
@@ -225,19 +224,19 @@ def measured_run(
 
 
 def case_of(bench: Bench, label: str) -> Case:
-    """Return a run of a bench's experiment; the first one where the label is empty.
+    """Return a run of a bench's experiment; the first one if the label is empty.
 
     Raises
     ------
     UnknownNameError
-        When there is none of that label.
+        For an unknown label.
     ParameterError
         When the experiment makes no run.
     """
     cases = {case.label: case for case in bench.cases()}
     if not cases:
         raise ParameterError(
-            f"experiment {bench.experiment!r} makes no run: choose another one",
+            f"experiment {bench.experiment!r} does not make a run: choose another one",
             name="experiment",
             value=bench.experiment,
         )
@@ -269,7 +268,7 @@ def _inputs(case: Case, data: xr.Dataset, wanted: Mapping[str, str] | None) -> d
 def _started(
     bench: Bench, data: xr.Dataset, compared: Sequence[str]
 ) -> tuple[Bench, dict[str, str], tuple[str, ...]]:
-    """Return the bench with its start at what was measured, where the experiment has one."""
+    """Return the bench with the measured start, if the experiment has one."""
     for name, signal in bench.definition.begins_at.items():
         known = name in bench.chosen_options.flat() and name not in bench.options
         if known and signal in compared:
@@ -285,9 +284,9 @@ def _started(
 def _on_grid(
     bench: Bench, data: xr.Dataset, case: Case
 ) -> tuple[xr.Dataset, Case, tuple[str, ...]]:
-    """Return data on instants at which the model can be recorded, and the case aligned to them."""
+    """Return data at instants of the model's recording, and the case aligned to them."""
     interval = even_interval(data["time"].values)
-    # A clock that begins before zero is the experiment's own: part of its settling was recorded.
+    # A clock that starts below zero is the experiment's: part of its settling was recorded.
     case = replace(case, settle=max(case.settle + min(float(data["time"].values[0]), 0.0), 0.0))
     try:
         return data, case.aligned(bench.step, interval), ()
@@ -343,25 +342,25 @@ def _run(
     )
 
 
-# --- The answer beside the measured one
+# --- Comparison with the measured response
 
 
 @dataclass(frozen=True)
 class Replayed:
-    """A measurement beside its replay.
+    """A measurement and its replay.
 
     Parameters
     ----------
     inputs
-        What drove the model, over ``time`` [s], by stimulus signal.
+        Inputs of the model over ``time`` [s], by stimulus signal.
     outputs
         ``measured`` and ``modeled`` over ``time`` [s], by output signal.
     run
         The run of the model.
     notes
-        What the user should know.
+        Notes for the user.
     others
-        ``outputs`` in other steps, by their length over that of the run; empty unless wanted.
+        ``outputs`` at other steps, by step length relative to the run's; empty unless requested.
     """
 
     inputs: xr.Dataset
@@ -387,18 +386,18 @@ def replay(
     bench, data, inputs, outputs, case
         See ``bywire.identification.bench_replay``.
     estimate_error
-        Whether the model runs in other steps too; see `bywire.bench.running.run`.
+        Whether the model also runs at other steps; see `bywire.bench.running.run`.
 
     Raises
     ------
     UnknownNameError
         When a signal is not measured, or the model has none of that name.
     ParameterError
-        When nothing drives the model, nothing is compared, or an input has gaps.
+        When no signal drives the model, none is compared, or an input has gaps.
     """
     if RECORD in data:
         raise ParameterError(
-            "replay takes one record, and this measurement has several", name="data"
+            "replay needs a single record, but this measurement has several", name="data"
         )
     measured = measured_run(bench, data, inputs, outputs, case)
     wanted = dict.fromkeys((*measured.compared, *energy_signals(measured.run)))
@@ -456,11 +455,11 @@ def beside(data: xr.Dataset, name: str, modeled: Array) -> xr.Dataset:
     Parameters
     ----------
     data
-        What was measured.
+        Measured signals.
     name
         The signal.
     modeled
-        On the same instants, shape (n,).
+        Modeled values at the same instants, shape (n,).
     """
     attrs = {
         "units": data[name].attrs.get("units", "1"),

@@ -21,22 +21,22 @@ _BLOCKS = 10  # per unknown, at least
 _KEPT = 0.9  # of the square of the Jacobian, at least
 _LEVEL = 0.01  # of the test whether residuals are white
 _NEAREST = 3  # lags
-_GROUPS = (8, 16, 64)  # blocks of the record, besides samples one by one
-_FEWEST_GROUPS = 6.0  # that tell a variance
+_GROUPS = (8, 16, 64)  # blocks of the record, in addition to single samples
+_FEWEST_GROUPS = 6.0  # that determine a variance
 
 
 @dataclass(frozen=True)
 class Uncertainty:
-    """How sure a least-squares estimate is.
+    """Uncertainty of a least-squares estimate.
 
     Parameters
     ----------
     covariance
         Shape (p, p).
     freedom
-        Independent residuals less unknowns.
+        Independent residuals minus unknowns.
     colored
-        Whether neighboring residuals go together.
+        Whether neighboring residuals are correlated.
     """
 
     covariance: Array
@@ -49,18 +49,18 @@ def uncertainty(
 ) -> Uncertainty:
     r"""Return the covariance of a least-squares estimate.
 
-    White residuals: :math:`s^2 (J^T J)^{-1}`. Where neighbors go together, the sandwich
+    White residuals: :math:`s^2 (J^T J)^{-1}`. For correlated neighbors, the sandwich
     :math:`(J^T J)^{-1} J^T \Gamma J (J^T J)^{-1}` with the autocovariance :math:`\Gamma` of an
     autoregressive model of the residuals; fewer of them then count as independent. Slow errors
-    may hide below white noise: the same is asked of sums of neighbors, and the largest answer
-    counts.
+    may hide below white noise, so the same is computed for sums of neighbors, and the largest
+    result counts.
 
-    Both take the residuals for a noise that has nothing to do with the Jacobian. Where they are
-    larger just where it is (noise that grows with the signal, a model that is wrong in a part of
-    the range), the scores themselves say it, sample by sample (White 1980) or summed over blocks
-    of the record (Bester, Conley and Hansen 2011): deviations that they refute at 1 % are theirs.
-    Where neighbors go together, the scores are those of what the autoregressive model makes of
-    the residuals, whose neighbors do not.
+    Both assume a noise that is independent of the Jacobian. If the residuals are larger where the
+    Jacobian is (noise that grows with the signal, or a model that is wrong in a part of the
+    range), the scores show it, by sample (White 1980) or summed over blocks of the record (Bester,
+    Conley and Hansen 2011). Deviations that the scores refute at 1 % are replaced by theirs. For
+    correlated neighbors, the scores are those of the residuals after whitening by the
+    autoregressive model.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def uncertainty(
     residuals
         Shape (n,), in the order in which they were measured.
     instruments
-        Of an instrumental-variable estimate, shape (n, p); the Jacobian by default.
+        Instruments of an instrumental-variable estimate, shape (n, p); the Jacobian by default.
     prior_rows
         Last rows that are independent, with a standard deviation of one: prior knowledge.
 
@@ -104,16 +104,16 @@ def uncertainty(
 
 
 def _as_scattered(sure: Uncertainty, influence: Array, r: Array) -> Uncertainty:
-    """Return an uncertainty with the deviations of the scores, where they refute its own.
+    """Return an uncertainty with the deviations of the scores if these refute its own.
 
     Parameters
     ----------
     sure
-        From a noise that has nothing to do with the Jacobian.
+        Uncertainty from a noise that is independent of the Jacobian.
     influence
-        What each residual does to each unknown, shape (n, p).
+        Effect of each residual on each unknown, shape (n, p).
     r
-        Shape (n,).
+        Residuals, shape (n,).
     """
     from scipy import special  # of which stats is made, and takes long to load
 
@@ -143,20 +143,20 @@ def _as_scattered(sure: Uncertainty, influence: Array, r: Array) -> Uncertainty:
 
 
 def _blocks(values: Array, together: int) -> Array:
-    """Return sums of neighbors, scaled so that white noise keeps its size."""
+    """Return sums of neighbors, scaled so that white noise keeps its variance."""
     count = len(values) // together
     parts = values[: count * together].reshape(count, together, *values.shape[1:])
     return np.asarray(parts.sum(axis=1) / np.sqrt(together))
 
 
 def _still_told(r: Array, rows: Array, whole: Array) -> bool:
-    """Return whether blocks are many, and short beside what the Jacobian does."""
+    """Return whether there are many blocks, short relative to changes of the Jacobian."""
     kept = np.sum(rows**2, axis=0) >= _KEPT * np.sum(whole**2, axis=0)
     return bool(r.size >= _BLOCKS * rows.shape[1] and kept.all())
 
 
 def _spread(r: Array, rows: Array, unknowns: int) -> tuple[Array, float, bool]:
-    """Return the scores' covariance, degrees of freedom, and whether neighbors go together."""
+    """Return the scores' covariance, degrees of freedom, and whether neighbors are correlated."""
     n = r.size
     if is_white(r):
         freedom = max(n - unknowns, 1)
@@ -178,7 +178,7 @@ class Autoregression:
     coefficients
         1, a_1, ..., shape (order + 1,).
     variance
-        Of the white noise.
+        Variance of the white noise.
     """
 
     coefficients: Array
@@ -191,7 +191,7 @@ class Autoregression:
 
 
 def autoregression(residuals: Array) -> Autoregression:
-    """Return the autoregressive model of a signal, its order by Schwarz's criterion."""
+    """Return the autoregressive model of a signal, with its order by Schwarz's criterion."""
     from scipy import linalg
 
     n = residuals.size
@@ -225,10 +225,10 @@ def autocorrelation(residuals: Array, lags: int) -> Array:
 
 
 def is_white(residuals: Array, lags: int = 20) -> bool:
-    """Return whether neighbors do not go together (Ljung and Box 1978, level 1 %).
+    """Return whether neighbors are uncorrelated (Ljung and Box 1978, level 1 %).
 
-    Asked twice, of the nearest neighbors and of all lags: over 20 lags that of the nearest one
-    is easily lost.
+    The test runs twice, for the nearest neighbors and for all lags, since over 20 lags the
+    correlation of the nearest one is easily lost.
     """
     from scipy import special  # of which stats is made, and takes long to load
 
@@ -243,30 +243,30 @@ def is_white(residuals: Array, lags: int = 20) -> bool:
     return all(special.chdtrc(most, float(terms[:most].sum())) > level for most in asked)
 
 
-# --- What the data tells of unknowns, and what it does not: singular values, correlations
+# --- Which unknowns the data determine: singular values, correlations
 
-_TOLD = 1.0  # standard deviation per scale above which nothing is known
-_FLAT = 1e-7  # singular value per the largest one: below it rounding decides
-_FAR = 10.0  # times the noise: residuals that no noise explains
-_MISFIT = 4.0  # times the noise: sensors whose noise is filtered leave up to 3
-_AS_ASSUMED = (0.5, 1.5)  # times the noise that was assumed: it explains what is left
+_DETERMINED = 1.0  # largest standard deviation per scale of a determined unknown
+_FLAT = 1e-7  # singular value relative to the largest one, below which rounding decides
+_FAR = 10.0  # times the noise: residuals that noise cannot explain
+_MISFIT = 4.0  # times the noise: filtered sensor noise gives up to 3
+_AS_ASSUMED = (0.5, 1.5)  # times the assumed noise, which then explains the residual
 _EXACT = (
-    "nothing but rounding is left: the record agrees with the model to the last digits, and its "
-    "intervals do not hold for a measured record, which has noise"
+    "the residual is only rounding: the record agrees with the model to the last digits, so its "
+    "intervals are not valid for a measured record, which has noise"
 )
 _CONTRADICTED = 3.0  # standard deviations of a prior
 
 
 class MisfitWarning(UserWarning):
-    """A model leaves more than noise, or its step is too coarse: intervals do not hold."""
+    """The residual exceeds the noise, or the step is too coarse: intervals are not valid."""
 
 
 def misfit(estimate: Estimate) -> str:
-    """Return what a model leaves that is no noise, in a sentence; empty where it is noise.
+    """Describe a residual that exceeds the noise in a sentence; empty if it is only noise.
 
-    What neighboring residuals differ by is noise; what they have in common above it is the
-    model's. Where a noise was assumed and explains what is left, it is believed. What rounding or
-    the step of the simulation explains says nothing of the model.
+    Differences of neighboring residuals are noise; their common part beyond it comes from the
+    model. An assumed noise that explains the residual is accepted. Residuals from rounding or from
+    the step of the simulation do not count against the model.
     """
     worst = max(
         (
@@ -284,25 +284,27 @@ def misfit(estimate: Estimate) -> str:
         return ""
     size = shown(float(f"{worst.rms:.3g}"), difference_unit(worst.unit))
     return (
-        f"{worst.label}: the model leaves {size}, {worst.over_noise:.2g} times the noise between "
-        "neighboring samples: something is missing in it or wrong, and the intervals do not hold, "
-        "which take what is left for chance"
+        f"{worst.label}: the residual is {size}, {worst.over_noise:.2g} times the noise between "
+        "neighboring samples: the model is incomplete or wrong, and the intervals are invalid, "
+        "since they assume a random residual"
     )
 
 
-def untold(estimate: Estimate, J: Array) -> tuple[int, str] | None:
-    """Return the unknown that the data tells least, and why, if there is one."""
+def least_determined(estimate: Estimate, J: Array) -> tuple[int, str] | None:
+    """Return the unknown that the data do not determine, with the reason; None if there is none."""
     share = estimate.singular_values[-1] / max(estimate.singular_values[0], 1e-300)
     reason = f"smallest singular value {share:.1e} of the largest"
     silent = np.flatnonzero(~J.any(axis=0))
     if silent.size:
-        return int(silent[0]), "nothing measured depends on it"
+        return int(silent[0]), "no measured signal depends on it"
     if share < _FLAT:
         direction = np.linalg.svd(J, full_matrices=False)[2][-1]
-        return int(np.argmax(np.abs(direction))), f"only a combination with others shows ({reason})"
+        return int(np.argmax(np.abs(direction))), (
+            f"only a combination with others is determined ({reason})"
+        )
     relative = estimate.deviations / np.array([u.scale for u in estimate.unknowns])
     index = int(np.argmax(relative))
-    if relative[index] <= _TOLD:
+    if relative[index] <= _DETERMINED:
         return None
     unknown = estimate.unknowns[index]
     return index, (
@@ -312,44 +314,44 @@ def untold(estimate: Estimate, J: Array) -> tuple[int, str] | None:
 
 
 def advice(estimate: Estimate, silent: bool) -> str:
-    """Return what to do where the data tells nothing.
+    """Return advice for unknowns that the data do not determine.
 
     Parameters
     ----------
     estimate
-        Where the search ended, with its residuals.
+        End of the search, with its residuals.
     silent
-        Whether it is known why nothing depends on the unknown.
+        Whether the model explains why no output depends on the unknown.
     """
     left = robust_scale(estimate.residuals)
     if left > _FAR:
         return (
-            f"the model does not fit, it leaves {left:.2g} times the noise at its best: check sign "
-            f"and unit of what was measured ({option('mapping')}), then what is taken as known"
+            f"the model does not fit: its best residual is {left:.2g} times the noise; check sign "
+            f"and unit of the measured signals ({option('mapping')}), then the known parameters"
         )
     return "switch it on, or name another unknown" if silent else "excite the system more"
 
 
 def notes_of(estimate: Estimate) -> tuple[str, ...]:
-    """Return what the user should know: what goes together, lies at a bound, or off its prior."""
+    """Return notes about correlated unknowns, bounds, contradicted priors, and misfit."""
     notes = [
-        f"{a} and {b} go together (correlation {c:.3f}): the data tells their combination better "
-        "than either"
+        f"{a} and {b} are correlated ({c:.3f}): the data determine their combination better "
+        "than either one"
         for a, b, c in estimate.correlated()
     ]
     bounds = estimate.at_bounds()
     for u, value in zip(estimate.unknowns, estimate.values, strict=True):
         if u.label in bounds:
-            notes.append(f"{u.label} lies at its bound, {shown(bounds[u.label], u.unit)}")
+            notes.append(f"{u.label} is at its bound, {shown(bounds[u.label], u.unit)}")
         if u.prior is None:
             continue
         mean, deviation = u.prior
         away = abs(float(value) - mean) / deviation
         if away > _CONTRADICTED:
             notes.append(
-                f"{u.label} = {shown(float(f'{value:.4g}'), u.unit)} lies {away:.2g} deviations "
-                f"of its prior ({shown(mean, u.unit)} ± "
-                f"{shown(deviation, difference_unit(u.unit))}) away: the prior or the model is "
+                f"{u.label} = {shown(float(f'{value:.4g}'), u.unit)} is {away:.2g} standard "
+                f"deviations from its prior ({shown(mean, u.unit)} ± "
+                f"{shown(deviation, difference_unit(u.unit))}): the prior or the model is "
                 "wrong"
             )
     if estimate.is_exact:
@@ -402,7 +404,7 @@ class Disagreement:
             )
         )
         return (
-            f"records do not agree: {self.name} is {there} in {self.record} and {rest} in the "
+            f"records disagree: {self.name} is {there} in {self.record} and {rest} in the "
             f"others (standard deviations), {self.apart:.2g} of their difference's apart: look at "
             "that record, or at what differs between them; no joint interval holds"
         )

@@ -20,7 +20,7 @@ _HOLD = np.array([-1.0, 13.0, 13.0, -1.0]) / 24.0
 
 
 def low_passed(values: Array, interval: float, cutoff: float) -> Array:
-    """Return signals without what is faster than a cutoff, and without delay.
+    """Return low-passed signals without delay.
 
     Butterworth of order 4, forward and backward (gain 1/2 at the cutoff).
 
@@ -68,7 +68,7 @@ def _derivative(values: Array, interval: float) -> Array:
 
 
 def _centered(values: Array) -> Array:
-    """Return around each sample what a held signal does to a double integrator.
+    """Return the effect of a held signal on a double integrator around each sample.
 
     Half an interval of delay, and the sinc of a hold up to the fourth power of the frequency.
     """
@@ -84,7 +84,7 @@ def differentiated(
     cutoff: float,
     held: Sequence[str] = (),
 ) -> xr.Dataset:
-    """Return data whose signals are low-passed, with derivatives of one of them added.
+    """Return low-passed data with derivatives of one signal.
 
     All signals go through the same filter, so that an equation between them still holds.
 
@@ -93,15 +93,15 @@ def differentiated(
     data
         Signals over ``time`` [s], evenly spaced.
     signal
-        What is differentiated.
+        Signal to differentiate.
     names
         Names of its first and further derivatives.
     cutoff
-        Of the low-pass [Hz].
+        Corner of the low-pass [Hz].
     held
-        Signals that a controller sets and holds for one interval, for instance a voltage: what
-        acts around a sample is the mean of the values before and after it. Without this they
-        come half an interval early and slightly too large.
+        Signals that a controller sets and holds for one interval, for instance a voltage: the mean
+        of the values before and after a sample acts around it. Without this they are half an
+        interval early and slightly too large.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Records of electric drives: current loops, their steps, and a winding alone."""
+"""Identification of electric drives: current loops from steps, and single windings."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ from bywire.identification.unknown import parameters_of
 from bywire.plant import anti_alias_filter, dc_motor
 from bywire.simulation.run import Run, simulate
 
-_AGAINST = -0.5  # correlation of demand and current: beyond chance
-_EXPLAINED = 0.5  # of the variance: what is explained outweighs what is left
-_MISFIT = 1.3  # a closed loop's own noise is 1.04 of the sensor's, which is known within 10 %
+_AGAINST = -0.5  # correlation of demand and current that is not random
+_EXPLAINED = 0.5  # of the variance: more than the residual
+_MISFIT = 1.3  # noise of a closed loop is 1.04 of the sensor's, which is known within 10 %
 
 
 def levels(
@@ -64,7 +64,7 @@ def levels(
 
 
 def noise_of_levels(answer: Array, demand: Array) -> float:
-    """Return the noise of an answer [its unit], from differences while the demand rests.
+    """Return the noise of a response [its unit], from differences while the demand rests.
 
     Parameters
     ----------
@@ -79,17 +79,17 @@ def noise_of_levels(answer: Array, demand: Array) -> float:
 
 
 def require_steps(data: xr.Dataset, name: str, answer: str, label: str) -> None:
-    """Refuse a record whose demand does not move, or whose current goes against it.
+    """Reject a record whose demand does not move, or whose current has the wrong sign.
 
-    A winding takes up power at every frequency, and a current loop follows: voltage or demand and
-    current cannot be of opposite sign on the average.
+    A winding absorbs power at every frequency, and a current loop follows its demand: voltage or
+    demand and current cannot have opposite signs on average.
 
     Parameters
     ----------
     data
         Signals over ``time`` [s].
     name, answer
-        What the demand and the current are called.
+        Names of demand and current.
     label
         Of the record.
 
@@ -104,8 +104,8 @@ def require_steps(data: xr.Dataset, name: str, answer: str, label: str) -> None:
     demand, current = data[name].values, data[answer].values
     if not float(np.ptp(demand)) > 0.0:
         raise ParameterError(
-            f"{name} of record {label or '1'} does not move: an answer at rest determines neither "
-            "winding nor gains; step it between several levels, the rotor locked",
+            f"{name} of record {label or '1'} does not move: a response at rest determines neither "
+            "winding nor gains; step it between several levels with the rotor locked",
             name=name,
         )
     together = float(np.corrcoef(demand, current)[0, 1]) if np.ptp(current) > 0.0 else 0.0
@@ -116,14 +116,14 @@ def require_steps(data: xr.Dataset, name: str, answer: str, label: str) -> None:
 def _identified_loop(
     trials: Sequence[Trial], par: ParameterSet, names: Sequence[str]
 ) -> Identified:
-    """Return a closed loop's parameters from its runs.
+    """Estimate a closed loop's parameters from its runs.
 
     Parameters
     ----------
     trials
-        Records beside the loop's model.
+        Records with the loop's model.
     par
-        Where the search begins.
+        Start of the search.
     names
         Unknown parameters.
 
@@ -142,16 +142,16 @@ def _identified_loop(
 
 
 def believable(fit: Estimate) -> dict[str, float]:
-    """Return the parameters by name, less those whose values mean nothing."""
+    """Return the parameters by name, without those whose values are meaningless."""
     vague = fit.vague()
     return {name: value for name, value in fit.parameters().items() if name not in vague}
 
 
 def checks_of(trials: Sequence[Trial], fit: Estimate) -> tuple[Check, ...]:
-    """Return whether the model explains the current, and whether the values mean something.
+    """Return the checks whether the model explains the current and the values are meaningful.
 
-    Noise alone is no proof of a model: where the record is nothing but noise, noise is what any
-    model leaves, one with an answer of zero as well.
+    A residual of pure noise does not prove a model: if the record is only noise, so is the residual
+    of any model, even of one with zero response.
     """
     vague = fit.vague()
     said = "; ".join(f"{label} {reason}" for label, reason in vague.items())
@@ -168,7 +168,7 @@ def checks_of(trials: Sequence[Trial], fit: Estimate) -> tuple[Check, ...]:
             "residual_over_noise",
             fit.rms,
             limit=_MISFIT,
-            note="1 where nothing but the sensor's noise is left",
+            note="1 if only the sensor's noise remains",
         ),
         Check(
             "parameters_without_meaning",
@@ -180,7 +180,7 @@ def checks_of(trials: Sequence[Trial], fit: Estimate) -> tuple[Check, ...]:
 
 
 def as_curve(trial: Trial, fit: Estimate) -> Curve:
-    """Return the measured current of a trial beside the modeled one."""
+    """Return measured and modeled current of a trial."""
     signal = next(iter(trial.measured))
     shared = {
         u.name: float(v)
@@ -192,37 +192,37 @@ def as_curve(trial: Trial, fit: Estimate) -> Curve:
     columns = {"measured": trial.measured[signal], "modeled": modeled}
     data = over(("time", computed.time, "s", "time"), columns, "A", "current")
     name = f"current-{trial.label}" if trial.label else "current"
-    return Curve(name, "Current: measured, and modeled where it counts.", data, "time")
+    return Curve(name, "Current: measured, and modeled where it is fitted.", data, "time")
 
 
 class LoopOptions(ParameterSet):
-    """What is unknown, and the steps of the synthetic experiment."""
+    """Unknowns, and the steps of the synthetic experiment."""
 
     unknowns: Literal["gains", "all"]
-    """gains alone, the winding being known; or the winding with them"""
+    """gains only (with a known winding), or gains and winding"""
     lead: Duration
-    """beginning of a record that does not count: where the loop was before is not known"""
+    """excluded beginning of a record, since the loop's earlier state is unknown"""
     dwell: Duration
     """synthetic: time from one step to the next"""
     duration: Duration
     """synthetic: length of the record"""
 
     def names(self, gains: tuple[str, ...], winding: tuple[str, ...]) -> tuple[str, ...]:
-        """Return what is estimated, given the names of all."""
+        """Return the names to estimate."""
         return gains if self.unknowns == "gains" else (*gains, *winding)
 
 
 def _without_lead(trial: Trial, data: xr.Dataset, lead: float) -> Trial:
-    """Return a trial of which the first seconds of its record do not count.
+    """Return a trial without the first seconds of its record.
 
     Parameters
     ----------
     trial
-        Of a whole record.
+        Trial of a whole record.
     data
         That record, over ``time`` [s].
     lead
-        How long that is [s].
+        Excluded time [s].
     """
     t = data["time"].values
     return replace(trial, used=t - t[0] >= lead)
@@ -233,22 +233,22 @@ def _without_lead(trial: Trial, data: xr.Dataset, lead: float) -> Trial:
 
 @dataclass(frozen=True)
 class CurrentLoop:
-    """A current loop whose gains are sought.
+    """A current loop with unknown gains.
 
     Parameters
     ----------
     model
-        The model that holds the loop, and what it drives.
+        Model of the loop and its plant.
     demand, current
-        What the record calls demand and measured current; the demand is the model's stimulus.
+        Names of demand and measured current in the record; the demand is the model's stimulus.
     computed
-        The model's signal that the measured current is compared with.
+        The model's signal for comparison with the measured current.
     gains, winding
         Names of the parameters: the controller's, and resistance and inductance.
     held
-        ``held(par, options)``: the parameters with the rotor held.
+        ``held(par, options)``: the parameters with a locked rotor.
     rest
-        ``rest(par)``: state and memory in which a record begins; all zero where None.
+        ``rest(par)``: state and memory at the start of a record; all zero if None.
     """
 
     model: Model
@@ -263,19 +263,19 @@ class CurrentLoop:
     def identify(
         self, data: xr.Dataset, par: ParameterSet, options: LoopOptions, effort: Effort
     ) -> Identified:
-        """Return the gains, with the winding where the options ask for it.
+        """Estimate the gains and, with that option, the winding.
 
-        The loop is run over the measured demand, the rotor held, and fitted to the measured
+        The loop runs over the measured demand with a locked rotor, and is fitted to the measured
         current.
 
         Parameters
         ----------
         data
-            Demand and current [A], the rotor locked or stuck. One or several records.
+            Demand and current [A] with the rotor locked or stuck; one or several records.
         par
-            Where the search begins.
+            Start of the search.
         options, effort
-            What is unknown; what the search may take.
+            Unknowns, and the effort of the search.
 
         Raises
         ------
@@ -284,8 +284,8 @@ class CurrentLoop:
 
         Notes
         -----
-        From demand to current only k_p V/L, k_i V/L and R/L show: with all four unknown, the one
-        that the data tells least keeps its value, and is named.
+        The response from demand to current depends only on k_p V/L, k_i V/L and R/L. With all four
+        unknown, the least determined one keeps its value, and is named.
         """
         trials = [self._trial(record, par, options, label) for label, record in split(data).items()]
         return _identified_loop(trials, par, options.names(self.gains, self.winding))
@@ -319,7 +319,7 @@ class CurrentLoop:
         return labeled({"time": (time, "s", "time")}, signals)
 
     def method(self, **declared: Any) -> Method:
-        """Return the method that identifies the loop; ``declared``: what only its brake knows."""
+        """Return the method that identifies the loop; ``declared``: details from its brake."""
         return Method(
             signals={self.demand: "A", self.current: "A"},
             identify=self.identify,
@@ -332,7 +332,7 @@ class CurrentLoop:
 # --- A winding alone
 
 Amperes = Annotated[float, Signal("A", "motor current", 5.0)]
-_SETTLED = 10.0  # time constants of the sensor's filter until the start is forgotten
+_SETTLED = 10.0  # time constants of the sensor's filter until the start has no effect
 _SUBSTEPS = 4  # per sample, at least
 _LONGEST = 5e-6  # of a substep [s]: at 20 us L_m is 0.04 % off where L_m/R_m is 0.3 ms
 
@@ -344,7 +344,7 @@ class Parameters(ParameterSet):
     f_aa: Frequency
     """corner of the current measurement's filter"""
     T: Duration
-    """how long an input is held"""
+    """hold time of an input"""
 
 
 class Currents(NamedTuple):
@@ -355,7 +355,7 @@ class Currents(NamedTuple):
 
 
 class Inputs(NamedTuple):
-    """What was measured: held between samples."""
+    """Measured inputs, held between samples."""
 
     v: Annotated[float, Signal("V", "motor voltage", 5.0)]
     omega: Annotated[float, Signal("rad/s", "motor speed", 20.0)]
@@ -376,7 +376,7 @@ class Winding(Driven):
     Input: ClassVar = Inputs
 
     def period(self, par: Parameters) -> float:
-        """Return for how long an input is held [s]."""
+        """Return the hold time of an input [s]."""
         return par.T
 
     def mass(self, xe: Currents, par: Parameters) -> Currents:
@@ -403,16 +403,16 @@ def winding_trial(
     sigma: float,
     label: str = "",
 ) -> Trial:
-    """Return a record beside the winding.
+    """Return the trial of a record with the winding's model.
 
     Parameters
     ----------
     motor
-        Where the search begins.
+        Start of the search.
     data
         Over ``time`` [s], evenly spaced.
     names
-        What ``v``, ``omega`` and ``i`` are called in it.
+        Names of ``v``, ``omega`` and ``i`` in it.
     f_aa
         Corner of the current measurement's filter [Hz].
     sigma
@@ -435,7 +435,7 @@ def winding_trial(
     speed = interpolate.CubicSpline(t, omega)
 
     def stimulus(at: Array) -> Array:
-        # Voltage is held from sample to sample; the speed goes on between them.
+        # Voltage is held from sample to sample; the speed continues in between.
         index = np.clip(np.floor(at / T + 1e-6).astype(int), 0, v.size - 1)
         return np.column_stack((v[index], speed(at + 0.5 * step)))
 

@@ -1,4 +1,4 @@
-"""Equation error: an equation of motion with measured motions in it, solved for parameters."""
+"""Equation error: an equation of motion with measured signals, solved for parameters."""
 
 from __future__ import annotations
 
@@ -43,9 +43,9 @@ class Equation:
     rate
         Measured signal that is its derivative.
     slowest
-        Speed below which a body with dry friction counts as turning round [unit of the state].
+        Speed below which a body with dry friction counts as reversing [unit of the state].
     unit
-        Of the equation, for what it leaves: ``"N*m"`` of a torque balance.
+        Unit of the equation, for residuals: ``"N*m"`` of a torque balance.
     """
 
     model: Model
@@ -56,7 +56,7 @@ class Equation:
 
 
 class EquationError:
-    """The equation's error and its derivatives by the unknowns, sample by sample."""
+    """The equation's error and its derivatives by the unknowns, for each sample."""
 
     def __init__(self, equation: Equation, par: ParameterSet, unknowns: Sequence[Unknown]) -> None:
         model = equation.model
@@ -130,12 +130,12 @@ class EquationError:
 
 
 # --- Inverse dynamics: solved at every instant
-# No run is needed, so that it is quick and takes any start; what it needs is that all of the
-# equation is measured or a derivative of what is measured. While the body moves, dry friction has
-# the value that its direction gives it; samples near a reversal tell nothing and are left out.
+# This needs no run, so it is fast and works from any start. Every signal of the equation must be
+# measured, or be a derivative of a measured signal. While the body moves, dry friction has the
+# value for its direction; samples near a reversal determine nothing and are excluded.
 
 _ROUNDS, _SETTLED = 50, 1e-12
-_DECIMATED = 0.8  # of half the new sample rate: what the decimation filter lets pass
+_DECIMATED = 0.8  # of half the new sample rate: passband of the decimation filter
 
 
 def inverse_dynamics(
@@ -152,35 +152,35 @@ def inverse_dynamics(
 
     Least squares on :math:`e = m \dot x - balance - friction`; where e is affine in the unknowns
     this is the linear regression :math:`e = W \pi - y` and needs no start. With instruments,
-    the estimate solves :math:`Z^T e = 0` with Z the derivatives of e along a simulated motion,
-    which no measurement noise has touched: it stays unbiased where noise gets into W.
+    the estimate solves :math:`Z^T e = 0` with Z the derivatives of e along a simulated motion
+    without measurement noise: it stays unbiased even if W contains noise.
 
     Parameters
     ----------
     equation
-        What is solved.
+        Equation to solve.
     par
-        Everything that is known.
+        Known parameters.
     unknowns
         Parameters to estimate.
     data
-        States, memories (what controllers put out) and the rate, under the model's names, over
+        States, memories (controller outputs) and the rate, under the model's names, over
         ``time`` [s], evenly spaced; see ``differentiated``.
     bandwidth
-        Frequency up to which the equation is trusted [Hz]: residuals are low-passed and decimated
-        to about twice that, so that they are independent. None for all samples as they are.
+        Frequency up to which the equation is valid [Hz]: residuals are low-passed and decimated
+        to about twice that, so that they are independent. None for unfiltered samples.
     instruments
         A simulation of the same experiment, filtered alike.
     weights
-        How much each sample counts, the inverse of its variance up to a factor, shape (n,); all
-        alike by default.
+        Weight of each sample, the inverse of its variance up to a factor, shape (n,); equal by
+        default.
 
     Raises
     ------
     UnknownNameError
         When the equation needs a signal that is not measured.
     ParameterError
-        When too few samples move, or they do not tell the unknowns.
+        When too few samples move, or they do not determine the unknowns.
     ModelError
         When the model has no such state.
     """
@@ -243,21 +243,21 @@ def inverse_dynamics(
 
 
 def _require_told(W: Array, unknowns: Sequence[Unknown]) -> None:
-    """Refuse data in which a combination of the unknowns leaves no trace."""
+    """Reject data that do not depend on a combination of the unknowns."""
     size = np.linalg.norm(W, axis=0)
     silent = [u.label for u, s in zip(unknowns, size, strict=True) if s == 0.0]
     if silent:
         raise ParameterError(
-            f"the data do not determine {', '.join(silent)}: nothing that it acts on moves; "
-            "excite it, or take it as known",
+            f"the data do not determine {', '.join(silent)}: nothing that depends on it moves; "
+            "excite it, or treat it as known",
             name=", ".join(silent),
         )
     _, s, V = np.linalg.svd(W / size, full_matrices=False)  # U would have samples squared
     if s[-1] < 1e-10 * s[0]:
         together = [u.label for u, v in zip(unknowns, V[-1], strict=True) if abs(v) > 0.1]
         raise ParameterError(
-            f"the data determine only a combination of {', '.join(together)}: take one of them as "
-            "known, or excite them apart",
+            f"the data determine only a combination of {', '.join(together)}: treat one of them as "
+            "known, or excite them separately",
             name=", ".join(together),
         )
 
@@ -265,7 +265,7 @@ def _require_told(W: Array, unknowns: Sequence[Unknown]) -> None:
 def _thinned(
     data: xr.Dataset, equation: Equation, interval: float, bandwidth: float | None
 ) -> NDArray[np.int64]:
-    """Return the samples that count: decimated, away from reversals and from the ends."""
+    """Return the valid samples: decimated, away from reversals and from the ends."""
     count = data.sizes["time"]
     every = 1
     margin = 0
@@ -275,15 +275,15 @@ def _thinned(
     index = np.arange(3 * margin, count - 3 * margin, every)
     if equation.state in equation.model.frictions:
         slow = np.abs(data[equation.state].values) <= equation.slowest
-        mixed = np.ones(2 * margin + 1)  # what the filter mixes
+        mixed = np.ones(2 * margin + 1)  # reach of the filter
         near = np.convolve(slow, mixed, mode="same") > 0.5
         index = index[~near[index]]
     return index
 
 
-# --- Steady motion: averaged over windows, so that what reversals do stays outside
-# A filter mixes what lies within its reach, and near a reversal dry friction takes any value; a
-# mean over a window has no reach beyond it.
+# --- Steady motion: averages over windows without reversals
+# A filter mixes samples within its reach, and near a reversal dry friction may have any value. A
+# mean over a window does not reach beyond it.
 
 _FEWEST = 4  # samples of a window
 
@@ -292,8 +292,8 @@ _FEWEST = 4  # samples of a window
 class Window:
     """Samples of steady motion.
 
-    ``rows``: which samples; ``motion``: number of the motion, from one reversal to the next, that
-    they belong to.
+    ``rows``: indices of the samples; ``motion``: number of their motion, from one reversal to the
+    next.
     """
 
     rows: slice
@@ -305,8 +305,8 @@ def windows(
 ) -> list[Window]:
     """Return windows within the motions of a signal.
 
-    ``omega``: speed, shape (n,); ``interval``: sample time [s]; ``slowest``: speed that a motion
-    keeps; ``margin``: time left out at either end of a motion [s]; ``length``: time of a window
+    ``omega``: speed, shape (n,); ``interval``: sample time [s]; ``slowest``: least speed of a
+    motion; ``margin``: time excluded at either end of a motion [s]; ``length``: time of a window
     [s].
     """
     way = np.where(np.abs(omega) > slowest, np.sign(omega), 0.0)
@@ -327,10 +327,10 @@ def windows(
 
 @dataclass(frozen=True)
 class Motions:
-    """What was measured of one body, and the windows of it that count.
+    """A measurement of one body with its valid windows.
 
-    ``data``: states, memories and the rate of the equation, over ``time`` [s]; ``windows``: where
-    they are averaged.
+    ``data``: states, memories and the rate of the equation, over ``time`` [s]; ``windows``: for
+    the averages.
     """
 
     data: xr.Dataset
@@ -366,17 +366,17 @@ def window_residuals(
 
 
 def steady_dynamics(parts: Sequence[Problem], unknowns: Sequence[Unknown], advice: str) -> Estimate:
-    """Solve the averaged equations of several bodies for what they share.
+    """Solve the averaged equations of several bodies for their common parameters.
 
-    Every part counts by its own scatter, which a first fit tells.
+    Every part is weighted by its own scatter from a first fit.
 
-    ``parts``: as ``window_residuals`` gives them, all of the same unknowns; ``advice``: which
-    experiment would tell more.
+    ``parts``: results of ``window_residuals`` for the same unknowns; ``advice``: a more
+    informative experiment.
 
     Raises
     ------
     ParameterError
-        When there is too little motion, or nothing is told.
+        When there is too little motion, or the data determine nothing.
     """
     weights = np.ones(len(parts))
     try:

@@ -1,4 +1,4 @@
-"""What an estimator gives: values with their uncertainty, and what the data does not tell."""
+"""Results of estimators: values with their uncertainty, and undetermined unknowns."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from bywire.core.typing import Array
 from bywire.core.units import difference_unit, shown
 from bywire.identification.unknown import Unknown
 
-_FEWEST = 30  # residuals that tell their noise
-_RESOLVED = 2.0**-24  # of a signal's size: what single precision and the finest converters resolve
+_FEWEST = 30  # residuals that determine their noise
+_RESOLVED = 2.0**-24  # of a signal's size: resolution of single precision and the finest converters
 
 
 @dataclass(frozen=True)
@@ -23,19 +23,19 @@ class Part:
     Parameters
     ----------
     name, record
-        What was measured, and the label of its record; empty where there is one alone.
+        Measured signal, and the label of its record; empty if there is only one.
     count
-        How many residuals.
+        Number of residuals.
     unit
-        Of what was measured.
+        Unit of the signal.
     noise
-        What they were divided by [unit]; None where no noise was assumed.
+        Divisor of the residuals [unit]; None if no noise was assumed.
     spread
-        Standard deviation of what the model has to explain [unit].
+        Standard deviation of the signal that the model has to explain [unit].
     size
-        Largest magnitude of what was measured [unit].
+        Largest magnitude of the signal [unit].
     numerical
-        Root mean square of what half the step of the simulation changes [unit].
+        Root mean square of the change by half the simulation step [unit].
     """
 
     name: str
@@ -49,22 +49,22 @@ class Part:
 
     @property
     def label(self) -> str:
-        """Name, with the record's where there are several."""
+        """Name, with the record's if there are several."""
         return f"{self.record}:{self.name}" if self.record else self.name
 
 
 @dataclass(frozen=True)
 class Leftover:
-    """What a model leaves of one output in one record.
+    """Residuals of one output in one record.
 
     Parameters
     ----------
     label, unit
-        What was measured, with the record's label where there are several.
+        Measured signal, with the record's label if there are several.
     residuals
-        Computed less measured [unit], shape (n,).
+        Computed minus measured [unit], shape (n,).
     noise
-        Standard deviation that was assumed [unit]; None for none.
+        Assumed standard deviation [unit], or None.
     spread, size, numerical
         As of its `Part` [unit].
     """
@@ -84,19 +84,19 @@ class Leftover:
 
     @property
     def is_rounding(self) -> bool:
-        """Whether no more is left than numbers resolve: the record is the model's own."""
+        """Whether the residual is below the resolution: the record is the model's own."""
         return self.rms <= _RESOLVED * max(self.size, self.spread)
 
     @property
     def is_numerical(self) -> bool:
-        """Whether no more is left than rounding, or the step of the simulation, explains."""
+        """Whether rounding or the simulation step explains the residual."""
         return self.is_rounding or self.rms <= self.numerical
 
     @property
     def fit(self) -> float:
-        """100 (1 - rms / spread) [%]: 100 where nothing is left, 0 where a constant does as well.
+        """100 (1 - rms / spread) [%]: 100 without residual, 0 where a constant fits as well.
 
-        NaN where what was measured does not move (Ljung 1999, section 16.4).
+        NaN where the measured signal is constant (Ljung 1999, section 16.4).
         """
         return 100.0 * (1.0 - self.rms / self.spread) if self.spread > 0.0 else math.nan
 
@@ -104,8 +104,8 @@ class Leftover:
     def over_noise(self) -> float:
         """Rms over the noise that the residuals' own third differences show.
 
-        About 1 where they are noise; a model that is wrong leaves more, which changes slowly from
-        sample to sample and which differences therefore hardly hold. NaN where they are too few.
+        About 1 for noise. A wrong model leaves more: slow residuals, which differences hardly
+        contain. NaN for too few residuals.
         """
         if self.residuals.size < _FEWEST:
             return math.nan
@@ -117,20 +117,20 @@ class Leftover:
 
 # --- Estimates
 
-_AT = 1e-6  # of an unknown's scale: nearer to a bound, it lies at it
-_INDISTINCT = 0.05  # of a standard deviation: nearer to a bound, the data does not tell it from it
+_AT = 1e-6  # of an unknown's scale: closer to a bound counts as at it
+_INDISTINCT = 0.05  # of a standard deviation: closer to a bound, the two are equal
 
 
 @dataclass(frozen=True)
 class Kept:
-    """An unknown that the data does not tell.
+    """An unknown that the data do not determine.
 
     Parameters
     ----------
     unknown
-        What it is; its start is the value that was kept.
+        The unknown; its start is the kept value.
     reason
-        Why it is not told, with numbers.
+        Reason, with numbers.
     """
 
     unknown: Unknown
@@ -144,30 +144,30 @@ class Estimate:
     Parameters
     ----------
     unknowns
-        What was estimated; p of them.
+        Estimated unknowns; p of them.
     values
         Estimates, shape (p,), SI.
     covariance
-        Of the estimates, shape (p, p).
+        Covariance of the estimates, shape (p, p).
     singular_values
-        Of the Jacobian whose columns are per unknown's scale, shape (p,), largest first: what
-        is small beside the first one hardly shows in the data.
+        Singular values of the Jacobian per unknown's scale, shape (p,), largest first. A small one
+        means a combination that the data hardly determine.
     residuals
-        Computed less measured over the noise, shape (n,): of size one where the noise is as
-        assumed. A robust loss has not weighted them.
+        Computed minus measured over the noise, shape (n,): of size one if the noise is as assumed.
+        They are not weighted by a robust loss.
     freedom
-        Degrees of freedom: independent residuals less unknowns.
+        Degrees of freedom: independent residuals minus unknowns.
     colored
-        Whether neighboring residuals go together, which the covariance then allows for.
+        Whether neighboring residuals are correlated, which the covariance then includes.
     kept
-        Unknowns that the data does not tell, left at their starts.
+        Unknowns that the data do not determine, kept at their starts.
     notes
-        What the user should know.
+        Notes for the user.
     parts
-        Which residuals belong together, in their order, with unit, noise and spread.
+        Groups of residuals in their order, with unit, noise and spread.
     step_errors
-        How far each value is off by the step of the simulation, shape (p,), SI; None where nothing
-        is simulated. Noise, of which intervals speak, and what a model leaves out come on top.
+        Error of each value from the simulation step, shape (p,), SI; None without a simulation.
+        Errors from noise (see the intervals) and from an incomplete model are additional.
     """
 
     unknowns: tuple[Unknown, ...]
@@ -189,7 +189,7 @@ class Estimate:
 
     @property
     def all_unknowns(self) -> tuple[Unknown, ...]:
-        """What was estimated, and what the data does not tell."""
+        """Estimated and undetermined unknowns."""
         return (*self.unknowns, *(kept.unknown for kept in self.kept))
 
     @property
@@ -201,7 +201,7 @@ class Estimate:
     def correlation(self) -> Array:
         """Correlations of the estimates, shape (p, p)."""
         product = np.outer(self.deviations, self.deviations)
-        alone = np.eye(len(product))  # of values without a deviation, where nothing at all is left
+        alone = np.eye(len(product))  # of values without a deviation, if the residual is zero
         return np.divide(self.covariance, product, out=alone, where=product > 0.0)
 
     def intervals(self, level: float = 0.95) -> Array:
@@ -213,7 +213,7 @@ class Estimate:
         return np.column_stack((self.values - reach, self.values + reach))
 
     def at_bounds(self) -> dict[str, float]:
-        """Return the unknowns that lie at a bound: label -> bound, SI."""
+        """Return the unknowns at a bound: label -> bound, SI."""
         return {
             u.label: end
             for u, value, d in zip(self.unknowns, self.values, self.deviations, strict=True)
@@ -222,18 +222,18 @@ class Estimate:
         }
 
     def vague(self) -> dict[str, str]:
-        """Return the unknowns whose values mean nothing: label -> why.
+        """Return the unknowns whose values are meaningless: label -> reason.
 
-        They lie at a bound, or their 95 % interval reaches further than +-100 % of the value.
+        They are at a bound, or their 95 % interval exceeds +-100 % of the value.
         """
         bounds = self.at_bounds()
         reach = 0.5 * np.diff(self.intervals(), axis=1).ravel()
         reasons = {}
         for u, value, half in zip(self.unknowns, self.values, reach, strict=True):
             if u.label in bounds:
-                reasons[u.label] = f"lies at its bound, {shown(bounds[u.label], u.unit)}"
+                reasons[u.label] = f"is at its bound, {shown(bounds[u.label], u.unit)}"
             elif half > abs(value):
-                reasons[u.label] = f"is {value:.3g} +- {half:.2g} {u.unit}: that may be nothing"
+                reasons[u.label] = f"is {value:.3g} +- {half:.2g} {u.unit}: it may be zero"
         return reasons
 
     def noted(self, notes: tuple[str, ...]) -> Estimate:
@@ -245,7 +245,7 @@ class Estimate:
         return float(self.values[self.names.index(name)])
 
     def correlated(self, above: float = 0.9) -> list[tuple[str, str, float]]:
-        """Return the pairs of unknowns that the data tells apart badly, worst first."""
+        """Return the strongly correlated pairs of unknowns, worst first."""
         c = self.correlation
         pairs = [
             (self.names[i], self.names[j], float(c[i, j]))
@@ -256,7 +256,7 @@ class Estimate:
         return sorted(pairs, key=lambda pair: -abs(pair[2]))
 
     def parameters(self) -> dict[str, float]:
-        """Return the estimated parameters by name: what a bench file's [set] takes."""
+        """Return the estimated parameters by name, for [set] of a bench file."""
         return {
             u.name: float(v)
             for u, v in zip(self.unknowns, self.values, strict=True)
@@ -276,12 +276,12 @@ class Estimate:
             )
         ]
         kept = [
-            f"{k.unknown.label:<16} not told by the data, kept at {k.unknown.start:g} "
+            f"{k.unknown.label:<16} not determined by the data, kept at {k.unknown.start:g} "
             f"{k.unknown.unit}: {k.reason}"
             for k in self.kept
         ]
         left = [
-            f"{leftover.label} leaves "
+            f"residual of {leftover.label} "
             + shown(float(f"{leftover.rms:.3g}"), difference_unit(leftover.unit))
             + (f", fit {leftover.fit:.1f} %" if math.isfinite(leftover.fit) else "")
             for leftover in self.leftovers()
@@ -290,17 +290,17 @@ class Estimate:
 
     @property
     def rms(self) -> float:
-        """Root mean square of the residuals; 1 where they are over a noise that is as assumed."""
+        """Root mean square of the residuals; 1 if the noise is as assumed."""
         return math.sqrt(float(np.mean(self.residuals**2)))
 
     @property
     def is_exact(self) -> bool:
-        """Whether nothing but rounding is left: the record is the model's own."""
+        """Whether the residual is only rounding: the record is the model's own."""
         leftovers = self.leftovers()
         return bool(leftovers) and all(left.is_rounding for left in leftovers)
 
     def leftovers(self) -> tuple[Leftover, ...]:
-        """Return what the model leaves of each part of the measurement, in its unit."""
+        """Return the residuals of each part of the measurement, in its unit."""
         begin, parts = 0, []
         for part in self.parts:
             r = self.residuals[begin : begin + part.count] * (part.noise or 1.0)
@@ -314,7 +314,7 @@ class Estimate:
 
 
 def as_object(estimate: Estimate) -> dict[str, object]:
-    """Return what JSON holds of an estimate."""
+    """Return an estimate as JSON data."""
     rows: Mapping[str, dict[str, object]] = {
         name: {
             "value": float(v),

@@ -20,10 +20,10 @@ from bywire.identification.confidence import (
     MisfitWarning,
     advice,
     between_records,
+    least_determined,
     misfit,
     notes_of,
     uncertainty,
-    untold,
 )
 from bywire.identification.estimate import Estimate, Kept, Part
 from bywire.identification.unknown import Unknown
@@ -39,7 +39,7 @@ def rho(z: Array, loss: Loss) -> Array:
     Parameters
     ----------
     z
-        Squared residuals, those of size one where the noise is as assumed, shape (n,).
+        Squared residuals over the assumed noise, shape (n,).
     loss
         ``linear`` :math:`z`; ``soft_l1`` :math:`2(\sqrt{1+z}-1)`; ``huber`` :math:`z` up to one,
         :math:`2\sqrt z-1` beyond; ``cauchy`` :math:`\ln(1+z)`.
@@ -47,7 +47,7 @@ def rho(z: Array, loss: Loss) -> Array:
     Returns
     -------
     numpy.ndarray
-        Shape (3, n), as ``scipy.optimize.least_squares`` wants it.
+        Shape (3, n), as ``scipy.optimize.least_squares`` requires.
     """
     ones = np.ones_like(z)
     if loss == "linear":
@@ -65,7 +65,7 @@ def rho(z: Array, loss: Loss) -> Array:
 
 
 def _of_data_alone(loss: Loss, apart: int) -> Any:
-    """Return the loss for SciPy; the last rows, what is known beforehand, count by their squares.
+    """Return the loss for SciPy; the last rows, prior knowledge, keep their squares.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def influence(r: Array, loss: Loss) -> tuple[Array, Array]:
 
 
 def _bread(slopes: Array, unknowns: int) -> float:
-    r"""Return what divides an M-estimate's scores, :math:`E[\psi'] / K`.
+    r"""Return the divisor of an M-estimate's scores, :math:`E[\psi'] / K`.
 
     :math:`K = 1 + (p/n) \operatorname{var}(\psi') / E[\psi']^2` corrects for few residuals; the
     covariance is :math:`K^2 \, [\sum \psi^2 / (n-p)] / E[\psi']^2 \, (J^T J)^{-1}`.
@@ -111,12 +111,12 @@ def _bread(slopes: Array, unknowns: int) -> float:
     ----------
     P. J. Huber, Robust Statistics, 1981, section 7.6.
     """
-    # A redescending loss whose residuals are mostly outliers has no minimum worth a name.
+    # With mostly outliers, a redescending loss has no meaningful minimum.
     mean = max(float(slopes.mean()), _LEAST)
     return mean / (1.0 + unknowns / slopes.size * float(slopes.var()) / mean**2)
 
 
-# --- The problem: unknowns, their residuals, and what is known beforehand
+# --- The problem: unknowns, residuals, and prior knowledge
 
 Evaluate = Callable[[Array], tuple[Array, Array]]
 
@@ -128,22 +128,22 @@ class Problem:
     Parameters
     ----------
     unknowns
-        What is varied; p of them.
+        Varied unknowns; p of them.
     evaluate
         ``evaluate(values) -> (residuals, jacobian)``, shapes (n,) and (n, p), weighted so that
-        residuals are of size one where the noise is as assumed.
+        residuals are of size one if the noise is as assumed.
     apart
-        Last rows that are independent of all others and taken to be weighted rightly.
+        Number of last rows that are independent of all others and correctly weighted.
     instrument
-        Whether the Jacobian is that of a model which the measured inputs' noise does not drive,
-        while it drives that of the residuals. Where their product vanishes, the estimate is then
-        free of the bias that the least sum of squares has.
+        Whether the Jacobian is of a model without the noise of measured inputs, while the residuals
+        contain it. The estimate then solves for a zero product of the two, which avoids the bias of
+        least squares.
     silent
-        Why nothing may depend on an unknown, by its name: what is switched off.
+        Reasons why no output may depend on an unknown, by name: what is switched off.
     parts
-        Which residuals belong together, in their order; all of them by default.
+        Groups of residuals, in their order; all in one by default.
     finer
-        The same as ``evaluate`` in half the steps of a simulation; None where nothing is simulated.
+        Like ``evaluate``, with half the simulation step; None without a simulation.
     resolved
         Share of the cost, and of the unknowns, below which a search only follows the roughness of
         the residuals or of a Jacobian by differences.
@@ -191,38 +191,38 @@ def _cost_of(problem: Problem, values: Array, loss: Loss = "linear") -> float:
     return 0.5 * float(np.sum(rho(r[:data] ** 2, loss)[0]) + np.sum(r[data:] ** 2))
 
 
-# --- What the step of a simulation does to estimates: their first-order shift in half steps
+# --- Effect of the simulation step on estimates: their first-order shift at half the step
 # At the minimum the weighted residuals r are orthogonal to their derivatives J. With the residuals
 # r' of half the step they are not, and one Gauss-Newton step leads to the minimum there,
 # dx = -J^+ (r' - r): three quarters of the error of the whole step, at second order.
 
-_SMALL = 1e-6  # of an unknown's scale: less matters to nobody
+_SMALL = 1e-6  # of an unknown's scale: smaller errors are negligible
 
 
 def _with_step_share(
     problem: Problem, best: Estimate, J: Array, loss: Loss
 ) -> tuple[Estimate, tuple[str, ...]]:
-    """Return an estimate with the errors that its values have from the step, and what exceeds.
+    """Return an estimate with its errors from the simulation step, and warnings.
 
     Parameters
     ----------
     problem
-        With residuals in half steps; without, nothing is simulated and nothing is said.
+        With residuals at half the step; without them there are no errors and no warnings.
     best
         The estimate at the minimum.
     J
         Derivatives of the residuals per unknown's scale there, priors included, shape (n, p).
     loss
-        How large residuals count.
+        Loss of the residuals.
 
     Returns
     -------
     Estimate
-        With ``step_errors`` and what the step changes of each part; unknowns at a bound are taken
-        to stay there.
+        With ``step_errors`` and the change of each part by the step; unknowns at a bound are
+        assumed to stay there.
     tuple of str
-        Unknowns whose error from the step exceeds the half width of their 95 % interval, or that
-        half steps cannot be run.
+        Warnings about unknowns whose error from the step exceeds the half width of their 95 %
+        interval, or about a failed run at half the step.
     """
     if problem.finer is None:
         return best, ()
@@ -232,7 +232,7 @@ def _with_step_share(
         difference = np.zeros(len(J))
         difference[:count] = finer - best.residuals
     except (*NO_ESTIMATE, ValueError) as error:  # a ValueError: other rows count in half steps
-        return best, (f"what the step does to the estimates is not known: {error}",)
+        return best, (f"the effect of the step on the estimates is unknown: {error}",)
     weights = np.ones(len(J))
     measured = count - problem.apart
     weights[:measured] = np.sqrt(np.maximum(influence(best.residuals[:measured], loss)[1], 0.0))
@@ -248,7 +248,7 @@ def _with_step_share(
 
 
 def _parts(parts: Iterable[Part], difference: Array) -> Iterator[Part]:
-    """Yield the parts of the residuals with the size of what the step changes of them."""
+    """Yield the parts of the residuals with the size of their change by the step."""
     begin = 0
     for part in parts:
         rows = difference[begin : begin + part.count]
@@ -260,10 +260,10 @@ def _parts(parts: Iterable[Part], difference: Array) -> Iterator[Part]:
 def _exceeding(best: Estimate, errors: Array) -> list[str]:
     half = 0.5 * np.diff(best.intervals(), axis=1).ravel()
     return [
-        f"{u.label} is off by about {shown(float(f'{error:.2g}'), difference_unit(u.unit))} from "
-        "the step of the simulation, more than its 95 % interval reaches, "
+        f"{u.label} has an error of about {shown(float(f'{error:.2g}'), difference_unit(u.unit))} "
+        "from the simulation step, more than the half width of its 95 % interval, "
         f"{shown(float(f'{reach:.2g}'), difference_unit(u.unit))}: "
-        "take a smaller step"
+        "use a smaller step"
         for u, error, reach in zip(best.unknowns, errors, half, strict=True)
         if error > max(reach, _SMALL * u.scale)
     ]
@@ -272,15 +272,15 @@ def _exceeding(best: Estimate, errors: Array) -> list[str]:
 # --- Estimation
 
 NO_TRIAL = (SolverError, ParameterError)
-"""what a trial ends with whose values the model, or its parameters' own rules, do not take"""
-_NEWTON = 8  # steps from the least sum to where instruments see no residual
-_WORSE = 0.02  # of the least sum of squares: more is another place
+"""errors of trials whose values violate the model or the rules of its parameters"""
+_NEWTON = 8  # steps from the least sum to the solution of the instruments
+_WORSE = 0.02  # of the least sum of squares: more is another minimum
 _NEAR = 1e-2  # of the scale: how far from a bound a search with bounds may stop short of it
 
 
 @dataclass(frozen=True)
 class Solution:
-    """Where one start led.
+    """End of the search from one start.
 
     Parameters
     ----------
@@ -302,13 +302,13 @@ def solve(
     Parameters
     ----------
     start
-        Where to begin, shape (p,).
+        Start values, shape (p,).
     loss
-        How large residuals count; beyond size one a robust loss grows slower.
+        Loss of the residuals; beyond size one a robust loss grows more slowly.
     most
-        Evaluations at most.
+        Limit of evaluations.
     share
-        Of the cost: the search ends when a step gains less.
+        Share of the cost: the search ends when a step gains less.
 
     Raises
     ------
@@ -329,14 +329,14 @@ def solve(
             cache.clear()
             r, J = _with_priors(problem, z * scale)
             if not (np.isfinite(r).all() and np.isfinite(J).all()):
-                raise SolverError("a residual, or how it changes, is not defined at these values")
+                raise SolverError("a residual or its derivative is not defined at these values")
             cache[key] = (r, J * scale)
         return cache[key]
 
     def residuals(z: Array) -> Array:
         try:
             return both(z)[0]
-        except NO_TRIAL:  # a step left the numbers, or what the model takes: a shorter one follows
+        except NO_TRIAL:  # the step diverged or left the model's range: a shorter one follows
             return np.full(cache_size[0], 1e6)
 
     def jacobian(z: Array) -> Array:
@@ -363,7 +363,7 @@ def solve(
 
 
 def _at_bounds(problem: Problem, solution: Solution, loss: Loss) -> Solution:
-    """Return the solution with unknowns at the bounds that the search only came near to."""
+    """Return the solution with unknowns moved to bounds that the search only approached."""
     scale = np.array([u.scale for u in problem.unknowns])
     for k, u in enumerate(problem.unknowns):
         for end in (u.low, u.high):
@@ -381,7 +381,7 @@ def _at_bounds(problem: Problem, solution: Solution, loss: Loss) -> Solution:
 
 
 def _solved(problem: Problem, begin: Array, loss: Loss) -> Solution:
-    """Return the nearest minimum, or what is no least sum where the Jacobian is an instrument."""
+    """Return the nearest minimum, or the instruments' solution if the Jacobian is one."""
     solution = solve(problem, begin, loss)
     if not problem.instrument:
         return solution
@@ -404,18 +404,18 @@ def _solved(problem: Problem, begin: Array, loss: Loss) -> Solution:
 def estimate(
     problem: Problem, loss: Loss = "linear", start: Array | None = None, *, search: bool = True
 ) -> Estimate:
-    """Return the estimate with its uncertainty; what the data does not tell is kept and named.
+    """Return the estimate with its uncertainty; undetermined unknowns are kept and named.
 
     Parameters
     ----------
     problem
         The residuals.
     loss
-        How large residuals count.
+        Loss of the residuals.
     start
-        Where to begin; the unknowns' starts by default.
+        Start values; the unknowns' starts by default.
     search
-        False: these values are a minimum already, and are taken as they are.
+        False if these values are a minimum already.
 
     Raises
     ------
@@ -428,7 +428,7 @@ def estimate(
     while True:
         solution = _solved(problem, begin, loss) if search else Solution(begin, math.nan)
         best, J = _at_minimum(problem, solution, loss)
-        worst = untold(best, J)
+        worst = least_determined(best, J)
         if worst is None:
             records = between_records(best, J) if loss == "linear" else ()
             apart = tuple(str(record) for record in records[:1])
@@ -467,7 +467,7 @@ def _at_minimum(problem: Problem, solution: Solution, loss: Loss) -> tuple[Estim
         )
     scale = np.array([u.scale for u in problem.unknowns])
     known = priors + problem.apart
-    # What is known beforehand is no outlier; only what was measured is weighted by the loss.
+    # Prior knowledge is not an outlier; the loss weights measured values only.
     psi, slopes = influence(r[: r.size - known], loss)
     rows = J.copy()
     rows[: r.size - known] *= _bread(slopes, len(problem.unknowns))

@@ -1,4 +1,4 @@
-"""Measured records as a method or a replay takes them: SI, one even time axis, all signals."""
+"""Measured records for methods and replays: SI, an evenly spaced time axis, all signals."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from bywire.data.column_units import measures, unit_of_symbol
 from bywire.data.mapping import MeasurementMapping, read_mapping
 from bywire.data.named_columns import NamedColumns, read_named, renamed
 
-_ROUNDED = 0.05  # of the samples equal the one before: a converter, not the signal
+_ROUNDED = 0.05  # of the samples equal the previous one: quantization by a converter
 _LARGER = 1.5  # times the noise
 _SURE = 2.5  # standard errors of a correlation
 FAR = 4.0  # standard deviations: of white noise 1 in 16 000 lies beyond
@@ -31,8 +31,8 @@ FAR = 4.0  # standard deviations: of white noise 1 in 16 000 lies beyond
 def noise_of(values: Array) -> float:
     """Return the standard deviation of a measured signal's noise, quantization included.
 
-    From differences of the third order, which a slow signal has not, by their median: slips do
-    not count.
+    It uses the median of third-order differences, which are zero for slow signals and insensitive
+    to slips.
     """
     third = np.diff(values, 3) / np.sqrt(20.0)
     scatter = 1.4826 * float(np.median(np.abs(third)))
@@ -44,19 +44,18 @@ def noise_of(values: Array) -> float:
     return max(scatter, quantized)
 
 
-def is_told(values: Array) -> bool:
-    """Return whether the third differences of a signal look like those of noise.
+def determines_its_noise(values: Array) -> bool:
+    """Return whether a signal's own samples determine its noise, by third differences.
 
-    Their neighbors have a correlation of -3/4 where the noise is white. Where it tends to 1, the
-    signal itself is seen; where it tends to -1, it alternates from one sample to the next: a
-    coarse record, or dither near half the sample rate. What is measured is how often neighbors
-    have the same sign, so that slips do not count. The noise is not told where such a signal would
-    make it come out half as large again.
+    Neighboring differences have a correlation of -3/4 if the noise is white. Toward 1, the signal
+    itself dominates. Toward -1, it alternates between samples: a coarse record, or dither near half
+    the sample rate. The correlation follows from the share of neighbors with equal signs, so that
+    slips do not count. The noise is undetermined if such a signal would inflate it by half.
 
     Parameters
     ----------
     values
-        Shape (n,). A signal that a converter has rounded repeats itself, and is not judged.
+        Shape (n,). A signal that a converter has rounded repeats values, and is accepted.
     """
     if float(np.mean(np.diff(values) == 0.0)) > _ROUNDED:
         return True
@@ -71,9 +70,9 @@ def is_told(values: Array) -> bool:
 
 
 def robust_scale(residuals: Array) -> float:
-    """Return the standard deviation that the median magnitude tells, were they Gaussian.
+    """Return the standard deviation from the median magnitude, for a Gaussian distribution.
 
-    About zero, not about their median: an offset that a model leaves is an error of its own.
+    It is about zero, not about the median, since an offset of the residuals is an error too.
 
     References
     ----------
@@ -83,9 +82,9 @@ def robust_scale(residuals: Array) -> float:
 
 
 def outliers(residuals: Array) -> NDArray[np.bool_]:
-    """Return which residuals, of size one where the noise is as assumed, are none of noise.
+    """Return the outliers among residuals that are scaled by the assumed noise.
 
-    Shape (n,); where all are larger than assumed, those that stand out from the others.
+    Shape (n,). If all are larger than assumed, outliers are relative to the others.
     """
     return np.asarray(np.abs(residuals) > FAR * max(robust_scale(residuals), 1.0))
 
@@ -101,14 +100,14 @@ RECORD = "record"
 
 
 def require_signals(data: xr.Dataset, names: Iterable[str]) -> None:
-    """Raise ``UnknownNameError`` when a signal is not measured, with the nearest ones."""
+    """Raise ``UnknownNameError`` if a signal is not measured, with the nearest names."""
     for name in names:
         if name not in data:
             raise unknown_name("measured signal", name, [str(k) for k in data.data_vars])
 
 
 def joined(records: Mapping[str, xr.Dataset]) -> xr.Dataset:
-    """Return records as one measurement; a single one stays as it is.
+    """Join records to one measurement; a single record is unchanged.
 
     Parameters
     ----------
@@ -118,10 +117,10 @@ def joined(records: Mapping[str, xr.Dataset]) -> xr.Dataset:
     Raises
     ------
     ParameterError
-        When there is none, or one has other signals than the first.
+        When there is no record, or their signals differ.
     """
     if not records:
-        raise ParameterError("no record is given: at least one is needed")
+        raise ParameterError("there is no record: give at least one")
     first, *others = records
     if not others:
         return records[first]
@@ -132,7 +131,7 @@ def joined(records: Mapping[str, xr.Dataset]) -> xr.Dataset:
             differing = ", ".join(sorted(wanted ^ set(map(str, record.data_vars))))
             raise ParameterError(
                 f"records {first} and {label} differ in their signals ({differing}): records of "
-                "one experiment have the same signals",
+                "one experiment need the same signals",
                 name=label,
             )
         t = record["time"].values - record["time"].values[0]
@@ -154,16 +153,16 @@ def joined(records: Mapping[str, xr.Dataset]) -> xr.Dataset:
 
 
 def split(data: xr.Dataset, own_clock: bool = False) -> dict[str, xr.Dataset]:
-    """Return the records of a measurement by label, each with a time that begins at zero.
+    """Return the records of a measurement by label, each with a time from zero.
 
-    Without the signal ``record`` it is one record without a name, as it is.
+    Without the signal ``record`` it is a single unnamed record.
 
     Parameters
     ----------
     data
         The measurement.
     own_clock
-        Whether each record's time begins where it did before they were joined.
+        Whether each record's time starts as before joining.
     """
     if RECORD not in data:
         return {"": data}
@@ -184,7 +183,7 @@ def split(data: xr.Dataset, own_clock: bool = False) -> dict[str, xr.Dataset]:
 
 
 def after_one_another(times: Mapping[str, Array]) -> dict[str, Any]:
-    """Return coordinates for records in a row: ``time``, which goes on, and ``record``, the names.
+    """Return coordinates of joined records: continuous ``time``, and ``record`` with the names.
 
     Parameters
     ----------
@@ -211,7 +210,7 @@ def after_one_another(times: Mapping[str, Array]) -> dict[str, Any]:
 # --- From measurement files
 
 _UNEVEN = 1e-3  # of a step
-_FEWEST = 10  # samples that tell noise
+_FEWEST = 10  # samples that determine the noise
 _NOT_NAMED = NamedColumns()
 NOISE_OF_SAMPLES = "noise_of_samples"
 """attribute of a signal that was resampled: noise of the samples before, SI"""
@@ -219,14 +218,14 @@ NOISE_OF_SAMPLES = "noise_of_samples"
 
 @dataclass(frozen=True)
 class Measured:
-    """A measurement and what was done to it.
+    """A measurement with notes on its preparation.
 
     Parameters
     ----------
     data
         Signals over ``time`` [s], evenly spaced within every record.
     notes
-        What the user should know: resampling, missing samples.
+        Notes for the user, such as on resampling and missing samples.
     """
 
     data: xr.Dataset
@@ -251,28 +250,28 @@ def measured(
     Parameters
     ----------
     sources
-        Files, or signals that were read before; several become records, named by the files.
+        Files, or signals in memory; several become records, named by the files.
     mapping
-        File that says what their columns mean.
+        Mapping file for their columns.
     signals
-        What must be there: name -> SI unit; all that there is by default.
+        Required signals: name -> SI unit; all by default.
     optional
-        What is taken too where it is there.
+        Signals that are used if present.
     interval
-        Wanted step [s]; by default the median one of the record.
+        Requested step [s]; by default the record's median.
     multiple
-        What that is rounded to multiples of where the record has to be resampled [s].
+        The step is rounded to multiples of this time [s] if the record must be resampled.
     gaps
         Whether samples may be missing.
     named
-        What else is known of the columns.
+        Columns that the user names.
     progress
-        Called with a label and the finished share.
+        Callback with a label and the finished share.
 
     Raises
     ------
     InputError
-        When a file cannot be read, a signal is missing or measures something else.
+        When a file cannot be read, or a signal is missing or has another dimension.
     """
     meaning = MeasurementMapping() if mapping is None else read_mapping(mapping)
     records, notes = {}, []
@@ -295,21 +294,21 @@ def measured(
 
 
 def name_of(source: str | Path | xr.Dataset) -> str:
-    """Return what reports call a measurement: the file's name, or that it came from memory."""
+    """Return the name of a measurement in reports: its file, or a text for signals in memory."""
     if isinstance(source, xr.Dataset):
         return str(source.attrs.get("source", "signals in memory"))
     return Path(source).name
 
 
 def require(data: xr.Dataset, signals: Mapping[str, str], where: str) -> tuple[str, ...]:
-    """Return the wanted signals' names, ``record`` with them where it is there.
+    """Return the names of the requested signals, with ``record`` if present.
 
     Raises
     ------
     UnknownNameError
-        When one is missing, with the nearest.
+        When one is missing, with the nearest names.
     UnitError
-        When one measures something else.
+        When one has another dimension.
     """
     there = [str(name) for name in data.data_vars]
     for name, unit in signals.items():
@@ -322,7 +321,7 @@ def require(data: xr.Dataset, signals: Mapping[str, str], where: str) -> tuple[s
         given = str(data[name].attrs.get("units", "1"))
         if unit not in ("", given) and not measures(unit_of_symbol(given), unit):
             raise UnitError(
-                f"{where}: {name} is in {given}, and must be in {unit}: check the map",
+                f"{where}: {name} is in {given}, but must be in {unit}: check the mapping",
                 name=name,
                 value=given,
                 valid=unit,
@@ -333,27 +332,29 @@ def require(data: xr.Dataset, signals: Mapping[str, str], where: str) -> tuple[s
 def as_even(
     data: xr.Dataset, interval: float | None = None, multiple: float | None = None
 ) -> tuple[xr.Dataset, list[str]]:
-    """Return signals on one evenly spaced axis, as they are where they lie on one already.
+    """Return signals on an evenly spaced axis, unchanged if they are on one already.
 
     Parameters
     ----------
     data
-        What ``read_measurement`` gives.
+        Result of ``read_measurement``.
     interval
-        Wanted step [s]; the median one by default.
+        Requested step [s]; the median one by default.
     multiple
-        What that is rounded to multiples of where the signals have to be resampled [s].
+        The step is rounded to multiples of this time [s] if the signals must be resampled.
     """
     steps = {str(dim): np.diff(data[dim].values) for dim in data.dims}
     if "record" in data and set(steps) == {"time"} and interval is None:
-        return data, []  # made by us: each record is even, time jumps between them
+        return data, []  # our own file: each record is evenly spaced, and time jumps between them
     middle = min(float(np.median(d)) for d in steps.values() if d.size)
     step = float(f"{middle if interval is None else interval:.9g}")
     if len(steps) == 1 and np.abs(next(iter(steps.values())) - step).max() <= _UNEVEN * step:
         (dim,) = steps
         return data if dim == "time" else data.rename({dim: "time"}), []
     if "record" in data:
-        raise ParameterError("several records in one file cannot be resampled: give a file each")
+        raise ParameterError(
+            "several records in one file cannot be resampled: give one file per record"
+        )
     if multiple is not None and interval is None:
         step = float(f"{max(round(step / multiple), 1) * multiple:.9g}")
     resampled = resample(data, step)
@@ -366,7 +367,7 @@ def as_even(
 
 def _said(report: AlignmentReport) -> str:
     missing = max(channel.excluded for channel in report.channels)
-    left_out = f"; {missing} of them in gaps and left out" if missing else ""
+    left_out = f"; {missing} of them are in gaps and not used" if missing else ""
     return (
         f"resampled to {report.samples} samples every {1e3 * report.interval:.6g} ms (its own "
         f"instants are not evenly spaced){left_out}"
@@ -382,23 +383,23 @@ def _require_whole(data: xr.Dataset, where: str, gaps: bool) -> None:
             at = float(data["time"].values[missing[0]])
             raise ParameterError(
                 f"{where}: {name} misses {missing.size} samples, the first at {at:.4g} s: cut the "
-                "record there, or fill it knowingly with 'bywire convert --exclude nothing'",
+                "record there, or fill it deliberately with 'bywire convert --exclude nothing'",
                 name=str(name),
             )
 
 
 @checked
 def wrong_sign(signal: str, other: str, evidence: str) -> ParameterError:
-    """Return the refusal of two signals of which one has the wrong sign.
+    """Return the error for two signals, one of which has the wrong sign.
 
     Parameters
     ----------
     signal, other
         Signals, in words.
     evidence
-        What shows it, with its value.
+        Evidence, with its value.
     """
     return ParameterError(
-        f"{signal} goes against {other} ({evidence}): one of the two has the wrong sign; "
-        "write sign = -1 for it in the map"
+        f"{signal} moves against {other} ({evidence}): one of the two has the wrong sign; "
+        "write sign = -1 for it in the mapping"
     )

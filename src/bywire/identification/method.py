@@ -1,4 +1,4 @@
-"""An identification method: measured experiment in, parameters with their confidence out."""
+"""Identification methods: from a measured experiment to parameters with confidence intervals."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ from bywire.identification.estimate import Estimate
 
 @dataclass(frozen=True)
 class Effort:
-    """How hard to search, and who watches.
+    """Effort of a search, and its progress report.
 
     Parameters
     ----------
     starts
         Number of starts; the first is the parameter set's own.
     spread
-        How far the others are away, as a share.
+        Distance of the others from the first, as a share.
     seed
-        Of their random numbers.
+        Seed of their random numbers.
     threads
-        All cores by default.
+        Number of threads; all cores by default.
     store
-        File in which finished starts survive an interrupt.
+        File that keeps finished starts across an interrupt.
     progress
-        Called with a label and the finished share.
+        Callback with a label and the finished share.
     """
 
     starts: int = 16
@@ -46,22 +46,22 @@ class Effort:
 
 @dataclass(frozen=True)
 class Check:
-    """A figure that says whether to believe an identification.
+    """A figure of merit that qualifies an identification.
 
     Parameters
     ----------
     name
-        What is checked.
+        Name of the check.
     value, unit
         The figure, SI.
     limit
-        What it must not exceed (or fall below, see ``at_least``); None for information.
+        Upper limit (lower, see ``at_least``); None for information only.
     at_least
         Whether the limit is a lower one.
     note
-        What it means.
+        Meaning of the figure.
     next_step
-        What to try next where it fails, with the words to type.
+        Next step if it fails, with the option to type.
     """
 
     name: str
@@ -74,7 +74,7 @@ class Check:
 
     @property
     def holds(self) -> bool:
-        """Whether the limit is kept."""
+        """Whether the figure meets the limit."""
         if self.limit is None:
             return True
         return self.value >= self.limit if self.at_least else self.value <= self.limit
@@ -89,10 +89,10 @@ class Curve:
     name
         File name of the figure.
     caption
-        What it shows, one sentence.
+        Caption of one sentence.
     data
         Over ``x``: ``measured`` and ``modeled``; or ``value``, ``low`` and ``high``; each may
-        have a second dimension that tells several curves.
+        have a second dimension with several curves.
     x
         Name of the coordinate along the horizontal axis.
     """
@@ -105,23 +105,23 @@ class Curve:
 
 @dataclass(frozen=True)
 class Identified:
-    """What a method found.
+    """Result of a method.
 
     Parameters
     ----------
     estimates
-        By what they are of; one entry unless a method estimates in groups.
+        Estimates by group; one entry unless a method estimates in groups.
     parameters
-        Dotted name -> value [SI], what a bench file's ``[set]`` takes; empty where a method
-        gives no parameters of the assembly.
+        Dotted name -> value [SI], for ``[set]`` of a bench file; empty if the method's estimates
+        are not parameters of the assembly.
     figures
         Further results: name -> (value [SI], unit).
     checks
-        Whether to believe it.
+        Figures that qualify the result.
     curves
-        What to look at.
+        Curves for the report.
     notes
-        What the user should know: data left out, assumptions.
+        Notes for the user, such as unused data and assumptions.
     """
 
     estimates: Mapping[str, Estimate]
@@ -139,15 +139,15 @@ class Method:
     Parameters
     ----------
     name
-        What the command line calls it.
+        Name on the command line.
     assembly
-        Whose parameters it finds; any assembly where empty.
+        Assembly whose parameters it estimates; any if empty.
     summary
         One line for listings, with the equations' numbers.
     experiment
-        The bench's experiment that gives such a measurement.
+        Experiment of the bench that produces such a measurement.
     signals
-        What must be measured: name -> SI unit; an empty one admits any.
+        Required signals: name -> SI unit; an empty unit allows any.
     options, defaults
         Settings with units and ranges.
     identify
@@ -155,30 +155,30 @@ class Method:
         ``time`` [s], evenly spaced. ``par`` is None for a method of any assembly.
     synthetic
         ``synthetic(par, options, seed) -> data``: the experiment simulated, with the sensors'
-        noise; what stands in for a measurement.
+        noise, in place of a measurement.
     unknowns
-        Names of the parameters that it can find.
+        Names of the parameters that it can estimate.
     several
-        Whether data may hold several records, see ``bywire.identification.measured``: each is
+        Whether data may contain several records, see ``bywire.identification.measured``. Each is
         evenly spaced, and the method splits them.
     gaps
-        Whether it takes data in which samples are missing (NaN).
+        Whether it accepts missing samples (NaN).
     optional
-        What it uses where it is measured: name -> SI unit.
+        Signals that it uses if they are measured: name -> SI unit.
     truth
-        ``truth(par, options) -> {label: value}``: what ``synthetic`` puts in, of estimates that
-        are no parameters of the assembly.
+        ``truth(par, options) -> {label: value}``: true values in ``synthetic`` of estimates that
+        are not parameters of the assembly.
     further
-        Estimates that are no parameters of the assembly: name -> SI unit (empty where it is the
+        Estimates that are not parameters of the assembly: name -> SI unit (empty where it is the
         data's) and meaning, for listings.
     simulated
-        Options that nothing but ``synthetic`` uses.
+        Options that only ``synthetic`` uses.
     bench_note
-        What a bench with the identified values cannot do.
+        Limitation of a bench with the identified values.
     bench
-        The bench whose parameters it finds, where it was made for one.
+        Bench whose parameters it estimates, if it is made for one.
     key
-        What else tells its simulated experiments from those of other methods.
+        Additional text that distinguishes its simulated experiments from those of other methods.
     """
 
     name: str
@@ -205,4 +205,4 @@ class Method:
 METHODS = Kind(
     "method", ("methods",), instances(Method), "bywire.identification.methods", declared="a Method"
 )
-"""every method that needs no bench"""
+"""all methods that do not need a bench"""

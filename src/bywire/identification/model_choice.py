@@ -1,6 +1,6 @@
-r"""Which of several models to take: by what they predict of data that they were not fitted to.
+r"""Choice among several models by their prediction of held-out data.
 
-Information criteria are given beside it, with the likelihood of residuals that go together
+Information criteria are also given, with the likelihood of correlated residuals
 (an autoregressive model of the richest candidate's residuals): :math:`AIC = n \ln s^2 + 2 k`,
 :math:`BIC = n \ln s^2 + k \ln n`.
 """
@@ -26,7 +26,7 @@ Predict = Callable[[xr.Dataset, Array], tuple[Array, Array]]
 
 _BLOCKS = 10  # of a single record
 _FOLDS = 5
-_RECORDS = 3  # from so many on, whole records are held out
+_RECORDS = 3  # least number of records to hold out whole ones
 
 
 @dataclass(frozen=True)
@@ -36,9 +36,9 @@ class Candidate:
     Parameters
     ----------
     name
-        What it is called.
+        Name of the model.
     unknowns
-        ``unknowns(data) -> (Unknown, ...)``: what it is fitted by, with starts from the data.
+        ``unknowns(data) -> (Unknown, ...)``: unknowns of the fit, with starts from the data.
     predict
         ``predict(data, values) -> (prediction, jacobian)``, shapes (n,) and (n, p).
     """
@@ -57,13 +57,13 @@ class Judged:
     candidate, estimate
         The model, fitted to all data.
     training_error, validation_error
-        Root mean square of what is left of data it was fitted to, and of data held out, in the
-        unit of the signal.
+        Root mean square of the residual for fitted and for held-out data, in the unit of the
+        signal.
     excess, excess_error
-        Mean over the folds of its held-out error less that of the best candidate, and the
+        Mean over the folds of its held-out error minus that of the best candidate, and the
         standard error of that mean.
     aic, bic
-        Less is better; differences count.
+        Smaller is better; differences count.
     """
 
     candidate: Candidate
@@ -78,16 +78,16 @@ class Judged:
 
 @dataclass(frozen=True)
 class Choice:
-    """What was chosen.
+    """Result of the choice.
 
     Parameters
     ----------
     judged
         Candidates in their order, the simplest first.
     chosen
-        The simplest whose held-out error exceeds the least by no more than one standard error.
+        The simplest whose held-out error exceeds the lowest by at most one standard error.
     held_out
-        What was held out, in words.
+        Description of the held-out data.
     """
 
     judged: tuple[Judged, ...]
@@ -100,9 +100,9 @@ def choose(
 ) -> Choice:
     """Choose a model by prediction of held-out data.
 
-    With three records or more, each is held out in turn; else blocks of the records, two at a
-    time far apart. Errors are compared fold by fold, so that what makes one fold hard for all
-    candidates does not hide which is better.
+    With three records or more, each is held out in turn; otherwise blocks of the records, two
+    distant ones at a time. Errors are compared in each fold, so that a fold that is hard for all
+    candidates does not hide differences.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ def choose(
     records
         By label, each over ``time``; without NaN.
     signal
-        What is predicted.
+        Name of the predicted signal.
 
     Raises
     ------
@@ -171,7 +171,7 @@ def _folds(records: Mapping[str, xr.Dataset]) -> tuple[list[_Fold], str]:
         for rows in np.array_split(np.arange(part.sizes["time"]), _BLOCKS)
     ]
     if min(b.sizes["time"] for b in blocks) < 2:
-        raise ParameterError("too few samples to hold some out: measure longer, or more records")
+        raise ParameterError("too few samples to hold some out: measure longer, or record more")
     folds = []
     for k in range(_FOLDS):
         held = [b for j, b in enumerate(blocks) if j % _FOLDS == k]
@@ -188,7 +188,7 @@ def _fitted(candidate: Candidate, parts: Sequence[xr.Dataset], signal: str) -> E
         predicted, slopes = candidate.predict(whole, values)
         return (predicted - y) / size, slopes / size
 
-    with warnings.catch_warnings():  # most of the candidates are wrong: that is why they compete
+    with warnings.catch_warnings():  # expected, since most candidates are wrong
         warnings.simplefilter("ignore", MisfitWarning)
         return estimate(Problem(unknowns, evaluate))
 
@@ -201,7 +201,7 @@ def _left(candidate: Candidate, fit: Estimate, parts: Sequence[xr.Dataset], sign
 
 
 def _values(candidate: Candidate, fit: Estimate, whole: xr.Dataset) -> Array:
-    """Return all values of a candidate, those that the data does not tell at their starts."""
+    """Return all values of a candidate; undetermined ones are at their starts."""
     known = dict(zip(fit.names, fit.values.tolist(), strict=True))
     return np.array([known.get(u.label, u.start) for u in candidate.unknowns(whole)])
 

@@ -1,4 +1,4 @@
-"""Several starts on all cores; what is finished survives an interrupt."""
+"""Searches from several starts on all cores; finished ones survive an interrupt."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ from bywire.identification.estimate import Estimate
 from bywire.identification.least_squares import NO_TRIAL, Loss, Problem, Solution, estimate, solve
 from bywire.identification.unknown import moved, scattered
 
-_SAME = 0.01  # of the lowest cost: minima that count as one
-_ROUGH = 1e-4  # of the cost: enough to come nearer
-_ENDED = 1e-5  # of the cost: enough to tell minima apart; the best one is polished later
+_SAME = 0.01  # of the lowest cost: minima that count as equal
+_ROUGH = 1e-4  # of the cost: enough for a first approach
+_ENDED = 1e-5  # of the cost: enough to distinguish minima; the best one is refined later
 
 
 @dataclass(frozen=True)
 class Search:
-    """Where several starts led.
+    """Results of several starts.
 
     Parameters
     ----------
     solutions
-        One per start that led anywhere, in the order of the starts.
+        One per successful start, in the order of the starts.
     failed
-        Starts from which nothing could be computed.
+        Starts that could not be computed.
     """
 
     solutions: tuple[Solution, ...]
@@ -46,7 +46,7 @@ class Search:
 
     @property
     def reached(self) -> int:
-        """How many starts came within 1 % of the lowest minimum."""
+        """Number of starts within 1 % of the lowest minimum."""
         lowest = self.best.cost
         return sum(s.cost <= (1.0 + _SAME) * lowest + 1e-12 for s in self.solutions)
 
@@ -61,42 +61,42 @@ def multistart(
     progress: Progress | None = None,
     store: Path | None = None,
 ) -> Estimate:
-    """Return the estimate at the lowest minimum that several starts lead to.
+    """Return the estimate at the lowest minimum from several starts.
 
     Parameters
     ----------
     problem
-        Of a model of one's own: ``output_error(trials, unknowns)``, or written by hand.
+        Problem of your own model: ``output_error(trials, unknowns)``, or written by hand.
     count
-        Starts: the unknowns' own, then others around it.
+        Number of starts: the unknowns' own, then others around it.
     spread
-        How far those are away at most, as a share of the start.
+        Largest distance of the others, as a share of the start.
     seed
-        Of their random numbers.
+        Seed of their random numbers.
     loss
-        How large residuals count.
+        Loss of the residuals.
     progress
-        Called with a label and the finished share.
+        Callback with a label and the finished share.
     store
         File that keeps every finished start.
 
     Returns
     -------
     Estimate
-        With a note on how many starts met the lowest minimum.
+        With a note on how many starts reached the lowest minimum.
 
     Raises
     ------
     SolverError
-        When no start led anywhere.
+        When no start could be computed.
     ParameterError
-        When the data tells none of the unknowns.
+        When the data determine none of the unknowns.
     """
     starts = scattered(problem.unknowns, count, spread, seed)
     led = search(problem, starts, loss, progress, store)
-    note = f"{led.reached} of {count} starts met the lowest minimum"
+    note = f"{led.reached} of {count} starts reached the lowest minimum"
     if led.reached == 1 < count:
-        note += ": there may be a lower one; take more starts, narrower bounds or fewer unknowns"
+        note += ": there may be a lower one; use more starts, narrower bounds or fewer unknowns"
     return estimate(problem, loss, led.best.values).noted((note,))
 
 
@@ -111,28 +111,28 @@ def search(
 ) -> Search:
     """Solve from every start.
 
-    Kernels let go of Python's lock while they run, so that threads use all cores.
+    Kernels release Python's lock while they run, so that threads use all cores.
 
     Parameters
     ----------
     starts
         Each of shape (p,).
     progress
-        Called with a label and the finished share.
+        Callback with a label and the finished share.
     store
-        File that keeps every finished start; a search of the same residuals and starts goes on
-        from there.
+        File that keeps every finished start; a search with the same residuals and starts
+        continues from there.
     threads
-        All cores by default.
+        Number of threads; all cores by default.
     before
-        Brings each start nearer first.
+        First brings each start closer to a minimum.
 
     Raises
     ------
     SolverError
-        When no start led anywhere.
+        When no start could be computed.
     ParameterError
-        Likewise, where the parameters' own rules refuse a start.
+        Likewise, if the parameters' rules reject the starts.
     KeyboardInterrupt
         When interrupted; finished starts are in the store.
     """
@@ -171,13 +171,14 @@ def search(
         raise refused[-1]
     if not solutions:
         raise SolverError(
-            "no start could be computed: begin nearer to the truth, or measure at other points"
+            "no start could be computed: start closer to the true values, "
+            "or measure at other points"
         )
     return Search(tuple(solutions[k] for k in sorted(solutions)), len(starts) - len(solutions))
 
 
 def nearer(problem: Problem, held: Collection[str], start: Array) -> Array:
-    """Return where a start leads with some unknowns, by name, held at it."""
+    """Return the result of a start with some unknowns, by name, held."""
     fixed = [k for k, u in enumerate(problem.unknowns) if u.name in held]
     rest = replace(problem, unknowns=moved(problem.unknowns, start))
     for k in reversed(fixed):
@@ -189,7 +190,7 @@ def nearer(problem: Problem, held: Collection[str], start: Array) -> Array:
 
 
 def _keys(problem: Problem, starts: Sequence[Array], loss: Loss) -> list[str]:
-    """Return what tells one search from another: unknowns, their residuals, and the start."""
+    """Return a text that identifies a search: unknowns, their residuals, and the start."""
     digest = hashlib.sha256(f"{loss} {problem.unknowns}".encode())
     for start in starts:
         try:
@@ -206,5 +207,5 @@ def _keys(problem: Problem, starts: Sequence[Array], loss: Loss) -> list[str]:
 
 
 def _solution(row: Mapping[str, Any]) -> Solution:
-    """Return the solution that a file of finished starts says."""
+    """Return the solution from an entry in a file of finished starts."""
     return Solution(np.array(row["values"], dtype=float), float(row["cost"]))

@@ -1,7 +1,7 @@
 """Output error: a model is run over measured inputs and fitted to measured outputs.
 
-Open loop, the measured input of the plant drives it; closed loop, the measured set point drives
-model and controller together, so that the fit sees what feedback makes of an error. Derivatives
+In open loop, the measured input of the plant drives it. In closed loop, the measured set point
+drives model and controller together, so that the fit includes the effect of feedback. Derivatives
 are the exact ones of the run, friction and contacts included.
 """
 
@@ -31,11 +31,11 @@ from bywire.simulation.run import Run, simulate
 from bywire.simulation.sensitivity import simulate_with_sensitivities
 
 Start = Callable[[Mapping[str, float]], tuple[Any, Any]]
-"""``start(values) -> (state, memory)``: where a run begins with parameters, and with what is
-called ``start.NAME``, changed"""
+"""``start(values) -> (state, memory)``: start of a run with changed parameters and start options
+(``start.NAME``)"""
 
 _SHIFT = 1e-6  # of an unknown's scale: for differences of the start
-_AFTERWARDS = ("initial.", "stimulus.")  # what no start depends on
+_AFTERWARDS = ("initial.", "stimulus.")  # prefixes of unknowns that do not affect the start
 
 
 @checked
@@ -47,15 +47,15 @@ def moved_run(run: Run, values: Mapping[str, float], start: Start | None = None)
     run
         The run.
     values
-        By name: parameters; ``initial.STATE`` replaces, ``stimulus.NAME`` adds, ``start.NAME``
-        goes to the start.
+        By name: parameters; ``initial.STATE`` replaces a value, ``stimulus.NAME`` adds to it, and
+        ``start.NAME`` is an option of the start.
     start
-        Where the run begins with other values; by default where it does.
+        Start of the run with other values; by default its own start.
 
     Raises
     ------
     ParameterError
-        When the values are not admissible together.
+        When the combination of values is not valid.
     """
     fixed = {n[8:]: v for n, v in values.items() if n.startswith("initial.")}
     shift = {n[9:]: v for n, v in values.items() if n.startswith("stimulus.")}

@@ -1,4 +1,4 @@
-"""What a user asks to be identified on a bench: options, and unknowns as texts."""
+"""Questions for identification on a bench: measured signals and unknowns as texts, and options."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ from bywire.identification.output_error import Between
 from bywire.identification.unknown import Unknown, parameters_of, scattered
 
 Texts = Mapping[str, str] | Iterable[str]
-"""what is said of each name; or the names alone"""
+"""text for each name; or the names alone"""
 
 BETWEEN = re.compile(r"\s*(?:\+-|\+/-|±)\s*")
-"""what stands between a value, or a column, and its standard deviation"""
+"""separator of a value, or a column, and its standard deviation"""
 
-_NUMBER = re.compile(r"[-+]?\.?\d")  # how a noise begins
+_NUMBER = re.compile(r"[-+]?\.?\d")  # first characters of a noise
 
 Share = Annotated[float, Unit("1", 0.01), Field(ge=0, le=1, allow_inf_nan=False)]
 
@@ -43,7 +43,7 @@ Share = Annotated[float, Unit("1", 0.01), Field(ge=0, le=1, allow_inf_nan=False)
 @checked
 @dataclass(frozen=True)
 class Question:
-    """What a method of any bench is asked: what is measured there, and what is unknown.
+    """Question for a method on any bench: measured signals and unknowns.
 
     Texts have units as on the command line.
 
@@ -62,16 +62,16 @@ class Question:
         Parameter, ``stimulus.NAME`` or ``offset.SIGNAL`` -> range such as ``"0.1..1 ohm"``; empty,
         or the names alone, for none.
     priors
-        What is known of an unknown: ``"0.35 +- 0.02 ohm"``.
+        Prior knowledge of an unknown: ``"0.35 +- 0.02 ohm"``.
     states
-        States whose initial values are unknown, in every record its own.
+        States whose initial values are unknown, separately for every record.
     case
         Run of the experiment; the first one by default.
     holdout
-        A measurement that is not fitted: validation.
+        A measurement for validation, which is not fitted.
     loss
-        How large residuals count: ``linear``, ``soft_l1``, ``huber`` or ``cauchy``; the method's
-        own choice by default.
+        Loss of the residuals: ``linear``, ``soft_l1``, ``huber`` or ``cauchy``; by default that of
+        the method.
     """
 
     bench: Bench | str | Path | None = None
@@ -86,28 +86,28 @@ class Question:
 
     @property
     def noise(self) -> dict[str, str]:
-        """Noise of each measured output as it is written; empty for the record's own."""
+        """Noise of each measured output as written; empty to estimate it from the record."""
         return {name: _column_and_noise(text)[1] for name, text in _texts_of(self.outputs).items()}
 
     @property
     def columns(self) -> dict[str, str]:
-        """Column of each output whose column is named, as it is written."""
+        """Column of each output that names one, as written."""
         texts = {name: _column_and_noise(text)[0] for name, text in _texts_of(self.outputs).items()}
         return {name: column for name, column in texts.items() if column}
 
     @property
     def ranges(self) -> dict[str, str]:
-        """Range of each unknown as it is written; empty for none."""
+        """Range of each unknown as written; may be empty."""
         return _texts_of(self.unknowns)
 
     @property
     def key(self) -> str:
-        """What tells experiments made for this from those made for anything else."""
+        """Text that identifies simulated experiments for this question."""
         return f"{self.inputs} {self.noise} {self.ranges} {self.priors} {self.states} {self.case}"
 
     @property
     def given(self) -> tuple[str, ...]:
-        """Names of what was given."""
+        """Names of the fields that were given."""
         options = {
             "bench": self.bench is not None,
             "inputs": self.inputs,
@@ -123,16 +123,16 @@ class Question:
 
 
 def _texts_of(names: Texts) -> dict[str, str]:
-    """Return what is said of each name, nothing where there are names alone."""
+    """Return the text for each name; empty if there are only names."""
     if isinstance(names, Mapping):
         return dict(names)
     return dict.fromkeys([names] if isinstance(names, str) else names, "")
 
 
 def _column_and_noise(text: str) -> tuple[str, str]:
-    """Return the column and the noise that a text names; both may be empty.
+    """Return the column and the noise in a text; both may be empty.
 
-    What begins with a digit and has no unit in brackets is a noise.
+    A text that starts with a digit and has no unit in brackets is a noise.
 
     Examples
     --------
@@ -156,13 +156,13 @@ class BenchMethod:
     Parameters
     ----------
     name
-        What the command line calls it.
+        Name on the command line.
     summary
         One line for listings.
     options, defaults, simulated
-        As of the methods that it makes.
+        As for the methods that it makes.
     on
-        ``on(bench, question) -> Method``: the method for what is asked of a bench.
+        ``on(bench, question) -> Method``: the method for a question about a bench.
     """
 
     name: str
@@ -176,7 +176,7 @@ class BenchMethod:
 BENCH_METHODS = Kind(
     "method", ("methods",), instances(BenchMethod), "bywire.identification.methods"
 )
-"""the methods that are made for a bench"""
+"""methods that need a bench"""
 
 
 def find_method(name: str) -> Method:
@@ -185,7 +185,7 @@ def find_method(name: str) -> Method:
     Raises
     ------
     UnknownNameError
-        With the nearest known names, those of methods for a bench among them.
+        With the nearest known names, including methods that need a bench.
     """
     if name not in METHODS.all():
         raise METHODS.unknown(name, BENCH_METHODS)
@@ -193,53 +193,53 @@ def find_method(name: str) -> Method:
 
 
 class Options(ParameterSet):
-    """How large residuals count, and what is asked of the result."""
+    """Loss of the residuals, and limits for the result."""
 
     loss: Loss
-    """how large residuals count: beyond the noise a robust loss grows slower than the square"""
+    """loss of the residuals: beyond the noise, a robust loss grows more slowly than the square"""
     between: Between
-    """what inputs do between samples: held as a controller's demand is, or joined by straight lines
-    as something smooth is that acts on the model faster than it was measured"""
+    """inputs between samples: held, as a controller's demand, or linear, for smooth inputs that
+    act on the model faster than they were measured"""
     most_residual: Factor
     """residual over noise above which the model does not explain the record"""
     most_outliers: Share
-    """residuals beyond four times the noise, of all, that a robust loss may set aside"""
+    """largest share of residuals beyond four times the noise that a robust loss may exclude"""
     least_vaf: Share
-    """variance of the held-out record that is to be accounted for, signal by signal"""
+    """least variance accounted for in the held-out record, for each signal"""
     noise: Share
-    """synthetic: standard deviation of an output's noise, of its range, where none is given"""
+    """synthetic: standard deviation of an output's noise relative to its range, if none is given"""
 
 
 # --- Unknowns as texts: names, ranges ``LOW..HIGH``, priors ``MEAN +- DEVIATION``
 
-_OPEN = 1e-6  # of a range: how near an end comes to zero that is not valid
+_OPEN = 1e-6  # of a range: distance of an end from zero if zero is not valid
 _EXAMPLES = {"range": (0.5, 2.0), "prior": (1.0, 0.1)}  # of the usual magnitude
 _STIMULUS, _OFFSET = "stimulus.", "offset."
 
 
 def is_parameter(name: str) -> bool:
-    """Return whether an unknown is a parameter of the bench, and no offset."""
+    """Return whether an unknown is a parameter of the bench, not an offset."""
     return not name.startswith((_STIMULUS, _OFFSET))
 
 
 def unknowns_of(case: Case, known: ParameterSet, question: Question) -> tuple[Unknown, ...]:
-    """Return what all records share; see `Question` for how it is written.
+    """Return the unknowns that all records share; `Question` describes the texts.
 
     Parameters
     ----------
     case
         Run of the bench: its parameters are the starts.
     known
-        Parameters of the bench; what the experiment sets itself differs from them.
+        Parameters of the bench; those that the experiment sets differ from them.
     question
-        What is asked for.
+        Question of the user.
 
     Raises
     ------
     UnknownNameError
-        For a name that is no number of the bench, with the nearest.
+        For a name that is not a number of the bench, with the nearest names.
     ParameterError, UnitError
-        When nothing is asked for; for ranges and priors that cannot be read or are empty.
+        When there are no unknowns, or a range or prior is not valid or empty.
     """
     if not question.ranges:
         raise ParameterError(
@@ -278,20 +278,20 @@ def _bare(name: str, case: Case, known: ParameterSet, outputs: Iterable[str]) ->
         return Unknown(name, 0.0, scale=signal.nominal, unit=signal.unit)
     if name.startswith("initial."):
         raise ParameterError(
-            f"unknown {name}: initial values are each record's own; write "
+            f"unknown {name}: each record has its own initial values; write "
             f"{option('states')} {name.removeprefix('initial.')}",
             name=name,
         )
     given, leaves = known.flat().get(name), leaf_fields(type(known))
     if name not in leaves and given is not None:
         raise ParameterError(
-            f"unknown {name}: it is a choice, here {quoted(given)}, and no number; try each with "
+            f"unknown {name}: it is a choice (here {quoted(given)}), not a number; try each with "
             f"{option('overrides', {name: '...'})}",
             name=name,
         )
     if isinstance(given, tuple):
         raise ParameterError(
-            f"unknown {name}: it is a table, of which no node can be estimated; name a number",
+            f"unknown {name}: it is a table, whose nodes cannot be estimated; name a number",
             name=name,
         )
     if name not in leaves:
@@ -320,7 +320,7 @@ def _with_texts(unknown: Unknown, within: str, prior: str, leaf: Leaf | None) ->
     if leaf is not None and (low < leaf.low or high > leaf.high):
         raise not_valid(f"range of {unknown.name}", quoted(within), leaf.range_text)
     low = low if low > unknown.low or leaf is None or not leaf.low_open else max(low, _OPEN * high)
-    # Where the bench's own value lies outside, the search begins in the middle.
+    # If the bench's value is outside, the search starts in the middle.
     start = unknown.start if low <= unknown.start <= high else 0.5 * (low + high)
     return replace(unknown, low=low, high=high, start=start)
 
@@ -336,11 +336,11 @@ def _prior(unknown: Unknown, text: str) -> tuple[float, float]:
 def _pair(
     unknown: Unknown, text: str, parts: Sequence[str], kind: str, sign: str
 ) -> tuple[float, float]:
-    """Return two quantities; a unit that only the second one has counts for both."""
+    """Return two quantities; a unit after the second one alone applies to both."""
     low, high = _EXAMPLES[kind]
     if len(parts) != 2 or not all(part.strip() for part in parts):
         raise ParameterError(
-            f"{kind} of {unknown.name}: {quoted(text)} cannot be read; write for instance "
+            f"{kind} of {unknown.name}: {quoted(text)} is not valid; write for instance "
             f"'{shown(low * unknown.scale, unknown.unit)}{sign}"
             f"{shown(high * unknown.scale, _second_unit(unknown, kind))}'",
             name=f"{kind} of {unknown.name}",
@@ -365,14 +365,14 @@ def _second_unit(unknown: Unknown, kind: str) -> str:
 def starts_of(
     unknowns: Sequence[Unknown], ranges: Mapping[str, str], count: int, spread: float, seed: int
 ) -> tuple[Array, ...]:
-    """Return starts: the unknowns' own, then others, all over a range that was given.
+    """Return starts: the unknowns' own, then others all over a given range.
 
     Parameters
     ----------
     ranges
-        Texts by name; without one, starts scatter around the own one.
+        Texts by name; without one, starts scatter around the first.
     count, spread, seed
-        As of `scattered`.
+        As for `scattered`.
     """
     first, *others = scattered(unknowns, count, spread, seed)
     given = [k for k, u in enumerate(unknowns) if ranges.get(u.name)]
@@ -386,16 +386,16 @@ def starts_of(
 def switched_off(
     known: ParameterSet, unknowns: Iterable[Unknown], fitted: Mapping[str, str]
 ) -> dict[str, str]:
-    """Return why nothing may depend on an unknown: name -> choices that stand beside it.
+    """Return reasons why no output may depend on an unknown: name -> choices next to it.
 
     Parameters
     ----------
     known
         Parameters of the bench.
     unknowns
-        What is searched.
+        Unknowns of the search.
     fitted
-        Choices that the fit makes itself: dotted name -> choice.
+        Choices that the fit sets: dotted name -> choice.
     """
     choices = {n: c for n, c in known.choices().items() if isinstance(c, str)}
     choices |= {name: c for name, c in fitted.items() if name in choices}

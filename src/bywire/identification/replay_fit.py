@@ -102,7 +102,7 @@ def estimate_lag(
                 name=name,
             )
         if np.ptp(values) == 0.0:
-            raise ParameterError(f"{name} does not move: it shows no lag", name=name)
+            raise ParameterError(f"{name} does not move: it has no lag", name=name)
     most = int(np.ceil(reach / step))
     if not most >= 1 or a.size - most < _LEAST:
         overlap = f"leave an overlap of {_LEAST} steps in {a.size * step:g} s"
@@ -281,8 +281,8 @@ def found_in(demand: xr.DataArray, tolerances: Mapping[str, str]) -> list[Segmen
     merged.append(ends[-1])
     if len(merged) - 1 > _MOST:
         raise ParameterError(
-            f"the demand {demand.name} holds and moves {len(merged) - 1} times: name the "
-            f"stretches that matter in a file, {option('segments')} FILE",
+            f"the demand {demand.name} changes between holding and moving {len(merged) - 1} times: "
+            f"name the segments that matter in a file, {option('segments')} FILE",
             name="segments",
         )
     counts = {"hold": 0, "move": 0}
@@ -305,14 +305,14 @@ def read_segments(path: str | Path, tolerances: Mapping[str, str]) -> list[Segme
         TOML file with a section ``[segments.NAME]`` for each, with ``start``, ``stop`` and
         ``tolerances``; a section ``[tolerances]`` holds for all.
     tolerances
-        For all as well; those in the file go first.
+        Tolerances for all segments; those in the file take precedence.
 
     Raises
     ------
     FileError
-        When the file cannot be read or is no TOML.
+        When the file cannot be read or is not valid TOML.
     InputError
-        For anything in it that does not fit.
+        For content that is not valid.
     """
     file = Path(path)
     content = read_toml(file, "file of segments")
@@ -326,20 +326,20 @@ def _from(content: Mapping[str, Any], tolerances: Mapping[str, str]) -> list[Seg
     file = SegmentFile.read(content, "a file of segments")
     if not file.segments:
         raise ParameterError(
-            "no segment: write [segments.NAME] with start and stop", name="segments"
+            "there is no segment: write [segments.NAME] with start and stop", name="segments"
         )
     shared = {**tolerances, **file.tolerances}
     segments = []
     for name, section in file.segments.items():
         if not section.start < section.stop:
-            raise ParameterError(f"[segments.{name}]: start must lie before stop", name=name)
+            raise ParameterError(f"[segments.{name}]: start must be before stop", name=name)
         limits = {**shared, **section.tolerances}
         segments.append(Segment(name, section.start, section.stop, limits))
     return segments
 
 
 # --- Tolerances
-# Errors may go either way: an upper limit alone of a figure that has a sign bounds its magnitude.
+# Errors may have either sign: an upper limit alone of a signed figure bounds its magnitude.
 
 SIGNED = ("bias", "lag")
 """figures that may be negative"""
@@ -347,12 +347,12 @@ _BOTH = re.compile(r"\s+and\s+")
 
 
 def read_tolerances(texts: Sequence[str]) -> dict[str, str]:
-    """Return the limits of each figure, where one is named several times all of them.
+    """Return all limits of each figure.
 
     Raises
     ------
     ParameterError
-        When a text has no figure, no sign or no limit.
+        When a text lacks a figure, a comparison or a limit.
 
     Examples
     --------
@@ -364,7 +364,7 @@ def read_tolerances(texts: Sequence[str]) -> dict[str, str]:
         name, compare, bound = parted(text)
         if compare is None or not name or not bound:
             raise ParameterError(
-                f"{option('tolerances')} {text!r} cannot be read: write for instance 'nrmse <= 5 "
+                f"{option('tolerances')} {text!r} is not valid: write for instance 'nrmse <= 5 "
                 "%' or 'p_mc.max_error <= 2 bar'",
                 name="tolerances",
                 value=text,
@@ -382,7 +382,7 @@ def judge_fit(
     Parameters
     ----------
     tolerances
-        Figure, or ``SIGNAL.FIGURE``, which goes before it -> limits, joined by ``and``. An upper
+        Figure, or ``SIGNAL.FIGURE``, which takes precedence -> limits, joined by ``and``. An upper
         limit of ``bias`` or ``lag`` without a lower one bounds the magnitude.
     signal, kpis
         Name and figures.
@@ -390,9 +390,9 @@ def judge_fit(
     Raises
     ------
     ParameterError
-        When a limit cannot be read, or no magnitude can meet it.
+        When a limit is not valid, or no magnitude can meet it.
     UnitError
-        When its unit measures something else than the figure.
+        When its unit has another dimension than the figure.
     """
     by_name = {kpi.name: kpi for kpi in kpis}
     wanted = {key: key for key in tolerances if "." not in key}
@@ -407,7 +407,7 @@ def judge_fit(
 
 
 def _require_known(tolerances: Mapping[str, str], figures: Mapping[str, Sequence[Kpi]]) -> None:
-    """Refuse tolerances of figures or signals that there are not.
+    """Reject tolerances of unknown figures or signals.
 
     Parameters
     ----------
@@ -433,8 +433,8 @@ def _limits(key: str, text: str, kpi: Kpi) -> list[Limit]:
     for limit in limits:
         if limit.bound < 0.0:
             raise ParameterError(
-                f"tolerance {limit} bounds the magnitude, which is never negative: give a "
-                f"lower limit as well, such as '{key} >= ...', and both are taken with their sign",
+                f"tolerance {limit} bounds the magnitude, which is never negative: add a "
+                f"lower limit, such as '{key} >= ...', so that both limits are signed",
                 name=key,
             )
     return [replace(limit, of_magnitude=True) for limit in limits]
@@ -442,23 +442,23 @@ def _limits(key: str, text: str, kpi: Kpi) -> list[Limit]:
 
 # --- The fit
 
-_LARGEST_LAG = 0.25  # of a stretch
+_LARGEST_LAG = 0.25  # of a segment
 _FIRST_LAG = 8.0  # samples
-_NO_LAG = 1e-3  # samples: what rounding makes of none
+_NO_LAG = 1e-3  # samples: rounding of zero lag
 
 
 @dataclass(frozen=True)
 class SegmentFit:
-    """How well one signal is met over one stretch.
+    """Fit of one signal over one segment.
 
     Parameters
     ----------
     segment, signal
-        Where, and what.
+        Segment, and name of the signal.
     kpis
         Its figures.
     verdicts
-        Tolerances that apply to it.
+        Verdicts of its tolerances.
     """
 
     segment: Segment
@@ -468,14 +468,14 @@ class SegmentFit:
 
 
 def fit_figures(pair: xr.Dataset, segment: Segment) -> tuple[Kpi, ...]:
-    """Return the figures of one signal over one stretch.
+    """Return the figures of one signal over one segment.
 
     Parameters
     ----------
     pair
-        ``measured`` and ``modeled`` over ``time`` [s]; where one is NaN nothing is compared.
+        ``measured`` and ``modeled`` over ``time`` [s]; samples with NaN are not compared.
     segment
-        The stretch.
+        The segment.
 
     Returns
     -------
@@ -486,7 +486,7 @@ def fit_figures(pair: xr.Dataset, segment: Segment) -> tuple[Kpi, ...]:
     Raises
     ------
     ParameterError
-        When the stretch goes beyond the record, or holds fewer than two samples.
+        When the segment extends beyond the record, or contains fewer than two samples.
     """
     _require_within(pair["time"].values, segment)
     part = pair.sel(time=slice(segment.start - 1e-9, segment.stop + 1e-9))
@@ -507,43 +507,45 @@ def fit_figures(pair: xr.Dataset, segment: Segment) -> tuple[Kpi, ...]:
     lag, lag_note = _lag(part, there)
     still = "the measured signal does not move"
     return (
-        Kpi("rmse", rmse, unit, "Root mean square of modeled less measured."),
+        Kpi("rmse", rmse, unit, "Root mean square of modeled minus measured."),
         Kpi(
             "nrmse",
             100.0 * rmse / span if span else math.nan,
             "%",
-            "That over the measured range of the whole record.",
+            "Root mean square error over the measured range of the whole record.",
             "" if span else still,
         ),
         Kpi(
             "vaf",
             100.0 * (1.0 - float(np.var(error)) / variance) if variance else math.nan,
             "%",
-            "Variance accounted for: 1 less that of the error over that of the measurement.",
+            "Variance accounted for: 1 minus error variance over measured variance.",
             "" if variance else still,
         ),
         Kpi("max_error", float(np.abs(error).max()), unit, "Largest magnitude of the error."),
-        Kpi("bias", float(error.mean()), unit, "Mean of modeled less measured."),
-        Kpi("lag", lag, "s", "By how much the model is later, by correlation.", lag_note),
+        Kpi("bias", float(error.mean()), unit, "Mean of modeled minus measured."),
+        Kpi(
+            "lag", lag, "s", "Delay of the model against the measurement, by correlation.", lag_note
+        ),
     )
 
 
 def _require_within(time: Array, segment: Segment) -> None:
-    """Refuse a stretch of which a part was not measured; by a sample's interval it may."""
+    """Reject a segment that extends beyond the record by more than a sample."""
     first, last = float(time[0]), float(time[-1])
     spare = 1.001 * float(np.median(np.diff(time)))
     if segment.start < first - spare or segment.stop > last + spare:
         raise ParameterError(
-            f"segment {segment.name!r}, {segment.start:g} to {segment.stop:g} s, goes beyond the "
-            f"record, which holds {first:.6g} to {last:.6g} s: correct its start or stop",
+            f"segment {segment.name!r}, {segment.start:g} to {segment.stop:g} s, extends beyond "
+            f"the record, which covers {first:.6g} to {last:.6g} s: correct its start or stop",
             name=segment.name,
         )
 
 
 def _lag(part: xr.Dataset, there: NDArray[np.bool_]) -> tuple[float, str]:
-    """Return the lag nearest to zero at which both go together best, and a note.
+    """Return the lag of best correlation nearest to zero, and a note.
 
-    A periodic signal looks alike a period later: the range of lags grows until it holds a peak.
+    A periodic signal repeats after a period, so the range of lags grows until it contains a peak.
     """
     if not there.all():
         return math.nan, "the measured signal has gaps"
@@ -559,7 +561,7 @@ def _lag(part: xr.Dataset, there: NDArray[np.bool_]) -> tuple[float, str]:
             value = peak.value if abs(peak.value) > _NO_LAG * step else 0.0
             return value, f"correlation {peak.correlation:.4f}"
         reach *= 2.0
-    return math.nan, "no lag stands out"
+    return math.nan, "no lag is distinct"
 
 
 def judged(
@@ -567,10 +569,10 @@ def judged(
     segments: Sequence[Segment],
     others: Mapping[float, Mapping[str, xr.Dataset]] = MappingProxyType({}),
 ) -> tuple[SegmentFit, ...]:
-    """Return the figures of all signals over all stretches, with the verdicts.
+    """Return the figures of all signals over all segments, with the verdicts.
 
-    With ``others``, the same in other steps by their length over the run's, figures have their
-    error from the step, and a tolerance that is closer than that is undecided.
+    With ``others``, the results at other steps by step length relative to the run's, figures have
+    their error from the step. A tolerance that is closer than this error is undecided.
 
     A tolerance named ``nrmse`` holds for every signal, ``p_mc.nrmse`` for one; its limits are
     read by `bywire.identification.replay_fit.judge_fit`.
@@ -578,9 +580,9 @@ def judged(
     Raises
     ------
     ParameterError, UnitError
-        When a limit cannot be read, or a stretch goes beyond the record.
+        When a limit is not valid, or a segment extends beyond the record.
     UnknownNameError
-        When a tolerance names no figure or signal.
+        When a tolerance names an unknown figure or signal.
     """
     fits = []
     for segment in segments:
@@ -596,7 +598,7 @@ def judged(
 
 
 def undefined(fits: Sequence[SegmentFit]) -> tuple[str, ...]:
-    """Return why figures are not defined, a sentence for each reason."""
+    """Return the reasons why figures are undefined, one sentence each."""
     where: dict[tuple[str, str, str], list[str]] = {}
     for fit in fits:
         for kpi in fit.kpis:

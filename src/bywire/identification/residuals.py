@@ -1,4 +1,4 @@
-"""Residuals of a fit: how much of the measurement is explained, and whether more could be."""
+"""Residuals of a fit: variance explained, and tests against richer models."""
 
 from __future__ import annotations
 
@@ -22,29 +22,29 @@ _LEVEL = 1e-3  # of a false alarm
 def lack_of_fit(
     name: str, residuals: Array, weights: Array, richer: Array, unknowns: int, note: str
 ) -> Check:
-    r"""Return how much better a richer model would fit, as Fisher's F.
+    r"""Return the improvement of the fit by a richer model, as Fisher's F.
 
     .. math:: F = \frac{(S - S_r) / (r - p)}{S_r / (n - r)}
 
-    with S the weighted sum of squares that is left over, S_r what a model with r columns leaves of
-    it, which contains the p unknowns of the fitted one to first order. Where neighboring readings
-    go together it is divided by how much stronger slow noise is than the average. It is of size
-    one where nothing is missing; chance exceeds the limit once in a thousand times.
+    with S the weighted sum of squared residuals, and S_r that of a model with r columns, which
+    contains the p unknowns of the fitted one to first order. For correlated readings it is divided
+    by the ratio of slow noise to the average. It is of size one for a complete model; chance
+    exceeds the limit once in a thousand times.
 
     Parameters
     ----------
     name
-        Of the check.
+        Name of the check.
     residuals
         One per reading, in the order of time, in its unit, shape (n,).
     weights
-        Of the readings, shape (n,): one over their scatter.
+        Weights of the readings, shape (n,): one over their scatter.
     richer
         Columns of the richer model, shape (n, r).
     unknowns
         p.
     note
-        What the richer model can do that the fitted one cannot.
+        Additional effect in the richer model.
     """
     from scipy import special
 
@@ -52,10 +52,10 @@ def lack_of_fit(
     r = int(np.linalg.matrix_rank(A))
     more, left = r - unknowns, e.size - r
     if more < 1 or left < 1:
-        return Check(name, 0.0, note=f"too few readings to tell: {note}")
+        return Check(name, 0.0, note=f"too few readings for this check: {note}")
     rest = e - A @ np.linalg.lstsq(A, e, rcond=None)[0]
     within = max(float(rest @ rest) / left, 1e-300)
-    # What a richer model bends is slow: there colored noise is larger than on the average.
+    # A richer model changes slow components, where colored noise is larger than on average.
     slow = 1.0 if is_white(rest) else autoregression(rest).at_zero_frequency / within
     value = float(e @ e - rest @ rest) / more / (within * max(slow, 1.0))
     return Check(
@@ -63,8 +63,8 @@ def lack_of_fit(
         value,
         limit=float(special.fdtri(more, left, 1.0 - _LEVEL)),
         note=note,
-        next_step="see in the curve where it bends, and identify the part of the range that is "
-        "straight, or a law that bends",
+        next_step="see in the curve where it bends, and identify the straight part of the range, "
+        "or a law that bends",
     )
 
 
@@ -88,11 +88,11 @@ def explained(
     Parameters
     ----------
     trials
-        What was fitted.
+        Fitted trials.
     estimate
-        With the residuals that are left.
+        Estimate with its residuals.
     counted
-        Which residuals count, shape (n,); all by default.
+        Mask of the evaluated residuals, shape (n,); all by default.
     """
     counted = np.ones(estimate.residuals.size, dtype=bool) if counted is None else counted
     total = 0.0

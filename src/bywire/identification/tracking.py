@@ -34,24 +34,24 @@ class Rows:
 
 @dataclass(frozen=True)
 class Relation:
-    """A relation that tells parameters.
+    """A relation that determines parameters.
 
     Parameters
     ----------
     name
-        What it is called.
+        Name of the relation.
     assembly
-        Whose parameters it tells.
+        Assembly whose parameters it determines.
     names, units
         All parameters of the relation, the tracked one first, and their SI units.
     signals
-        What must be measured: name -> SI unit.
+        Required signals: name -> SI unit.
     rows
         ``rows(data, par) -> Rows``.
     start
         ``start(par) -> values``, shape (p,).
     assumption
-        When it holds, one sentence.
+        Condition for its validity, one sentence.
     """
 
     name: str
@@ -70,11 +70,11 @@ class Relation:
 
 
 RELATIONS = Kind("relation", ("tracked",), instances(Relation))
-"""by preference: the first of a parameter whose signals are measured is taken"""
+"""in order of preference: the first one of a parameter whose signals are measured is used"""
 
 
 def _find_relation(name: str, data: xr.Dataset, par: Any) -> Relation:
-    """Return the relation that tells a parameter from what is measured.
+    """Return the relation that determines a parameter from the measured signals.
 
     Parameters
     ----------
@@ -88,9 +88,9 @@ def _find_relation(name: str, data: xr.Dataset, par: Any) -> Relation:
     Raises
     ------
     UnknownNameError
-        When nothing tells such a parameter.
+        When no relation determines such a parameter.
     ParameterError
-        When what it needs is not measured, or the brake is another one.
+        When a required signal is not measured, or the relation is for another brake.
     """
     known = {relation.parameter for relation in RELATIONS.all().values()}
     relations = [
@@ -115,20 +115,20 @@ def _find_relation(name: str, data: xr.Dataset, par: Any) -> Relation:
 
 
 # --- Recursive least squares: parameters of a linear relation, sample by sample
-# The relation is :math:`y_k = \varphi_k^T \theta_k + e_k`. Either the parameters walk at random and
-# a Kalman filter follows them, or past samples are forgotten exponentially.
+# The relation is :math:`y_k = \varphi_k^T \theta_k + e_k`. Either the parameters are a random walk
+# that a Kalman filter tracks, or past samples are forgotten exponentially.
 
-_BURN_IN = 3  # samples per unknown that set the start rather than test the model
+_BURN_IN = 3  # samples per unknown that determine the start and do not test the model
 
 
 @dataclass(frozen=True)
 class Walk:
-    """How parameters may drift, and how noisy the relation is.
+    """Drift of the parameters, and noise of the relation.
 
     Parameters
     ----------
     drift
-        Standard deviation that each parameter gains in the square root of a second, shape (p,).
+        Growth of each parameter's standard deviation per square root of a second, shape (p,).
     noise
         Standard deviation of e.
     """
@@ -146,8 +146,8 @@ class Tracked:
     values, deviations
         Estimates and their standard deviations after each sample, shape (n, p).
     innovations
-        What each sample said against the prediction, over the standard deviation of that, shape
-        (n,); NaN where a sample did not count. White and of size one where the model is right.
+        Prediction error of each sample over its standard deviation, shape (n,); NaN for unused
+        samples. White and of size one if the model is right.
     spreads
         Variance of each sample about its prediction, shape (n,).
     """
@@ -174,7 +174,7 @@ def kalman(
     start: Array,
     deviation: Array,
 ) -> Tracked:
-    r"""Track parameters that walk at random.
+    r"""Track parameters that follow a random walk.
 
     .. math::
         \theta_{k+1} = \theta_k + w_k,\ \mathrm{cov}(w) = \mathrm{diag}(q^2) T; \quad
@@ -183,13 +183,13 @@ def kalman(
     Parameters
     ----------
     regressors, targets
-        Shapes (n, p) and (n,); a sample with NaN tells nothing, and the parameters walk on.
+        Shapes (n, p) and (n,); samples with NaN are not used, and the parameters drift on.
     interval
         Sample time T [s].
     walk
         q and sigma.
     start, deviation
-        What is known before the first sample, shape (p,).
+        Values and standard deviations before the first sample, shape (p,).
 
     References
     ----------
@@ -220,16 +220,16 @@ def kalman(
 
 
 def forgetting(regressors: Array, targets: Array, interval: float, memory: float) -> Tracked:
-    r"""Track parameters by least squares that forgets, weight :math:`e^{-(t_n - t_k) / \tau}`.
+    r"""Track parameters by least squares with forgetting, weight :math:`e^{-(t_n - t_k) / \tau}`.
 
     The deviations are those of the weighted least squares, :math:`\sigma^2 S^{-1} S_2 S^{-1}` with
-    :math:`S = \sum w \varphi \varphi^T` and :math:`S_2 = \sum w^2 \varphi \varphi^T`, as if the
-    parameters stood still within the memory: drift faster than that is not in them.
+    :math:`S = \sum w \varphi \varphi^T` and :math:`S_2 = \sum w^2 \varphi \varphi^T`, for
+    parameters that are constant within the memory; they do not include faster drift.
 
     Parameters
     ----------
     regressors, targets
-        Shapes (n, p) and (n,); a sample with NaN tells nothing, and nothing is forgotten then.
+        Shapes (n, p) and (n,); samples with NaN are not used, and nothing is forgotten then.
     interval
         Sample time [s].
     memory
@@ -238,7 +238,7 @@ def forgetting(regressors: Array, targets: Array, interval: float, memory: float
     Returns
     -------
     Tracked
-        NaN until the samples tell all parameters.
+        NaN until the samples determine all parameters.
     """
     n, p = regressors.shape
     _require_shapes(regressors, targets, np.zeros(p))
@@ -283,7 +283,7 @@ def likeliest(
     deviation: Array,
     least: float = 0.0,
 ) -> Walk:
-    r"""Return drift and noise under which the data is likeliest.
+    r"""Return drift and noise of maximum likelihood.
 
     Maximum likelihood of the innovations, :math:`\min \sum \ln s_k + \nu_k^2 / s_k`; the drifts of
     all parameters are one factor times their initial deviations.
@@ -291,8 +291,8 @@ def likeliest(
     Parameters
     ----------
     least
-        Noise that is there for sure, for instance from the scatter within averaged blocks: a
-        walk that jumps now and then would otherwise explain all noise as drift.
+        Known part of the noise, for instance from the scatter within averaged blocks. Otherwise a
+        walk with occasional jumps would explain all noise as drift.
 
     Raises
     ------
@@ -309,8 +309,8 @@ def likeliest(
     p = regressors.shape[1]
     if counts.sum() < 10 * p:
         raise ParameterError(
-            f"{int(counts.sum())} samples count: too few to track {p} parameters; measure longer, "
-            "or where the relation holds",
+            f"{int(counts.sum())} samples are valid, too few to track {p} parameters: measure "
+            "longer, or where the relation holds",
             name="samples",
             value=str(int(counts.sum())),
         )
@@ -348,7 +348,7 @@ def _require_shapes(regressors: Array, targets: Array, start: Array) -> None:
 
 # --- Through a record
 
-_UNSURE = 0.5  # of the start: how far off the parameters may be at first
+_UNSURE = 0.5  # of the start: initial standard deviation of the parameters
 _MOST = 4000  # blocks
 _BLOCK, _LONGEST = 0.1, 1.0  # s
 
@@ -360,13 +360,13 @@ class Track:
     Parameters
     ----------
     relation
-        What it was tracked from.
+        Relation of the tracking.
     data
-        ``value``, ``low``, ``high`` (95 %) over ``time`` [s] and ``parameter``; ``used``: samples
-        behind each value.
+        ``value``, ``low``, ``high`` (95 %) over ``time`` [s] and ``parameter``; ``used``: number of
+        samples for each value.
     drift, noise
-        Found likeliest: what each parameter gains in the square root of a second, and the
-        standard deviation of the relation.
+        Maximum likelihood: growth of each parameter per square root of a second, and the standard
+        deviation of the relation.
     consistency
         Mean square and lag-one correlation of the normalized innovations: 1 and 0 when right.
     """
@@ -383,7 +383,7 @@ def track(name: str, data: xr.Dataset, par: Any, block: float | None = None) -> 
     """Track a parameter.
 
     Samples are averaged over blocks, so that the sensor's lag and the disc's run-out do not make
-    neighbors depend on each other; drift and noise are those that make the blocks likeliest.
+    neighbors depend on each other; drift and noise are those of maximum likelihood.
 
     Parameters
     ----------
@@ -392,7 +392,7 @@ def track(name: str, data: xr.Dataset, par: Any, block: float | None = None) -> 
     data
         Measured signals over ``time`` [s], evenly spaced.
     par
-        Parameters of the brake; what is tracked starts at its value there, known to 50 %.
+        Parameters of the brake; the tracked one starts at its value there, known to 50 %.
     block
         Length of a block [s]; by default a turn of the disc where ``Omega`` is measured, else
         0.1 s; longer where a record would have more than 4000.
@@ -400,7 +400,7 @@ def track(name: str, data: xr.Dataset, par: Any, block: float | None = None) -> 
     Raises
     ------
     UnknownNameError, ParameterError
-        When nothing tells the parameter, or too little is measured.
+        When no relation determines the parameter, or too little is measured.
     """
     relation = _find_relation(name, data, par)
     interval = even_interval(data["time"].values)
@@ -426,13 +426,13 @@ def track(name: str, data: xr.Dataset, par: Any, block: float | None = None) -> 
 
 
 def _turn(data: xr.Dataset) -> float:
-    """Return how long the disc takes for a turn [s], the median of the record."""
+    """Return the median time of a disc revolution [s]."""
     speed = float(np.nanmedian(np.abs(data["Omega"].values))) if "Omega" in data else 0.0
     return min(2.0 * math.pi / speed, _LONGEST) if speed > 0.0 else _BLOCK
 
 
 def _blocks(rows: Rows, width: int) -> tuple[Rows, NDArray[np.int64]]:
-    """Return means over blocks; NaN where less than half of a block counts."""
+    """Return means over blocks; NaN where less than half of a block is valid."""
     count = rows.targets.size // width
     phi = rows.regressors[: count * width].reshape(count, width, -1)
     y = rows.targets[: count * width].reshape(count, width)
@@ -447,7 +447,7 @@ def _blocks(rows: Rows, width: int) -> tuple[Rows, NDArray[np.int64]]:
 
 
 def _scatter(rows: Rows, width: int, used: NDArray[np.int64]) -> float:
-    """Return the standard error of a block's mean that the scatter within blocks tells."""
+    """Return the standard error of a block's mean from the scatter within blocks."""
     p = rows.regressors.shape[1]
     variances = []
     for k in np.flatnonzero(used > 2 * p):

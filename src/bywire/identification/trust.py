@@ -1,4 +1,4 @@
-"""Trust in a method: estimates from simulated experiments against the values put into them."""
+"""Trust in a method: estimates from simulated experiments compared with the true values."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _STEP = 20e-6
 
 @dataclass(frozen=True)
 class Sensor:
-    """What is read of a run.
+    """A sensor that reads a run.
 
     ``output``: output of the model; ``sigma``: standard deviation of white noise on every sample
     [unit of the output].
@@ -47,9 +47,9 @@ class Sensor:
 
 
 def sensed(case: Case, sensors: Mapping[str, Sensor], random: np.random.Generator) -> xr.Dataset:
-    """Return one run's signals from time zero on, with noise.
+    """Return a run's signals from time zero on, with noise.
 
-    ``sensors``: signal -> what it reads; ``random``: where the noise comes from.
+    ``sensors``: signal -> its sensor; ``random``: generator of the noise.
     """
     run = as_run(case, _STEP)
     computed = simulate(run, tuple({s.output for s in sensors.values()}))
@@ -66,32 +66,32 @@ def sensed(case: Case, sensors: Mapping[str, Sensor], random: np.random.Generato
 
 
 # --- Trust
-# Each experiment is made with a seed of its own, and identified from a start off the truth. Over
-# many of them the mean estimate has to hit the truth within its own scatter, and the 95 %
-# intervals have to hold it about 95 times in 100.
+# Each experiment has its own seed, and is identified from a start off the truth. Over many of them,
+# the mean estimate must match the truth within its scatter, and the 95 % intervals must contain it
+# about 95 times in 100.
 
 _TRIES = 20
-_KILLED = "what was finished is kept where there is an output folder, and the same command goes on"
+_KILLED = "with an output folder, finished experiments are kept and the same command continues"
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What one simulated experiment gave.
+    """Outcome of one simulated experiment.
 
     Parameters
     ----------
     seed
-        Of its noise and of its start.
+        Seed of its noise and of its start.
     values, deviations, low, high
         By label: estimate, its standard deviation, and the 95 % interval, SI.
     units
         SI unit by label.
     failed_checks
-        Names of the method's checks that did not hold.
+        Names of the method's failed checks.
     kept
-        Labels that the data did not tell.
+        Labels that the data did not determine.
     error
-        Why nothing was identified; empty where something was.
+        Reason if nothing was identified; otherwise empty.
     """
 
     seed: int
@@ -106,12 +106,12 @@ class Outcome:
 
 
 def displaced(par: ParameterSet, names: Sequence[str], spread: float, seed: int) -> ParameterSet:
-    """Return parameters with some of them up to ``spread`` off, so that a search has to move.
+    """Return parameters of which some are up to ``spread`` off, so that a search must move.
 
     Raises
     ------
     ParameterError
-        When no admissible set is found around this one.
+        When there is no valid set around this one.
     """
     unknowns = parameters_of(par, [n for n in names if n in par.leaves()])
     if not unknowns or spread == 0.0:
@@ -122,7 +122,7 @@ def displaced(par: ParameterSet, names: Sequence[str], spread: float, seed: int)
         except ParameterError:
             continue
     raise ParameterError(
-        f"no valid parameters within {100 * spread:g} % of these: lower it",
+        f"no valid parameters within {100 * spread:g} % of these: reduce it",
         name="spread",
         value=f"{100 * spread:g} %",
     )
@@ -195,7 +195,7 @@ def _key(method: Method, par: Any, options: Any, effort: Effort) -> str:
 
 
 def _outcome(row: Mapping[str, Any]) -> Outcome:
-    """Return the outcome that a file of finished experiments says."""
+    """Return the outcome from an entry in a file of finished experiments."""
     return Outcome(**{**row, **{name: tuple(row[name]) for name in ("failed_checks", "kept")}})
 
 
@@ -207,21 +207,21 @@ _COVERED = (0.90, 0.99)
 
 @dataclass(frozen=True)
 class Recovered:
-    """How well one unknown comes back.
+    """Recovery of one unknown.
 
     Parameters
     ----------
     label, unit, truth
-        What it is, its SI unit and the value put in.
+        Name, SI unit and true value.
     count
-        Experiments that told it.
+        Number of experiments that determined it.
     bias
-        Mean estimate less truth.
+        Mean estimate minus truth.
     bias_in_errors
-        The same over the standard error of the mean.
+        Bias over the standard error of the mean.
     coverage, coverage_range
-        Share of 95 % intervals that hold the truth, and the range of 95 % confidence in which the
-        share of infinitely many lies (Clopper, Pearson 1934).
+        Share of 95 % intervals that contain the truth, and its own 95 % confidence interval
+        (Clopper, Pearson 1934).
     scatter, claimed
         Standard deviation of the estimates, and the root mean square of those claimed.
     """
@@ -246,7 +246,7 @@ class Recovered:
 
 @dataclass(frozen=True)
 class Trust:
-    """What many simulated experiments say of a method.
+    """Results of many simulated experiments on a method.
 
     Parameters
     ----------
@@ -261,12 +261,12 @@ class Trust:
 
     @property
     def failed(self) -> tuple[Outcome, ...]:
-        """Experiments from which nothing was identified."""
+        """Experiments without an identification."""
         return tuple(o for o in self.outcomes if o.error)
 
     @property
     def holds(self) -> bool:
-        """Whether every unknown comes back, from every experiment."""
+        """Whether every experiment recovers every unknown."""
         return bool(self.recovered) and not self.failed and all(r.holds for r in self.recovered)
 
 
@@ -286,17 +286,18 @@ def trust(
     Parameters
     ----------
     method, par, options
-        What is simulated and identified.
+        Method, true parameters, and options.
     seeds
-        One experiment each.
+        Seeds, one per experiment.
     effort
-        Of each search; ``spread`` is also how far off its first start is. One start by default.
+        Effort of each search; ``spread`` is also the offset of its first start. One start by
+        default.
     processes
-        That many experiments at a time; None for all cores.
+        Number of parallel experiments; None for all cores.
     store
-        File that keeps every finished experiment; the same study goes on from there.
+        File that keeps finished experiments; the same study continues from there.
     progress
-        Called with a label and the finished share.
+        Callback with a label and the finished share.
 
     Raises
     ------
@@ -322,14 +323,14 @@ def put_in(method: Method, par: Any, options: Any) -> dict[str, float]:
     Parameters
     ----------
     method
-        Simulates with ``method.synthetic``.
+        Method with the simulation ``method.synthetic``.
     par, options
         Its parameters, None for a method of any assembly, and its options.
 
     Raises
     ------
     ParameterError
-        When what is simulated has no true values of what the method estimates.
+        When the simulation has no true values of the method's estimates.
     """
     truth: dict[str, float] = {} if par is None else par.leaves()
     return truth if method.truth is None else {**truth, **method.truth(par, options)}

@@ -1,4 +1,4 @@
-"""What is to be estimated: names with starts, bounds, and what is known beforehand."""
+"""Unknowns of an estimation: names with starts, bounds, and prior knowledge."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from bywire.core.errors import ParameterError, not_valid, unknown_name
 from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.typing import Array
 
-_BEYOND = 1e3  # of the start: how far a parameter may go that nothing else bounds
+_BEYOND = 1e3  # of the start: bounds of a parameter without others
 
 
 @dataclass(frozen=True)
@@ -26,17 +26,17 @@ class Unknown:
         Dotted name of a parameter; or ``initial.STATE``, ``stimulus.NAME`` (an offset of an
         input), ``offset.SIGNAL`` (an offset of a measured output).
     start
-        Where the search begins.
+        Start of the search.
     low, high
         Bounds.
     scale
-        Typical magnitude, > 0: what an uncertainty is large or small against.
+        Typical magnitude, > 0: reference for the size of an uncertainty.
     unit
         SI unit.
     prior
-        Mean and standard deviation known beforehand; None where nothing is known.
+        Mean and standard deviation from prior knowledge, or None.
     trial
-        Label of the trial that it belongs to; empty where all trials share it.
+        Label of its trial; empty if all trials share it.
     """
 
     name: str
@@ -61,7 +61,7 @@ class Unknown:
 
     @property
     def label(self) -> str:
-        """Name, with the trial's where it belongs to one."""
+        """Name, with the trial's if it belongs to one."""
         return f"{self.trial}:{self.name}" if self.trial else self.name
 
 
@@ -72,12 +72,12 @@ def parameters_of(
     starts: Mapping[str, float] | None = None,
     priors: Mapping[str, tuple[float, float]] | None = None,
 ) -> tuple[Unknown, ...]:
-    """Return parameters of a set as unknowns, within their admissible ranges.
+    """Return parameters of a set as unknowns, within their valid ranges.
 
     Parameters
     ----------
     par
-        Gives units, ranges, and the starts that are not given.
+        Source of units, ranges, and default starts.
     names
         Dotted names.
     starts, priors
@@ -112,14 +112,14 @@ def _inside(low: float, is_open: bool, size: float) -> float:
 def scattered(
     unknowns: Sequence[Unknown], count: int, spread: float, seed: int
 ) -> tuple[Array, ...]:
-    """Return ``count`` starts: the given one, then others up to ``spread`` of it away.
+    """Return ``count`` starts: the given one, then others within ``spread`` of it.
 
     Parameters
     ----------
     spread
-        Share of the start, or of the scale where the start is zero.
+        Share of the start, or of the scale if the start is zero.
     seed
-        Of the random numbers.
+        Seed of the random numbers.
     """
     random = np.random.default_rng(seed)
     first = np.array([u.start for u in unknowns])

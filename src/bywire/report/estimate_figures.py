@@ -326,7 +326,7 @@ def _histogram(axes: Axes, r: Array) -> None:
     style.legend_above(axes)
 
 
-# --- Correlations: which unknowns the data tells apart badly
+# --- Correlations: which unknowns the data hardly separate
 
 _NUMBERED = 14  # largest number of unknowns with room for numbers
 

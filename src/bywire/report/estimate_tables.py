@@ -1,4 +1,4 @@
-"""Tables of an identification: parameters with intervals, undetermined ones, and checks."""
+"""Tables of an identification: parameters with their intervals, undetermined unknowns, checks."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ def estimate_table(
     Parameters
     ----------
     estimate
-        Result of the identification; undetermined parameters are below it. For a simulated model, a
-        column gives the numerical error due to the step.
+                Estimates; unknowns that the data do not determine are below them. If the model is
+        simulated, a column gives the error from the simulation step.
     start
         Initial values of the search, by label.
     put_in
@@ -68,9 +68,8 @@ def estimate_table(
     for u in (kept.unknown for kept in estimate.kept):
         number, _, unit = with_interval(u.start, 0.0, u.unit)
         by_step = [] if steps is None else [Cell("-")]
-        rows.append(
-            (u, [Cell(number), Cell("not determined", "bad"), *by_step, Cell("-"), Cell(unit)])
-        )
+        undetermined = Cell("not determined", "bad")
+        rows.append((u, [Cell(number), undetermined, *by_step, Cell("-"), Cell(unit)]))
     return Table(
         (
             Column("parameter"),
@@ -99,7 +98,7 @@ def with_interval(value: float, half: float, symbol: str) -> tuple[str, str, str
 
 
 def _percent(share: float) -> str:
-    """Return an uncertainty in percent; more than a thousand are not written out."""
+    """Return an uncertainty in percent, capped at 1000 %."""
     if share >= 1000.0:
         return "> 1000 %"
     return f"{share:.0f} %" if share >= 10.0 else f"{share:.2g} %"

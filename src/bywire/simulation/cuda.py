@@ -55,7 +55,7 @@ def bindings(name: str) -> ModuleType:
         return importlib.import_module(f"cuda.bindings.{name}")
     except ImportError:
         raise DeviceError(
-            "engine 'cuda' needs NVIDIA's bindings and compiler, which are not installed: "
+            "engine 'cuda' needs NVIDIA's bindings and compiler, which are not installed; "
             f"{how_to_install('gpu')}; {OTHERWISE}",
             name="engine",
             value="cuda",
@@ -94,7 +94,7 @@ def cuda_binary(source: str, capability: int, entry: str) -> bytes:
         _, known = nvrtc.nvrtcGetSupportedArchs()
     except RuntimeError:  # the bindings are installed, but the library is not
         raise DeviceError(
-            f"NVIDIA's compiler NVRTC cannot be loaded: {how_to_install('gpu')}; {OTHERWISE}"
+            f"NVIDIA's compiler NVRTC cannot be loaded; {how_to_install('gpu')}; {OTHERWISE}"
         ) from None
     target = max((each for each in known if each <= capability), default=0)
     if not target:

@@ -195,7 +195,7 @@ def test_the_limit_falls_between_two_temperatures(T: float, left: float) -> None
             "zero or negative at T_most = 155 degC",
         ),
         ("motor_heat.C_w=0", "must be > 0"),
-        ("motor_heat.T_a=20", "cannot be K"),
+        ("motor_heat.T_a=20", "cannot be converted to K"),
         ("motor_heat.law=hot", "lumped"),
     ],
 )

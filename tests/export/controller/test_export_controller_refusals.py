@@ -73,7 +73,7 @@ def test_operation_and_line_are_named(tick: Any, said: str) -> None:
 def test_bad_requests_are_refused(tmp_path: Path) -> None:
     with pytest.raises(UnknownNameError, match="did you mean 'single'"):
         bywire.export_controller("hard-braking", tmp_path, precision="singel")
-    with pytest.raises(ParameterError, match="vectors = 0: a whole number"):
+    with pytest.raises(ParameterError, match="vectors = 0 must be a whole number"):
         bywire.export_controller("hard-braking", tmp_path, vectors=0)
     (tmp_path / "file").write_text("")
     with pytest.raises(FileError, match="cannot be written"):

@@ -63,12 +63,12 @@ def notes(data: xr.Dataset, **options: object) -> str:
 
 def test_the_record_that_does_not_fit_and_a_drift_are_named() -> None:
     data = METHOD.synthetic(None, METHOD.defaults, 1)
-    assert "off what all other" not in notes(data)
+    assert "off the fit of all other" not in notes(data)
     assert "drifts" not in notes(data)
     third = data["record"] == 2.0
     said = notes(data.assign(F=data["F"] + 8.0 * third))
-    assert "level_2 lies" in said
-    assert said.count("off what all other") == 1
+    assert "level_2 is" in said
+    assert said.count("off the fit of all other") == 1
     slow = (data["time"] - data["time"].where(third).min()) / 40.0
     drift = data.assign(F=data["F"] + 5.0 * third * slow)
     assert "N over the 4 strokes level_2 outward" in notes(drift)
@@ -77,7 +77,7 @@ def test_the_record_that_does_not_fit_and_a_drift_are_named() -> None:
 def test_a_value_that_may_be_nothing_is_marked() -> None:
     flat = METHOD.defaults.replace({"truth.f": 1e-7})
     assert "f is " in notes(METHOD.synthetic(None, flat, 1))
-    assert "that may be nothing" not in notes(METHOD.synthetic(None, METHOD.defaults, 1))
+    assert "it may be zero" not in notes(METHOD.synthetic(None, METHOD.defaults, 1))
 
 
 @pytest.mark.parametrize(("signal", "factor"), [("p", 0.0689476), ("F", 1000.0)])

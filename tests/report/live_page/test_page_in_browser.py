@@ -107,8 +107,8 @@ def test_loops_are_drawn_when_sliders_rest(tab):
 def test_panels_out_of_sight_follow_when_sliders_rest(tab):
     tab.open()
     tab.page.wait_for_timeout(300)
-    panel = "[...document.querySelectorAll('#curves canvas')].at(-2)"
-    assert tab.page.evaluate(f"() => {panel}.getBoundingClientRect().top > 1.5 * innerHeight")
+    panel = "[...document.querySelectorAll('#curves canvas')].at(-1)"
+    assert tab.page.evaluate(f"() => {panel}.getBoundingClientRect().top > 1.2 * innerHeight")
     before = tab.page.evaluate(f"() => {panel}.toDataURL()")
     tab.moved({VARIED[tab.file.stem][0]: 350})
     tab.page.wait_for_function(f"(before) => {panel}.toDataURL() !== before", arg=before)

@@ -1,6 +1,6 @@
-"""CSV: text tables, read block by block, of which only the chosen columns are kept.
+"""CSV: text tables, read in blocks; only the chosen columns are kept.
 
-The end of a table is looked at too: a number that was cut is told from one that is complete.
+The end of a table is also checked, to detect a truncated last number.
 """
 
 from __future__ import annotations
@@ -53,9 +53,9 @@ if TYPE_CHECKING:
     import xarray as xr
 
 _LOOKED_AT = 1 << 16
-"""bytes before the end that are looked at for a number that was cut"""
+"""bytes before the end that are checked for a truncated number"""
 
-_LAST = 100  # rows before the last one that are looked at
+_LAST = 100  # rows before the last one that are checked
 _FEWEST = 10
 _RARE = 0.05  # of them: as many numbers may be as short as one that counts as cut
 _NUMBER = re.compile(r"[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]+)?")
@@ -63,16 +63,16 @@ _NUMBER = re.compile(r"[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]+)?")
 
 @dataclass
 class _Seen:
-    """What was found in a table beside its numbers.
+    """Content of a table other than numbers.
 
     Parameters
     ----------
     marks
-        How often each cell of a column, counted from 0, says that nothing was measured.
+        Count of each cell that marks a missing value, by column from 0.
     comments, empty
-        How many rows were left out as comments, and as rows of separators alone.
+        Number of skipped comments, and of skipped rows with separators only.
     origins
-        First time stamp of each column that has such [ns].
+        First time stamp [ns] of each column of time stamps.
     """
 
     marks: Counter[tuple[int, str]] = field(default_factory=Counter)
@@ -81,7 +81,7 @@ class _Seen:
     origins: dict[int, int] = field(default_factory=dict)
 
     def add(self, other: _Seen) -> None:
-        """Add what was found in a part of the table."""
+        """Add the content of another part of the table."""
         self.marks += other.marks
         self.comments += other.comments
         self.empty += other.empty
@@ -90,27 +90,27 @@ class _Seen:
 def _strict_columns(
     path: Path, block: bytes, first_line: int, dialect: Dialect, indices: Sequence[int], seen: _Seen
 ) -> list[NDArray[np.float64]]:
-    """Return columns of a block of lines; blank cells become NaN, blank lines are left out.
+    """Return columns of a block of lines; blank cells become NaN, blank lines are skipped.
 
     Parameters
     ----------
     path
-        What errors call the file.
+        Path of the file, for errors.
     block
-        Whole lines.
+        Complete lines.
     first_line
-        Number of the first of them.
+        Number of the first line.
     dialect
-        How the table is written.
+        Dialect of the table.
     indices
-        Which columns.
+        Columns to read.
     seen
-        What else is found is added to it.
+        Other content is added to it.
 
     Raises
     ------
     FileError
-        For a row of another length and a cell that is no number, with line and column.
+        For a row of another length, or a cell that is not a number, with line and column.
     """
     try:
         text = block.decode("utf-8")
@@ -149,21 +149,20 @@ def _require_width(path: Path, line: int, cells: list[str], dialect: Dialect) ->
     if dialect.is_ragged:
         if cells[0].startswith(END_OF_HEADER) or cells[0] == "Channels":
             raise FileError(
-                f"{path}, line {line}: another table begins here: save each in a file of its own"
+                f"{path}, line {line}: another table begins here: save each in a separate file"
             )
         cells += [""] * (dialect.width - len(cells))
     if len(cells) != dialect.width:
         fix = (
-            "complete the row: where blanks separate columns, a missing value needs a mark such as "
-            "nan"
+            "complete the row: if blanks separate columns, a missing value needs a mark such as nan"
             if dialect.separator == " "
             else "complete the row, or remove it if the recording was cut here; with decimal "
             "commas, separate the columns by semicolons"
         )
         raise FileError(
             f"{path}, line {line}: {len(cells)} cells, but the first row has {dialect.width} "
-            f"(separated by {SEPARATORS[dialect.separator]}): {fix}; where other lines stand "
-            "before the table, skip_lines in the mapping tells how many"
+            f"(separated by {SEPARATORS[dialect.separator]}): {fix}; if other lines "
+            "precede the table, give their number as skip_lines in the mapping"
         )
 
 
@@ -177,7 +176,7 @@ def _number(path: Path, line: int, cell: str, column: int, dialect: Dialect, see
     if kind not in (NUMBER, DIGITS):
         stamp = nanoseconds(cell, kind)
         if stamp is None:
-            raise FileError(f"{where} is no {kind} like those above it: correct it")
+            raise FileError(f"{where} is not a {kind} like those above it: correct it")
         return (stamp - seen.origins[column]) / 1e9
     plain = cell if dialect.decimal == "." else cell.replace(",", ".")
     ok = _NUMBER.fullmatch(plain) and (dialect.decimal == "." or "." not in cell)
@@ -186,35 +185,34 @@ def _number(path: Path, line: int, cell: str, column: int, dialect: Dialect, see
         return value
     if is_stamp(cell):
         raise FileError(
-            f"{where} is a time stamp that bywire cannot read among these cells: times are read "
-            "as 09:12:33.5 or 2026-11-26T09:12:33.5 in all rows; seconds from the start are "
-            "read too"
+            f"{where} is a time stamp that bywire cannot read among these cells: write "
+            "09:12:33.5 or 2026-11-26T09:12:33.5 in all rows, or seconds from the start"
         )
     other = "," if dialect.decimal == "." else "."
     hint = f"; the decimal mark is {dialect.decimal!r} here" if other in cell else ""
     raise FileError(
-        f"{where} is not a finite number{hint}: correct it; where it marks a missing value, write "
+        f"{where} is not a finite number{hint}: correct it; if it marks a missing value, write "
         f"missing = [{cell!r}] in the mapping"
     )
 
 
 def _require_whole_end(path: Path, block: bytes, last_line: int, dialect: Dialect) -> None:
-    """Refuse a table that seems to end within its last number.
+    """Reject a table that seems to end within its last number.
 
-    Many programs end a table without a line end, and a cut there does not show by itself. It does
-    where hardly a number before it in that column is as short: counted in decimals where they
-    have as many as each other, in characters where they vary.
+    Many programs write no line end after a table, so a cut there is not obvious. It is detected if
+    hardly any number above in that column is as short, by decimals if their count is constant,
+    otherwise by characters.
 
     Parameters
     ----------
     path
-        What errors call the file.
+        Path of the file, for errors.
     block
         Its last bytes.
     last_line
-        Number of the last of them.
+        Number of the last line.
     dialect
-        How the table is written.
+        Dialect of the table.
 
     Raises
     ------
@@ -240,23 +238,23 @@ def _require_whole_end(path: Path, block: bytes, last_line: int, dialect: Dialec
         few = f"all but {as_short}" if as_short else "all"
         cell = quoted(cells[-1].decode("utf-8", "replace"))
         raise FileError(
-            f"{path}, line {last_line}: it ends with {cell} and without a line end, and {few} "
-            f"numbers before in that column {more}: remove the row if the recording was cut here, "
-            "or end it with a line end if it is whole"
+            f"{path}, line {last_line}: it ends with {cell} without a line end, but {few} "
+            f"numbers above in that column {more}: remove the row if the recording was cut here, "
+            "or add a line end if it is complete"
         )
 
 
-# --- Block by block
+# --- Reading in blocks
 
 _BLOCK = 1 << 24  # bytes
-_PIECE = 1 << 18  # bytes of a block with a flaw that are looked at together: cells take much memory
+_PIECE = 1 << 18  # bytes of a flawed block to parse together, since cells take much memory
 _ROWS = 1 << 16  # that are written at a time
 _QUOTED = rb'(?m)(?:^|%s) *"[^"\r\n]*"(?=%s|\r?$)'  # a cell, separators around it
 _COMMENTS = tuple(mark.encode() for mark in COMMENTS)
 _STAMPS = (CLOCK, MOMENT, DAY)
 
 _RASTER = "X_Value"
-"""name of the instants that a file has as a start and a step alone, as LabVIEW calls them"""
+"""LabVIEW's name of instants that a file defines by start and step only"""
 
 
 class TextSource:
@@ -280,7 +278,7 @@ class TextSource:
 
     @property
     def columns(self) -> Mapping[str, Column]:
-        """Every column by its title, or by its number from 1 where it has none."""
+        """All columns by title, or by number from 1 if there is none."""
         columns = {
             name: Column(name, self._unit(k), clock=self._clock(k))
             for name, k in self._index.items()
@@ -307,7 +305,7 @@ class TextSource:
                 column += columns[-1]
             elif self._kind(k) in (CLOCK, DIGITS) and (days := over_midnight(column)):
                 self.remarks.append(
-                    f"{self._dialect.label(k)}: it goes on over midnight (passed {days} x)"
+                    f"{self._dialect.label(k)}: it continues past midnight ({days} x)"
                 )
             if self._kind(k) == DIGITS:
                 column -= column[0] if column.size else 0.0
@@ -332,7 +330,7 @@ class TextSource:
         return f"row {row + 1}"
 
     def _columns(self, indices: Sequence[int], progress: Progress) -> list[NDArray[np.float64]]:
-        """Return columns as they are written, block by block."""
+        """Return columns in blocks as written."""
         dialect = with_mark(self._path, self._dialect, indices)
         size = self._path.stat().st_size
         if dialect.encoding.startswith("utf-16"):
@@ -344,7 +342,7 @@ class TextSource:
             if columns is None:
                 columns = _careful(self._path, block, line, dialect, indices, self._seen)
             done += len(block)
-            if not growing.rows:  # as many rows as bytes promise, and a hundredth more
+            if not growing.rows:  # estimated from bytes, plus one per cent
                 expected = 1.01 * len(columns[0]) * max(size - dialect.start, 0) / len(block)
                 growing = GrowingColumns(len(indices), int(expected) + 1)
             growing.append(columns)
@@ -380,11 +378,11 @@ class TextSource:
         if kind == DAY:
             clocks = [k for k, other in enumerate(self._dialect.kinds) if other == CLOCK]
             is_used = self._day == column and clocks
-            return "its dates go with the times of day" if is_used else "it holds dates"
+            return "its dates belong to the times of day" if is_used else "it holds dates"
         return ""
 
     def _remark(self) -> None:
-        """Note which cells counted as missing, and which rows were left out."""
+        """Note cells that counted as missing, and skipped rows."""
         by_column: dict[int, Counter[str]] = {}
         for (column, mark), count in self._seen.marks.items():
             by_column.setdefault(column, Counter())[mark] += count
@@ -394,14 +392,14 @@ class TextSource:
                 f"{self._dialect.label(column)}: missing samples: {marks.total()} ({cells})"
             )
         if self._seen.comments:
-            self.remarks.append(f"lines of comment left out of the table: {self._seen.comments}")
+            self.remarks.append(f"comment lines skipped: {self._seen.comments}")
         if self._seen.empty:
-            self.remarks.append(f"rows of empty cells left out: {self._seen.empty}")
+            self.remarks.append(f"empty rows skipped: {self._seen.empty}")
         self._seen = _Seen(origins=self._seen.origins)
 
 
 def _names(dialect: Dialect) -> list[str]:
-    """Return the name of every column; a title that stands twice tells its number."""
+    """Return the name of every column; a repeated title gets its number."""
     names: list[str] = []
     for k in range(dialect.width):
         title = dialect.titles[k] if k < len(dialect.titles) else ""
@@ -421,7 +419,7 @@ def _holds_cells(dialect: Dialect, column: int) -> bool:
 
 
 def _day_column(dialect: Dialect) -> int | None:
-    """Return the column of dates that goes with the times of day; None where it is not clear."""
+    """Return the column of dates for the times of day; None if it is ambiguous."""
     days = [k for k, kind in enumerate(dialect.kinds) if kind == DAY]
     return days[0] if len(days) == 1 and CLOCK in dialect.kinds else None
 
@@ -457,7 +455,7 @@ def _blocks(path: Path, dialect: Dialect) -> Iterator[bytes]:
 def _fast(
     block: bytes, dialect: Dialect, indices: Sequence[int], seen: _Seen
 ) -> list[NDArray[np.float64]] | None:
-    """Return the columns of a block without a flaw; None where each line needs a look."""
+    """Return the columns of a flawless block; None if every line must be checked."""
     import pandas as pd
 
     width = _width(block, dialect)
@@ -481,7 +479,7 @@ def _fast(
             engine="c",
             **options,
         )
-    except (ValueError, OverflowError):  # the strict reader finds the cell, and says it better
+    except (ValueError, OverflowError):  # the strict reader finds the cell and has a better message
         return None
     columns = []
     for k in indices:
@@ -493,7 +491,7 @@ def _fast(
 
 
 def _width(block: bytes, dialect: Dialect) -> int:
-    """Return how many cells all rows of a block have; 0 where they are not alike."""
+    """Return the common number of cells in a block's rows; 0 if they differ."""
     lines = block.count(b"\n") + (not block.endswith(b"\n"))
     if dialect.separator == " ":
         return dialect.width if len(block.split()) == lines * dialect.width else 0
@@ -503,7 +501,7 @@ def _width(block: bytes, dialect: Dialect) -> int:
 
 
 def _seconds(cells: Any, dialect: Dialect, column: int, seen: _Seen) -> NDArray[np.float64] | None:
-    """Return time stamps as seconds from the first one; None where one is none."""
+    """Return time stamps as seconds from the first one; None if one is not valid."""
     kind, origin = dialect.kinds[column], seen.origins[column]
     stamps = [nanoseconds(str(cell).strip(), kind) for cell in cells]
     if any(stamp is None for stamp in stamps):
@@ -514,7 +512,7 @@ def _seconds(cells: Any, dialect: Dialect, column: int, seen: _Seen) -> NDArray[
 def _careful(
     path: Path, block: bytes, line: int, dialect: Dialect, indices: Sequence[int], seen: _Seen
 ) -> list[NDArray[np.float64]]:
-    """Return the columns of a block with a flaw: line by line where it is, else by a library."""
+    """Return the columns of a flawed block: the flawed part by lines, the rest by a library."""
     parts = []
     for piece in _pieces(block):
         plain = _plain(piece, dialect)
@@ -531,7 +529,7 @@ def _careful(
 def _with_marks(
     block: bytes, dialect: Dialect, indices: Sequence[int], seen: _Seen
 ) -> list[NDArray[np.float64]] | None:
-    """Return the columns of lines whose only flaw is cells that say that nothing was measured."""
+    """Return the columns of lines whose only flaw is cells that mark missing values."""
     import pandas as pd
 
     is_split = dialect.separator == " " or any(dialect.kinds[k] in _STAMPS for k in indices)
@@ -575,7 +573,7 @@ def _with_marks(
 
 
 def _plain(piece: bytes, dialect: Dialect) -> bytes:
-    """Return lines without blank ones, and cells without quotation marks where that is all."""
+    """Return lines without blank ones, and without quotation marks if these are simple."""
     if b'"' in piece:
         mark = re.escape(dialect.separator.encode())
         if 2 * len(re.findall(_QUOTED % (mark, mark), piece)) == piece.count(b'"'):
@@ -584,7 +582,7 @@ def _plain(piece: bytes, dialect: Dialect) -> bytes:
 
 
 def _pieces(block: bytes) -> Iterator[bytes]:
-    """Yield a block in pieces of whole lines, which end outside of quotation marks."""
+    """Yield a block in pieces of complete lines, which end outside of quotation marks."""
     begin, end = 0, 0
     while end < len(block):
         end = block.find(b"\n", max(end, begin + _PIECE)) + 1 or len(block)
@@ -600,7 +598,7 @@ def _open(path: Path, options: ReadOptions) -> Iterator[TextSource]:
 
 
 def write_table(dataset: xr.Dataset, path: Path, progress: Progress, separator: str) -> None:
-    """Write signals on one time axis as a text table, every number exactly."""
+    """Write signals on one time axis as a text table, with exact numbers."""
     import pandas as pd
 
     names = [str(name) for name in dataset.data_vars]
@@ -640,9 +638,9 @@ class GrowingColumns:
     Parameters
     ----------
     count
-        How many columns.
+        Number of columns.
     rows
-        How many rows are expected.
+        Expected number of rows.
     """
 
     def __init__(self, count: int, rows: int) -> None:
@@ -651,7 +649,7 @@ class GrowingColumns:
 
     @property
     def rows(self) -> int:
-        """How many rows there are."""
+        """Number of rows."""
         return self._rows
 
     def append(self, blocks: Sequence[NDArray[np.float64]]) -> None:
@@ -659,13 +657,13 @@ class GrowingColumns:
         end = self._rows + len(blocks[0])
         for array, block in zip(self._arrays, blocks, strict=True):
             if end > len(array):
-                # The system moves the pages: no second copy of the column is ever made.
+                # The system moves the pages, so that there is never a second copy of the column.
                 array.resize(max(end, int(_GROWTH * len(array))), refcheck=False)
             array[self._rows : end] = block
         self._rows = end
 
     def finished(self) -> list[NDArray[np.float64]]:
-        """Return the columns at their length."""
+        """Return the columns with their final length."""
         for array in self._arrays:
             array.resize(self._rows, refcheck=False)
         return self._arrays

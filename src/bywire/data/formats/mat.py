@@ -19,7 +19,7 @@ from bywire.data.matlab_layout import OBJECT, Found, Part, columns_of, described
 if TYPE_CHECKING:
     import xarray as xr
 
-_LARGEST = 2**31 - 2**16  # bytes of a variable that the format can hold
+_LARGEST = 2**31 - 2**16  # largest size of a variable in the format, bytes
 _LONGEST = 4096  # characters of a unit or label
 _DEEPEST = 8  # structs in structs
 _MOST_STRUCTS = 1000  # in an array of structs
@@ -41,7 +41,7 @@ _NUMBERS = {
 
 
 class MatSource:
-    """An open MAT file; structs become dotted names, cells and objects are left out."""
+    """An open MAT file; structs become dotted names, cells and objects are skipped."""
 
     def __init__(self, path: Path) -> None:
         from scipy.io import whosmat
@@ -75,7 +75,7 @@ class MatSource:
             numbers = self._inner[array] if array in self._inner else self._variable(array)
             if numbers.dtype.kind not in "iufb":
                 raise FileError(
-                    f"{self._path}: {quoted(array)} holds no real numbers: leave it out"
+                    f"{self._path}: {quoted(array)} contains no real numbers: do not select it"
                 )
             for name in names:
                 part = self._parts[name]
@@ -85,7 +85,7 @@ class MatSource:
                         yield name, begin, column[begin : begin + _VALUES]
 
     def _variable(self, name: str) -> NDArray[Any]:
-        """Return a variable as MATLAB has it."""
+        """Return a variable in MATLAB's layout."""
         from scipy.io import loadmat
 
         variable = loadmat(self._path, variable_names=[name], appendmat=False)[name]
@@ -99,9 +99,9 @@ class MatSource:
         return column.dtype.kind in "iuf" and bool(np.all(np.diff(column) > 0))
 
     def _walk(self, name: str, struct: NDArray[Any], found: Found, depth: int) -> None:
-        """Find arrays and texts in a struct, or in each of an array of structs."""
+        """Collect arrays and texts in a struct, or in each struct of an array."""
         if depth > _DEEPEST or struct.size > _MOST_STRUCTS:
-            found.left_out[name] = "it has too many structs, or structs in structs"
+            found.left_out[name] = "it has too many structs, or too deeply nested ones"
             return
         for k, element in enumerate(struct.reshape(-1), 1):
             of_element = name if struct.size == 1 else f"{name}({k})"
@@ -143,7 +143,7 @@ def _write(dataset: xr.Dataset, path: Path, progress: Progress) -> None:
     if large is not None:
         raise FileError(
             f"cannot write {path}: {large!r} has {content[large].nbytes} bytes, more than this "
-            "format can hold: use the format mat73"
+            "format allows: use the format mat73"
         )
     progress(f"writing {path.name}", 0.0)
     savemat(

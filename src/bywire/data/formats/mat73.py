@@ -1,4 +1,4 @@
-"""MAT files of version 7.3, and other HDF5 files: read and written by h5py, array by array."""
+"""MAT files of version 7.3, and other HDF5 files, read and written by h5py."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _MOST_ROWS = 64
 _LONGEST = 1000  # characters of a text
 _USER_BLOCK = 512
 _HEADER = b"MATLAB 7.3 MAT-file, written by bywire".ljust(116) + bytes(8) + b"\x00\x02IM"
-_NETCDF = "_NCProperties"  # attribute of NetCDF files, whose numbers may be packed
+_NETCDF = "_NCProperties"  # attribute of NetCDF files, which may contain packed numbers
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 _WHAT = "MAT files of version 7.3"
 
@@ -64,7 +64,7 @@ class Mat73Source:
                 yield name, begin, array[self._index(array, part, piece)]
 
     def _walk(self, group: Any, prefix: str, depth: int, found: Found) -> None:
-        """Find arrays and texts; links are not followed, neither out of the file nor within."""
+        """Collect arrays and texts, without following links."""
         import h5py
 
         for name in group:
@@ -76,7 +76,7 @@ class Mat73Source:
             self._take(group[name], f"{prefix}{name}", depth, found)
 
     def _take(self, item: Any, name: str, depth: int, found: Found) -> None:
-        """Take an array, a text, the arrays in a group, or those of an array of structs."""
+        """Collect an array, a text, the arrays of a group, or those of an array of structs."""
         import h5py
 
         if len(self._arrays) + len(found.texts) + len(found.scalars) > _MOST:
@@ -104,7 +104,7 @@ class Mat73Source:
             )
 
     def _take_structs(self, item: Any, name: str, depth: int, found: Found) -> None:
-        """Take a field of an array of structs, which refers to an array for each."""
+        """Collect a field of an array of structs, which refers to an array for each struct."""
         if item.size > _MOST_STRUCTS or depth >= _DEEPEST:
             found.left_out[name] = f"it is an array of {item.size} structs"
             return
@@ -126,14 +126,14 @@ class Mat73Source:
         return codes.tobytes().decode("utf-16-le", "replace")
 
     def _with_unit(self, column: Column) -> Column:
-        """Return a column with the unit that its array's attribute says, where no struct does."""
+        """Return a column with the unit from its array's attribute, if no struct has one."""
         array = self._arrays[self._parts[column.name].array]
         unit = column.unit or _attribute(array, "units") or _attribute(array, "unit")
         label = column.label or _attribute(array, "long_name")
         return replace(column, unit=unit, label=label)
 
     def _shape(self, array: Any) -> tuple[int, ...]:
-        """Return the shape in MATLAB, which counts the other way round."""
+        """Return the shape in MATLAB, which has the reverse order."""
         return tuple(array.shape[::-1]) if self._is_matlab else tuple(array.shape)
 
     def _index(self, array: Any, part: Part, piece: slice) -> tuple[Any, ...]:
@@ -144,10 +144,11 @@ class Mat73Source:
         return tuple(piece if axis == long else 0 for axis in range(array.ndim))
 
     def _require_whole(self, name: str, array: Any) -> None:
-        """Refuse numbers that are not in the file: the library would read zeros."""
+        """Reject numbers that are not in the file, which the library would read as zeros."""
         if array.is_virtual or array.external:
             raise FileError(
-                f"{self._path}: {name!r} lies in other files, which are not opened: save it whole"
+                f"{self._path}: {name!r} is stored in other files, which bywire does not open: "
+                "save it in one file"
             )
         if array.chunks is None:
             is_whole = array.id.get_storage_size() >= array.nbytes
@@ -156,13 +157,13 @@ class Mat73Source:
             is_whole = array.id.get_num_chunks() >= math.prod(wanted)
         if not is_whole and not np.isnan(float(array.fillvalue)):
             raise FileError(
-                f"{self._path}: of the {array.size} numbers of {name!r} some were never written: "
-                "was the recording stopped? Save those that were"
+                f"{self._path}: some of the {array.size} numbers of {name!r} were never written: "
+                "was the recording stopped? Save the written ones"
             )
 
 
 def _attribute(item: Any, name: str) -> str:
-    """Return a short text that is an attribute; nothing where it is something else."""
+    """Return a short text attribute; empty for anything else."""
     if name not in item.attrs or math.prod(item.attrs.get_id(name).shape or ()) > 1:
         return ""
     value = item.attrs[name]
@@ -177,7 +178,7 @@ def _open(path: Path, options: ReadOptions) -> Iterator[Mat73Source]:
     with h5py.File(path, "r") as file:
         if _NETCDF in file.attrs:
             raise FileError(
-                f"{path} is a NetCDF file: rename it with the ending .nc, or say format = 'netcdf'"
+                f"{path} is a NetCDF file: rename it with the ending .nc, or give format = 'netcdf'"
             )
         yield Mat73Source(path, file)
 
@@ -204,7 +205,7 @@ def _write(dataset: xr.Dataset, path: Path, progress: Progress) -> None:
 
 
 def _write_text(group: Any, name: str, text: str, codes: NDArray[np.uint16]) -> None:
-    """Write a text as MATLAB does: one number for each character, in a column."""
+    """Write a text in MATLAB's form: one number for each character, in a column."""
     if not text:
         written = group.create_dataset(name, data=np.array([0, 0], dtype=np.uint64))
         written.attrs["MATLAB_empty"] = np.uint8(1)
@@ -228,10 +229,10 @@ FORMAT = FileFormat(
 
 
 class FailingStream(io.RawIOBase):
-    """A file whose first error is remembered; nothing is written after it.
+    """A file that stores its first error and then writes nothing more.
 
-    The HDF library does not survive a write that fails: what it still holds is written at the end
-    of the process, which then crashes.
+    The HDF library does not survive a failed write: it writes its buffers at the end of the
+    process, which then crashes.
 
     Parameters
     ----------
@@ -245,7 +246,7 @@ class FailingStream(io.RawIOBase):
         self.error: OSError | None = None
 
     def write(self, data: Buffer, /) -> int:
-        """Write everything, or remember why not."""
+        """Write everything, or store the error."""
         left = memoryview(data).cast("B")
         size = len(left)
         try:
@@ -256,7 +257,7 @@ class FailingStream(io.RawIOBase):
         return size
 
     def truncate(self, size: int | None = None, /) -> int:
-        """Set the size of the file, or remember why not."""
+        """Set the size of the file, or store the error."""
         try:
             return self._stream.truncate(size)
         except OSError as error:
@@ -264,7 +265,7 @@ class FailingStream(io.RawIOBase):
             return 0
 
     def readinto(self, buffer: WriteableBuffer, /) -> int:
-        """Read what was written; zeros where nothing could be."""
+        """Read written data; zeros where writing failed."""
         wanted = memoryview(buffer).cast("B")
         count = self._stream.readinto(wanted) or 0
         wanted[count:] = bytes(len(wanted) - count)
@@ -277,12 +278,12 @@ class FailingStream(io.RawIOBase):
 
 @contextmanager
 def kept(path: Path) -> Iterator[FailingStream]:
-    """Open a new file for a library that must not see an error.
+    """Open a new file for a library that must not receive errors.
 
     Raises
     ------
     OSError
-        At the end, the first one that writing met.
+        At the end, the first error of writing.
     """
     with FileIO(path, "w+") as stream:
         failing = FailingStream(stream)

@@ -1,4 +1,4 @@
-"""ASAM MDF 4: groups of channels, each with its instants, read and written by asammdf."""
+"""ASAM MDF 4: groups of channels with common instants, read and written by asammdf."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ _NUMBERS = range(6)  # data types: integers and reals, either byte order
 _VALUE, _MASTER, _VIRTUAL_MASTER, _VIRTUAL = 0, 2, 3, 6
 _TEXTS = range(7, 12)  # conversions to and from texts
 _FORMULA = 3  # conversion
-_CODES, _RANGES = 7, 8  # conversions that have texts for single numbers, and for ranges
+_CODES, _RANGES = 7, 8  # conversions with texts for single numbers, and for ranges
 _NO_QUANTITY = ("", "-", "1", "enum", "state", "bool")  # units of states
 _NO_STATE = frozenset({"sna", "snv", "na", "n/a", "not available", "signal not available"})
-_TIME = 1  # what a master channel counts
-# A file that is given by its path is mapped into memory: quick, and too much for large ones.
+_TIME = 1  # kinds of master channels
+# A file given by path is mapped into memory: fast, but too much for large files.
 _MAPPED = 2**29  # bytes
 _RECORDS = 1 << 20  # that are read at a time from a larger one
 _WHAT = "MDF files"
 
 
 class Mdf4Source:
-    """An open MDF file; a name that several groups have gets the number of its group."""
+    """An open MDF file; a name in several groups gets the number of its group."""
 
     def __init__(self, path: Path, file: Any, records: int | None) -> None:
         self._path, self._file, self._records = path, file, records
@@ -44,7 +44,7 @@ class Mdf4Source:
         self.columns: Mapping[str, Column] = self._columns()
 
     def pieces(self, names: Sequence[str]) -> Iterator[tuple[str, int, NDArray[Any]]]:
-        """Yield the numbers of some channels; what is marked as invalid becomes NaN."""
+        """Yield the numbers of some channels; invalid samples become NaN."""
         for group in sorted({self._places[name][0] for name in names}):
             wanted = [name for name in names if self._places[name][0] == group]
             length = self._file.groups[group].channel_group.cycles_nr
@@ -73,9 +73,9 @@ class Mdf4Source:
             of_group = (
                 "its group holds no records"
                 if not length
-                else "its group has no instants"
+                else "its group has no time channel"
                 if master not in names
-                else "its group counts no time"
+                else "its group's master channel is not time"
                 if not _is_time(group.channels[master])
                 else ""
             )
@@ -99,12 +99,12 @@ class Mdf4Source:
     def _read(
         self, group: int, names: Sequence[str], begin: int, size: int
     ) -> Iterator[tuple[str, NDArray[Any]]]:
-        """Yield numbers of channels of one group, or of their instants, from a record on."""
+        """Yield numbers of one group's channels, or of their instants, from a record on."""
         master = self._file.masters_db[group]
         indices = [self._places[name][1] for name in names]
         for index in {master, *indices}:
             self._require_inside(group, index)
-        # With a channel of values come the instants; alone, they are a channel like any other.
+        # Reading a channel also returns the instants; alone, they are a channel like any other.
         values = [index for index in indices if index != master]
         signals: dict[int, Any] = {}
         for coded in (False, True):
@@ -116,7 +116,9 @@ class Mdf4Source:
             signal = None if index == master else signals[index]
             numbers = instants if signal is None else signal.samples
             if numbers.ndim != 1 or numbers.dtype.kind not in "iufb":
-                raise FileError(f"{self._path}: channel {name!r} holds no numbers: leave it out")
+                raise FileError(
+                    f"{self._path}: channel {name!r} contains no numbers: do not select it"
+                )
             channel = self._channel(group, index)
             if signal is not None and _has_codes(channel):
                 numbers = self._without_codes(name, channel, numbers)
@@ -133,9 +135,9 @@ class Mdf4Source:
     def _selected(
         self, group: int, indices: Sequence[int], begin: int, size: int, *, raw: bool
     ) -> dict[int, Any]:
-        """Return some records of channels, as they are stored or converted."""
+        """Return some records of channels, raw or converted."""
         self._records_read = 0
-        # Asked for a number of records, the library is slower by a third.
+        # With a number of records, the library is a third slower.
         signals = self._file.select(
             [(None, group, index) for index in indices],
             record_offset=begin,
@@ -147,14 +149,14 @@ class Mdf4Source:
         )
         if self._records_read != size:
             raise FileError(
-                f"{self._path} is damaged: group {group} has {size} records from {begin} on as it "
-                f"says, and {self._records_read} could be read: copy it again, or repair it with "
+                f"{self._path} is damaged: group {group} declares {size} records from {begin} on, "
+                f"but {self._records_read} could be read: copy it again, or repair it with "
                 "the program that recorded it"
             )
         return dict(zip(indices, signals, strict=True))
 
     def _without_codes(self, name: str, channel: Any, raw: NDArray[Any]) -> NDArray[np.float64]:
-        """Return numbers with NaN where the file has a text for them, unless these are states."""
+        """Return numbers with NaN where the file has a text, unless the texts are states."""
         texts: dict[str, NDArray[np.bool_]] = {}
         numbers = _converted(channel.conversion, raw, texts)
         is_quantity = _is_quantity(channel)
@@ -169,7 +171,7 @@ class Mdf4Source:
             self._missing.setdefault(name, Counter())[why] += count
 
     def _require_inside(self, group: int, index: int) -> None:
-        """Refuse a channel behind the end of its record: the library reads what lies there."""
+        """Reject a channel beyond the end of its record, where the library reads other data."""
         place = self._file.groups[group]
         channel, size = place.channels[index], place.channel_group.samples_byte_nr
         end = channel.byte_offset + (channel.bit_offset + channel.bit_count + 7) // 8
@@ -181,9 +183,9 @@ class Mdf4Source:
             )
 
     def count_records(self) -> None:
-        """Count the records that are read: the library says nothing where some are missing.
+        """Count the records that were read, since the library does not report missing ones.
 
-        It ends at a block that it cannot inflate or that is cut, and leaves whatever lay in memory.
+        It stops at a truncated block or one that it cannot inflate, and leaves arbitrary numbers.
         """
         inner = self._file._mdf
         plain = inner._yield_selected_signals
@@ -201,20 +203,20 @@ def _is_time(master: Any) -> bool:
 
 
 def _why_not(channel: Any, parts: Any) -> str:
-    """Return why a channel is not read; nothing where it holds numbers."""
+    """Return the reason to skip a channel; empty if it contains numbers."""
     if parts:
         return "it is an array or a structure"
     if channel.data_type not in _NUMBERS:
         return "it holds text or bytes"
     if channel.channel_type not in (_VALUE, _MASTER, _VIRTUAL_MASTER, _VIRTUAL):
-        return "it holds no samples of its own"
+        return "it contains no samples itself"
     if _has_formula(channel.conversion):
-        return "a formula converts it, and nothing that stands in a file is evaluated"
+        return "a formula converts it, and bywire evaluates no formulas of files"
     return ""
 
 
 def _has_formula(conversion: Any) -> bool:
-    """Return whether a conversion is computed by a formula, or one of those in it is."""
+    """Return whether a conversion, or one within it, uses a formula."""
     if getattr(conversion, "conversion_type", None) == _FORMULA:
         return True
     inner = getattr(conversion, "referenced_blocks", None) or {}
@@ -222,7 +224,7 @@ def _has_formula(conversion: Any) -> bool:
 
 
 def _has_texts(channel: Any) -> bool:
-    """Return whether a channel's numbers stand for texts; the numbers are what is read."""
+    """Return whether a channel's numbers represent texts; bywire reads the numbers."""
     return getattr(channel.conversion, "conversion_type", 0) in _TEXTS
 
 
@@ -231,9 +233,9 @@ def _has_codes(channel: Any) -> bool:
 
 
 def _is_quantity(channel: Any) -> bool:
-    """Return whether a channel whose conversion has texts measures something, beside states.
+    """Return whether a channel whose conversion has texts also contains measured values.
 
-    A factor for the other numbers says so, and a unit where the other numbers have no text either.
+    It does if there is a factor for the other numbers, or a unit and no text for other numbers.
     """
     inner = _blocks(channel.conversion)
     if any(not isinstance(block, bytes) and _is_numeric(block) for block in inner):
@@ -257,7 +259,7 @@ def _blocks(conversion: Any) -> list[Any]:
 def _converted(
     conversion: Any, raw: NDArray[Any], texts: dict[str, NDArray[np.bool_]]
 ) -> NDArray[np.float64]:
-    """Return raw numbers as a conversion has them, and for each text where it stands for one."""
+    """Return converted numbers, and for each text the places that it represents."""
     kind = getattr(conversion, "conversion_type", None)
     if kind not in (_CODES, _RANGES):
         plain = conversion.convert(raw, ignore_value2text_conversions=True) if conversion else raw
@@ -273,7 +275,7 @@ def _converted(
 
 
 def _entries(conversion: Any, kind: int, raw: NDArray[Any]) -> Iterator[NDArray[np.bool_]]:
-    """Yield where the raw numbers are those of each entry of a conversion."""
+    """Yield the places of raw numbers for each entry of a conversion."""
     if kind == _CODES:
         for k in range(conversion.val_param_nr):
             yield raw == conversion[f"val_{k}"]
@@ -291,7 +293,7 @@ def _fill(
     numbers: NDArray[np.float64],
     texts: dict[str, NDArray[np.bool_]],
 ) -> None:
-    """Convert the numbers of one entry, or note where its text stands for them."""
+    """Convert the numbers of one entry, or note the places of its text."""
     if not block or not where.any():
         return
     if isinstance(block, bytes):
@@ -323,12 +325,12 @@ def _require_mdf4(path: Path) -> None:
         head = stream.read(16)
     if head[:8] != b"MDF     ":
         raise FileError(
-            f"{path} was not finished: the recorder was stopped before it could write how much "
-            "there is; finish it with the program that recorded it"
+            f"{path} was not finished: the recorder stopped before it wrote the number of "
+            "records; finalize it with the program that recorded it"
         )
     if head[8:9] != b"4":
         version = head[8:16].decode("latin-1").strip("\0 ")
-        raise FileError(f"{path} is MDF {version}: convert it to MDF 4, as asammdf does")
+        raise FileError(f"{path} is MDF {version}: convert it to MDF 4, for example with asammdf")
 
 
 def _write(dataset: xr.Dataset, path: Path, progress: Progress) -> None:

@@ -1,4 +1,4 @@
-"""NetCDF: signals with units on named dimensions, as recordings of bywire are stored."""
+"""NetCDF: signals with units on named dimensions, the format of bywire's recordings."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _MAGICS = (b"CDF\x01", b"CDF\x02", b"CDF\x05", b"\x89HDF\r\n\x1a\n")
 
 
 class NetcdfSource:
-    """An open NetCDF file; variables of one dimension count, groups and tables do not."""
+    """An open NetCDF file; only variables of one dimension are read, not groups and tables."""
 
     def __init__(self, path: Path, file: Any) -> None:
         self._path = path
@@ -33,7 +33,7 @@ class NetcdfSource:
         self.columns = _columns(file)
 
     def pieces(self, names: Sequence[str]) -> Iterator[tuple[str, int, NDArray[Any]]]:
-        """Yield the numbers of some variables; what was never written becomes NaN."""
+        """Yield the numbers of some variables; unwritten numbers become NaN."""
         for name in names:
             variable = self._file.variables[name]
             for begin in range(0, variable.shape[0], _VALUES):
@@ -65,16 +65,16 @@ def _open(path: Path, options: ReadOptions) -> Iterator[NetcdfSource]:
 
 
 def _require_whole(path: Path, file: Any) -> None:
-    """Refuse a classic file that is cut: the library reads zeros behind its end."""
+    """Reject a truncated classic file, since the library reads zeros beyond its end."""
     if file.data_model in _CLASSIC:
         from scipy.io import netcdf_file
 
-        netcdf_file(path, mmap=True).close()  # maps every variable, which has to be there for it
+        netcdf_file(path, mmap=True).close()  # maps every variable, so each must be complete
     elif file.data_model.startswith("NETCDF3"):  # with 64-bit sizes, which SciPy does not know
         size = sum(math.prod(v.shape) * v.dtype.itemsize for v in file.variables.values())
         if size > path.stat().st_size:
             raise FileError(
-                f"{path} is damaged: it says that it holds {size} bytes of numbers, the file has "
+                f"{path} is damaged: it declares {size} bytes of numbers, but the file has "
                 f"{path.stat().st_size}: copy or export it again"
             )
 

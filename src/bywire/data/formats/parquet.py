@@ -1,4 +1,4 @@
-"""Parquet: tables by columns; only the chosen ones are read, a batch of rows at a time."""
+"""Parquet: column tables; only the chosen columns are read, in batches of rows."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class ParquetSource:
         if pa.types.is_timestamp(column.type) or pa.types.is_duration(column.type):
             column = column.cast(pa.int64())
         if name in self._instants and column.null_count < len(column):
-            # Since 1970 they are so many nanoseconds that a number would lose the last digits.
+            # Nanoseconds since 1970 are too many for a float, which would lose the last digits.
             first = self._origins.setdefault(name, column.drop_null()[0].as_py())
             column = pc.subtract(column, first)
         if column.null_count:
@@ -124,6 +124,6 @@ FORMAT = FileFormat(
     lambda head: head[:4] == b"PAR1",
     _open,
     _write,
-    # The last is loaded by the first numbers that pyarrow hands over: once, and not for each file.
+    # The last one is loaded by pyarrow's first numbers; here once, not for each file.
     libraries=("pyarrow.parquet", "pyarrow.compute", "pandas"),
 )

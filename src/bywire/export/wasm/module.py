@@ -22,6 +22,7 @@ import numpy as np
 
 from bywire.core.child_process import run_program
 from bywire.core.errors import CompilerError
+from bywire.core.libraries import how_to_install
 from bywire.core.scratch import process_folder, scratch_folder
 from bywire.core.signals import Signal, ranges_of, signals_of
 from bywire.export.exported import (
@@ -455,8 +456,8 @@ def _compiled(headers: Mapping[str, str], further: Mapping[str, str]) -> bytes:
     compiler = bundled_compiler()
     if compiler is None:
         raise CompilerError(
-            "WebAssembly needs the extra bywire[compiler], which is not installed: in your clone: "
-            "pip install -e '.[compiler]'"
+            "WebAssembly is compiled by the extra bywire[compiler], which is not installed; "
+            f"{how_to_install('compiler')}"
         )
     with scratch_folder(process_folder()) as folder:
         for name in ("math.h", "string.h", "page.c"):

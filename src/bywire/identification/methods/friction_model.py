@@ -1,7 +1,7 @@
 r"""Which friction law a record supports: Coulomb, viscous, asymmetric, with pressure, Stribeck.
 
 All laws hold while sliding: :math:`F = s\,F_c(p)\,(1 + (k - 1) e^{-|v|/v_s}) + d v`, with the
-direction :math:`s = \mathrm{sgn}(v)`, less what a simpler law leaves out.
+direction :math:`s = \mathrm{sgn}(v)`; simpler laws omit terms.
 """
 
 from __future__ import annotations
@@ -32,12 +32,12 @@ _LEAST = 20  # samples each way
 
 @dataclass(frozen=True)
 class Law:
-    """Which terms a law has.
+    """Friction law as a choice of terms.
 
     Parameters
     ----------
     name
-        What it is called.
+        Name of the law.
     viscous, stribeck, asymmetric, pressure
         Whether friction grows with speed; falls after breaking away; depends on the direction;
         depends on the pressure.
@@ -50,7 +50,7 @@ class Law:
     pressure: bool = False
 
     def unknowns(self, data: xr.Dataset) -> tuple[Unknown, ...]:
-        """Return what it is fitted by, with starts and units from the data."""
+        """Return the unknowns of the fit, with starts and units from the data."""
         F, v = data["friction"].values, np.abs(data["speed"].values)
         force, rate = (str(data[n].attrs.get("units", "1")) for n in ("friction", "speed"))
         size, fast = float(np.mean(np.abs(F))), float(v.max())
@@ -109,7 +109,7 @@ LAWS = (
 
 
 def _laws_for(data: xr.Dataset) -> Sequence[Law]:
-    """Return the laws that a record can tell: those with pressure where it differs enough."""
+    """Return the laws that a record can separate; laws with pressure only if it varies enough."""
     if "pressure" in data:
         p = data["pressure"].values
         if float(np.max(p)) > _APART * max(float(np.min(p)), 0.0):
@@ -134,7 +134,7 @@ def _sliding(records: Mapping[str, xr.Dataset], slowest: float) -> dict[str, xr.
     records
         ``friction``, ``speed`` and, where measured, ``pressure`` over ``time``; NaN in gaps.
     slowest
-        Slower samples are left out; a share of the record's fastest speed.
+        Lower limit of the speed of used samples, as a share of the record's fastest speed.
 
     Raises
     ------
@@ -155,7 +155,7 @@ def _sliding(records: Mapping[str, xr.Dataset], slowest: float) -> dict[str, xr.
 
 
 def _require_both_ways(sliding: Mapping[str, xr.Dataset], slowest: float) -> None:
-    """Refuse records in which too few samples slide forward, or backward."""
+    """Reject records in which too few samples slide forward or backward."""
     v = np.concatenate([record["speed"].values for record in sliding.values()])
     counts = {"forward": int(np.sum(v > 0)), "backward": int(np.sum(v < 0))}
     short = [way for way, count in counts.items() if count < _LEAST]
@@ -165,14 +165,14 @@ def _require_both_ways(sliding: Mapping[str, xr.Dataset], slowest: float) -> Non
             f"too few samples slide {' and '.join(short)} ({said}; {_LEAST} each way are needed): "
             "record motion to and fro (speed changes its sign), or lower "
             f"{option('options')} slowest, which "
-            f"leaves out what is slower than {100 * slowest:g} % of a record's fastest speed",
+            f"excludes samples slower than {100 * slowest:g} % of a record's fastest speed",
             name="slowest",
             value=f"{slowest:g}",
         )
 
 
 def _require_braking(sliding: Mapping[str, xr.Dataset]) -> None:
-    """Refuse friction that gives power: it takes some up, in the mean over the record."""
+    """Reject friction that supplies power on average over the record."""
     F, v = (
         np.concatenate([record[n].values for record in sliding.values()])
         for n in ("friction", "speed")
@@ -210,7 +210,7 @@ class Truth(ParameterSet):
 
 
 class Options(ParameterSet):
-    """Which laws, and which samples."""
+    """Choice of laws and samples."""
 
     law: Literal[
         "choose",
@@ -222,19 +222,19 @@ class Options(ParameterSet):
         "stribeck-asymmetric",
         "stribeck-pressure",
     ]
-    """one of the laws, or all compared on data held out"""
+    """one of the laws, or a comparison of all on held-out data"""
     slowest: Share
-    """of the fastest speed: slower samples stick or turn round, and are left out"""
+    """share of the fastest speed; slower samples stick or reverse, and are not used"""
     pressures: Annotated[Nodes, Unit("Pa", 2e6), Field(min_length=1)]
-    """pressures of simulated records, one record each"""
+    """pressures of simulated records, one per record"""
     v_max: Annotated[float, Unit("m/s", 0.1), Field(gt=0)]
     """fastest speed of simulated records"""
     f_motion: Frequency
-    """frequency of their motion"""
+    """frequency of the motion in simulated records"""
     duration: Duration
-    """their length"""
+    """length of simulated records"""
     interval: Duration
-    """their sample time"""
+    """sample time of simulated records"""
     truth: Truth
 
 
@@ -245,12 +245,12 @@ def identify(data: xr.Dataset, par: None, options: Options, effort: Effort) -> I
     ----------
     data
         ``friction``: force or torque, friction alone, of the motion's sign; ``speed``; where it
-        is measured ``pressure`` [Pa]. Several records help: whole ones are then held out.
+        is measured ``pressure`` [Pa]. With several records, whole ones are held out.
 
     Raises
     ------
     ParameterError
-        When too few samples slide both ways, friction drives, or the law wanted needs a pressure
+        When too few samples slide both ways, friction drives, or the chosen law needs a pressure
         that varies.
 
     References
@@ -285,30 +285,30 @@ def identify(data: xr.Dataset, par: None, options: Options, effort: Effort) -> I
                 "misfit_over_friction",
                 _misfit(whole, predicted),
                 limit=_MISFIT,
-                note="what is left on average at a speed or a pressure, over the friction",
-                next_step="see in the curve where it is left: at low speed, record slower "
+                note="mean residual at a speed or a pressure, relative to the friction",
+                next_step="see in the curve where it occurs: at low speed, record slower "
                 "strokes; over pressure, give p as well; if it differs from record to record, "
-                "identify them one by one",
+                "identify each record separately",
             ),
             Check(
                 "validation_over_training",
                 best.validation_error / best.training_error,
                 limit=1.5,
-                note="error on data held out over that on data fitted",
+                note="error on held-out data over the error on fitted data",
                 next_step="measure more records, or the same speeds and pressures in each",
             ),
             _driving(best.estimate),
         ),
         curves=(_curve(records, whole, predicted),),
         notes=(
-            f"held out: {choice.held_out}; chosen is the simplest law within a standard error "
-            "of the best",
+            f"held out: {choice.held_out}; the simplest law within one standard error "
+            "of the best is chosen",
         ),
     )
 
 
 def _driving(fit: Estimate) -> Check:
-    """Return whether a part of the law drives: its 95 % interval lies below zero."""
+    """Check that no part of the law drives: its 95 % interval would be below zero."""
     highest = dict(zip(fit.names, fit.intervals()[:, 1], strict=True))
     below = [n for n, high in highest.items() if high < 0.0]
     unit = {u.label: u.unit for u in fit.unknowns}
@@ -317,9 +317,9 @@ def _driving(fit: Estimate) -> Check:
         "terms_that_drive",
         float(len(below)),
         limit=0.0,
-        note=said or "no part of the law has a sign that friction cannot have",
+        note=said or "every part of the law has a sign that friction can have",
         next_step="check the signs of friction and speed, and whether speeds and pressures "
-        "spread widely enough to tell the parts of the law apart",
+        "vary enough to separate the parts of the law",
     )
 
 
@@ -335,7 +335,7 @@ def _figures(choice: Choice, unit: str) -> dict[str, tuple[float, str]]:
 
 
 def _misfit(whole: xr.Dataset, predicted: Array) -> float:
-    """Return the root mean square of class means of the residual, over that of the friction.
+    """Return the RMS of the residual's class means, relative to the RMS of the friction.
 
     Classes of speed each way, and of pressure each way; the larger of both.
     """
@@ -359,7 +359,7 @@ def _curve(records: Mapping[str, xr.Dataset], whole: xr.Dataset, predicted: Arra
     attrs = {"units": whole["friction"].attrs.get("units", "1"), "long_name": "friction"}
     return Curve(
         "friction",
-        "Friction while it slides, record after record: measured, and of the chosen law.",
+        "Friction during sliding, one record after another: measured, and by the chosen law.",
         xr.Dataset(
             {
                 "measured": ("time", whole["friction"].values, attrs),
@@ -393,7 +393,7 @@ def synthetic(par: None, options: Options, seed: int) -> xr.Dataset:
 
 
 def _known_values(par: None, options: Options) -> dict[str, float]:
-    """Return what simulated records are made of, under the laws' names."""
+    """Return the true values of simulated records, under the laws' names."""
     values = options.truth.leaves()
     values.pop("noise")
     return values | {"F_c": options.truth.F_p}
@@ -402,7 +402,7 @@ def _known_values(par: None, options: Options) -> dict[str, float]:
 METHOD = Method(
     name="friction-model",
     assembly="",
-    summary=f"which of {len(LAWS)} friction laws a record supports, judged on data held out",
+    summary=f"which of {len(LAWS)} friction laws a record supports, judged on held-out data",
     experiment="",
     signals={"friction": "", "speed": ""},
     options=Options,

@@ -28,18 +28,18 @@ _SIMULATED = ("noise",)
 
 
 def simulated(bench: Bench, question: Question, options: Options, seed: int) -> xr.Dataset:
-    """Return what drives the experiment and what is measured of it.
+    """Simulate the inputs and measured outputs of the experiment.
 
     Parameters
     ----------
     bench
         With the true values.
     question
-        Says which outputs, under which names the inputs, and how noisy the outputs are.
+        Names of outputs and inputs, and the noise of the outputs.
     options
-        Their noise where it does not.
+        Noise of outputs for which the question gives none.
     seed
-        Of the noise.
+        Seed of the noise.
 
     Returns
     -------
@@ -79,19 +79,19 @@ def _attrs(signal: Signal) -> dict[str, str]:
 
 
 def on(bench: Bench, question: Question) -> Method:
-    """Return the method for what is asked of a bench.
+    """Return the method for a question about a bench.
 
     Parameters
     ----------
     bench
-        Gives model, experiment, and all that is known.
+        Model, experiment, and known values.
     question
-        What is measured and what is unknown.
+        Measured signals and unknowns.
 
     Raises
     ------
     InputError
-        When something that is asked for is not there, or cannot be read.
+        When the question names something that does not exist or is not valid.
 
     References
     ----------
@@ -138,7 +138,7 @@ class _Simulation:
 
 
 def _require_known(case: Case, question: Question) -> None:
-    """Refuse names of signals and states that the model does not have."""
+    """Reject names of signals and states that the model does not have."""
     outputs, stimuli = signals_of(case.model.Output), signals_of(case.model.Stimulus)
     if not question.noise:
         raise ParameterError(
@@ -161,7 +161,7 @@ def _require_known(case: Case, question: Question) -> None:
 
 METHOD = BenchMethod(
     name=_NAME,
-    summary="any parameters of any bench: its model, driven by what was measured, beside its "
+    summary="any parameters of any bench: its model, driven by measured inputs, against its "
     "outputs",
     options=Options,
     defaults=_DEFAULTS,

@@ -1,4 +1,4 @@
-"""Friction of a sealed piston from strokes at several pressures: it grows with pressure."""
+"""Pressure-dependent friction of a sealed piston, from strokes at several pressures."""
 
 from __future__ import annotations
 
@@ -31,19 +31,19 @@ from bywire.identification.unknown import Unknown
 _CROSSED = 0.8  # of the stretch that a stroke has to cross
 _LEVEL = 0.01  # of a false alarm
 _FEWEST_STROKES = 4  # that tell a drift
-_APART = 1.2  # ratio of the highest pressure to the lowest that tells them apart
+_APART = 1.2  # least ratio of the highest to the lowest pressure
 
 
 @dataclass(frozen=True)
 class Stroke:
-    """One crossing.
+    """One stroke through the stretch of travel.
 
     Parameters
     ----------
     direction
         1 outward, -1 inward.
     rows
-        Samples in it that slide, of the record.
+        Samples of the record that slide in this stroke.
     """
 
     direction: int
@@ -163,7 +163,7 @@ def _grouped(
 
 
 def _require_told(groups: Sequence[Group]) -> None:
-    """Refuse strokes that do not tell the friction from the area, or its two parts apart.
+    """Reject strokes that do not separate friction and area, or the two parts of friction.
 
     Raises
     ------
@@ -184,20 +184,20 @@ def _require_told(groups: Sequence[Group]) -> None:
     if max(levels) < _APART * min(levels) or len(groups) < 4:
         raise ParameterError(
             f"f cannot be separated from F_0: all strokes were made at {min(levels) / 1e5:.3g} to "
-            f"{max(levels) / 1e5:.3g} bar; give a record each at two pressures or more",
+            f"{max(levels) / 1e5:.3g} bar; give one record per pressure, at two pressures or more",
             name="f",
         )
 
 
 def _require_signs(A: float, friction: float) -> None:
-    """Refuse an area below zero, and friction that drives.
+    """Reject a negative area, and friction that drives.
 
     Parameters
     ----------
     A
         Force over pressure [m^2].
     friction
-        In the mean over all strokes [N].
+        Mean over all strokes [N].
 
     Raises
     ------
@@ -208,7 +208,7 @@ def _require_signs(A: float, friction: float) -> None:
     if A < 0.0:
         raise wrong_sign("F", "p", f"area {shown(float(f'{A:.4g}'), 'm**2')}")
     if friction < 0.0:
-        raise wrong_sign("F", "x", f"friction {friction:.3g} N in the mean: it would drive")
+        raise wrong_sign("F", "x", f"mean friction {friction:.3g} N: it would drive")
 
 
 def _half_widths(groups: Sequence[Group]) -> tuple[Array, Array]:
@@ -219,20 +219,20 @@ def _half_widths(groups: Sequence[Group]) -> tuple[Array, Array]:
 
 
 def _pressure_between(groups: Sequence[Group]) -> float:
-    """Return by how much the pressure is higher outward than inward [Pa]."""
+    """Return the pressure difference between outward and inward strokes [Pa]."""
     up, down = (np.mean([g.p for g in groups if g.direction == d]) for d in (1, -1))
     return float(up - down)
 
 
 def _drifting(groups: Sequence[Group], area: float) -> tuple[str, ...]:
-    """Return which groups' force drifts from stroke to stroke, with how much.
+    """Return the groups whose force drifts from stroke to stroke, with the drift.
 
     Parameters
     ----------
     groups
         Of all records.
     area
-        Force over pressure [m^2]: what the pressure's own drift adds is no drift.
+        Force over pressure [m^2], to exclude the drift of the pressure itself.
     """
     from scipy import stats
 
@@ -252,7 +252,7 @@ def _drifting(groups: Sequence[Group], area: float) -> tuple[str, ...]:
 
 
 def _misfits(groups: Sequence[Group], W: Array, F: Array) -> tuple[str, ...]:
-    """Return which records lie off what all others tell, with how far.
+    """Return the records that deviate from the fit of all others, with the deviation.
 
     The mean forces of each record are compared with what the fit without it predicts.
 
@@ -282,8 +282,8 @@ def _misfits(groups: Sequence[Group], W: Array, F: Array) -> tuple[str, ...]:
         ratio = float(off @ np.linalg.solve(spread, off)) / count / variance
         if ratio > stats.f.isf(_LEVEL / len(groups), count, freedom):
             texts.append(
-                f"{label or 'the record'} lies {float(np.abs(off).max()):.2g} N off what all other "
-                "records tell: look at its zeros, its pressure and its run-in"
+                f"{label or 'the record'} is {float(np.abs(off).max()):.2g} N off the fit of all "
+                "other records: check its zeros, its pressure and its run-in"
             )
     return tuple(texts)
 
@@ -292,7 +292,7 @@ def _misfits(groups: Sequence[Group], W: Array, F: Array) -> tuple[str, ...]:
 
 
 def _friction_line(fit: Estimate, groups: Sequence[Group]) -> Curve:
-    """Return friction over pressure with its band, and what each group says of it."""
+    """Return friction over pressure with its band, and the value of each group."""
     offset = fit["F_off"] if "F_off" in fit.names else 0.0
     seen = {g.p: g.direction * (g.F - fit["A"] * g.p - offset) for g in groups}
     p = np.union1d(np.linspace(0.0, 1.1 * max(seen), 60), list(seen))
@@ -323,14 +323,14 @@ def _sliding_force(
     slowest: float,
     cutoff: float,
 ) -> Curve:
-    """Return the force while it slides, measured and modeled, record after record."""
+    """Return the sliding force, measured and modeled, one record after another."""
     pairs, times = [], {}
     for name, record in records.items():
         times[name] = record["time"].values - record["time"].values[0]
         pairs.append(_sliding(record, fit, stretch, slowest, cutoff))
     return Curve(
         "strokes",
-        "Force while the piston slides, record after record: measured, and of the model.",
+        "Force while the piston slides, one record after another: measured and modeled.",
         _beside(pairs, after_one_another(times)),
         "time",
     )
@@ -343,7 +343,7 @@ def _force_over_travel(
     slowest: float,
     cutoff: float,
 ) -> Curve:
-    """Return the loops of force over travel while it slides, measured and modeled."""
+    """Return loops of the sliding force over travel, measured and modeled."""
     pairs = [_sliding(record, fit, stretch, slowest, cutoff) for record in records.values()]
     x = np.concatenate([record["x"].values for record in records.values()])
     axis = {"x": ("x", x, {"units": "m", "long_name": "travel"})}
@@ -401,22 +401,22 @@ class Truth(ParameterSet):
 
 
 class Options(ParameterSet):
-    """Which part of the strokes counts."""
+    """Evaluated part of the strokes."""
 
     x_low: Position
-    """travel from which strokes count"""
+    """lower end of the evaluated travel"""
     x_high: Position
-    """travel up to which they do"""
+    """upper end of the evaluated travel"""
     slowest: Annotated[float, Unit("m/s", 5e-3), Field(gt=0)]
     """speed above which the piston slides"""
     cutoff: Frequency
     """corner of the low-pass before the travel is differentiated"""
     bore: Annotated[float, Unit("m", 0.025), Field(ge=0, allow_inf_nan=False)]
-    """diameter of the cylinder, which the area is compared with; 0 where it is not known"""
+    """diameter of the cylinder, to check the area; 0 if unknown"""
     zero: Literal["known", "free"]
-    """zero of the force sensor: taken as right, or estimated"""
+    """zero of the force sensor: assumed correct, or estimated"""
     pressures: Annotated[Nodes, Unit("Pa", 2e6), Field(min_length=2)]
-    """chamber pressures of simulated records, one record each"""
+    """chamber pressures of simulated records, one per record"""
     interval: Duration
     """sample time of simulated records"""
     truth: Truth
@@ -429,7 +429,7 @@ def identify(data: xr.Dataset, par: None, options: Options, effort: Effort) -> I
         F = A p + s\,(F_0 + f p) + F_{off}, \qquad s = \mathrm{sgn}(v)
 
     The mean force of all strokes of a record in one direction is one measured value, since
-    whatever one record has in common is no independent evidence. The pressure is that of each
+    the strokes of a record are not independent. The pressure is that of each
     direction: a regulator holds it higher while the piston moves against it.
 
     Parameters
@@ -478,7 +478,7 @@ def identify(data: xr.Dataset, par: None, options: Options, effort: Effort) -> I
                 "misfit_over_friction",
                 sigma / friction,
                 limit=_MISFIT,
-                note="what the line leaves of the mean forces, over the mean friction",
+                note="residual of the mean forces about the line, over the mean friction",
                 next_step=_advice(),
             ),
             Check(
@@ -497,7 +497,7 @@ def identify(data: xr.Dataset, par: None, options: Options, effort: Effort) -> I
         notes=(
             f"{sum(len(g.strokes) for g in groups)} strokes in {len(groups)} groups of record "
             "and direction",
-            "loop half widths leave out that the pressure differs between the directions",
+            "loop half widths neglect the pressure difference between the directions",
             *(f"{label} {reason}" for label, reason in fit.vague().items()),
             *_drifting(groups, fit["A"]),
             *_misfits(groups, W, F),
@@ -515,16 +515,16 @@ def _unchecked() -> str:
 
 def _advice() -> str:
     return (
-        "look at 'pressure_between_directions' and the curve of each record: if one record lies "
-        "off, identify without it; if all forces are shifted, take "
+        "look at 'pressure_between_directions' and the curve of each record: if one record is "
+        "off, identify without it; if all forces are shifted, use "
         f"{option('options', {'zero': 'free'})}; if friction depends on speed or bends over "
-        "pressure, take 'bywire identify friction-model' on friction, speed and pressure, which "
+        "pressure, run 'bywire identify friction-model' on friction, speed and pressure, which "
         "compares such laws"
     )
 
 
 def _bore_check(area: float, bore: float) -> tuple[Check, ...]:
-    """Return whether the area is that of the bore, where that is known: units show in it."""
+    """Check the area against a known bore, which reveals wrong units."""
     if not bore:
         return ()
     known = 0.25 * math.pi * bore**2
@@ -533,8 +533,8 @@ def _bore_check(area: float, bore: float) -> tuple[Check, ...]:
             "area_off_bore",
             abs(area / known - 1.0),
             limit=_OFF_BORE,
-            note=f"{1e6 * area:.5g} mm^2 found, the bore has {1e6 * known:.5g} mm^2: "
-            "beyond the limit a unit of pressure or force is wrong",
+            note=f"{1e6 * area:.5g} mm^2 estimated, the bore has {1e6 * known:.5g} mm^2; "
+            "above the limit, a unit of pressure or force is wrong",
             next_step=f"check both units in the file ({option('outputs')} 'p=COLUMN [bar]'), and "
             "the bore",
         ),
@@ -553,7 +553,7 @@ def _misfit(W: Array, F: Array) -> float:
 
 
 def synthetic(par: None, options: Options, seed: int) -> xr.Dataset:
-    """Return strokes to and fro at each pressure, with the scatter that real seals show."""
+    """Simulate strokes to and fro at each pressure, with the scatter of real seals."""
     random, truth = np.random.default_rng(seed), options.truth
     t = np.arange(0.0, 40.0, options.interval)
     low, high = options.x_low, options.x_high
@@ -581,7 +581,7 @@ def synthetic(par: None, options: Options, seed: int) -> xr.Dataset:
 
 
 def known(par: None, options: Options) -> dict[str, float]:
-    """Return what simulated records are made of."""
+    """Return the true values of simulated records."""
     truth = options.truth
     return {"A": truth.A, "F_0": truth.F_0, "f": truth.f, "F_off": 0.0}
 

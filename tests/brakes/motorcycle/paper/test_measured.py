@@ -213,7 +213,7 @@ def test_overshoot_is_no_slow_pair(page):
 def test_bounds_that_the_stored_set_lies_at_are_said(best):
     assert best.estimate.at_bounds() == {"gear.eta_g": 1.0, "master_cylinder.k_damp": 0.0}
     assert all(
-        "lies at its bound" in best.estimate.vague()[name] for name in best.estimate.at_bounds()
+        "is at its bound" in best.estimate.vague()[name] for name in best.estimate.at_bounds()
     )
 
 
