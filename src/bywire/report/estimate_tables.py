@@ -24,7 +24,7 @@ def estimate_table(
     Parameters
     ----------
     estimate
-                Estimates; unknowns that the data do not determine are below them. If the model is
+        Estimates; unknowns that the data do not determine are below them. If the model is
         simulated, a column gives the error from the simulation step.
     start
         Initial values of the search, by label.
