@@ -35,9 +35,7 @@ whole = closed_loop(
 )
 kept = whole.effective()
 A, B = whole.A[np.ix_(kept, kept)], whole.B[kept]
-scale = (
-    np.linalg.norm(B, axis=1) + np.abs(A).max(axis=1) * 1e-6
-)  # scales the states to similar size
+scale = np.linalg.norm(B, axis=1) + np.abs(A).max(axis=1) * 1e-6  # of the states
 A, B, C = A / scale[:, None] * scale, B / scale[:, None], whole.C[:, kept] * scale / BAR
 n, T = len(kept), whole.period
 

@@ -22,4 +22,4 @@ def test_without_the_library_nothing_is_measured(monkeypatch):
     monkeypatch.setattr(measurement_files.importlib, "import_module", missing)
     (found,) = measurement_files.measured()
     assert (found.value, found.holds) == (None, None)
-    assert "bywire[measurements]" in found.note
+    assert "'.[measurements]'" in found.note

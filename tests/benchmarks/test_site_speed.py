@@ -17,7 +17,7 @@ def test_without_sphinx_the_reason_is_said(monkeypatch):
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
     for each in site.measured():
         assert (each.value, each.holds) == (None, None)
-        assert "bywire[docs]" in each.note
+        assert "'.[docs]'" in each.note
 
 
 @pytest.mark.parametrize("status", [0, 2])

@@ -141,7 +141,7 @@ def test_a_demand_at_rest_is_refused(method: Method, signal: str) -> None:
 
 def test_a_current_of_the_wrong_sign_is_refused(winding: xr.Dataset) -> None:
     data = winding.assign(i=-winding["i"])
-    with pytest.raises(ParameterError, match=r"i of record 1 goes against v .* sign = -1"):
+    with pytest.raises(ParameterError, match=r"i of record 1 moves against v .* sign = -1"):
         WINDING.identify(data, MOTORCYCLE, WINDING.defaults, Effort())
 
 

@@ -66,7 +66,7 @@ def test_the_actuation_force_tells_it_within_the_wedge_friction(
     par = parameters("roberts2003")
     found = track("wedge.mu_B", data.drop_vars("F_N"), par)
     one = found.data.sel(parameter="wedge.mu_B")
-    assert "friction of its own" in found.relation.assumption
+    assert "internal friction" in found.relation.assumption
     t = data["time"].values
     at = np.interp(one["time"].values, t, truth)
     rows = settled(one, truth, t)

@@ -148,7 +148,7 @@ def test_a_killed_process_ends_a_study_that_then_goes_on(tmp_path: Path) -> None
     method = replace(METHOD, synthetic=partial(fatal_once, tmp_path / "mark"))
     asked = (method, None, METHOD.defaults, range(12), Effort())
     store = tmp_path / "experiments.jsonl"
-    with pytest.raises(RunError, match=r"a process of the study was killed.*goes on"):
+    with pytest.raises(RunError, match=r"a process of the study was killed.*continues"):
         trust(*asked, processes=2, store=store)
     found = trust(*asked, processes=2, store=store)
     assert [each.seed for each in found.outcomes] == list(range(12))

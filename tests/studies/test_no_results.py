@@ -40,7 +40,7 @@ def test_a_study_without_any_result_says_why_and_fails(study, tmp_path, design, 
     assert "report.html" in names
     assert not [name for name in names if name.endswith((".png", ".toml", ".nc"))]
     if requirements:
-        with pytest.raises(ParameterError, match=r"no .* case of peak_current: none has a result"):
+        with pytest.raises(ParameterError, match=r"has no .* case: no case has a result"):
             run.worst("peak_current")
         with pytest.raises(UnknownNameError, match="did you mean 'peak_current'"):
             run.worst("peak_curent")

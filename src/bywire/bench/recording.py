@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Callable, Collection, ItemsView, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, ItemsView, Iterable, Iterator, Mapping, Sequence
 from functools import cache, cached_property
 from numbers import Number
 from typing import Any, cast
@@ -126,12 +126,18 @@ def _attributes(signal: Signal) -> dict[str, str]:
     return attributes | role_attributes(signal.role)
 
 
+def _separable(texts: Iterable[str]) -> list[str]:
+    """Return warnings without the ``"; "`` that joins them in a recording's attribute."""
+    return [text.replace("; ", ", ") for text in texts]
+
+
 def watch(recording: xr.Dataset, run: Run, trajectory: Trajectory) -> list[str]:
     """Return warnings on a recording: ranges of validity, end stops, solver problems, energies."""
     if not recording.sizes["time"]:  # interrupted before the first row
         return []
     doubts = solver_doubts(trajectory.doubt, trajectory.unsettled)
-    return [*doubts, *energy_doubts(recording, [run]), *run.model.watch(recording, run.par)]
+    warnings = [*doubts, *energy_doubts(recording, [run]), *run.model.watch(recording, run.par)]
+    return _separable(warnings)
 
 
 def watch_cases(
@@ -147,14 +153,14 @@ def watch_cases(
     rows.silent = model.silent(rows, pars)
     asked = set(model.may_warn(rows, pars))
     return [
-        [*doubts, *book, *(model.watch(rows.case(k), pars[k]) if k in asked else ())]
+        _separable([*doubts, *book, *(model.watch(rows.case(k), pars[k]) if k in asked else ())])
         for k, (doubts, book) in enumerate(zip(solver, books, strict=True))
     ]
 
 
 def solver_doubts(doubt: str, unsettled: int) -> list[str]:
     """Return warnings of a run's solver; ``unsettled``: substeps that hit the contacts' cap."""
-    doubts = [doubt.replace("; ", ", ")] if doubt else []  # semicolons separate warnings
+    doubts = [doubt] if doubt else []
     if unsettled:
         doubts.append(
             f"{unsettled} substeps hit the cap of the contact iteration: take a smaller step"

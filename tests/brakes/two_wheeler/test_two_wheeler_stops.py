@@ -280,10 +280,10 @@ def test_the_road_shows_where_tyres_slide_on_what():
     figure = next(each.figure for each in bench_figures(result) if each.name == "road-marks")
     _, road = figure.axes
     legend = {text.get_text() for text in road.get_legend().get_texts()}
-    assert legend == {"dry asphalt", "snow", "tyre slides", "wheel stands"}
+    assert legend == {"dry asphalt", "snow", "tyre slides", "wheel locked"}
     # Of the lanes' bars, the front wheel's are below: it stands from the change of the road on.
     lanes = {each.get_label(): each for each in road.collections}
-    bars = [path.get_extents() for path in lanes["wheel stands"].get_paths()]
+    bars = [path.get_extents() for path in lanes["wheel locked"].get_paths()]
     run = result.recording
     stands = (run["omega_f"] == 0) & (run["v"] > 5.0)
     locked = run["x"].values[stands.values]

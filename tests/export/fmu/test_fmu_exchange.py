@@ -172,7 +172,7 @@ def test_what_it_refuses_leaves_it_usable(
         assert said in capfd.readouterr().out
     client.begin(motor__R_m=0.5)
     assert client["motor.R_m"] == 0.5
-    with pytest.raises(ParameterError, match="model exchange is only for the plant"):
+    with pytest.raises(ParameterError, match="model exchange supports only the plant"):
         export_fmu(THROWN, tmp_path, part="ecu", kind="model-exchange")
     with pytest.raises(UnknownNameError, match="did you mean 'model-exchange'"):
         export_fmu(THROWN, tmp_path, kind="model-exchang")

@@ -43,6 +43,6 @@ def _pulled_back(recording: xr.Dataset, choices: Mapping[str, Any]) -> list[str]
     if choices["port.law"] == "makeup":
         text += (
             f", with {p / 1e5:.2g} bar remaining in the caliper: port.law = 'makeup' does not "
-            "model the compensation port; port.law = 'dead-stroke' lets the fluid out"
+            "model the compensation port, port.law = 'dead-stroke' lets the fluid out"
         )
     return [text]

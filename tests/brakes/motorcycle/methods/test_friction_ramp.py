@@ -91,7 +91,7 @@ def test_records_that_cannot_be_such_a_ramp_are_refused(data: xr.Dataset) -> Non
     ):
         with raises(ParameterError, **fields):
             METHOD.identify(record, PAR, OPTIONS, Effort(starts=1))
-    with pytest.raises(ParameterError, match=r"p_mc goes against i.*sign = -1"):
+    with pytest.raises(ParameterError, match=r"p_mc moves against i.*sign = -1"):
         METHOD.identify(data.assign(i=-data["i"]), PAR, OPTIONS, Effort(starts=1))
 
 
