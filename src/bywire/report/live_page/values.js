@@ -7,14 +7,11 @@ const siOf = (value, { factor, offset }) => (value - offset) / factor;
 /** Return a number with as many digits as a reader needs. */
 const digits = (value) => String(Number(value.toPrecision(6)));
 
-/** Return a key figure as it is read: four digits, and small times, lengths and large forces in the unit of their size. */
+/** Return a key figure in four digits, times below 1 s in ms, as `wording.readable_unit` has it. */
 function readable(value, unit) {
-  const size = Math.abs(value);
-  const [factor, shown] = unit === "s" && size > 0 && size < 1 ? [1e3, "ms"]
-    : unit === "m" && size > 0 && size < 0.1 ? [1e3, "mm"]
-    : ["N", "J", "W"].includes(unit) && size >= 1e4 ? [1e-3, `k${unit}`] : [1, unit];
-  const written = String(Number((value * factor).toPrecision(4)));
-  return shown ? `${written} ${shown}` : written;
+  const isShort = unit === "s" && Math.abs(value) < 1;
+  const written = String(Number((isShort ? value * 1e3 : value).toPrecision(4)));
+  return `${written} ${isShort ? "ms" : unit}`.trim();
 }
 
 /** Return the ends of a slider [SI], and whether it goes by factors; null where it makes no sense. */
