@@ -14,11 +14,13 @@ from bywire.brakes.motorcycle.paper.dardanelli2010_measured import (
     _best,
     reproduce,
 )
-from bywire.brakes.motorcycle.paper.measured.estimation import (
+from bywire.brakes.motorcycle.paper.measured import (
     FREE,
     HELD,
     LOSS,
+    STATEMENTS,
     TIED,
+    allowances,
     brake,
     estimated,
     misfit,
@@ -29,7 +31,6 @@ from bywire.brakes.motorcycle.paper.measured.estimation import (
     slopes,
     unknowns,
 )
-from bywire.brakes.motorcycle.paper.measured.statements import STATEMENTS, allowances
 from bywire.brakes.motorcycle.paper.runs import parameters
 from bywire.brakes.motorcycle.sets.dardanelli2010 import ESTIMATED, UNDETERMINED
 from bywire.brakes.motorcycle.trim import travel_at
