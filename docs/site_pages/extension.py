@@ -1,9 +1,11 @@
-"""Sphinx extension: generated pages, links that leave the folder, formulas, public names."""
+"""Sphinx extension: generated pages, results, links that leave the folder, formulas, names."""
 
 from __future__ import annotations
 
 import builtins
+import os
 import re
+from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -18,13 +20,14 @@ from sphinx.errors import ExtensionError
 from sphinx.util import logging
 from sphinx_gallery.scrapers import figure_rst
 
-from site_pages import pages, python_names
+from site_pages import pages, python_names, results
 
 HERE = Path(__file__).parents[1]
 GENERATED = HERE / "_generated"
 GALLERY = HERE.parent / "examples" / "gallery"
 FIGURES = GENERATED / "gallery-figures"
 _log = logging.getLogger(__name__)
+_shown: dict[str, list[results.Shown]] = {}  # page -> what its marked blocks show
 
 # Links of pages in this folder that leave it in the repository -> the page that replaces them.
 _MOVED = {
@@ -45,6 +48,8 @@ _ELSEWHERE = re.compile(
 def setup(app: Sphinx) -> dict[str, Any]:
     """Connect everything."""
     app.connect("builder-inited", _make_pages, priority=100)  # before the gallery
+    app.connect("env-get-outdated", _pages_with_results)
+    app.connect("source-read", _show_results)
     app.connect("source-read", _follow_links)
     app.connect("autodoc-process-signature", _own_result)
     app.connect("missing-reference", _public_name)
@@ -54,7 +59,25 @@ def setup(app: Sphinx) -> dict[str, Any]:
 
 
 def _make_pages(app: Sphinx) -> None:
-    pages.write(GENERATED, lambda what: _log.info("%s", what))
+    folder, sources = GENERATED / pages.RESULTS, pages.digest_of_sources()
+    with ThreadPoolExecutor(os.cpu_count()) as pool:  # of processes
+        started = results.start(pool, results.pages(), folder, sources)
+        pages.write(GENERATED, lambda what: _log.info("%s", what))
+        for page, shown in started.items():
+            try:
+                _shown[page] = shown.result()
+            except results.PageError as error:
+                raise ExtensionError(f"{page}: {error}") from None
+
+
+def _pages_with_results(app: Sphinx, *changes: Any) -> list[str]:
+    return list(_shown)
+
+
+def _show_results(app: Sphinx, name: str, source: list[str]) -> None:
+    if name in _shown:
+        place = "../" * name.count("/") + f"_generated/{pages.RESULTS}/{name}"
+        source[0] = results.with_results(source[0], _shown[name], place)
 
 
 def _follow_links(app: Sphinx, name: str, source: list[str]) -> None:

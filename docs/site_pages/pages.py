@@ -15,10 +15,12 @@ from site_pages import (
     papers,
     python_names,
     repository_files,
+    results,
 )
 
 ROOT = Path(__file__).parents[2]
 STAMP = "made-of"
+RESULTS = "results"
 
 
 def texts() -> Iterator[tuple[str, str]]:
@@ -44,13 +46,13 @@ def texts() -> Iterator[tuple[str, str]]:
 
 def write(folder: Path, said: Callable[[str], None]) -> None:
     """Write all pages, unless their sources are unchanged."""
-    digest = _digest()
+    digest = digest_of_sources(Path(__file__).parent, ROOT / "CHANGELOG.md")
     stamp = folder / STAMP
     if stamp.exists() and stamp.read_text() == digest:
         return
     if stamp.exists():
         stamp.unlink()
-    kept = {"gallery"}  # Sphinx-Gallery itself updates it
+    kept = {"gallery", RESULTS}  # they know themselves what has changed
     for path in folder.iterdir() if folder.exists() else ():
         if path.name not in kept:
             shutil.rmtree(path) if path.is_dir() else path.unlink()
@@ -70,13 +72,12 @@ def _write(path: Path, text: str) -> None:
     path.write_text(text, encoding="utf-8")
 
 
-def _digest() -> str:
-    """Return a digest of the sources of these pages."""
+def digest_of_sources(*more: Path) -> str:
+    """Return a digest of the sources that commands run, and of more files and folders."""
     digest = hashlib.sha256()
-    folders = (ROOT / "src", Path(__file__).parent, ROOT / "benches", ROOT / "studies")
-    inside = (p for folder in folders for p in folder.rglob("*") if p.suffix != ".pyc")
-    single = (ROOT / "CHANGELOG.md", ROOT / "examples" / "emb_caliper" / "README.md")
-    for path in sorted({*(p for p in inside if p.is_file()), *single}):
+    places = (*(ROOT / each for each in ("src", *results.FOLDERS)), *more)
+    inside = (p for place in places for p in (place, *place.rglob("*")) if p.suffix != ".pyc")
+    for path in sorted({p for p in inside if p.is_file()}):
         digest.update(path.relative_to(ROOT).as_posix().encode())
         digest.update(path.read_bytes())
     return digest.hexdigest()

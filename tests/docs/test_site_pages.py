@@ -90,7 +90,9 @@ def test_every_page_is_led_to_and_is_there(made: dict[str, str]) -> None:
 
 def blocks(page: Path, language: str) -> list[str]:
     """Return the code blocks of a page in a language."""
-    return re.findall(rf"```{language}\n(.*?)```", page.read_text(encoding="utf-8"), re.S)
+    return re.findall(
+        rf"```{language}(?: run[^\n]*)?\n(.*?)```", page.read_text(encoding="utf-8"), re.S
+    )
 
 
 def command_lines(page: Path) -> Iterator[list[str]]:
