@@ -20,7 +20,7 @@ from sphinx.errors import ExtensionError
 from sphinx.util import logging
 from sphinx_gallery.scrapers import figure_rst
 
-from site_pages import pages, python_names, results
+from site_pages import gallery, pages, python_names, results
 
 HERE = Path(__file__).parents[1]
 GENERATED = HERE / "_generated"
@@ -28,6 +28,7 @@ GALLERY = HERE.parent / "examples" / "gallery"
 FIGURES = GENERATED / "gallery-figures"
 _log = logging.getLogger(__name__)
 _shown: dict[str, list[results.Shown]] = {}  # page -> what its marked blocks show
+_gallery: list[str] = []
 
 # Links of pages in this folder that leave it in the repository -> the page that replaces them.
 _MOVED = {
@@ -61,23 +62,28 @@ def setup(app: Sphinx) -> dict[str, Any]:
 def _make_pages(app: Sphinx) -> None:
     folder, sources = GENERATED / pages.RESULTS, pages.digest_of_sources()
     with ThreadPoolExecutor(os.cpu_count()) as pool:  # of processes
-        started = results.start(pool, results.pages(), folder, sources)
+        texts = results.pages()
+        started = results.start(pool, texts, folder, sources)
         pages.write(GENERATED, lambda what: _log.info("%s", what))
+        texts |= (generated := results.pages(GENERATED))
+        started |= results.start(pool, generated, folder, sources)
         for page, shown in started.items():
             try:
                 _shown[page] = shown.result()
             except results.PageError as error:
                 raise ExtensionError(f"{page}: {error}") from None
+    _gallery.extend(gallery.lines(texts, _shown, folder, f"_generated/{pages.RESULTS}"))
 
 
 def _pages_with_results(app: Sphinx, *changes: Any) -> list[str]:
-    return list(_shown)
+    return [*_shown, "gallery"]
 
 
 def _show_results(app: Sphinx, name: str, source: list[str]) -> None:
     if name in _shown:
         place = "../" * name.count("/") + f"_generated/{pages.RESULTS}/{name}"
         source[0] = results.with_results(source[0], _shown[name], place)
+    source[0] = source[0].replace(gallery.MARKER, "\n".join(_gallery))
 
 
 def _follow_links(app: Sphinx, name: str, source: list[str]) -> None:

@@ -26,13 +26,12 @@ RESULTS = "results"
 def texts() -> Iterator[tuple[str, str]]:
     """Yield file and text of the pages that need no computation."""
     yield "brakes.md", catalog.brakes_page()
-    for topic in catalog.TOPICS:
-        yield f"{topic}.md", catalog.page(topic)
+    yield from catalog.texts()
     yield "faults.md", catalog.faults_page()
     yield "loop-figures.md", catalog.loop_figures_page()
     yield "commands.md", commands.page()
     yield "python.rst", python_names.page()
-    yield "authoring.rst", python_names.authoring_page()
+    yield from python_names.authoring_pages()
     yield "errors.rst", python_names.errors_page()
     yield "elements/index.rst", elements.index()
     for inside in elements.modules().values():

@@ -22,6 +22,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import textwrap
 from collections.abc import Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import asdict, dataclass
@@ -72,18 +73,30 @@ class Step:
 
 @dataclass(frozen=True)
 class Shown:
-    """What one step shows: its terminal output, and the file names of its figures."""
+    """What one step shows.
+
+    Parameters
+    ----------
+    text
+        Terminal output.
+    figures
+        Paths of figures that it wrote -> their file names in the folder of what is kept.
+    """
 
     text: str
     figures: dict[str, str]
 
 
-def pages() -> dict[str, str]:
-    """Return all written pages, without their ending -> text."""
-    paths = (p for p in sorted(DOCS.rglob("*.md")) if not _NOT_PAGES & set(p.parts))
+def pages(folder: Path = DOCS) -> dict[str, str]:
+    """Return all pages in a folder as paths from `DOCS`, without their ending -> text.
+
+    Pages in its folder ``_generated`` are left out.
+    """
+    paths = sorted(folder.rglob("*.md"))
     return {
         path.relative_to(DOCS).with_suffix("").as_posix(): path.read_text(encoding="utf-8")
         for path in paths
+        if not _NOT_PAGES & set(path.relative_to(folder).parts)
     }
 
 
@@ -131,9 +144,9 @@ def _play(step: Step, folder: Path, kept: Path, prefix: str) -> Shown:
     for figure in new if step.figures == ALL else step.figures:
         if figure not in new:
             raise PageError(f"no new figure {figure!r}, but {sorted(new)}: {step.text}")
-        figures[figure] = f"{prefix}-{figure}.png"
+        file = figures[new[figure].relative_to(folder).as_posix()] = f"{prefix}-{figure}.png"
         kept.mkdir(parents=True, exist_ok=True)
-        shutil.copy(new[figure], kept / figures[figure])
+        shutil.copy(new[figure], kept / file)
     return Shown("\n".join(texts).strip("\n"), figures)
 
 
@@ -159,10 +172,17 @@ def _run(language: str, command: str, folder: Path) -> str:
         encoding="utf-8",
         check=False,
     )
-    text = done.stdout.replace(f"{folder}{os.sep}", "").rstrip()
+    text = done.stdout.replace(f"{folder}{os.sep}", "")
+    text = "\n".join(map(_wrapped, text.splitlines())).rstrip()
     if done.returncode != (1 if _STATUS in command else 0):
         raise PageError(f"exit status {done.returncode}: {command}\n{text[-2000:]}")
     return text
+
+
+def _wrapped(line: str) -> str:
+    """Return a line of prose as a terminal shows it; rows of tables stay whole."""
+    is_prose = len(line) > COLUMNS and "  " not in line.strip()
+    return textwrap.fill(line, COLUMNS, break_long_words=False) if is_prose else line
 
 
 def _lines(text: str) -> list[str]:
@@ -234,7 +254,6 @@ def with_results(markdown: str, shown: list[Shown], place: str) -> str:
 def _result_lines(step: Step, result: Shown, place: str) -> Iterator[str]:
     if result.text:
         yield f"\n\n```{{code-block}} text\n:class: terminal\n\n{result.text}\n```"
-    for name, file in result.figures.items():
-        label = name.replace("-", " ")
-        yield f"\n\n```{{figure}} {place}/{file}\n:alt: {label}\n:class: result\n\n"
-        yield f"{label.capitalize()}.\n```"
+    for path, file in result.figures.items():
+        name = Path(path).stem.replace("-", " ")
+        yield f"\n\n```{{figure}} {place}/{file}\n:alt: {name}\n:class: result\n\n`{path}`\n```"

@@ -53,7 +53,7 @@ def page(commands: str, words: str = "", language: str = "sh") -> str:
 def test_a_page_shows_output_and_figures_below_its_blocks(tmp_path: Path) -> None:
     text = page("bywire run hard-braking --out r\nbywire list loops", "step-response")
     (shown,) = results.play(results.steps(text), tmp_path)
-    assert (tmp_path / shown.figures["step-response"]).stat().st_size > 1e4
+    assert (tmp_path / shown.figures["r/step-response.png"]).stat().st_size > 1e4
     after = results.with_results(text, [shown], "figures")
     parts = [
         "```sh\n",

@@ -6,6 +6,7 @@ import re
 import shlex
 import sys
 from collections.abc import Iterator
+from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any
 
@@ -39,53 +40,49 @@ def made() -> dict[str, str]:
 def test_every_public_name_and_command_is_described(made: dict[str, str]) -> None:
     for name in bywire.__all__:
         assert re.search(rf":: bywire\.{name}$", made["python.rst"], re.M), name
+    models = "".join(text for name, text in made.items() if name.startswith("authoring/"))
     for name in authoring.__all__:
-        assert re.search(rf":: bywire\.authoring\.{name}$", made["authoring.rst"], re.M), name
+        assert re.search(rf":: bywire\.authoring\.{name}$", models, re.M), name
     for words in commands.commands():
         assert f"## {words}\n" in made["commands.md"], words
 
 
 def test_every_parameter_and_key_figure_is_described(made: dict[str, str]) -> None:
-    notation = (DOCS / "notation.md").read_text(encoding="utf-8")
+    notation = "".join(page.read_text("utf-8") for page in (DOCS / "notation").glob("*.md"))
+    sets = "".join(text for name, text in made.items() if name.startswith("parameter-sets/"))
     for cited in PARAMETER_SETS.all().values():
         for name in leaf_fields(cited.parameter_class):
             assert f"`{name}`" in notation, name
-            assert markdown.plain(name) in made["parameter-sets.md"], name
+            assert markdown.plain(name) in sets, name
     for name in definitions():
         assert f"KPI {markdown.plain(name)}" in made["key-figures.md"], name
 
 
-def led_to() -> set[str]:
+def led_to(texts: dict[str, str]) -> set[str]:
     """Return all pages that a table of contents names, without their ending."""
+    blocks = re.compile(
+        r"^```\{toctree\}\n(.*?)```|^\.\. toctree::\n((?:   [^\n]*\n|\n)+)", re.S | re.M
+    )
     known: set[str] = set()
-    for page in WRITTEN:
-        for block in re.findall(r"```\{toctree\}\n(.*?)```", page.read_text(), re.S):
-            for line in block.splitlines():
-                if line and not line.startswith(":"):
-                    target = (page.parent / line).resolve().relative_to(DOCS).as_posix()
-                    known |= set(_matching(target))
+    for page, text in texts.items():
+        for line in "\n".join("".join(each) for each in blocks.findall(text)).splitlines():
+            if (entry := line.strip()) and not entry.startswith(":"):
+                entry = re.sub(r".*<(.*)>", r"\1", entry)
+                target = ((DOCS / page).parent / entry).resolve().relative_to(DOCS).as_posix()
+                known |= {name for name in texts if fnmatch(name, target)} or {target}
     return known
 
 
-def _matching(target: str) -> Iterator[str]:
-    if "*" not in target:
-        yield target
-    elif target == "_generated/papers/*":
-        yield from (f"_generated/papers/{source}" for source in papers.sources())
-    else:
-        for path in DOCS.glob(f"{target}.md"):
-            yield path.relative_to(DOCS).with_suffix("").as_posix()
-
-
 def test_every_page_is_led_to_and_is_there(made: dict[str, str]) -> None:
-    written = {page.relative_to(DOCS).with_suffix("").as_posix() for page in WRITTEN}
-    generated = {f"_generated/{Path(name).with_suffix('').as_posix()}" for name in made}
-    generated |= {f"_generated/papers/{source}" for source in papers.sources()}
-    elements = {name for name in generated if name.startswith("_generated/elements/bywire")}
-    there = (written | generated) - elements | {"_generated/gallery/index"}
-    assert led_to() ^ there == {"index"}
-    for name in elements:
-        assert name.removeprefix("_generated/elements/") in made["elements/index.rst"]
+    texts = {
+        page.relative_to(DOCS).with_suffix("").as_posix(): page.read_text("utf-8")
+        for page in WRITTEN
+    }
+    texts |= {f"_generated/{name.rpartition('.')[0]}": text for name, text in made.items()}
+    texts |= {f"_generated/papers/{source}": "" for source in papers.sources()}
+    texts |= {"_generated/gallery/index": ""}
+    assert led_to(texts) ^ texts.keys() == {"index"}
+    assert led_to({**texts, "new": ""}) ^ texts.keys() == {"index"}  # one that nothing leads to
 
 
 def blocks(page: Path, language: str) -> list[str]:
