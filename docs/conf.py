@@ -55,6 +55,8 @@ sphinx_gallery_conf = {
     "backreferences_dir": None,
 }
 
+smartquotes_action = "qe"  # -- is part of an option, not a dash
+
 html_theme = "pydata_sphinx_theme"
 html_title = "bywire"
 html_static_path = ["static"]

@@ -20,7 +20,7 @@ from sphinx.errors import ExtensionError
 from sphinx.util import logging
 from sphinx_gallery.scrapers import figure_rst
 
-from site_pages import gallery, pages, python_names, results
+from site_pages import gallery, pages, python_names, results, search
 
 HERE = Path(__file__).parents[1]
 GENERATED = HERE / "_generated"
@@ -28,7 +28,7 @@ GALLERY = HERE.parent / "examples" / "gallery"
 FIGURES = GENERATED / "gallery-figures"
 _log = logging.getLogger(__name__)
 _shown: dict[str, list[results.Shown]] = {}  # page -> what its marked blocks show
-_gallery: list[str] = []
+_pictures: dict[str, list[str]] = {}  # marker of a page -> thumbnails in its place
 
 # Links of pages in this folder that leave it in the repository -> the page that replaces them.
 _MOVED = {
@@ -54,7 +54,7 @@ def setup(app: Sphinx) -> dict[str, Any]:
     app.connect("source-read", _follow_links)
     app.connect("autodoc-process-signature", _own_result)
     app.connect("missing-reference", _public_name)
-    app.connect("build-finished", _require_one_host)
+    app.connect("build-finished", _check_site)
     app.add_html_math_renderer("mathml", (_inline_math, None), (_displayed_math, None))
     return {"parallel_read_safe": True, "parallel_write_safe": True}
 
@@ -72,18 +72,22 @@ def _make_pages(app: Sphinx) -> None:
                 _shown[page] = shown.result()
             except results.PageError as error:
                 raise ExtensionError(f"{page}: {error}") from None
-    _gallery.extend(gallery.lines(texts, _shown, folder, f"_generated/{pages.RESULTS}"))
+    place = f"_generated/{pages.RESULTS}"
+    _pictures[gallery.MARKER] = list(gallery.lines(texts, _shown, folder, place))
+    papers = gallery.paper_lines(GENERATED / "papers", "_generated/papers")
+    _pictures[gallery.PAPER_MARKER] = list(papers)
 
 
 def _pages_with_results(app: Sphinx, *changes: Any) -> list[str]:
-    return [*_shown, "gallery"]
+    return [*_shown, "gallery", "papers"]
 
 
 def _show_results(app: Sphinx, name: str, source: list[str]) -> None:
     if name in _shown:
         place = "../" * name.count("/") + f"_generated/{pages.RESULTS}/{name}"
         source[0] = results.with_results(source[0], _shown[name], place)
-    source[0] = source[0].replace(gallery.MARKER, "\n".join(_gallery))
+    for marker, lines in _pictures.items():
+        source[0] = source[0].replace(marker, "\n".join(lines))
 
 
 def _follow_links(app: Sphinx, name: str, source: list[str]) -> None:
@@ -169,9 +173,16 @@ def _displayed_math(writer: Any, node: nodes.Element) -> None:
     raise nodes.SkipNode
 
 
-def _require_one_host(app: Sphinx, error: Exception | None) -> None:
+def _check_site(app: Sphinx, error: Exception | None) -> None:
     if error is not None or app.builder.format != "html":
         return
+    _require_one_host(app)
+    index = Path(app.outdir, "searchindex.js").read_text(encoding="utf-8")
+    if missed := search.missed(index, app.builder.indexer.lang.stem):
+        raise ExtensionError(f"the search does not find {missed}")
+
+
+def _require_one_host(app: Sphinx) -> None:
     for path in sorted(Path(app.outdir).rglob("*.html")):
         if asked := _ELSEWHERE.search(path.read_text(encoding="utf-8")):
             raise ExtensionError(f"{path.name} loads from another host: {asked.group()}")

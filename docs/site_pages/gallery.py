@@ -11,6 +11,7 @@ from site_pages.markdown import plain
 from site_pages.results import Shown, Step, steps
 
 MARKER = "<!-- pictures -->"
+PAPER_MARKER = "<!-- pictures of the papers -->"
 EXPERIMENTS = "_generated/experiments/"
 _SIZE = (480, 360)  # px; of a higher figure, the upper part
 # An experiment is shown by the first of its figures whose name begins with one of these.
@@ -57,7 +58,11 @@ def lines(
         groups.setdefault(heading, []).extend(cards)
     for heading, cards in groups.items():
         if cards:
-            yield f"## {heading}\n\n::::{{container}} gallery\n\n{''.join(cards)}::::\n"
+            yield _group(heading, cards)
+
+
+def _group(heading: str, cards: Iterable[str]) -> str:
+    return f"## {heading}\n\n::::{{container}} gallery\n\n{''.join(cards)}::::\n"
 
 
 def _chosen(page: str, figures: Mapping[str, str]) -> Iterable[tuple[str, str]]:
@@ -87,3 +92,25 @@ def _card(page: str, command: str, file: Path, place: str) -> str:
     name = plain(file.stem.partition("-")[2].replace("-", " "))
     head = f":::{{figure}} {place}/{page}/{small.name}\n:target: {page}.html\n:alt: {name}\n"
     return f"{head}\n`{command}`\n:::\n\n"
+
+
+def paper_lines(folder: Path, place: str) -> Iterator[str]:
+    """Yield the cards of the figures that are drawn for the papers.
+
+    Parameters
+    ----------
+    folder
+        Folder of the pages of papers, with a folder of figures for each.
+    place
+        Path of that folder from the page of the cards.
+    """
+    for figures in sorted(folder.glob("*-figures")):
+        source = figures.name.removesuffix("-figures")
+        files = sorted(figures.iterdir(), key=lambda file: int(file.stem.rpartition("-")[2]))
+        cards = (
+            f":::{{figure}} {place}/{figures.name}/{file.name}\n"
+            f":target: {place}/{source}.html\n:alt: {file.stem.rpartition('-')[0]}\n\n"
+            f"{file.stem.rpartition('-')[0]}\n:::\n\n"
+            for file in files
+        )
+        yield _group(f"`bywire reproduce {source}`", cards)

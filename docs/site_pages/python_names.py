@@ -60,7 +60,8 @@ def authoring_pages() -> Iterator[tuple[str, str]]:
     for module, names in sorted(modules.items()):
         about = (inspect.getdoc(importlib.import_module(module)) or "").partition("\n\n")[0]
         entries = [line for name in names for line in _authoring_entry(name)]
-        lines = [module, "=" * len(module), "", about, "", *entries]
+        title = module.removeprefix("bywire.")
+        lines = [title, "=" * len(title), "", about, "", *entries]
         yield f"authoring/{module}.rst", "\n".join(lines)
     title = "Names for writing models"
     lines = [title, "=" * len(title), "", inspect.getdoc(authoring) or "", ""]

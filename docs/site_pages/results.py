@@ -141,7 +141,8 @@ def _play(step: Step, folder: Path, kept: Path, prefix: str) -> Shown:
         texts.append(f"$ {command}\n{output}" if len(step.commands) > 1 else output)
     new = {file.stem: file for file, age in _pictures(folder).items() if before.get(file) != age}
     figures = {}
-    for figure in new if step.figures == ALL else step.figures:
+    every = sorted(new, key=lambda name: name.startswith("energy"))  # what moves comes first
+    for figure in every if step.figures == ALL else step.figures:
         if figure not in new:
             raise PageError(f"no new figure {figure!r}, but {sorted(new)}: {step.text}")
         file = figures[new[figure].relative_to(folder).as_posix()] = f"{prefix}-{figure}.png"

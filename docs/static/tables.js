@@ -1,5 +1,5 @@
 // Tables to look things up in: a field that filters all rows of the page, and headings that sort.
-const LONG = 20; // rows on a page from which on it has a field
+const LONG = 20; // rows of a table from which on its page has a field
 
 document.addEventListener("DOMContentLoaded", () => {
   const article = document.querySelector("article.bd-article");
@@ -7,7 +7,8 @@ document.addEventListener("DOMContentLoaded", () => {
     (table) => table.tBodies.length && table.tHead && !table.closest("dl"));
   tables.forEach(sortable);
   const rows = tables.flatMap((table) => [...table.tBodies[0].rows]);
-  if (rows.length >= LONG) filterable(article, tables, rows);
+  const longest = Math.max(0, ...tables.map((table) => table.tBodies[0].rows.length));
+  if (longest >= LONG) filterable(article, tables, rows);
 });
 
 function filterable(article, tables, rows) {
@@ -18,8 +19,7 @@ function filterable(article, tables, rows) {
   const box = document.createElement("div");
   box.className = "filter";
   box.append(field, count);
-  const headings = article.querySelectorAll("h1");
-  headings[0].after(box);
+  article.querySelector("h1").after(box);
   const words = new Map(rows.map((row) => [row, row.textContent.toLowerCase()]));
   field.addEventListener("input", () => {
     const sought = field.value.toLowerCase().split(/\s+/);

@@ -23,7 +23,7 @@ ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
 sys.path.insert(0, str(DOCS))
 
-from site_pages import commands, markdown, pages, papers  # noqa: E402  beside what they describe
+from site_pages import commands, markdown, pages, papers, search  # noqa: E402  beside what they describe
 
 WRITTEN = [
     page
@@ -136,3 +136,15 @@ def test_messages_of_the_page_of_troubleshooting_are_in_the_product() -> None:
 
 def test_letters_that_mean_something_in_markdown_are_escaped() -> None:
     assert markdown.plain("a_b *c* |d| <e>") == r"a\_b \*c\* \|d\| \<e\>"
+
+
+def test_a_search_that_does_not_find_its_page_is_told() -> None:
+    terms = '"terms":{"instal":[0,1],"window":1},"titleterms":{"maco":0}'
+    index = f'Search.setIndex({{"docnames":["a","b"],{terms}}})'
+    stem = {"windows": "window", "install": "instal", "macos": "maco"}.get
+    queries = {"install windows": "b", "install": "a", "install macos": "a"}
+    assert search.missed(index, stem, queries) == {}
+    assert search.missed(index, stem, {"install windows": "a", "windows cat": "b"}) == {
+        "install windows": "a",
+        "windows cat": "b",
+    }
