@@ -16,7 +16,6 @@ from site_pages import results  # noqa: E402  beside what they describe
 
 # Pages whose commands leave no figure.
 WITHOUT_RESULT = {
-    "fmu": "archives",
     "measurement-files": "files of the reader",
     "serve": "a server",
     "speed": "benchmarks of an hour",
