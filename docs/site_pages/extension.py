@@ -20,7 +20,7 @@ from sphinx.errors import ExtensionError
 from sphinx.util import logging
 from sphinx_gallery.scrapers import figure_rst
 
-from site_pages import gallery, pages, python_names, results, search
+from site_pages import built, gallery, pages, python_names, results, search
 
 HERE = Path(__file__).parents[1]
 GENERATED = HERE / "_generated"
@@ -38,12 +38,6 @@ _MOVED = {
     "../src/bywire/plant": "_generated/elements/index.rst",
     "trust/": "trust.md",
 }
-# A script, style sheet, picture or frame that a browser would load from another host.
-_ELSEWHERE = re.compile(
-    r"<(?:script|img|iframe|link(?![^>]*rel=\"(?:canonical|search|author)\"))[^>]*"
-    r"(?:src|href)=\"(?:https?:)?//[^\"]*",
-    re.IGNORECASE,
-)
 
 
 def setup(app: Sphinx) -> dict[str, Any]:
@@ -176,13 +170,11 @@ def _displayed_math(writer: Any, node: nodes.Element) -> None:
 def _check_site(app: Sphinx, error: Exception | None) -> None:
     if error is not None or app.builder.format != "html":
         return
-    _require_one_host(app)
-    index = Path(app.outdir, "searchindex.js").read_text(encoding="utf-8")
-    if missed := search.missed(index, app.builder.indexer.lang.stem):
-        raise ExtensionError(f"the search does not find {missed}")
-
-
-def _require_one_host(app: Sphinx) -> None:
-    for path in sorted(Path(app.outdir).rglob("*.html")):
-        if asked := _ELSEWHERE.search(path.read_text(encoding="utf-8")):
-            raise ExtensionError(f"{path.name} loads from another host: {asked.group()}")
+    folder = Path(app.outdir).resolve()
+    pictures = {page: sum(len(each.figures) for each in shown) for page, shown in _shown.items()}
+    faults = list(built.faults(folder, pictures))
+    index = (folder / "searchindex.js").read_text(encoding="utf-8")
+    missed = search.missed(index, app.builder.indexer.lang.stem)
+    faults += [f"the search for {words!r} does not find {page}" for words, page in missed.items()]
+    if faults:
+        raise ExtensionError("\n".join(faults))

@@ -23,7 +23,7 @@ ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
 sys.path.insert(0, str(DOCS))
 
-from site_pages import commands, markdown, pages, papers, search  # noqa: E402  beside what they describe
+from site_pages import built, commands, markdown, pages, papers, search  # noqa: E402  beside what they describe
 
 WRITTEN = [
     page
@@ -148,3 +148,21 @@ def test_a_search_that_does_not_find_its_page_is_told() -> None:
         "install windows": "a",
         "windows cat": "b",
     }
+
+
+def test_faults_of_a_built_site_are_told(tmp_path: Path) -> None:
+    (tmp_path / "b.html").write_text('<h1 id="there">B</h1>')
+    (tmp_path / "_modules").mkdir()
+    (tmp_path / "_modules" / "m.html").write_text('<a href="gone.html">m</a>')
+    links = '<a href="b.html#there">b</a> <a href="https://a.b/c">out</a> <img src="b.html?x=1">'
+    page = tmp_path / "a.html"
+    page.write_text(links)
+    assert list(built.faults(tmp_path, {"a": 1})) == []
+    page.write_text(f'{links} <a href="b.html#gone"></a> <a href="c.html"></a>')
+    assert list(built.faults(tmp_path, {"a": 2})) == [
+        "a does not show its 2 figures",
+        "a has a dead link: b.html#gone",
+        "a has a dead link: c.html",
+    ]
+    page.write_text('<script src="https://a.b/c.js"></script>')
+    assert "loads from another host" in next(built.faults(tmp_path, {}))
