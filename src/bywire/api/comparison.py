@@ -49,7 +49,7 @@ from bywire.report.document import (
 from bywire.report.subject import bench_changes
 from bywire.report.tables import Cell, Column, Table, measured_cell, value_text
 from bywire.report.terminal import change_texts
-from bywire.report.wording import clean, duration, measured_amount
+from bywire.report.wording import amount, beside_limit, clean, measured_amount
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -264,6 +264,12 @@ class Compared:
         return any(value != first for value in others)
 
     @property
+    def largest(self) -> float:
+        """Largest magnitude of a key figure, which determines the unit of all its values."""
+        known = (abs(v) for v in self.values if v is not None and math.isfinite(v))
+        return max(known, default=0.0)
+
+    @property
     def is_distinct(self) -> bool:
         """Whether a key figure differs by more than its errors, taken as independent."""
         values = [math.nan if value is None else value for value in self.values]
@@ -318,7 +324,7 @@ def _kpi_table(labels: Sequence[str], rows: Sequence[Compared]) -> Table:
             (
                 Cell(clean(each.name)),
                 *(
-                    measured_cell(v, each.unit, e)
+                    measured_cell(v, each.unit, e, like=each.largest)
                     for v, e in zip(each.values, each.errors, strict=True)
                 ),
                 _change(each),
@@ -340,7 +346,8 @@ def _verdict_table(runs: Sequence[ComparedRun]) -> Table:
             if verdict is None:
                 cells.append(Cell("-"))
                 continue
-            shown = measured_amount(verdict.value, verdict.unit, verdict.error)
+            value, error, unit = beside_limit(verdict.value, verdict.error, verdict.unit, limit)
+            shown = measured_amount(value, unit, error)
             text = f"{shown} {verdict.outcome}"
             cells.append(Cell(text, "good" if verdict.met else "bad", verdict.outcome))
         rows.append((Cell(clean(name)), Cell(clean(limit)), *cells))
@@ -359,10 +366,11 @@ def _change(row: Compared) -> Cell:
     if not row.is_distinct:
         return Cell("not distinct", value=change)
     error = row.errors[low] + row.errors[high]
-    written = measured_amount(change, difference_unit(row.unit), error, 3)
+    of = difference_unit(row.unit)
+    written = measured_amount(change, of, error, 3, like=row.largest if of == row.unit else None)
     is_share = is_pair and first and row.unit not in ("%", "K")
-    share = f" ({100 * change / abs(first):+.3g} %)" if is_share else ""
     sign = "+" if is_pair and change > 0 else ""
+    share = f" ({sign}{amount(100 * change / abs(first), '%', 3)})" if is_share else ""
     return Cell(f"{sign}{written}{share}", value=change)
 
 
@@ -510,7 +518,7 @@ class Comparison(Answer):
 
     def _spans(self) -> list[str]:
         spans = {
-            each.label: tuple(f"{duration(float(t))}" for t in recordings["time"].values[[0, -1]])
+            each.label: tuple(amount(float(t), "s") for t in recordings["time"].values[[0, -1]])
             for group in self._groups.values()
             for each, recordings in zip(self.runs, group, strict=True)
         }

@@ -43,7 +43,7 @@ from bywire.report.document import (
 )
 from bywire.report.subject import Subject
 from bywire.report.tables import Cell, Column, Table, measured_cell
-from bywire.report.wording import amount, clean, duration
+from bywire.report.wording import amount, clean
 
 _SHOWN = ("nrmse", "vaf", "max_error", "bias", "lag")
 
@@ -252,7 +252,7 @@ def _fit_table(fits: Sequence[SegmentFit]) -> Table:
 
 def _figure(kpi: Kpi) -> Cell:
     if kpi.unit == "s" and math.isfinite(kpi.value) and not kpi.bound > 0.0:
-        return Cell(duration(kpi.value), value=kpi.value, unit=kpi.unit)
+        return Cell(amount(kpi.value, "s", 3), value=kpi.value, unit=kpi.unit)
     return measured_cell(kpi.value, kpi.unit, kpi.bound, 3)
 
 
