@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 import numpy as np
 import xarray as xr
@@ -35,6 +35,7 @@ from bywire.core.typing import Progress
 from bywire.core.units import difference_unit
 from bywire.report.answer import Answer
 from bywire.report.document import (
+    Banner,
     Block,
     Change,
     Document,
@@ -270,6 +271,13 @@ class Compared:
         return max(known, default=0.0)
 
     @property
+    def ratio(self) -> float:
+        """Spread of a key figure relative to its smallest magnitude; 0 if one is zero or none."""
+        known = [v for v in self.values if v is not None and math.isfinite(v)]
+        least = min(map(abs, known), default=0.0)
+        return (max(known) - min(known)) / least if least and len(known) > 1 else 0.0
+
+    @property
     def is_distinct(self) -> bool:
         """Whether a key figure differs by more than its errors, taken as independent."""
         values = [math.nan if value is None else value for value in self.values]
@@ -353,6 +361,10 @@ def _verdict_table(runs: Sequence[ComparedRun]) -> Table:
         rows.append((Cell(clean(name)), Cell(clean(limit)), *cells))
     columns = (Column("requirement"), Column("limit", numeric=True))
     return Table((*columns, *(Column(each.label, numeric=True) for each in runs)), tuple(rows))
+
+
+def _not_met(run: ComparedRun) -> list[Verdict]:
+    return [verdict for verdict in run.verdicts if verdict.outcome != "met"]
 
 
 def _change(row: Compared) -> Cell:
@@ -454,20 +466,46 @@ class Comparison(Answer):
         sources = [f"{each.label}: {each.source}" for each in self.runs]
         changed = self._changed()
         changes = [Listing(changed, "Also changed:")] if changed else []
+        conclusion = self._conclusion()
         return Document(
             "Comparison of " + ", ".join(each.label for each in self.runs),
             f"{len(self.runs)} runs; values in the order of the command",
             sections=lambda: [
-                Section("Differing settings", [Listing(sources), *settings, *changes]),
                 *([Section("Requirements", verdicts)] if verdicts else []),
+                Section("Differing settings", [Listing(sources), *settings, *changes]),
                 Section("Curves", self._curves()),
                 *([Section("Differences", apart)] if (apart := self._differences()) else []),
                 Section("Key figures", figures),
             ],
-            brief=spaced([*settings, *changes, *figures, *verdicts]),
+            brief=spaced([f"{conclusion}.", *verdicts, *settings, *figures, *changes]),
             data=self._data(),
+            banner=Banner(conclusion, self._overall()),
             record="compare.json",
         )
+
+    def _conclusion(self) -> str:
+        """Return who meets the requirements, the worst run first, and what differs most."""
+        parts = []
+        judged = [each for each in self.runs if each.verdicts]
+        for each in sorted(judged, key=lambda run: -len(_not_met(run))):
+            open_ = [f"{v.kpi} {v.outcome}" for v in _not_met(each)]
+            met = f"{len(each.verdicts) - len(open_)} of {len(each.verdicts)} requirements"
+            missed = f" ({', '.join(open_)})" if open_ else ""
+            parts.append(f"{each.label} meets {met}{missed}")
+        distinct = [each for each in self.figures if each.differs and each.is_distinct]
+        count = f"{len(distinct)} of {len(self.figures)} key figures differ"
+        most = max(distinct, key=lambda each: each.ratio, default=None)
+        if most is not None and math.isfinite(most.ratio) and most.ratio > 0.0:
+            pairs = zip(most.values, most.errors, strict=True)
+            values = (measured_amount(v, most.unit, e, like=most.largest) for v, e in pairs)
+            count += f", {most.name} the most ({', '.join(values)})"
+        return "; ".join([*parts, count])
+
+    def _overall(self) -> Literal["good", "bad", "open", "none"]:
+        outcomes = {v.outcome for each in self.runs for v in each.verdicts}
+        if "missed" in outcomes:
+            return "bad"
+        return "none" if not outcomes else "open" if "undecided" in outcomes else "good"
 
     def _changed(self) -> list[str]:
         """Return the changes of the runs, without settings that differ between them."""
