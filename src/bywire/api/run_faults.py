@@ -24,6 +24,7 @@ from bywire.report.document import (
     Document,
     FigureBlock,
     Listing,
+    Paragraph,
     Section,
     TableBlock,
 )
@@ -177,13 +178,18 @@ class FaultCampaign(Answer):
         table = TableBlock(self._table())
         residuals = TableBlock(self._residual_table())
         uncovered = sum(f.kind in _RANK[:2] for f in findings.faults)
-        kinds = ", ".join(f"{n} {kind}" for kind, n in findings.kinds().most_common())
+        counts = findings.kinds()
+        order = sorted(counts, key=lambda kind: _RANK.index(kind) if kind in _RANK else len(_RANK))
+        kinds = ", ".join(f"{counts[kind]} {kind}" for kind in order)
+        first = f"{len(plan.faults)} faults: {kinds}"
         known = Listing([kinds, *varied_texts(plan.varied), *self.notes])
         return Document(
             f"Faults: {plan.name}",
             f"{len(plan.faults)} faults, {plan.total} runs of {subject.line}",
             sections=lambda: [
-                Section("Faults", [table]),
+                Section(
+                    "Faults", [Paragraph(f"{first}. The most dangerous are listed first."), table]
+                ),
                 Section("Notes", [known]),
                 Section("Figures", self._figures()),
                 Section("Residuals", [residuals]),
@@ -191,8 +197,9 @@ class FaultCampaign(Answer):
                 subject.provenance("" if self.folder is None else f"Outcomes: {self.folder}."),
             ],
             brief=[
+                f"{first}{self._worst_fault()}",
+                "",
                 TableBlock(self._worst_first(), most=max(_MOST, uncovered)),
-                f"{len(plan.faults)} faults: {kinds}",
                 Details("", [table, residuals, known]),
             ],
             data=self._data(),
@@ -256,16 +263,27 @@ class FaultCampaign(Answer):
 
     def _table(self) -> Table:
         columns = [self._quantities[name] for name in _COLUMNS if name in self._quantities]
-        return record_table(self.findings.faults, columns)
+        return record_table(self._ranked, columns)
 
-    def _worst_first(self) -> Table:
-        """Return the table for a terminal, with the most dangerous faults first."""
-        ranked = sorted(
+    @cached_property
+    def _ranked(self) -> list[FaultFinding]:
+        """The faults, the most dangerous first."""
+        return sorted(
             self.findings.faults,
             key=lambda f: (_RANK.index(f.kind), f.tolerance if f.dangerous else math.inf),
         )
+
+    def _worst_fault(self) -> str:
+        """Return the most dangerous fault that no monitor detects in time; empty for none."""
+        worst = self._ranked[0] if self._ranked else None
+        if worst is None or worst.kind not in _RANK[:2]:
+            return ""
+        return f"; the worst: {_name(worst)}, {worst.kind}, {_violated(worst)}"
+
+    def _worst_first(self) -> Table:
+        """Return the table for a terminal."""
         columns = [self._quantities[name] for name in _SHORT if name in self._quantities]
-        return record_table(ranked, columns)
+        return record_table(self._ranked, columns)
 
     def _off_healthy(self, each: FaultFinding) -> str:
         signals = signals_of(self.findings.plan.case(0).model.Output)
