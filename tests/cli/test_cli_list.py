@@ -194,7 +194,7 @@ def test_a_word_finds_what_is_declared_to_mean_it(
     found = bywire("list", word, "--json").object["found"]
     assert (kind, name) in {(one["kind"], one["name"]) for one in found}
     text = bywire("list", word).out
-    assert text.startswith(f"nothing has the name {word!r}; these mention it")
+    assert text.startswith(f"nothing is named {word!r}, but these entries mention it")
     assert len(text.splitlines()) <= 40
 
 

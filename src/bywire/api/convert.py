@@ -1,4 +1,4 @@
-"""Conversion of a measurement file to another format, also to one time axis."""
+"""Conversion of a measurement file to another format, or to a common time axis."""
 
 from __future__ import annotations
 
@@ -21,23 +21,23 @@ if TYPE_CHECKING:
     from bywire.data.channel_quality import AlignedChannel, AlignmentReport, Stretch
 
 _LISTED = 20
-"""longest list of stretches per kind and channel in the JSON object, which counts all of them"""
+"""longest list of stretches of a kind in a channel in the JSON object, which counts all"""
 
-_ROUNDING = 1e-9  # steps; smaller jitter is rounding, not the clock's
+_ROUNDING = 1e-9  # steps; smaller jitter is rounding and does not come from the clock
 
 
 @dataclass(frozen=True)
 class Conversion(Answer):
-    """A converted measurement.
+    """Converted measurement.
 
     Parameters
     ----------
     source, target
-        The files read and written.
+        The input file and the output file.
     recording
-        Its signals, SI.
+        Signals in SI units.
     alignment
-        Resampling to one time axis; None if the signals keep their own.
+        Resampling to a common time axis, or None if each signal keeps its own.
     remarks
         Notes from reading the file.
     """
@@ -50,11 +50,11 @@ class Conversion(Answer):
 
     @property
     def notes(self) -> list[str]:
-        """Notes on omitted, missing or guessed content of the file."""
+        """Notes on content of the file that bywire omitted, missed or guessed."""
         return list(self.remarks)
 
     def document(self) -> Document:
-        """Return the signals, and the findings of the alignment."""
+        """Return the signals and the alignment's findings."""
         report = self.alignment
         table = TableBlock(self._signal_table() if report is None else _channel_table(report))
         head, foot = ([], []) if report is None else _around(report)
@@ -123,7 +123,7 @@ def aligned(
     exclude: Sequence[str] | None,
     max_gap: str,
 ) -> tuple[xr.Dataset, AlignmentReport]:
-    """Return the signals on one time axis, with a report; see `bywire.convert`.
+    """Return the signals on a common time axis, with a report (see `bywire.convert`).
 
     Raises
     ------
@@ -160,7 +160,7 @@ def _channel(channel: AlignedChannel) -> dict[str, Any]:
 
 
 def _stretches(stretches: tuple[Stretch, ...]) -> dict[str, Any]:
-    """Return count, total length, and the longest stretches in the order of time."""
+    """Return count, total length and the longest stretches in order of time."""
     longest = sorted(stretches, key=lambda stretch: -stretch.length)[:_LISTED]
     return {
         "count": len(stretches),
@@ -173,15 +173,15 @@ def _stretches(stretches: tuple[Stretch, ...]) -> dict[str, Any]:
 
 
 def _around(report: AlignmentReport) -> tuple[list[str], list[str]]:
-    """Return the lines above and below the table of an alignment."""
+    """Return the lines above and below an alignment's table."""
     head = (
         f"{report.samples} samples every {units.shown(report.interval, 's')} from "
         f"{units.shown(report.start, 's')} to {units.shown(report.stop, 's')}, method "
         f"{report.method}; excluded: {', '.join(report.exclude) or 'nothing'}"
     )
     folded = (
-        f"sampled faster than the time axis: {', '.join(report.folded)}; content above half the "
-        f"axis's rate aliases to low frequencies, unless {option('method', 'average')}"
+        f"sampled faster than the time axis: {', '.join(report.folded)}. Content above half the "
+        f"new sample rate aliases to low frequencies unless you use {option('method', 'average')}"
     )
     return [head], [folded] if report.folded else []
 

@@ -68,7 +68,7 @@ def worst(evidence: Iterable[Evidence]) -> Evidence:
             return each
         if nearest is None or _share(each) > _share(nearest):
             nearest = each
-    return nearest or Evidence(True, "there is nothing to check")
+    return nearest or Evidence(True, "nothing to check")
 
 
 def _share(evidence: Evidence) -> float:

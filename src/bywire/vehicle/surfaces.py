@@ -7,9 +7,9 @@ from bywire.plant.road import SURFACES, SurfaceName
 
 
 def laid(prefix: str, first: SurfaceName, further: SurfaceName | None = None) -> dict[str, float]:
-    """Return the parameters of a road, below a prefix, of a surface and of a further one.
+    """Return the parameters of a road, below a prefix, of one surface and of the surface after it.
 
-    The further one is the first, unless given; ``"own"`` changes none.
+    The second surface defaults to the first. ``"own"`` changes none.
     """
     names = {"first": first, "further": first if further is None else further}
     return {
