@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from bywire.core.errors import ParameterError, SolverError, WorkLimitError
-from bywire.core.interrupts import interrupt_heard
+from bywire.core.interrupts import interrupt_handled
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import Role, Signal, signals_of
 from bywire.core.typing import Array
@@ -72,7 +72,7 @@ def advance_all(
         try:
             engine.advance(request, vector, begin, end, values[row:])
         except KeyboardInterrupt:
-            interrupt_heard()
+            interrupt_handled()
             vector[:] = saved
             return begin
         require_finite(
@@ -84,7 +84,7 @@ def advance_all(
             if progress is not None:
                 progress(end / schedule.frames)
         except KeyboardInterrupt:
-            interrupt_heard()
+            interrupt_handled()
             return begin
         elapsed = max(time.perf_counter() - started, 1e-9)
         factor = min(max(_CHUNK_SECONDS / elapsed, 0.5), 8.0)
