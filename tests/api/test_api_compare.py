@@ -285,5 +285,5 @@ def test_a_set_that_is_not_known_here_leaves_values_without_units(folders, tmp_p
 def test_a_folder_whose_result_was_not_written_to_its_end(folders, tmp_path):
     shutil.copytree(folders[0], tmp_path / "half")
     (tmp_path / "half" / UNFINISHED).write_text("")
-    with pytest.raises(FileError, match="half holds a result that is incomplete"):
+    with pytest.raises(FileError, match="half contains an incomplete result"):
         bywire.compare(tmp_path / "half", folders[1])

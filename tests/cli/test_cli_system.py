@@ -231,7 +231,9 @@ def test_its_own_experiment_runs_by_its_name(bywire: Bywire, tmp_path: Path) -> 
 def test_its_own_names_come_first(bywire: Bywire) -> None:
     assert next(iter(bywire("list", "--json", *SYSTEM).object["brakes"])) == "spring-axis"
     caliper = ("--system", ROOT / "examples" / "emb_caliper")
-    refused(bywire("margins", "xyzzy", *caliper), "unknown loop 'xyzzy': known are clamp-force")
+    refused(
+        bywire("margins", "xyzzy", *caliper), "unknown loop 'xyzzy': valid names are clamp-force"
+    )
 
 
 def test_a_set_for_an_assembly_that_does_not_exist_is_said(bywire: Bywire, tmp_path: Path) -> None:
