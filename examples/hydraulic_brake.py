@@ -1,4 +1,4 @@
-"""A hydraulic brake of your own in one file: motor, gear, rack, master cylinder, caliper.
+"""Your own hydraulic brake in one file: motor, gear, rack, master cylinder, caliper.
 
 All elements come from `bywire.plant`; only the brake itself is new. The tutorial
 "A hydraulic brake of your own" explains this file from top to bottom.
