@@ -8,7 +8,7 @@ import pytest
 from command_line import BRAKING, QUICK, no_half_files, refused
 
 from bywire.core.errors import FileError
-from bywire.usecases.study_report import study_report
+from bywire.usecases.study import study_report
 from emulated_driver import EmulatedDriver, emulated
 
 STUDY = 'bench = "bench.toml"\n[vary]\n"motor.R_m" = "+-5 %"\n[design]\ncases = 64\n'

@@ -14,9 +14,9 @@ from typing import Any, Protocol
 from bywire.core import ops
 from bywire.core.errors import ModelError
 from bywire.core.parameters import ParameterSet
-from bywire.export.controller.body import Body
 from bywire.export.controller.c_text import c_name
 from bywire.export.controller.elementary import MAGNITUDE
+from bywire.export.controller.functions import Body
 from bywire.export.controller.structs import is_number, literal
 from bywire.export.controller.values import (
     BOTH,

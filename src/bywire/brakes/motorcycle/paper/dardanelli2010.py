@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from bywire.brakes.motorcycle.paper import fig3, fig5, fig6, fig7, gear, table3, table4, tables_1_2
+from bywire.brakes.motorcycle.paper import control, friction, gear, transfer_functions
 from bywire.brakes.motorcycle.paper.facts import ALLOWANCES, CITATION, FACTS
 from bywire.brakes.motorcycle.paper.runs import MAIN, Runs
 from bywire.reproduction.item import Item, Quoted, RootCause, causes_of
@@ -116,17 +116,17 @@ def _single(q: Quoted) -> RootCause:
 # --- The reproduction
 
 PARTS = {
-    "Table 1": tables_1_2.table1,
-    "Table 2": tables_1_2.table2,
-    "repair of Table 1": tables_1_2.repair,
-    "Table 3, Fig. 4": table3.part,
-    "Fig. 3": fig3.part,
-    "Fig. 5": fig5.part,
-    "waveforms": fig5.waveforms,
-    "Table 4": table4.part,
-    "Fig. 6": fig6.part,
-    "Fig. 7": fig7.part,
-    "requirements": fig7.requirements,
+    "Table 1": transfer_functions.table1,
+    "Table 2": transfer_functions.table2,
+    "repair of Table 1": transfer_functions.repair,
+    "Table 3, Fig. 4": friction.table3,
+    "Fig. 3": control.fig3,
+    "Fig. 5": friction.fig5,
+    "waveforms": friction.waveforms,
+    "Table 4": transfer_functions.table4,
+    "Fig. 6": transfer_functions.fig6,
+    "Fig. 7": control.fig7,
+    "requirements": control.requirements,
     "gear": gear.part,
 }
 NAMES = {

@@ -6,19 +6,17 @@ from collections.abc import Mapping
 from functools import cache
 
 from bywire.brakes.motorcycle.paper.facts import CITATION, FACTS
-from bywire.brakes.motorcycle.paper.measured.estimation import (
+from bywire.brakes.motorcycle.paper.measured import (
     FREE,
     HELD,
     PRIOR,
-    Appraisal,
-    appraised,
-    predicted,
-)
-from bywire.brakes.motorcycle.paper.measured.statements import (
     STATEMENTS,
+    Appraisal,
     Statement,
     allowances,
+    appraised,
     overshoots,
+    predicted,
     stuck_at,
 )
 from bywire.brakes.motorcycle.paper.runs import MAIN, PRINTED, Runs, parameters

@@ -13,9 +13,8 @@ from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis import step_response
 from bywire.bench.kpis.families import evaluate, units_of
 from bywire.bench.kpis.kpi import Figures, Kpi
-from bywire.brakes.wedge.case import steps
+from bywire.brakes.wedge.case import check_current, shaft_case, steps
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.rigs.rig_case import check_current, shaft_case
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Current, Duration, Unit
 

@@ -10,10 +10,9 @@ from pydantic import Field
 
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis.kpi import Figures, Kpi
-from bywire.brakes.wedge.case import mean
+from bywire.brakes.wedge.case import mean, peak, screw_case
 from bywire.brakes.wedge.experiments.screw_position import SomeAngle
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.rigs.rig_case import peak, screw_case
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Frequency, Unit
 from bywire.core.typing import Array

@@ -14,14 +14,14 @@ import xarray as xr
 
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis.kpi import Figures, Kpi
-from bywire.brakes.wedge.case import parameters_of
-from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.rigs.rig_case import (
+from bywire.brakes.wedge.case import (
     Stimuli,
     check_current,
+    parameters_of,
     shaft_case,
     torque_constant_of,
 )
+from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Current, Duration, Inertia
 from bywire.core.typing import Array

@@ -16,15 +16,16 @@ from pydantic import Field
 
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis.kpi import Figures, Kpi
-from bywire.brakes.wedge.case import mean, parameters_of
-from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.rigs.rig_case import (
+from bywire.brakes.wedge.case import (
     check_current,
+    mean,
+    parameters_of,
     screw_case,
     shaft_case,
     slope_of,
     torque_constant_of,
 )
+from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Current, Duration, Unit
 from bywire.core.signals import Signal

@@ -15,9 +15,8 @@ from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis import step_response
 from bywire.bench.kpis.families import evaluate, units_of
 from bywire.bench.kpis.kpi import Figures, Kpi
-from bywire.brakes.wedge.case import parameters_of, steps
+from bywire.brakes.wedge.case import Stimuli, parameters_of, peak, shaft_case, steps
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.rigs.rig_case import Stimuli, peak, shaft_case
 from bywire.brakes.wedge.rigs.shaft_rig import friction
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Frequency, Unit

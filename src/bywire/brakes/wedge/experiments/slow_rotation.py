@@ -11,9 +11,8 @@ import numpy as np
 
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis.kpi import Figures, Kpi
-from bywire.brakes.wedge.case import parameters_of
+from bywire.brakes.wedge.case import parameters_of, shaft_case, torque_constant_of
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.rigs.rig_case import shaft_case, torque_constant_of
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration
 from bywire.core.typing import Array

@@ -10,15 +10,16 @@ import xarray as xr
 
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis.kpi import Figures, Kpi
-from bywire.brakes.wedge.case import case_from_parked, parameters_of
-from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.rigs.rig_case import (
+from bywire.brakes.wedge.case import (
     Stimuli,
+    case_from_parked,
     check_current,
+    parameters_of,
     screw_case,
     slope_of,
     torque_constant_of,
 )
+from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Current, Duration, Length
 from bywire.core.typing import Array

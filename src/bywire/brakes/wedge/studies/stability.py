@@ -17,7 +17,7 @@ from bywire.brakes.wedge.laws.moment_control import SomeMoment
 from bywire.brakes.wedge.loops import MOMENT_LOOP
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.plants import full, mechanical, rigid_rate
-from bywire.brakes.wedge.sizing import Count, Slope, redesigned
+from bywire.brakes.wedge.studies.drive_train import Count, Slope, redesigned
 from bywire.core.errors import InputError
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Unit
