@@ -179,7 +179,7 @@ def test_python_and_forms_take_the_only_parameter_set(tmp_path: Path) -> None:
 
 
 def test_what_the_option_itself_lacks_is_said(bywire: Bywire, tmp_path: Path) -> None:
-    refused(bywire("list", "--system"), "--system needs a PATH")
+    refused(bywire("list", "--system"), "--system needs the path")
     refused(bywire("list", "--system", tmp_path / "none.py"), "none.py does not declare a brake")
     assert "list" in bywire(*SYSTEM).out  # the help
 

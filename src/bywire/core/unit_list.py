@@ -339,6 +339,18 @@ def spellings() -> Iterator[str]:
     yield from _TWO_MEANINGS
 
 
+def units_by_symbol() -> dict[str, list[str]]:
+    """Return the listed units by the SI unit of their quantity, one spelling each, for choosers."""
+    found: dict[str, list[str]] = {}
+    rows = {(number, symbol): row for number, symbol, *row in reversed(_ROWS)}  # one a size
+    for (_, symbol), (prefixes, names, words) in reversed(rows.items()):
+        first = (names or words).split()[0]
+        spelled = ["", *prefixes.split()] if names else [""]
+        found.setdefault(symbol, []).extend(f"{prefix}{first}" for prefix in spelled)
+    found["K"] += [names.split()[0] for _, _, names in _TEMPERATURES]
+    return found
+
+
 def _plain(text: str) -> str:
     """Return a unit with one sign for each meaning."""
     plain = re.sub(" +", " ", text.translate(_PLAIN)).strip(" ")

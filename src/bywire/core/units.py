@@ -22,7 +22,8 @@ F = TypeVar("F")
 
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*(.*?)\s*", re.DOTALL)
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-_SIGNS = {"ohm": "Ω", "percent": "%", "degree": "°", "deg": "°", "degC": "°C"}
+_SIGNS = {"um": "µm", "ohm": "Ω", "percent": "%", "degree": "°", "deg": "°", "degC": "°C"}
+_DIFFERENCES = {"K": "delta_degC", "%": "percentage points", "percent": "percentage points"}
 _LONGEST = 100  # characters; keeps patterns fast on hostile text
 _WORDS = {"1": "a pure number", "delta_degC": "a temperature difference in K"}
 ICE = 273.15
@@ -248,12 +249,16 @@ def convert(value: F, symbol: str, unit: str) -> F:
 def difference_unit(symbol: str) -> str:
     """Return the SI unit of differences; for temperatures, a unit without an offset.
 
+    Percentages differ by percentage points.
+
     Examples
     --------
     >>> shown(20.0, "K"), shown(20.0, difference_unit("K")), difference_unit("Pa")
     ('-253.15 degC', '20 K', 'Pa')
+    >>> shown(3.8, difference_unit("%"))
+    '3.8 percentage points'
     """
-    return "delta_degC" if symbol == "K" else symbol
+    return _DIFFERENCES.get(symbol, symbol)
 
 
 def display_factor(symbol: str) -> float:
