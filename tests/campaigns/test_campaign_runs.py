@@ -352,7 +352,7 @@ def test_an_interrupt_says_what_is_kept(campaign, file, folder):
         if share > 0:
             raise KeyboardInterrupt
 
-    with pytest.raises(KeyboardInterrupt, match="7 of 7 faults are kept: repeat the command"):
+    with pytest.raises(KeyboardInterrupt, match="7 of 7 faults are kept: rerun the command"):
         bywire.run_faults(file, folder, progress=interrupt)
 
 

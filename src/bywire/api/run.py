@@ -323,14 +323,14 @@ def _remark(verdict: Verdict) -> str:
         written = measured_amount(verdict.value, verdict.unit, verdict.error)
         return (
             f"requirement undecided: {verdict.kpi} is {written}, numerical error "
-            f"{amount(verdict.error, verdict.unit, 2)}{limit}: take a smaller step"
+            f"{amount(verdict.error, verdict.unit, 2)}{limit}: use a smaller step"
         )
     if not verdict.is_decided and not math.isinf(verdict.error):
         return f"requirement undecided: {verdict.kpi} is not defined{limit} ({verdict.note})"
     if not verdict.is_decided:
         return (
             f"requirement undecided: {verdict.kpi} is defined for only one of the step and half "
-            f"the step{limit}: take a smaller step"
+            f"the step{limit}: use a smaller step"
         )
     return f"requirement not met: {verdict.kpi} is {amount(verdict.value, verdict.unit)}{limit}" + (
         f" ({verdict.note})" if verdict.note else ""

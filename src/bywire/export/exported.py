@@ -111,7 +111,7 @@ def cases_of(bench: Bench) -> tuple[Case, ...]:
     if not cases:
         raise ParameterError(
             f"experiment {bench.experiment!r} computes a characteristic without any run, so that "
-            "there is nothing to export: take another experiment, for instance 'open-loop'",
+            "nothing to export. Use another experiment, for instance 'open-loop'",
             name="experiment",
             value=repr(bench.experiment),
         )

@@ -515,8 +515,8 @@ def overlaid_panels(
     present = _chosen(data)
     if not present:
         raise ParameterError(
-            f"the {len(recordings)} recordings share no signal over time that moves: there is "
-            "nothing to overlay"
+            f"the {len(recordings)} recordings share no signal over time that moves, so "
+            "they cannot be overlaid"
         )
     looks = _looks(list(recordings), scale, skipped)
     heights = [panel.height for panel, _ in present]

@@ -419,7 +419,7 @@ def design(
     """
     if not tunables:
         raise ParameterError(
-            "there is nothing to tune: set fewer of the loop's parameters", name="parameters"
+            "no parameter is left to tune: set fewer of the loop's parameters", name="parameters"
         )
     floors = linear_floors(requirements, largest_error(cases, start))
     problem = Problem(tunables, (*requirements, *floors), tuple(cases))

@@ -161,7 +161,7 @@ class Form:
     name
         Name of the task; the words of the command by default.
     fields
-        Fields in their order; by default all arguments with a label.
+        Fields in their order; default: all arguments with a label.
     is_listed
         Whether the start page links to a separate page for it.
     is_kept

@@ -55,7 +55,7 @@ def export_controller(
     vectors
         Test vectors per task.
     check
-        Whether to compile the C in both precisions, run it on the vectors, compare it bit by bit,
+        Whether to compile the C in both precisions, run it on the vectors, compare it bit for bit,
         and measure it. This happens on this machine and on Cortex-M3, M4F and M7, if
         arm-none-eabi-gcc and qemu-system-arm are installed.
     dbc

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from bywire.api.loop_case import LoopCase
 
 LoopOrPlant = Annotated[
-    str, Ask("Loop or plant, see 'bywire list'.", "Loop", name="loop", known=("loops", "plants"))
+    str, Ask("Loop or plant (see 'bywire list').", "Loop", name="loop", known=("loops", "plants"))
 ]
 LocusRange = Annotated[
     str, Ask("Root locus over a range, e.g. motor.R_m=0.1ohm:1ohm:71.", "Root locus")

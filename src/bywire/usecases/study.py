@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from bywire.core.typing import Progress
 
 SizingName = Annotated[
-    str, Ask("Sizing study, see 'bywire list'.", "Sizing study", known=("studies",))
+    str, Ask("Sizing study (see 'bywire list').", "Sizing study", known=("studies",))
 ]
 SizingChanges = Annotated[
     Mapping[str, Any],

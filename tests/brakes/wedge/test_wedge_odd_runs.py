@@ -130,7 +130,7 @@ def test_chatter_is_no_lack_of_torque(changes):
     assert np.abs(result.recordings["run"]["M_B"].values).max() > 200.0
     (text,) = result.warnings
     assert text.startswith("the demanded current swings between its limits of -20 A and 20 A, ")
-    assert text.endswith("see 'bywire margins position' and 'bywire margins moment'")
+    assert text.endswith("(see 'bywire margins position' and 'bywire margins moment')")
 
 
 def test_moment_that_comes_late_is_not_out_of_reach():

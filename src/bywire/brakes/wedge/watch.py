@@ -101,8 +101,8 @@ def _limits(recording: xr.Dataset, values: Mapping[str, Any]) -> list[str]:
         begin, end, number = swings
         return [
             f"the demanded current swings between its limits of -{limit:.4g} A and {limit:.4g} A, "
-            f"{number} times from t = {begin:.4g} s to {end:.4g} s: a loop is likely unstable, "
-            "see 'bywire margins position' and 'bywire margins moment'"
+            f"{number} times from t = {begin:.4g} s to {end:.4g} s: a loop is likely unstable "
+            "(see 'bywire margins position' and 'bywire margins moment')"
         ]
     k = int(np.argmax(limited))
     return [f"the current limit of {limit:.4g} A was reached {_when(recording, k)}"]

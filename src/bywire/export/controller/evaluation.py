@@ -318,7 +318,7 @@ def called(at: Context, node: ast.Call, function: Any, given: list[Any], named: 
         return _method(at, node, function, given, named)
     if isinstance(function, Closure):
         return at.translation.inlined(at, node, function, given, named)
-    target = at.known(node, function, "it is no function that export knows")
+    target = at.known(node, function, "it is not a function that export can translate")
     if isinstance(target, partial):
         held = {**{n: Known(v) for n, v in target.keywords.items()}, **named}
         return called(at, node, Known(target.func), [*map(Known, target.args), *given], held)

@@ -873,7 +873,7 @@ def _require(region: Region, joint: bool) -> None:
             raise ParameterError(
                 f"the pressure hardly responds to the step at {where} (it changes by "
                 f"{change / 1e5:.2g} bar, its noise is {step.sigma / 1e5:.2g} bar), so none "
-                f"of {', '.join(NAMES)} can be estimated: take a larger step, with dither",
+                f"of {', '.join(NAMES)} can be estimated: use a larger step, with dither",
                 name=where,
                 value=f"{change / 1e5:.2g} bar",
             )

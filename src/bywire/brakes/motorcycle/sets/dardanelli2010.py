@@ -23,7 +23,7 @@ _TABLE1 = next(entry for entry in _PUBLISHED if entry.name == "dardanelli2010-ta
 # --- The set estimated from the paper's measurements
 
 ESTIMATED = SourceFile(Path(__file__).with_name("dardanelli2010_measured.toml")).values()
-UNDETERMINED = ("master_cylinder.s_mc", "fluid.V_air", "seal.T_pr", "seal.mu_T", "pipeline.d_pl")
+UNDETERMINED = ("master_cylinder.s_mc", "fluid.V_air", "seal.T_pr")
 _AS_TABLE1 = "as in dardanelli2010-table1: free in the estimation, but no statement determines it"
 _ASSUMED = "the ECU assumes the estimated friction"
 _SEAL: dict[str, Formula] = {
