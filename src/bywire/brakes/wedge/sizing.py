@@ -1,7 +1,7 @@
 """Drive trains of the wedge brake: demand, response, and comparison of many designs.
 
-A design is a slope of the wedge and a lead of the screws. All other
-parameters follow from them. The speeds of the reference make every design respond equally fast.
+A design consists of a wedge slope and a screw lead. All other parameters follow from these two. The
+reference speeds give every design the same response time.
 """
 
 from __future__ import annotations
