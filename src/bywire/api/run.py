@@ -45,7 +45,7 @@ from bywire.report.document import (
 from bywire.report.stated_levels import stated_figure
 from bywire.report.subject import bench_changes
 from bywire.report.tables import KpiRow, kpi_table
-from bywire.report.wording import amount, measured_amount
+from bywire.report.wording import amount, beside_limit, error_text, measured_amount
 
 if TYPE_CHECKING:
     from bywire.report.bench_figures import Shown
@@ -361,11 +361,11 @@ def faulty(bench: Bench, faults: Sequence[str]) -> Bench:
 def _remark(verdict: Verdict) -> str:
     """Return a remark on a requirement that is missed or undecided."""
     limit = f", limit {verdict.limit}"
+    value, error, unit = beside_limit(verdict.value, verdict.error, verdict.unit, verdict.limit)
     if not verdict.is_decided and math.isfinite(verdict.error):
-        written = measured_amount(verdict.value, verdict.unit, verdict.error)
         return (
-            f"requirement undecided: {verdict.kpi} is {written}, numerical error "
-            f"{amount(verdict.error, verdict.unit, 2)}{limit}: use a smaller step"
+            f"requirement undecided: {verdict.kpi} is {measured_amount(value, unit, error)}, "
+            f"numerical error {error_text(value, unit, error)}{limit}: use a smaller step"
         )
     if not verdict.is_decided and not math.isinf(verdict.error):
         return f"requirement undecided: {verdict.kpi} is not defined{limit} ({verdict.note})"
@@ -374,6 +374,6 @@ def _remark(verdict: Verdict) -> str:
             f"requirement undecided: {verdict.kpi} is defined for only one of the step and half "
             f"the step{limit}: use a smaller step"
         )
-    return f"requirement not met: {verdict.kpi} is {amount(verdict.value, verdict.unit)}{limit}" + (
+    return f"requirement not met: {verdict.kpi} is {amount(value, unit)}{limit}" + (
         f" ({verdict.note})" if verdict.note else ""
     )
