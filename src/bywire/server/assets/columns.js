@@ -144,6 +144,8 @@ function armColumns(form) {
     const asked = new URLSearchParams({ file, bench: valueOf("bench"), method: valueOf("method") });
     try {
       const said = await ask(`/api/columns?${asked}`);
+      const folded = form.elements.output.closest("details"); // that hides the fields to fill in
+      if (folded) folded.open = true;
       if (number === latest) showColumns(place, said, (rows, usual) => fillIn(form, rows, usual));
     } catch (error) {
       if (number !== latest) return;
