@@ -189,7 +189,7 @@ class BenchResult(Result, Answer):
 
         def run(changes: Mapping[str, float]) -> BenchResult:
             changed = self.bench.with_overrides(changes)
-            return run_once(changed, None, "auto", estimate_error=False, animate=False)
+            return run_once(changed, None, "auto", estimate_error=False, animated=False)
 
         return sliders(self, self.bench.par, parameters, figure, run)
 
