@@ -69,7 +69,7 @@ def test_ramp_is_judged_on_enough_rows_only():
 
 
 def test_ramp_downward_is_refused():
-    with pytest.raises(InputError, match=r"M_low = 300 N\*m must not be above M_high = 200 N\*m"):
+    with pytest.raises(InputError, match=r"M_low = 300 N\*m must be <= M_high = 200 N\*m"):
         bywire.Bench("moment-ramp", "roberts2003", options={"M_low": 300.0})
 
 
