@@ -71,7 +71,7 @@ BAD = [
     ("life", {"life": "two-wheeler-pads", "check": "1"}, "check", "it must be 0 or >="),
     ("life", {"life": "wedge-pads", "set": "wear.x=1"}, "set", "unknown"),
     ("compare", {"runs": "curve.toml"}, "runs", "at least two"),
-    ("compare", {"runs": "curve.toml\naside"}, "runs", "not a finished result"),
+    ("compare", {"runs": "curve.toml\naside"}, "runs", "not a complete result"),
     ("compare", {"runs": "curve.toml\nseal-stribek"}, "runs", "seal-stribeck"),
     ("compare", {"runs": "curve.toml\nseal-stribeck", "set": "motor.x=1"}, "set", "motor.x"),
     (
@@ -90,7 +90,7 @@ BAD = [
     ("margins", {**LOOP, "set": "motor.R_m=-1 ohm"}, "set", "motor.R_m"),
     ("margins", {**LOOP, "over": "motor.R_m"}, "over", "LOW:HIGH:COUNT"),
     ("linearize", {"loop": "pressures"}, "loop", "pressure"),
-    ("linearize", {**LOOP, "friction": "stuck"}, "friction", "is only for plants"),
+    ("linearize", {**LOOP, "friction": "stuck"}, "friction", "applies only to plants"),
     ("linearize", {**LOOP, "at": "20"}, "at", "unit"),
     ("linearize", {"loop": "wedge-plant", "friction": "gone"}, "friction", "removed"),
     ("linearize", {"loop": "wedge-plant", "friction": "sliding"}, "friction", "speed"),

@@ -13,7 +13,7 @@ from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.typing import Array
 from bywire.report import style
 from bywire.report.channel import Channel, channel, kept_samples
-from bywire.report.wording import amount, duration
+from bywire.report.wording import amount
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -80,7 +80,7 @@ def hysteresis_loop(
         Line2D([], [], color=style.GRAY, linestyle="--", label="releasing"),
     ]
     if average > 0:
-        label = f"ripple around the average over {duration(average)}"
+        label = f"ripple around the average over {amount(average, 's', 3)}"
         opacity = style.PALE_OPACITY
         handles.append(Line2D([], [], color=style.GRAY, linewidth=6.0, alpha=opacity, label=label))
     style.legend_above(axes, handles)

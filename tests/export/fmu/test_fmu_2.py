@@ -301,6 +301,6 @@ def test_what_cannot_be_exported_is_said(tmp_path: Path, monkeypatch: pytest.Mon
     monkeypatch.setattr(archive, "find_compiler", lambda: None)
     with pytest.raises(CompilerError):
         export_fmu(MOTORCYCLE, tmp_path / "a" / "folder")
-    with pytest.raises(FileError, match="null character; make room there, or name another folder"):
+    with pytest.raises(FileError, match="null character"):
         export_fmu(MOTORCYCLE, f"{tmp_path}/a\0b")
     assert list(tmp_path.iterdir()) == []

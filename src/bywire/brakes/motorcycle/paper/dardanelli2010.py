@@ -28,6 +28,7 @@ def _tables(q: Quoted) -> RootCause:
         f"current loop's bandwidth falls from {q.stated('fig3.bandwidth.free')} to "
         f"{q('fig3.bandwidth.free@table1')}.",
         ("table2.*@table1", "fig3.bandwidth.free@table1"),
+        is_within_source=True,
     )
 
 
@@ -39,6 +40,7 @@ def _gear(q: Quoted) -> RootCause:
         f"({q.share(paper)}; with Table 1 {q.share(f'{paper}@table1')}), where a loss "
         f"that depends on direction returns {q(ours)} ({q.share(ours)}).",
         ("gear.returned.paper*",),
+        is_within_source=True,
     )
 
 
@@ -52,6 +54,7 @@ def _gain(q: Quoted) -> RootCause:
         f"Fig. 5's ramp would reach {q('table4.medium.p_ramp')}, but its axis "
         f"ends at {q.stated('table4.medium.p_ramp')}.",
         ("table4.*.K", "table4.*.K@table1"),
+        is_within_source=True,
     )
 
 
@@ -86,6 +89,7 @@ def _slow_pair(q: Quoted) -> RootCause:
         f"{q('table4.medium.identified.zero')} and "
         f"{q('table4.medium.identified.T_L')}.",
         ("table4.air", "table4.*.identified.zero", "table4.*.identified.T_L"),
+        is_within_source=True,
     )
 
 
@@ -110,6 +114,7 @@ def _single(q: Quoted) -> RootCause:
         f"of Figs. 4 and 5 are too short for Table 3's friction and dither ({q(top)} of "
         f"{q.stated(top)}, {q(end)} of {q.stated(end)}, {q(ripple)} of {q.stated(ripple)}).",
         ("laminar.*", "section3.mu", "eq19.*", "fig4.*", "fig5.p_max.dither", "fig5.i_max.*"),
+        is_within_source=True,
     )
 
 

@@ -22,7 +22,7 @@ from bywire.brakes.motorcycle.experiments import hard_braking
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.trim import highest_pressure, travel_at
 from bywire.core.errors import not_valid
-from bywire.core.parameters import ParameterSet
+from bywire.core.parameters import ParameterSet, RuleError
 from bywire.core.quantities import Frequency, GearRatio, Pressure, Unit
 from bywire.core.typing import Array, Progress
 from bywire.data.labeled import labeled
@@ -377,9 +377,11 @@ class Options(ParameterSet):
         ratios, bandwidths = ("k_g_min", "k_g_max", "m/rad"), ("f_min", "f_max", "Hz")
         require_ranges(self, (ratios, bandwidths, ("p_from", "p_peak", "Pa")))
         if not 2.0 * self.amplitude <= self.p_peak:
-            raise ValueError(
-                f"amplitude = {self.amplitude / 1e5:g} bar must be <= half of p_peak = "
-                f"{self.p_peak / 1e5:g} bar: pressures cannot fall below zero"
+            raise RuleError(
+                "amplitude",
+                f"{self.amplitude / 1e5:g} bar",
+                f"<= half of p_peak = {self.p_peak / 1e5:g} bar",
+                "pressures cannot fall below zero",
             )
         return self
 

@@ -36,7 +36,7 @@ from bywire.brakes.motorcycle.dither import (
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.trim import highest_pressure
 from bywire.core.errors import InputError, RunError, not_valid
-from bywire.core.parameters import ParameterSet
+from bywire.core.parameters import ParameterSet, RuleError
 from bywire.core.quantities import Duration, Factor, Fraction, Frequency, Pressure, Unit
 from bywire.core.typing import Progress
 from bywire.synthesis.study import Cut, Findings, Map, Mark, Study, require_ranges, variable
@@ -93,12 +93,15 @@ class Options(ParameterSet):
     def _ordered(self) -> Options:
         require_ranges(self, (("gain_min", "gain_max", "1"), ("f_min", "f_max", "Hz")))
         if any(not a < b for a, b in pairwise(self.pressures)):
-            raise ValueError("pressures must increase, without repetition")
+            shown = ", ".join(f"{p / 1e5:g} bar" for p in self.pressures)
+            raise RuleError("pressures", shown, "increasing, without repetition")
         lowest = min(self.pressures)
         if not self.approach < lowest:
-            raise ValueError(
-                f"approach = {self.approach / 1e5:g} bar must be below the lowest of the pressures,"
-                f" {lowest / 1e5:g} bar: the approach from below starts there"
+            raise RuleError(
+                "approach",
+                f"{self.approach / 1e5:g} bar",
+                f"below the lowest of the pressures, {lowest / 1e5:g} bar",
+                "the approach from below starts there",
             )
         return self
 

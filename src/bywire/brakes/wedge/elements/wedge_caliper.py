@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 
 from bywire.core import ops
 from bywire.core.faults import ParameterFault
-from bywire.core.parameters import ParameterSet
+from bywire.core.parameters import ParameterSet, RuleError
 from bywire.core.quantities import Length, Nodes, Stiffness, TimeConstant, Unit
 from bywire.core.signals import ContactCompliance, Energy, Overlap, Role, Signal
 
@@ -53,14 +53,11 @@ class Parameters(ParameterSet):
         for name, unit, nodes in (("n_table", "m", n), ("F_table", "N", F)):
             _require_rising(name, unit, nodes)
         if len(n) != len(F):
-            raise ValueError(
-                f"n_table has {len(n)} nodes and F_table {len(F)}: give one force for each travel"
-            )
+            valid = f"of the same length as F_table, {len(F)} nodes"
+            raise RuleError("n_table", f"{len(n)} nodes", valid, "set one force for each travel")
         if self.law == "table" and not n:
-            raise ValueError(
-                "law = 'table' needs 2 nodes or more in n_table [m] and F_table [N], which are "
-                "empty: set both, or law = 'linear'"
-            )
+            reason = "law = 'table' interpolates n_table and F_table. Set both, or law = 'linear'"
+            raise RuleError("n_table", "0 nodes", "of 2 nodes or more", reason)
         return self
 
 
@@ -74,14 +71,15 @@ FAULTS = (
 def _require_rising(name: str, unit: str, nodes: Nodes) -> None:
     if not nodes:
         return
-    rule = f"{name} must hold 2 nodes or more, from 0 {unit} and increasing"
-    if len(nodes) < 2 or nodes[0] != 0.0:
-        raise ValueError(f"{rule}: it holds {len(nodes)}, the first is {nodes[0]:g} {unit}")
-    for k, (a, b) in enumerate(pairwise(nodes), 2):
+    if len(nodes) < 2:
+        raise RuleError(name, f"{len(nodes)} nodes", "of 2 nodes or more")
+    if nodes[0] != 0.0:
+        raise RuleError(f"{name}.0", f"{nodes[0]:g} {unit}", f"0 {unit}, the start of the curve")
+    for k, (a, b) in enumerate(pairwise(nodes), 1):
         if b <= a:
-            raise ValueError(
-                f"{rule}, but as node {k} of {len(nodes)}, {b:g} {unit} follows {a:g} {unit}: "
-                "sort the nodes, and leave out those where the curve does not rise"
+            reason = "sort the nodes, and omit those where the curve does not rise"
+            raise RuleError(
+                f"{name}.{k}", f"{b:g} {unit}", f"> {a:g} {unit}, the previous node", reason
             )
 
 

@@ -28,7 +28,7 @@ from bywire.brakes.wedge.case import (
 )
 from bywire.brakes.wedge.laws.moment_control import SomeMoment, SpeedLimit
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.core.parameters import ParameterSet
+from bywire.core.parameters import ParameterSet, RuleError
 from bywire.core.quantities import Duration, Fraction, Unit
 from bywire.core.typing import Array
 
@@ -262,10 +262,9 @@ class RampOptions(ParameterSet):
     @model_validator(mode="after")
     def _rises(self) -> RampOptions:
         if self.M_low > self.M_high:
-            raise ValueError(
-                f"M_low = {self.M_low:g} N*m must not be above M_high = {self.M_high:g} N*m: "
-                "the ramp rises from M_low to M_high"
-            )
+            reason = "the ramp rises from M_low to M_high"
+            valid = f"<= M_high = {self.M_high:g} N*m"
+            raise RuleError("M_low", f"{self.M_low:g} N*m", valid, reason)
         return self
 
 

@@ -8,7 +8,7 @@ from annotated_types import Gt
 from pydantic import model_validator
 
 from bywire.core import ops
-from bywire.core.parameters import ParameterSet
+from bywire.core.parameters import ParameterSet, RuleError
 from bywire.core.quantities import Duration, Force, GearRatio, Position
 from bywire.core.signals import Signal
 
@@ -41,9 +41,7 @@ class Parameters(ParameterSet):
     @model_validator(mode="after")
     def _ordered(self) -> Parameters:
         if not self.F_low < self.F_high:
-            raise ValueError(
-                f"screw_offset.F_low = {self.F_low:g} N must be below F_high = {self.F_high:g} N"
-            )
+            raise RuleError("F_low", f"{self.F_low:g} N", f"below F_high = {self.F_high:g} N")
         return self
 
 
