@@ -89,7 +89,7 @@ def test_the_books_of_a_brake_close_over_a_change_of_its_stores():
     assert abs(ledger.closing_error) < 1e-9 * ledger.turnover
     without = actuator_ledger(recording.drop_vars("E_change"))
     assert abs(without.closing_error) > 1e-3 * ledger.turnover
-    assert recording.attrs["warnings"] == ""
+    assert recording.attrs["warnings"] == []
     grown, ledger = books(value=0.5, ramp=0.1)
     assert abs(ledger.closing_error) < 1e-9 * ledger.turnover
     assert float(grown["E_change"][-1]) == pytest.approx(float(recording["E_change"][-1]), rel=0.2)

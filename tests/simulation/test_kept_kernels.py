@@ -293,6 +293,30 @@ def test_a_program_that_uses_bywire_is_no_command() -> None:
         assert not sources.source_state().is_running
 
 
+STARTED = """
+import bywire.cli.main
+from bywire.core import sources
+{before}
+with sources.command():
+    print(bool(sources._started))
+"""
+
+
+@pytest.mark.parametrize(
+    ("before", "is_command"),
+    [
+        ("", True),  # what the start itself loads shapes no model
+        ("import bywire.core.ops", False),
+        ("import bywire.core.parameters", False),
+        ("import bywire.simulation.compiler", False),
+    ],
+)
+def test_the_start_loads_nothing_that_shapes_models(before: str, is_command: bool) -> None:
+    code = STARTED.format(before=before)
+    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert out.stdout.strip() == str(is_command), out.stderr
+
+
 RUN = """
 import sys
 from bywire.core import sources

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 
 import numpy as np
@@ -31,7 +32,7 @@ def found(study):
             "peak_current": peaks,
         }
         columns[FAILURE] = np.where(np.isnan(peaks), "it left the numbers", "")
-        said = [f"far out; hot: {20 + k} degC" for k in range(peaks.size)]
+        said = [json.dumps(["far out; cold", f"hot: {20 + k} degC"]) for k in range(peaks.size)]
         columns[WARNINGS] = np.array(said, dtype=object)
         kpi = Kpi("peak_current", float(peaks[0]), "A", "Largest current.", error=error)
         return Findings(plan, pd.DataFrame(columns), (kpi,))
@@ -56,7 +57,7 @@ def test_a_case_without_a_result_misses_and_the_worst_is_named(found):
     assert judgment.met.tolist() == [True, False, False, True]
     assert (judgment.share.count, judgment.worst) == (2, 2)
     assert findings.failures == {1: "it left the numbers"}
-    assert findings.warnings == {"far out": 4, "hot: 20 degC, and so on": 4}
+    assert findings.warnings == {"far out; cold": 4, "hot: 20 degC, and so on": 4}
     assert [s.undefined for s in findings.spreads] == [1]
     assert findings.values(2) == {"motor.R_m": pytest.approx(0.3 + 0.2 / 3)}
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Callable, Collection, ItemsView, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, ItemsView, Iterator, Mapping, Sequence
 from functools import cache, cached_property
 from numbers import Number
 from typing import Any, cast
@@ -53,7 +53,7 @@ def record(
     recording["time"].attrs["long_name"] = "time"
     recording.attrs = {
         **run_notes(run, trajectory),
-        "warnings": "; ".join(watch(cast(xr.Dataset, rows), run, trajectory)),
+        "warnings": watch(cast(xr.Dataset, rows), run, trajectory),
         **notes,
     }
     return recording
@@ -127,18 +127,12 @@ def _attributes(signal: Signal) -> dict[str, str]:
     return attributes | role_attributes(signal.role)
 
 
-def _separable(texts: Iterable[str]) -> list[str]:
-    """Return warnings with ``"; "`` replaced, which joins them in a recording's attribute."""
-    return [text.replace("; ", ", ") for text in texts]
-
-
 def watch(recording: xr.Dataset, run: Run, trajectory: Trajectory) -> list[str]:
     """Return warnings on a recording: ranges of validity, end stops, solver problems, energies."""
     if not recording.sizes["time"]:  # interrupted before the first row
         return []
     doubts = solver_doubts(trajectory.doubt, trajectory.unsettled)
-    warnings = [*doubts, *energy_doubts(recording, [run]), *run.model.watch(recording, run.par)]
-    return _separable(warnings)
+    return [*doubts, *energy_doubts(recording, [run]), *run.model.watch(recording, run.par)]
 
 
 def watch_cases(
@@ -154,7 +148,7 @@ def watch_cases(
     rows.silent = model.silent(rows, pars)
     asked = set(model.may_warn(rows, pars))
     return [
-        _separable([*doubts, *book, *(model.watch(rows.case(k), pars[k]) if k in asked else ())])
+        [*doubts, *book, *(model.watch(rows.case(k), pars[k]) if k in asked else ())]
         for k, (doubts, book) in enumerate(zip(solver, books, strict=True))
     ]
 

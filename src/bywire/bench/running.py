@@ -87,8 +87,7 @@ class Result:
         warnings = [
             f"{label}: {text}" if len(self.recordings) > 1 else text
             for label, recording in self.recordings.items()
-            for text in str(recording.attrs.get("warnings", "")).split("; ")
-            if text
+            for text in recording.attrs.get("warnings", ())
         ]
         return warnings + ([self.unestimated] if self.unestimated else [])
 

@@ -22,24 +22,9 @@ import bywire.core
 TICK = 2_000_000_000
 """coarsest resolution [ns] of file systems' modification times"""
 
-_ROOMS = ("bywire.core.", "bywire.plant", "bywire.control", "bywire.simulation", "bywire.brakes")
-_HARMLESS = {
-    f"bywire.core.{name}"
-    for name in (
-        "callers",
-        "child_process",
-        "clean_text",
-        "engines",
-        "errors",
-        "interrupts",
-        "lazy_names",
-        "libraries",
-        "machine",
-        "scratch",
-        "sources",
-        "version",
-    )
-}
+_ROOMS = ("bywire.plant", "bywire.control", "bywire.simulation", "bywire.brakes")
+_LIBRARIES = ("numpy", "pydantic", "casadi")
+"""libraries of which code that shapes models loads at least one, and the start of a command none"""
 
 _started: list[int] = []
 
@@ -51,8 +36,8 @@ def command() -> Iterator[None]:
     If code that shapes models is loaded already, another program loaded it and may have changed
     it. In that case the process is not marked.
     """
-    shaping = {name for name in sys.modules if name.startswith(_ROOMS)} - _HARMLESS
-    _started[:] = [] if shaping else [time.time_ns()]
+    is_shaped = any(name in _LIBRARIES or name.startswith(_ROOMS) for name in sys.modules)
+    _started[:] = [] if is_shaped else [time.time_ns()]
     try:
         yield
     finally:

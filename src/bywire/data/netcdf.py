@@ -177,7 +177,11 @@ def _dataset(source: LimitedSource) -> xr.Dataset:
             values = columns.pop(name).astype(kind)
         variables[name] = (said["dims"], values.reshape(said["shape"]), _attributes(said["attrs"]))
     coords = {name: variables.pop(name) for name in source.notes["coords"]}
-    return xr.Dataset(variables, coords, _attributes(source.notes["attrs"]))
+    attributes = _attributes(source.notes["attrs"])
+    if "warnings" in attributes:  # NetCDF has one text for a list of one, as earlier versions did
+        texts = np.atleast_1d(attributes["warnings"]).tolist()
+        attributes["warnings"] = [text for text in texts if text]
+    return xr.Dataset(variables, coords, attributes)
 
 
 @contextmanager

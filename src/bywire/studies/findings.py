@@ -33,7 +33,7 @@ from bywire.studies.statistics import (
     share,
     spread_of,
 )
-from bywire.studies.store import CASE, FAILURE, WARNINGS
+from bywire.studies.store import CASE, FAILURE, WARNINGS, warnings_in
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -439,7 +439,7 @@ class Findings:
         """Number of cases by warning, merged where only numbers differ."""
         said: dict[str, Counter[str]] = {}
         for text, cases in Counter(self._texts(WARNINGS).tolist()).items():
-            for each in filter(None, text.split("; ")):
+            for each in warnings_in(text):
                 said.setdefault(_NUMBER.sub("#", each), Counter())[each] += cases
         return {
             next(iter(each)) + ", and so on" * (len(each) > 1): each.total()

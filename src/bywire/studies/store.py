@@ -6,6 +6,7 @@ A chunk depends only on the plan and its number, wherever and in whatever order 
 from __future__ import annotations
 
 import gc
+import json
 import math
 import shlex
 from collections import Counter
@@ -197,7 +198,13 @@ def _fill(
         return
     for figure in given.figures:
         columns[figure.name][cases] = figure.values
-    columns[WARNINGS][cases] = ["; ".join(texts) for texts in given.warnings]
+    columns[WARNINGS][cases] = [json.dumps(texts) if texts else "" for texts in given.warnings]
+
+
+def warnings_in(cell: str) -> list[str]:
+    """Return the warnings of a case, a JSON list; earlier versions joined them to one text."""
+    warnings: list[str] = json.loads(cell) if cell.startswith("[") else [cell] if cell else []
+    return warnings
 
 
 # --- Its file: one Parquet file, whole or not at all, that says whose it is

@@ -268,7 +268,7 @@ def _dataset(par: TwoWheelerParameters, pieces: list[dict[str, Array]]) -> xr.Da
         for name, y in rows.items()
     }
     time = ("time", t, {"units": "s", "long_name": "time"})
-    return xr.Dataset(values, {"time": time}, {"warnings": "; ".join(warnings)})
+    return xr.Dataset(values, {"time": time}, {"warnings": warnings})
 
 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
