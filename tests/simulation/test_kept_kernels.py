@@ -324,20 +324,20 @@ if len(sys.argv) > 1:
     sources.TICK = int(sys.argv[1])
 sys.argv = ["bywire", "run", "hard-braking", "--json", "--no-error-estimate"]
 sys.argv += ["--set", "options.duration=40 ms"]
-from bywire.cli.main import main
+from bywire.cli.main import {start} as start
 try:
-    main()
+    start()
 finally:
     print("built" if "bywire.simulation.program" in sys.modules else "kept", file=sys.stderr)
 """
 
 
-def start(home: Path, cache: Path, *tick: str) -> subprocess.Popen[str]:
+def start(home: Path, cache: Path, *tick: str, function: str = "process") -> subprocess.Popen[str]:
     """Start a command of the package in a folder, with a tick of the clock [ns] if one is given."""
     paths = os.pathsep.join([str(home), *sys.path])
     changes = {"PYTHONPATH": paths, "BYWIRE_CACHE": str(cache)}
     return subprocess.Popen(
-        [sys.executable, "-c", RUN, *tick],
+        [sys.executable, "-c", RUN.format(start=function), *tick],
         env=os.environ | changes,
         text=True,
         stdout=subprocess.PIPE,
@@ -362,6 +362,7 @@ def test_commands_at_once_and_then_a_changed_equation(tmp_path: Path) -> None:
     assert first == both[1][0]
     assert sorted(p.suffix for p in cache.iterdir()) == [".json", ".sha256", ".so"]
     assert answer(start(home, cache, waited)) == (first, "kept")
+    assert answer(start(home, cache, waited, function="main")) == (first, "built")  # a program
     (entry,) = cache.glob("kernel-*.json")
     kept = entry.read_bytes()
 

@@ -36,6 +36,8 @@ def process() -> None:
     Finalization after all output would take a sixth of a warm run's time. A library's thread that
     is still running after Ctrl-C might abort it. Functions registered with ``atexit`` still run.
     """
+    from bywire.core.sources import command
+
     status: list[object] = []
 
     def leave() -> None:
@@ -49,7 +51,8 @@ def process() -> None:
     silence_matplotlib()
     keep_one_thread()
     try:
-        main()
+        with command():  # a program that calls ``main`` may have changed functions
+            main()
     except SystemExit as done:
         if done.code is None or isinstance(done.code, int):
             status.append(done.code)
@@ -59,14 +62,13 @@ def process() -> None:
 def main() -> None:
     """Run the command line, and turn user errors into one message and an exit status."""
     from bywire.core.callers import command_line
-    from bywire.core.sources import command
 
     # All output is written before finalization, where Ctrl-C would kill the process by its signal.
     atexit.register(signal.signal, signal.SIGINT, signal.SIG_IGN)
     gc.set_threshold(GARBAGE, *gc.get_threshold()[1:])
     open_streams()
     try:
-        with interrupts_noted() as was_interrupted, command(), command_line():
+        with interrupts_noted() as was_interrupted, command_line():
             status = _status(was_interrupted)
             flush()
     except KeyboardInterrupt:  # before the first output, or during the last
