@@ -25,7 +25,7 @@ TEXT = """
 kind = "corners"
 """
 SENTENCE = (
-    "fault pressure.stuck-at-last, from 0.01 s to 0.015 s: pressure sensor holds its last value"
+    "fault pressure.stuck-at-last, from 10 ms to 15 ms: pressure sensor holds its last value"
 )
 
 
