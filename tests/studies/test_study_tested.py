@@ -24,9 +24,7 @@ TEXT = """
 [design]
 kind = "corners"
 """
-SENTENCE = (
-    "fault pressure.stuck-at-last, from 0.01 s to 0.015 s: pressure sensor holds its last value"
-)
+SENTENCE = "fault pressure.stuck-at-last, from 10 ms to 15 ms: pressure sensor holds its last value"
 
 
 def test_a_study_says_which_bench_with_which_faults_and_changes_was_tested(study, tmp_path):

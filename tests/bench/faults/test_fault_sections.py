@@ -88,7 +88,7 @@ def test_a_bench_file_with_faults_is_read_and_written_and_read_again(tmp_path):
     np.testing.assert_array_equal(*values)
     answer = bywire.run(in_numbers, faults=["ecu.frozen@50 ms"], estimate_error=False)
     said = answer.document().data["remarks"]
-    assert said[3].startswith("fault ecu.frozen, from 0.05 s on: task ecu misses every tick")
+    assert said[3].startswith("fault ecu.frozen, from 50 ms on: task ecu misses every tick")
 
 
 @pytest.mark.parametrize(
