@@ -46,7 +46,7 @@ def test_a_value_that_fails_leaves_the_sliders_usable(result, monkeypatch):
     shown = result.interact("motor.R_m")
     slider, message = shown.children[:2]
 
-    def fails(*_):
+    def fails(*_, **__):
         raise ParameterError("no rest <here>")
 
     with monkeypatch.context() as patched:

@@ -120,7 +120,6 @@ def test_pages_are_in_plain_english(path):
     assert not found(in_page(path.read_text(encoding="utf-8")), path.relative_to(ROOT))
 
 
-@pytest.mark.xfail(reason="messages are being reworded", strict=False)
 def test_strings_of_the_package_are_in_plain_english():
     hits = [hit for path in MODULES for hit in found(in_module(tree(path)), path.relative_to(ROOT))]
     texts = ((path, path.read_text(encoding="utf-8")) for path in TEXTS)

@@ -31,7 +31,7 @@ def hysteresis_loop(
     demand: str = "",
     average: float = 0.0,
 ) -> Figure:
-    """Draw drive over response, applying solid and releasing dashed, one color per recording.
+    """Draw response over drive, applying solid and releasing dashed, one color per recording.
 
     Parameters
     ----------
@@ -58,8 +58,8 @@ def hysteresis_loop(
     figure, (axes,) = style.new_figure(4.2)
     for k, (label, recording) in enumerate(recordings.items()):
         color = style.SEQUENCE[k % len(style.SEQUENCE)]
-        x, y = channel(recording, response), channel(recording, drive)
-        by = channel(recording, demand) if demand in recording.data_vars else y
+        x, y = channel(recording, drive), channel(recording, response)
+        by = channel(recording, demand) if demand in recording.data_vars else x
         turn = _turn(by.values)
         if average > 0:
             kept = np.union1d(kept_samples(x.time, x.values), kept_samples(x.time, y.values))

@@ -204,11 +204,25 @@ def _block(block: Block, numbered: _Numbered) -> str:
     return f"<figure>\n{caption}{table}\n</figure>"
 
 
+def _verdicts_first(table: Table) -> Table:
+    """Return a table whose limits and verdicts are visible on a phone: errors come after them."""
+    headings = [column.heading for column in table.columns]
+    if not {"numerical error", "verdict"} <= set(headings):
+        return table
+    order = list(range(len(headings)))
+    order.insert(headings.index("verdict"), order.pop(headings.index("numerical error")))
+    return Table(
+        tuple(table.columns[k] for k in order),
+        tuple(tuple(row[k] for k in order) for row in table.rows),
+    )
+
+
 def table_html(table: Table, *, is_sortable: bool = False) -> str:
     """Return a table as HTML; every text in it is escaped.
 
     Cells of a sortable table have their numbers in an attribute, in one unit.
     """
+    table = _verdicts_first(table)
     heading = "".join(
         f'<th scope="col"{_number_class(column)}>{escape(column.heading)}</th>'
         for column in table.columns

@@ -278,6 +278,7 @@ SHOWN = """([from, to]) => {
 
 def test_the_ordinate_fits_a_part_of_the_time_and_new_values_keep_it(tab):
     tab.open()
+    tab.page.wait_for_function("() => place('loops').textContent.includes('phase margin')")
     tab.page.wait_for_timeout(400)
     tab.page.evaluate(RANGES)
     over = tab.page.locator("#curves .u-over").first.bounding_box()
@@ -286,20 +287,20 @@ def test_the_ordinate_fits_a_part_of_the_time_and_new_values_keep_it(tab):
     tab.page.mouse.down()
     tab.page.mouse.move(over["x"] + 0.6 * over["width"], height, steps=4)
     tab.page.mouse.up()
-    tab.page.wait_for_timeout(100)
+    tab.page.wait_for_function("() => ranges.length")
     time = tab.page.evaluate(GIVEN)["time"]
     part = [time[0] + share * (time[-1] - time[0]) for share in (0.4, 0.6)]
     shown, whole = (tab.page.evaluate(SHOWN, each) for each in (part, [time[0], time[-1]]))
     ranges = tab.page.evaluate("() => ranges")
     close = 0.1 * (whole[1] - whole[0])
-    assert ranges[0] == pytest.approx(shown, abs=close)
+    assert any(each == pytest.approx(shown, abs=close) for each in ranges)
     if tab.file.stem == "motorcycle":  # pulses of the other bench look alike everywhere
         assert shown[1] - shown[0] < 0.8 * (whole[1] - whole[0])
     tab.page.evaluate("() => { ranges.length = 0; }")
     tab.moved({VARIED[tab.file.stem][0]: 480})
-    tab.page.wait_for_timeout(300)
-    ranges = tab.page.evaluate("() => ranges")
-    assert ranges[0] == pytest.approx(tab.page.evaluate(SHOWN, part), abs=close)
+    tab.page.wait_for_function("() => ranges.length")
+    shown, ranges = tab.page.evaluate(SHOWN, part), tab.page.evaluate("() => ranges")
+    assert any(each == pytest.approx(shown, abs=close) for each in ranges)
     assert not tab.noise
 
 
@@ -309,7 +310,7 @@ def test_the_pointer_reads_values_with_units(tab):
     over = tab.page.locator("#curves .u-over").first.bounding_box()
     before = tab.page.locator("#curves .u-legend").first.bounding_box()
     tab.page.mouse.move(over["x"] + 0.5 * over["width"], over["y"] + 0.5 * over["height"])
-    tab.page.wait_for_timeout(100)
+    tab.page.wait_for_timeout(300)
     legend = tab.page.locator("#curves .u-legend").first
     values = legend.locator(".u-value").all_inner_texts()
     unit = tab.page.evaluate("() => panels[0].unit")

@@ -90,11 +90,11 @@ class EcuParameters(ParameterSet):
         return self
 
     def pressure_at(self, p: float) -> pressure_pid.Parameters:
-        """Return the pressure PID with the gains that its schedule gives at a pressure [Pa]."""
+        """Return the pressure PID with its scheduled gains at a pressure [Pa]."""
         if self.schedule.law == "off":
             return self.pressure
         gains = gain_schedule.output(p, self.pressure, self.schedule)
-        # Between valid gains; symbols could not be validated.
+        # Not validated: the gains may be symbols, and they are between valid gains.
         return pressure_pid.Parameters.model_construct(**{**dict(self.pressure), **gains._asdict()})
 
 
@@ -144,7 +144,7 @@ class MotorcycleParameters(ParameterSet):
     def _sticks_on_fluid_alone(self) -> MotorcycleParameters:
         """Reject a sticking piston together with laws of the caliper's fluid.
 
-        These laws need the pressure of the fluid, but the state is the pressure of the pads.
+        These laws need the fluid pressure, but the state is the pads' pressure.
         """
         fluid_laws = {
             "caliper.leak": self.caliper.leak == "leaking",

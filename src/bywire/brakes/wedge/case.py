@@ -40,7 +40,7 @@ def case_from_parked(
     Parameters
     ----------
     changes
-        Parameters that the experiment sets; the command mode is "moment" by default.
+        Parameters that the experiment sets. Default command mode: "moment".
     timing
         ``settle``, ``keep`` and ``record`` of the case [s].
     """
@@ -68,7 +68,7 @@ def steps(t: Array, levels: Mapping[float, float]) -> Array:
 
 def parameters_of(run: xr.Dataset) -> WedgeParameters:
     """Return the parameters of a recording."""
-    par = getattr(run, "par", None)  # plain rows carry them
+    par = getattr(run, "par", None)  # an attribute of plain rows
     if isinstance(par, WedgeParameters):
         return par
     return WedgeParameters.model_validate_json(run.attrs["parameters"])
@@ -82,12 +82,12 @@ def release_time(run: xr.Dataset, begin: float, name: str = "release_time") -> K
     if not after.sizes["time"]:
         note = "the recording has no row after the demand"
     elif not pressing.size:
-        note = "the pads do not press when the demand falls"
+        note = "the pads are not applied when the demand falls"
     elif pressing[-1] + 1 == after.sizes["time"]:
-        note = "the pads press until the end of the recording"
+        note = "the pads stay applied until the end of the recording"
     else:
         value = float(after["time"].values[pressing[-1]]) - begin
-    text = "Time from the end of the demand until the pads have left the disc."
+    text = "Time from the end of the demand until the pads leave the disc."
     return Kpi(name, value, "s", text, note)
 
 
@@ -95,7 +95,7 @@ def parking_time(run: xr.Dataset, begin: float, name: str = "parking_time") -> K
     """Return the time from the end of the demand [s] until the brake is parked."""
     after = run.sel(time=slice(begin - 1e-9, None))
     parked = np.flatnonzero(after["mode"].values == PARKED)
-    value, note = math.nan, "the brake is not parked when the recording ends"
+    value, note = math.nan, "the brake is not parked at the end of the recording"
     if parked.size:
         value, note = float(after["time"].values[parked[0]]) - begin, ""
     return Kpi(name, value, "s", "Time from the end of the demand until the brake is parked.", note)
@@ -125,14 +125,14 @@ def swing(run: xr.Dataset, name: str, begin: float, end: float) -> float:
     return float(np.ptp(values)) if values.size else math.nan
 
 
-# --- Reading recordings: the disc's direction, its revolutions, their rows
+# --- Reading recordings: the disc's direction, its revolutions, and their rows
 
 
 def along_disc(run: xr.Dataset) -> xr.Dataset:
-    """Return a recording whose moments and speed count positive in the disc's first direction."""
+    """Return a recording with moments and speed positive in the disc's first direction."""
     if not float(run["Omega"].values[0]) < 0:
         return run
-    # Subtraction, because negation would give negative zeros.
+    # Subtraction instead of negation, which would give negative zeros.
     return run.assign({name: 0.0 - run[name] for name in ("M_B", "y_M", "Omega")})
 
 
@@ -150,7 +150,7 @@ FRICTIONLESS = {
     "wedge_friction.mu_R": 0.0,
     "encoder.law": "ideal",
 }
-"""changes that remove all dry friction except the pads' on the disc; the encoder is ideal, because
+"""changes that remove all dry friction except between pads and disc; the encoder is ideal, since
 without friction its counts would keep the shafts moving"""
 
 
@@ -163,7 +163,7 @@ def distinct(
         names = [name(value) for value in values]
         for k, value in enumerate(values):
             if names[k] in names[:k]:
-                raise ValueError(f"{value:g}{unit} appears twice: remove one of them")
+                raise ValueError(f"{value:g}{unit} is listed twice: remove one of them")
         return values
 
     return check
@@ -186,17 +186,17 @@ Coefficients = Annotated[
     Field(min_length=1, max_length=100),
     AfterValidator(distinct(tag)),
 ]
-"""friction coefficients of the pads, in any order, each once"""
+"""friction coefficients of the pads, in any order, without repetition"""
 
 
 def with_friction(par: WedgeParameters, mu_B: float, known: bool) -> dict[str, Any]:
-    """Return the changes that give the pads a friction coefficient.
+    """Return the changes that set the pads' friction coefficient.
 
     Parameters
     ----------
     known
-        Whether the moment controller knows the coefficient and assumes the corresponding slope.
-        That slope keeps its ratio to the brake's slope, so an existing mismatch remains.
+        Whether the moment controller uses the slope that corresponds to the coefficient. That slope
+        keeps its ratio to the brake's slope, so an existing mismatch remains.
     """
     slope = par.control.moment.slope_hat
     if known and par.wedge.mu_B > 0:

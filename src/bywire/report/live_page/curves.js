@@ -4,6 +4,7 @@ const HEIGHT = 150; // px of a panel of height 1
 const NEAR = 0.5; // share of a limit from which its lines are drawn
 const OFF = 0.25; // px by which a drawn line may be off a point
 const DENSE = 4; // points in a column of pixels from which their extremes are drawn
+const KEPT_DASHES = [[8, 3, 2, 3], [2, 3], [12, 4], [6, 3, 2, 3, 2, 3]]; // of kept runs, in their order
 const DASHES = { "set point": [6, 4], limit: [2, 4], stated: [7, 3] };
 
 /** Return the colors of the page as they are: they change with its theme. */
@@ -59,8 +60,8 @@ function linesOf(panel, kept, colors) {
     dash: DASHES[role], points: { show: false },
     paths: panel.levels.length ? uPlot.paths.stepped({ align: 1 }) : lineOf,
   }));
-  const others = kept.map(({ name }) => ({
-    label: name, value, stroke: colors.kept, width: 1.5, dash: [8, 3, 2, 3], points: { show: false }, paths: lineOf,
+  const others = kept.map(({ name }, k) => ({
+    label: name, value, stroke: colors.kept, width: 1.5, dash: KEPT_DASHES[k % KEPT_DASHES.length], points: { show: false }, paths: lineOf,
   }));
   return [{ label: "time", value: (_, time) => reading(time, "s") }, ...lines, ...others];
 }
@@ -175,7 +176,7 @@ function curves(place, panels) {
           const shown = isWhole ? ends() : []; // in a part of the time, the curves alone
           return uPlot.rangeNum(Math.min(low, ...shown), Math.max(high, ...shown), 0.1, true);
         } } },
-        legend: { live: true },
+        legend: { live: true, markers: { dash: ({ series }, k) => (series[k].dash ? "dashed" : "solid") } },
         cursor: { sync: { key: "time" }, drag: { x: true, y: false } },
         series: linesOf(panel, kept, colors),
         hooks: { drawAxes: [drawMarks(() => marks[k], color)], draw: [drawBar(panel, () => current, colors)] },

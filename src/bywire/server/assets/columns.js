@@ -103,8 +103,8 @@ function showColumns(place, said, filled) {
     for (const each of [row.use, row.unit]) each?.addEventListener("change", () => update(row));
   }
   table.append(caption, head, body);
-  const lacking = element("p", "Choose a use for each column that drives the model or that you compare with it, and its unit. "
-    + "The fields below follow.", { className: "hint" });
+  const lacking = element("p", "Choose the use and the unit of each column that drives the model or is compared with it. "
+    + "The page then fills in the fields below.", { className: "hint" });
   place.replaceChildren(lacking, table, ...said.notes.map((text) => element("p", text, { className: "hint" })));
   place.hidden = false;
   update(null);
@@ -144,6 +144,8 @@ function armColumns(form) {
     const asked = new URLSearchParams({ file, bench: valueOf("bench"), method: valueOf("method") });
     try {
       const said = await ask(`/api/columns?${asked}`);
+      const folded = form.elements.output.closest("details"); // that hides the fields to fill in
+      if (folded) folded.open = true;
       if (number === latest) showColumns(place, said, (rows, usual) => fillIn(form, rows, usual));
     } catch (error) {
       if (number !== latest) return;

@@ -275,8 +275,8 @@ def _exhibit(runs: Runs, name: str, suffix: str) -> Exhibit:
     return Exhibit(
         f"fig5{suffix.replace('@', '-')}",
         lambda: hysteresis_loop(recordings, "p_mc", "i_filtered", "i_star", average=0.02),
-        "Fig. 5: measured current (low-passed at 20 Hz) over pressure during the slow "
-        "ramp, averaged over one dither period; pale: with ripple. Parameter set "
+        "Fig. 5 with the axes swapped: pressure over measured current (low-passed at 20 Hz) "
+        "during the slow ramp, averaged over one dither period; pale: with ripple. Parameter set "
         f"{name}.",
     )
 

@@ -4,8 +4,8 @@
 parameters are estimated together from Table 4, Figs. 5 to 7 and the friction of Table 3, by
 ``paper.measured``: six starts, then random steps from the best one, then ``settled``.
 ``docs/identification.md`` describes the procedure and the misfits, and
-``bywire reproduce dardanelli2010-measured`` lists which statements the set explains. A gear without
-losses and a piston without damping lie at their bounds. The other parameters are those of Table 1.
+``bywire reproduce dardanelli2010-measured`` lists which statements the set explains. The gear's
+loss and the piston's damping are at their bound zero. The other parameters come from Table 1.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Drive train of the wedge brake: peak power over wedge slope and screw lead at equal response.
 
-A design is a slope of the wedge and a lead of the screws. All other
-parameters follow from them. The speeds of the reference make every design respond equally fast.
+A design consists of a wedge slope and a screw lead. All other parameters follow from these two. The
+reference speeds give every design the same response time.
 """
 
 from __future__ import annotations
@@ -340,17 +340,17 @@ _ASSUMPTIONS = (
     "and the travel that preloads the screws are constant.",
     "The screws' friction angle is constant: their efficiency grows with the lead, and a small "
     "lead is self-locking. With efficiency 'as-given' the efficiency is constant.",
-    "The controllers know the design: their travel per shaft angle and moment per angle follow it.",
+    "The controllers use the design's travel per shaft angle and moment per angle.",
     "Equal response: all speeds and accelerations of the reference are scaled so that the pads "
-    "close equally fast; with response 'enforced' they get a common factor, the smallest at which "
-    "the sensor shows 90 % of the demand in time at every friction coefficient.",
-    "Bandwidths are constant: those of the position loops on the shaft, and the crossover of the "
-    "moment loop.",
+    "close equally fast. With response 'enforced', they have a common factor: the smallest with "
+    "which the measured moment reaches 90 % of the demand in time at every friction coefficient.",
+    "The bandwidths of the position loops on the shaft and the moment loop's crossover are "
+    "constant.",
     "The end stops of the wedge allow the same travel of the pads as before.",
     "A design is infeasible if at any coefficient it is more than 2 % late (with an enforced "
     "response), does not hold 95 % of the demand, does not release, or presses on an end stop.",
-    "Power is the power at the drives' input, standby included, in build-up and hold, and "
-    "optionally in the release.",
+    "Power is the power at the drives' input, including standby, during build-up and hold, and "
+    "optionally during the release.",
     "Each case runs with the disc at four angles, a quarter turn apart, and the worst counts: "
     "the phase of the run-out at the stop is random, and holding the moment against it takes "
     "power.",
@@ -361,9 +361,9 @@ class Options(ParameterSet):
     """The stop, the friction coefficients, and the designs to compare."""
 
     moment: SomeMoment
-    """moment demanded in one step"""
+    """demanded moment, in one step"""
     t_90: Duration
-    """time within which the sensor must show 90 % of the moment"""
+    """time within which the measured moment must reach 90 %"""
     t_hold: Duration
     """length of the moment demand"""
     t_release: Duration
@@ -373,7 +373,7 @@ class Options(ParameterSet):
     omega_gap: SpeedLimit
     """largest speed of the given drive train while crossing the gap, scaled with all others"""
     mu_B: Coefficients
-    """friction coefficients of the pads; the worst counts"""
+    """friction coefficients of the pads; the worst case counts"""
     believed: Literal["known", "as-given"]
     """whether the moment controller knows them, or assumes the parameter set's coefficient"""
     response: Literal["enforced", "as-scaled"]
@@ -423,7 +423,7 @@ DEFAULTS = Options(
 )
 """the pulse of Fig. 9 in Roberts et al. (2003), around the catalog's design"""
 
-_NONE_FEASIBLE = "no design is feasible: allow more time (t_90, t_hold), or compare other designs"
+_NONE_FEASIBLE = "no design is feasible: increase t_90 or t_hold, or compare other designs"
 _NEAR = 1.05
 """designs within this factor of the smallest power count as equally good"""
 _ROUNDS = 2  # of the optimum's refinement; each halves the spacing
@@ -523,8 +523,8 @@ def _optimum(best: _Best, grids: Sequence[xr.Dataset], options: Options) -> tupl
         leads += [float(value) for value in data["lead"].values[good[:, 1]]]
     share = f"of designs within {100 * (_NEAR - 1):.0f} % of the smallest power"
     return (
-        Kpi("optimum_tan_alpha", best.tan_alpha, "1", "Slope of the wedge of least power."),
-        Kpi("optimum_lead", best.lead, "m", "Lead of the screws of least power."),
+        Kpi("optimum_tan_alpha", best.tan_alpha, "1", "Wedge slope with the lowest power."),
+        Kpi("optimum_lead", best.lead, "m", "Screw lead with the lowest power."),
         Kpi(
             "optimum_power",
             best.power,
@@ -541,13 +541,13 @@ def _optimum(best: _Best, grids: Sequence[xr.Dataset], options: Options) -> tupl
             "optimum_release",
             float(best.at["release"].max()),
             "W",
-            "Largest power of its release, filtered.",
+            "Largest power during its release, filtered.",
         ),
         Kpi(
             "optimum_t_90",
             float(best.at["t_90"].max()),
             "s",
-            "Time to 90 % of the demand reached, slowest friction coefficient.",
+            "Time to 90 % of the demand, slowest friction coefficient.",
         ),
         Kpi(
             "optimum_closing_speed",
@@ -564,13 +564,13 @@ def _optimum(best: _Best, grids: Sequence[xr.Dataset], options: Options) -> tupl
             "other_tan_alpha",
             other.tan_alpha,
             "1",
-            f"Slope on the map of least {_other(options.power)} power.",
+            f"Slope on the map with the lowest {_other(options.power)} power.",
         ),
         Kpi(
             "other_lead",
             other.lead,
             "m",
-            f"Lead on the map of least {_other(options.power)} power.",
+            f"Lead on the map with the lowest {_other(options.power)} power.",
         ),
         Kpi(
             "other_power",
@@ -599,7 +599,7 @@ def _given(given: Answer, options: Options) -> tuple[Kpi, ...]:
             "given_release",
             float(given.release.max()),
             "W",
-            "Largest power of its release, filtered.",
+            "Largest power during its release, filtered.",
         ),
         Kpi(
             "given_t_90",
@@ -778,7 +778,7 @@ def active(at: xr.Dataset, par: WedgeParameters, options: Options) -> list[str]:
             f"mu_B = {_where(-at['held']):g}"
         )
     if float(at["left"].max()) > _AT * _LEFT * options.moment:
-        texts.append(f"release: {float(at['left'].max()):.3g} N·m remain at its end")
+        texts.append(f"release: {float(at['left'].max()):.3g} N·m remain at the end")
     powers = at[options.power]
     near = at["mu_B"].values[powers.values >= _AT * float(powers.max())]
     texts.append(f"power: {float(powers.max()):.3g} W at mu_B = {_listed(near)}")
@@ -855,9 +855,9 @@ STUDY = Study(
     defaults=DEFAULTS,
     compute=compute,
     ruled={
-        "wedge.mu_B": "the study takes several; set its option mu_B, e.g. mu_B=0.3,0.5",
+        "wedge.mu_B": "the study uses several; set its option mu_B, for example mu_B=0.3,0.5",
         "control.moment.omega_gap": "set the study's option omega_gap",
         "command.mode": "the study demands moments",
-        "rig": "it belongs to the rigs",
+        "rig": "only the rigs use it",
     },
 )
