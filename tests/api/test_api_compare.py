@@ -181,12 +181,12 @@ def test_one_page_and_one_record(folders, tmp_path):
 def test_identical_runs_differ_in_nothing(folders):
     comparison = bywire.compare(folders[0], folders[0])
     assert not any(each.differs for each in (*comparison.settings, *comparison.figures))
-    assert "are the same" in str(comparison)
+    assert "are equal" in str(comparison)
     assert len({each.label for each in comparison.runs}) == 2
 
 
 def test_different_brakes_share_what_they_share(results):
-    with pytest.warns(AnswerWarning, match="the runs are of different brakes"):
+    with pytest.warns(AnswerWarning, match="the runs use different brakes"):
         comparison = bywire.compare(results[0], "moment-ramp")
     names = {each.name for each in comparison.settings}
     assert "motor.R_m" not in names
@@ -275,7 +275,7 @@ def test_a_set_that_is_not_known_here_leaves_values_without_units(folders, tmp_p
         (foreign / name).write_bytes((folders[1] / name).read_bytes())
     recording = bywire.read_recording(foreign / "run.nc")
     bywire.write_recording(recording.assign_attrs(parameter_set="gone"), foreign / "run.nc")
-    with pytest.warns(AnswerWarning, match="unknown here"):
+    with pytest.warns(AnswerWarning, match="parameter set is not loaded"):
         comparison = bywire.compare(foreign, folders[0])
     (row,) = [each for each in comparison.settings if each.name == "motor.R_m"]
     assert row.values == pytest.approx((0.5, 0.35))
@@ -285,5 +285,5 @@ def test_a_set_that_is_not_known_here_leaves_values_without_units(folders, tmp_p
 def test_a_folder_whose_result_was_not_written_to_its_end(folders, tmp_path):
     shutil.copytree(folders[0], tmp_path / "half")
     (tmp_path / "half" / UNFINISHED).write_text("")
-    with pytest.raises(FileError, match="half holds a result that is incomplete"):
+    with pytest.raises(FileError, match="half contains an incomplete result"):
         bywire.compare(tmp_path / "half", folders[1])

@@ -10,8 +10,10 @@ import numpy as np
 import pytest
 
 import bywire
+from bywire.core.errors import ParameterError
 from bywire.identification.method import METHODS
 from bywire.report.answer import AnswerWarning
+from raising import raises
 
 SHORT = {"duration": "0.1 s"}
 
@@ -55,9 +57,9 @@ def test_signals_in_memory_are_a_measurement() -> None:
     assert again.source == "signals in memory"
     assert again.estimates["seal friction"]["A"] == made.estimates["seal friction"]["A"]
     assert again.put_in == {}
-    with pytest.raises(bywire.BywireError, match="give only one of"):
+    with raises(ParameterError, name="synthetic", valid="only one of measurement files"):
         bywire.identify("seal-friction", made.data, synthetic=2)
-    with pytest.raises(bywire.BywireError, match="unknowns is only for methods of any bench"):
+    with raises(ParameterError, name="unknowns"):
         bywire.identify("seal-friction", made.data, question=bywire.Question(unknowns="A"))
 
 
@@ -85,7 +87,7 @@ def test_an_interrupt_says_where_it_goes_on(
     (tmp_path / "starts.jsonl").write_text("")
     method = replace(METHODS.find("seal-friction"), identify=stopped)
     monkeypatch.setattr("bywire.api.identification.find_method", lambda _: method)
-    with pytest.raises(KeyboardInterrupt, match="finished starts are in"):
+    with pytest.raises(KeyboardInterrupt, match="finished starts are saved in"):
         bywire.identify("seal-friction", synthetic=1, folder=tmp_path)
 
 

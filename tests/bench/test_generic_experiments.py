@@ -211,7 +211,7 @@ def test_further_stimuli_act_beside() -> None:
             UnknownNameError,
             "stimulus of spring-axis in options.input 'F_sett': did you mean 'F_set'?",
         ),
-        ({"input": "noise_x"}, UnknownNameError, "known are F_set, load"),
+        ({"input": "noise_x"}, UnknownNameError, "valid names are F_set, load"),
         ({"output": "y"}, UnknownNameError, "recording of spring-axis in options.output 'y'"),
         ({"input": ""}, ParameterError, "options.input is missing"),
         ({"input": 3}, ParameterError, "a stimulus of spring-axis"),

@@ -200,7 +200,7 @@ def test_what_sticks_is_said_and_has_no_gain(bywire):
         (("margins", "moment", "--over", "wedge.mu_B=0.6:0.2:3"), ("below",)),
         (("margins", "moment", "--set", "wedge.mu_b=0.4"), ("wedge.mu_B",)),
         (("frequency-response", "moment", "--frequencies", "600 Hz"), ("Nyquist",)),
-        (("agreement", "moment", "--amplitudes", "1 Nm"), ("give two, the small one first",)),
+        (("agreement", "moment", "--amplitudes", "1 Nm"), ("two amplitudes, the small one first",)),
         (("linearize", "moment", "--locus", "wedge.mu_B"), ("--locus", "LOW:HIGH:COUNT")),
         (("linearize", "moment", "--locus", "wedge.mu_B=0.3"), ("at least two values",)),
         (("frequency-response", "moment", "--frequencies", "5"), ("Hz",)),

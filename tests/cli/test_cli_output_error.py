@@ -212,11 +212,11 @@ def test_refusals(bywire: Bywire, bench: Path, tmp_path: Path) -> None:
     refused(
         bywire(*given, "--holdout", tmp_path / ".." / tmp_path.name / "run.csv"),
         "run.csv is",
-        "which is fitted",
+        "a fitted record",
     )
     copy = tmp_path / "copy.csv"
     copy.write_bytes(data.read_bytes())
-    refused(bywire(*given, "--holdout", copy), "has the same content as", "which is fitted")
+    refused(bywire(*given, "--holdout", copy), "has the same content as", "a fitted record")
     refused(bywire("identify", "output-eror"), "output-error")
 
 

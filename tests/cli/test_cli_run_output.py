@@ -68,7 +68,7 @@ def test_folder_is_made_with_its_parents(bywire, bench, tmp_path):
 def test_no_folder_is_not_the_current_one(bywire, bench, tmp_path, monkeypatch, out):
     path = bench()
     monkeypatch.chdir(tmp_path)
-    refused(bywire("run", path, "--out", out), "--out", "name a folder")
+    refused(bywire("run", path, "--out", out), "--out", "Specify a folder")
     assert [p.name for p in tmp_path.iterdir()] == [path.name]
 
 

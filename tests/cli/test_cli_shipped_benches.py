@@ -49,7 +49,7 @@ def test_a_command_takes_a_shipped_bench(bywire, tmp_path: Path, command: str, f
     given = {"bench": file, "out": tmp_path, "parameters": chosen.split('"')[1]}
     (tmp_path / "study.toml").write_text(STUDY.format(bench=file))
     outcome = bywire(*(word.format(**given) for word in COMMANDS[command]))
-    assert "defect of bywire" not in outcome.err
+    assert "bug in bywire" not in outcome.err
     if outcome.status == 2:
         assert [line[:15] for line in outcome.lines if "error" in line] == ["bywire: error: "]
         assert not [path for path in tmp_path.iterdir() if path.suffix == ".html"]

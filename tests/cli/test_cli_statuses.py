@@ -49,7 +49,7 @@ def test_bad_input_is_2(bywire, bench):
 def test_benchmarks_are_those_of_a_clone(bywire, process, tmp_path, monkeypatch):
     refused(process("benchmark", "comands"), "part of the benchmark 'comands'", "did you mean")
     monkeypatch.setattr("bywire.cli.app.__file__", str(tmp_path / "a/b/c/d.py"))
-    refused(bywire("benchmark"), "the benchmarks need a clone", "tasks.py")
+    refused(bywire("benchmark"), "clone of its repository", "tasks.py")
 
 
 def test_failed_run_is_3(bywire, bench):

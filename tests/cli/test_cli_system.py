@@ -180,7 +180,7 @@ def test_python_and_forms_take_the_only_parameter_set(tmp_path: Path) -> None:
 
 
 def test_what_the_option_itself_lacks_is_said(bywire: Bywire, tmp_path: Path) -> None:
-    refused(bywire("list", "--system"), "--system needs a PATH")
+    refused(bywire("list", "--system"), "--system needs the path")
     refused(bywire("list", "--system", tmp_path / "none.py"), "none.py does not declare a brake")
     assert "list" in bywire(*SYSTEM).out  # the help
 
@@ -232,7 +232,9 @@ def test_its_own_experiment_runs_by_its_name(bywire: Bywire, tmp_path: Path) -> 
 def test_its_own_names_come_first(bywire: Bywire) -> None:
     assert next(iter(bywire("list", "--json", *SYSTEM).object["brakes"])) == "spring-axis"
     caliper = ("--system", ROOT / "examples" / "emb_caliper")
-    refused(bywire("margins", "xyzzy", *caliper), "unknown loop 'xyzzy': known are clamp-force")
+    refused(
+        bywire("margins", "xyzzy", *caliper), "unknown loop 'xyzzy': valid names are clamp-force"
+    )
 
 
 def test_a_set_for_an_assembly_that_does_not_exist_is_said(bywire: Bywire, tmp_path: Path) -> None:

@@ -93,7 +93,7 @@ def test_refused_files(tmp_path, content, text):
         ),
         ("pedal [N]", "'N' cannot be converted to m"),
         ("pedal [furlongs per beat]", "the unit 'furlongs' in .* is not known"),
-        ("pedal [9**9**9**9]", "is not written like a unit"),
+        ("pedal [9**9**9**9]", "does not have the form of a unit"),
     ],
 )
 def test_refused_units(tmp_path, title, text):

@@ -125,7 +125,7 @@ def _wrong(status: Any, out: io.StringIO, err: io.StringIO, results: list[Any]) 
     said, shown = err.getvalue(), out.getvalue()
     if "Hang" in said:
         return "hangs"
-    if "Traceback" in said or "defect of bywire" in said:
+    if "Traceback" in said or "bug in bywire" in said:
         return "traceback: " + " | ".join(said.strip().splitlines()[-4:])
     if status not in (0, 1, 2, 3):
         return f"status {status}"

@@ -121,7 +121,7 @@ def case(
             process.kill()
             return f"{second}: does not end after {sign.name}"
     is_late = process.returncode in (0, 1)
-    is_refused = process.returncode == 2 and "name another folder" in said
+    is_refused = process.returncode == 2 and "choose another folder" in said
     if sign == signal.SIGINT and not is_late and not is_refused:
         # Before Python has come to the command, it ends by the signal itself.
         is_early = process.returncode == -signal.SIGINT and "bywire" not in said

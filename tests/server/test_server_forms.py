@@ -90,7 +90,7 @@ BAD = [
     ("margins", {**LOOP, "set": "motor.R_m=-1 ohm"}, "set", "motor.R_m"),
     ("margins", {**LOOP, "over": "motor.R_m"}, "over", "LOW:HIGH:COUNT"),
     ("linearize", {"loop": "pressures"}, "loop", "pressure"),
-    ("linearize", {**LOOP, "friction": "stuck"}, "friction", "is only for plants"),
+    ("linearize", {**LOOP, "friction": "stuck"}, "friction", "applies only to plants"),
     ("linearize", {**LOOP, "at": "20"}, "at", "unit"),
     ("linearize", {"loop": "wedge-plant", "friction": "gone"}, "friction", "removed"),
     ("linearize", {"loop": "wedge-plant", "friction": "sliding"}, "friction", "speed"),

@@ -123,7 +123,7 @@ def test_what_does_not_fit_is_told_in_one_message(capsys):
     assert job_process._explained(ParameterError("R_m must be > 0 ohm")) == "R_m must be > 0 ohm"
     missing = job_process._explained(FileNotFoundError(2, "No such file", "a.csv"))
     assert missing.startswith("a.csv: No such file: check")
-    assert "defect of bywire" in job_process._explained(ZeroDivisionError("seeded"))
+    assert "bug in bywire" in job_process._explained(ZeroDivisionError("seeded"))
     assert "seeded" in capsys.readouterr().err
 
 

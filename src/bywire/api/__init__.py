@@ -1,1 +1,1 @@
-"""The use cases, one file each: what commands and notebooks call, with typed results."""
+"""Use cases, one file each: the functions behind commands and notebooks, with typed results."""

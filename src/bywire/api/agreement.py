@@ -1,4 +1,4 @@
-"""Differences between nonlinear and linear response of a loop, by cause."""
+"""Differences between a loop's nonlinear and linear response, by cause."""
 
 from __future__ import annotations
 
@@ -34,33 +34,36 @@ if TYPE_CHECKING:
 
 
 LABELS = {NOTHING: "nothing, small amplitude", LIMITS: "limits", EVERYTHING: "everything"}
-"""labels of the active causes"""
+"""label of each set of active causes"""
 STEP = "step (computed)"
-"""label of the numerical error from the simulation's step"""
+"""label of the numerical error that comes from the simulation's step"""
 LEGEND = (
-    "Nonlinear response minus the exact linear one, by the active causes. All rows except the "
-    "first use the large amplitude, at which limits of currents, voltages and rates also act. -: "
-    "the output sticks or does not settle. Largest: the cause without a number, otherwise the "
-    "cause with the largest effect; limits count by themselves, others by what they add to the "
-    "limits. Step: linear model of the simulation's midpoint rule minus the exact one."
+    "Nonlinear response minus exact linear response, by active causes. The first row uses the "
+    "small "
+    "amplitude. All other rows use the large one, at which limits of currents, voltages and rates "
+    "also act. A dash (-) means that the output sticks or does not settle. 'Largest' lists the "
+    "cause with the largest effect, or the one without a number. The effect of limits counts by "
+    "itself, that of any other cause as its difference from the limits. 'Step' is the linear model "
+    "of the simulation's midpoint rule minus the exact model."
 )
-"""legend of the table"""
+"""caption of the table"""
 
 
 @dataclass(frozen=True)
 class LoopAgreement(Answer):
-    """Difference of a loop's nonlinear response from its exact linear one, by active cause.
+    """Difference between a loop's nonlinear and exact linear response, by active cause.
 
     Parameters
     ----------
     case
         The loop, its parameters and its operating point.
     differences
-        Nonlinear minus linear response, by cause and frequency.
+        Nonlinear response minus linear response, by cause and frequency.
     small, large
-        Amplitudes [``unit``]: the small one without causes, the large one with each cause.
+        Amplitudes [``unit``]: a small one, used without causes, and a large one, used with each
+        cause.
     unit
-        SI unit of the excited input.
+        SI unit of the input that is excited.
     """
 
     case: LoopCase
@@ -71,16 +74,16 @@ class LoopAgreement(Answer):
 
     @property
     def notes(self) -> list[str]:
-        """Side of corners of the linear model."""
+        """Notes on the linear model's side of kinks."""
         return corner_notes([self.case.loop.closed(self.case.par, self.case.value).corners])
 
     @property
     def holds(self) -> bool:
-        """Whether both responses agree without any cause."""
+        """Whether both responses agree when no cause is active."""
         return self.differences.holds
 
     def document(self) -> Document:
-        """Return table, verdict and figure."""
+        """Return the table, the verdict and the figure."""
         case, compared = self.case, self.differences
         table = TableBlock(agreement_table(compared))
         legend, text = Paragraph(LEGEND), verdict(compared)
@@ -88,8 +91,9 @@ class LoopAgreement(Answer):
         sizes = f"small amplitude {small}, large amplitude {large}"
         figure = FigureBlock(
             self._draw,
-            "Size of the differences from the exact linear response; for single causes, what they "
-            "add to the limits. Values below the range are at the lower edge.",
+            "Size of the difference from the exact linear response. For single causes, the figure "
+            "shows "
+            "the difference from the limits. Values below the range are drawn at the lower edge.",
             f"{case.loop.name}-agreement",
         )
         head = f"closed loop {case.loop.name} of {case.name} at {case.point}"
@@ -101,7 +105,7 @@ class LoopAgreement(Answer):
                 case.subject.provenance(f"{sizes[0].upper()}{sizes[1:]}."),
             ],
             brief=[
-                f"{head}: nonlinear response minus linear response",
+                f"{head}: nonlinear minus linear response",
                 sizes,
                 table,
                 Details("", [legend]),
@@ -155,12 +159,12 @@ def compared_responses(
     amplitudes: tuple[float, float],
     progress: Progress | None,
 ) -> LoopAgreement:
-    """Return the difference between both responses of a loop, by cause.
+    """Compare a loop's two responses, cause by cause.
 
     Parameters
     ----------
     case
-        The loop at its operating point.
+        Loop at its operating point.
     frequencies, amplitudes
         Frequencies [Hz], and the small and the large amplitude [SI].
     progress
@@ -169,15 +173,15 @@ def compared_responses(
     Raises
     ------
     ParameterError
-        If the loop is unstable, or its output does not respond to the set point.
+        If the loop is unstable or its output does not respond to the set point.
     """
     gain, closed = case.loop.gain_and_closed(case.par, case.value)
     require_stable(closed)
     if not LoopFigures(gain, closed).answers:
         raise ParameterError(
             f"loop {case.loop.name!r} at {case.point}: {NO_LOOP}, and the output does not respond "
-            f"to the set point; choose other gains with {option('overrides')}, or another point "
-            f"with {option('at')}",
+            f"to the set point. Choose other gains with {option('overrides')}, or another "
+            f"operating point with {option('at')}",
             name=f"loop {case.loop.name!r}",
             value=case.point,
         )
@@ -188,39 +192,41 @@ def compared_responses(
 
 
 def two_amplitudes(case: LoopCase, text: str) -> tuple[float, float]:
-    """Return the small and the large amplitude [SI], by default those of the loop.
+    """Return the small and the large amplitude [SI]. Default: those that the loop declares.
 
     Raises
     ------
     InputError
-        If these are not two, the small one first.
+        If the text does not contain two amplitudes in increasing order.
     """
     if not text:
         return case.loop.amplitudes[0], case.loop.amplitudes[-1]
     sizes = spread(text, case.input_unit, "amplitudes")
     if len(sizes) != 2 or not sizes[0] < sizes[1]:
         raise ParameterError(
-            f"{option('amplitudes')} {text}: give two, the small one first; bywire measures the "
-            "loop without nonlinear causes at the small one, and each cause at the large one",
+            f"{option('amplitudes')} {text} is not valid. Specify two amplitudes, the small one "
+            "first. bywire measures the loop without nonlinear causes at the small amplitude, and "
+            "each cause at the large amplitude",
             name=option("amplitudes"),
             value=text,
+            valid="two amplitudes",
         )
     return sizes[0], sizes[1]
 
 
 def verdict(compared: Agreement) -> str:
-    """Return whether the responses agree without any cause, as a text with the limits."""
+    """Return a text on whether the responses agree when no cause is active, with the limits."""
     state = "agree" if compared.holds else "DO NOT agree"
     gain = max(map(abs, compared.gain[NOTHING].tolist()))
     phase = max(map(abs, compared.phase[NOTHING].tolist()))
     return (
-        f"with everything off both responses {state}: largest differences {gain:.2g} dB and "
+        f"with all causes off, both responses {state}: largest differences {gain:.2g} dB and "
         f"{phase:.2g}° (limits {GAIN:g} dB and {PHASE:g}°)"
     )
 
 
 def agreement_table(compared: Agreement) -> Table:
-    """Return the differences, a row for each active cause, and the largest cause by frequency."""
+    """Return a table of differences by active cause, and the largest cause at each frequency."""
     heading = ["left on", *(amount(float(f), "Hz", 3) for f in compared.frequencies)]
     rows = [
         [LABELS.get(cause, cause), *map(_cell, compared.gain[cause], compared.phase[cause])]

@@ -1,4 +1,4 @@
-"""Test of a brake, or of a part of one, against every contract."""
+"""Test of a brake, or of one of its parts, against every contract."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ _HEADINGS = ("subject", "contract", "outcome", "what was found")
 
 @dataclass(frozen=True)
 class Check(Answer):
-    """Findings of a check.
+    """Outcome of a check.
 
     Parameters
     ----------
     subject
-        Subject of the check: a brake, a model, an element, a parameter set, or everything.
+        Brake, model, element, parameter set, or everything.
     findings
-        One finding per part and contract.
+        One finding for each part and contract.
     """
 
     subject: str
@@ -35,7 +35,7 @@ class Check(Answer):
 
     @property
     def holds(self) -> bool:
-        """Whether no contract is broken."""
+        """Whether there are no broken contracts."""
         return not self.broken
 
     @property
@@ -45,21 +45,21 @@ class Check(Answer):
 
     @property
     def not_checked(self) -> tuple[Finding, ...]:
-        """Contracts that could not be checked, each with the reason."""
+        """Findings of contracts that could not be checked, each with the reason."""
         return self._with("not checked")
 
     def _with(self, outcome: str) -> tuple[Finding, ...]:
         return tuple(f for f in self.findings if f.outcome == outcome)
 
     def document(self) -> Document:
-        """Return contracts that pass or fail, with figure, limit and the source line."""
+        """Return all contracts with outcome, figure, limit and source line."""
         kept = len(self._with("holds"))
         counts = [f"{kept} of {len(self.findings)} contracts hold"]
-        counts += [f"{len(self.broken)} do not"] if self.broken else []
+        counts += [f"{len(self.broken)} are broken"] if self.broken else []
         counts += [f"{len(self.not_checked)} could not be checked"] if self.not_checked else []
         summary = f"{self.subject}: {', '.join(counts)}"
         if not self.findings:
-            summary = f"{self.subject} declares nothing to check: see docs/modeling.md"
+            summary = f"{self.subject} declares nothing to check. See docs/modeling.md"
         shown = [f for f in self.findings if f.figure is not None and "(" in f.subject]
         brief: list[str | Flat] = [TableBlock(_figures(shown)), ""] if shown else []
         if self.not_checked:
@@ -70,7 +70,7 @@ class Check(Answer):
             brief += [Listing(texts, "not checked, because"), ""]
         return Document(
             f"Check of {self.subject}",
-            "All contracts of elements, parameter sets and models.",
+            "Contracts of elements, parameter sets and models.",
             sections=[
                 Section("Broken contracts", [TableBlock(_table(self.broken))]),
                 Section("Not checked", [TableBlock(_table(self.not_checked))]),
@@ -109,7 +109,7 @@ class Check(Answer):
 
 
 def _figures(findings: list[Finding]) -> Table:
-    """Return the measured figures, one per line."""
+    """Return a table of the measured figures."""
     rows = [
         (
             Cell(clean(f.subject)),

@@ -1,4 +1,4 @@
-"""Comparison of runs: differing settings and key figures, verdicts, curves."""
+"""Comparison of runs: settings and key figures that differ, verdicts, and curves."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 import numpy as np
 import xarray as xr
@@ -35,6 +35,7 @@ from bywire.core.typing import Progress
 from bywire.core.units import difference_unit
 from bywire.report.answer import Answer
 from bywire.report.document import (
+    Banner,
     Block,
     Change,
     Document,
@@ -49,7 +50,7 @@ from bywire.report.document import (
 from bywire.report.subject import bench_changes
 from bywire.report.tables import Cell, Column, Table, measured_cell, value_text
 from bywire.report.terminal import change_texts
-from bywire.report.wording import clean, duration, measured_amount
+from bywire.report.wording import amount, beside_limit, clean, measured_amount
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -63,13 +64,13 @@ _BENCH = {
     "step": "simulation.step",
     "seed": "simulation.seed",
 }
-"""attributes of a recording that bench files set, with their names there"""
+"""attributes of a recording that bench files set, with their names in these files"""
 _PROGRAM = ("bywire_version", "engine")
 
 
 @dataclass(frozen=True)
 class Setting:
-    """A setting of a bench: a value in an SI unit, or a choice."""
+    """Setting of a bench: a value in its SI unit, or a choice."""
 
     value: Any
     unit: str = "1"
@@ -77,22 +78,22 @@ class Setting:
 
 @dataclass(frozen=True)
 class ComparedRun:
-    """A run bench.
+    """Run of a bench, ready for comparison.
 
     Parameters
     ----------
     label
-        Its name in the comparison.
+        Name in the comparison.
     source
-        Its origin: a folder, a bench file, an experiment.
+        Origin: a folder, a bench file or an experiment.
     recordings
-        One dataset per run of the experiment, by label.
+        One dataset for each run of the experiment, by label.
     kpis, verdicts
         Key figures, and verdicts on requirements.
     warnings
-        Warnings of its run.
+        Warnings of the run.
     changes
-        Changes from the cited values.
+        Changes from the published values.
     """
 
     label: str
@@ -105,18 +106,18 @@ class ComparedRun:
 
     @cached_property
     def attributes(self) -> Mapping[str, Any]:
-        """Attributes of the first recording, as plain numbers and texts."""
+        """Attributes of the first recording as plain numbers and texts."""
         attributes = next(iter(self.recordings.values())).attrs
         return {key: v.item() if isinstance(v, np.generic) else v for key, v in attributes.items()}
 
     @property
     def model(self) -> str:
-        """Name of the tested assembly."""
+        """Name of the assembly under test."""
         return str(self.attributes.get("model", ""))
 
     @cached_property
     def definition(self) -> Experiment | None:
-        """The experiment; None if this installation does not have it."""
+        """The experiment, or None if it is not installed."""
         attributes = self.attributes
         name, cited, model = (
             str(attributes.get(k, "")) for k in ("experiment", "parameter_set", "model")
@@ -127,7 +128,7 @@ class ComparedRun:
 
     @cached_property
     def options(self) -> Any:
-        """The options of the experiment; None if they cannot be read."""
+        """The experiment's options, or None if they cannot be read."""
         if self.definition is None:
             return None
         with contextlib.suppress(InputError):
@@ -136,7 +137,7 @@ class ComparedRun:
 
     @cached_property
     def settings(self) -> dict[str, Setting]:
-        """All settings, by the names that ``--set`` takes."""
+        """All settings by the names that ``--set`` accepts."""
         attributes = self.attributes
         settings = {
             name: Setting(attributes[key], "s" if key == "step" else "1")
@@ -151,7 +152,7 @@ class ComparedRun:
 
     @property
     def has_units(self) -> bool:
-        """Whether the units of its parameters are known: its parameter set is installed."""
+        """Whether its parameter set is installed, so that the units are known."""
         return self._parameter_class is not None
 
     @property
@@ -179,7 +180,7 @@ class ComparedRun:
 
 
 def ran(result: Result, label: str, source: str) -> ComparedRun:
-    """Return a bench run by this call."""
+    """Return a run that this call computed."""
     warned = tuple(result.warnings)
     return ComparedRun(
         label,
@@ -193,7 +194,7 @@ def ran(result: Result, label: str, source: str) -> ComparedRun:
 
 
 def kept(folder: Path) -> ComparedRun:
-    """Return the run in a result folder.
+    """Read a run from a result folder.
 
     Raises
     ------
@@ -226,7 +227,7 @@ def _tupled(values: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _object(attributes: Mapping[str, Any], key: str) -> dict[str, Any]:
-    """Return an attribute that contains a JSON object, or an empty object."""
+    """Return an attribute's JSON object, or an empty object."""
     with contextlib.suppress(ValueError):
         content = json.loads(str(attributes.get(key, "{}")))
         return content if isinstance(content, dict) else {}
@@ -240,16 +241,16 @@ _LONGEST = 48  # characters of a value in a table
 
 @dataclass(frozen=True)
 class Compared:
-    """One setting or key figure of all runs.
+    """Setting or key figure, with its values in all runs.
 
     Parameters
     ----------
     name, unit
-        Its name, and its SI unit or ``"%"``.
+        Name, and SI unit or ``"%"``.
     values
-        Its value in each run; None if a run does not have it, NaN if it is not defined.
+        Value in each run: None if a run does not have it, NaN if it is undefined.
     errors
-        Numerical error of each value of a key figure, NaN if it was not estimated.
+        Numerical error of a key figure in each run, NaN if it was not estimated.
     """
 
     name: str
@@ -259,19 +260,32 @@ class Compared:
 
     @property
     def differs(self) -> bool:
-        """Whether not all runs have the same value; undefined values count as equal."""
+        """Whether the runs have different values. Undefined values count as equal."""
         first, *others = (_comparable(value) for value in self.values)
         return any(value != first for value in others)
 
     @property
+    def largest(self) -> float:
+        """Largest magnitude of a key figure, which determines the unit of all its values."""
+        known = (abs(v) for v in self.values if v is not None and math.isfinite(v))
+        return max(known, default=0.0)
+
+    @property
+    def ratio(self) -> float:
+        """Spread of a key figure relative to its smallest magnitude; 0 if one is zero or none."""
+        known = [v for v in self.values if v is not None and math.isfinite(v)]
+        least = min(map(abs, known), default=0.0)
+        return (max(known) - min(known)) / least if least and len(known) > 1 else 0.0
+
+    @property
     def is_distinct(self) -> bool:
-        """Whether a key figure differs by more than its errors, taken as independent."""
+        """Whether a key figure differs by more than its errors, assumed independent."""
         values = [math.nan if value is None else value for value in self.values]
         return are_distinct(values, self.errors)
 
 
 def _compared_settings(runs: Sequence[ComparedRun], *, shared_only: bool) -> tuple[Compared, ...]:
-    """Return all settings, or only those that all runs have."""
+    """Return all settings, or only those that all runs share."""
     names = list(dict.fromkeys(name for each in runs for name in each.settings))
     if shared_only:
         names = [name for name in names if all(name in each.settings for each in runs)]
@@ -284,7 +298,7 @@ def _compared_settings(runs: Sequence[ComparedRun], *, shared_only: bool) -> tup
 
 
 def _compared_figures(runs: Sequence[ComparedRun]) -> tuple[Compared, ...]:
-    """Return the key figures of all runs; figures with different units are separate."""
+    """Return the key figures of all runs. Figures with different units are separate."""
     keys = dict.fromkeys((kpi.name, kpi.unit) for each in runs for kpi in each.kpis)
     each_run = [{(k.name, k.unit): (k.value, k.bound) for k in each.kpis} for each in runs]
     rows = []
@@ -295,7 +309,7 @@ def _compared_figures(runs: Sequence[ComparedRun]) -> tuple[Compared, ...]:
 
 
 def _settings_table(labels: Sequence[str], rows: Sequence[Compared]) -> Table:
-    """Return settings with one column per run."""
+    """Return a table of settings with one column for each run."""
     return Table(
         (Column("setting"), *(Column(label, numeric=True) for label in labels)),
         tuple(
@@ -306,7 +320,7 @@ def _settings_table(labels: Sequence[str], rows: Sequence[Compared]) -> Table:
 
 
 def _kpi_table(labels: Sequence[str], rows: Sequence[Compared]) -> Table:
-    """Return key figures with one column per run, and their change, or spread for many runs."""
+    """Return a table of key figures with a column for each run, and one for change or spread."""
     change = "change" if len(labels) == 2 else "spread"
     return Table(
         (
@@ -318,7 +332,7 @@ def _kpi_table(labels: Sequence[str], rows: Sequence[Compared]) -> Table:
             (
                 Cell(clean(each.name)),
                 *(
-                    measured_cell(v, each.unit, e)
+                    measured_cell(v, each.unit, e, like=each.largest)
                     for v, e in zip(each.values, each.errors, strict=True)
                 ),
                 _change(each),
@@ -329,7 +343,7 @@ def _kpi_table(labels: Sequence[str], rows: Sequence[Compared]) -> Table:
 
 
 def _verdict_table(runs: Sequence[ComparedRun]) -> Table:
-    """Return the requirements, one per row, with the verdict of every run."""
+    """Return a table with one requirement per row and the verdict of each run."""
     each_run = [{(v.kpi, v.limit): v for v in each.verdicts} for each in runs]
     keys = dict.fromkeys(key for verdicts in each_run for key in verdicts)
     rows = []
@@ -340,7 +354,8 @@ def _verdict_table(runs: Sequence[ComparedRun]) -> Table:
             if verdict is None:
                 cells.append(Cell("-"))
                 continue
-            shown = measured_amount(verdict.value, verdict.unit, verdict.error)
+            value, error, unit = beside_limit(verdict.value, verdict.error, verdict.unit, limit)
+            shown = measured_amount(value, unit, error)
             text = f"{shown} {verdict.outcome}"
             cells.append(Cell(text, "good" if verdict.met else "bad", verdict.outcome))
         rows.append((Cell(clean(name)), Cell(clean(limit)), *cells))
@@ -348,8 +363,12 @@ def _verdict_table(runs: Sequence[ComparedRun]) -> Table:
     return Table((*columns, *(Column(each.label, numeric=True) for each in runs)), tuple(rows))
 
 
+def _not_met(run: ComparedRun) -> list[Verdict]:
+    return [verdict for verdict in run.verdicts if verdict.outcome != "met"]
+
+
 def _change(row: Compared) -> Cell:
-    """Return the difference of two values, or the spread of several, if it is distinct."""
+    """Return the difference between two values or the spread of several, if it is distinct."""
     known = [value for value in row.values if value is not None and math.isfinite(value)]
     if len(known) < len(row.values):
         return Cell("-")
@@ -359,10 +378,11 @@ def _change(row: Compared) -> Cell:
     if not row.is_distinct:
         return Cell("not distinct", value=change)
     error = row.errors[low] + row.errors[high]
-    written = measured_amount(change, difference_unit(row.unit), error, 3)
+    of = difference_unit(row.unit)
+    written = measured_amount(change, of, error, 3, like=row.largest if of == row.unit else None)
     is_share = is_pair and first and row.unit not in ("%", "K")
-    share = f" ({100 * change / abs(first):+.3g} %)" if is_share else ""
     sign = "+" if is_pair and change > 0 else ""
+    share = f" ({sign}{amount(100 * change / abs(first), '%', 3)})" if is_share else ""
     return Cell(f"{sign}{written}{share}", value=change)
 
 
@@ -376,23 +396,23 @@ def _value(setting: Setting | None) -> Any:
 
 
 def _comparable(value: Any) -> Any:
-    """Return a value that compares equal to itself, even for NaN."""
+    """Return a value that equals itself even if it is NaN."""
     return "NaN" if isinstance(value, float) and math.isnan(value) else value
 
 
 # --- The comparison
 
-_FEW = 2  # differing settings that a legend names
+_FEW = 2  # differing settings in a legend
 
 
 @dataclass(frozen=True)
 class Comparison(Answer):
-    """Comparison of runs.
+    """Comparison of several runs.
 
     Parameters
     ----------
     runs
-        The runs.
+        Runs to compare.
     is_full
         Whether to also show equal settings and key figures.
     """
@@ -402,12 +422,12 @@ class Comparison(Answer):
 
     @cached_property
     def settings(self) -> tuple[Compared, ...]:
-        """All settings; for different brakes, those that all of them have."""
+        """All settings. For different brakes, only those that all runs share."""
         return _compared_settings(self.runs, shared_only=self._mixed)
 
     @cached_property
     def figures(self) -> tuple[Compared, ...]:
-        """Key figures of all runs; figures of one name with different units are separate."""
+        """Key figures of all runs. Figures with one name and different units are separate."""
         return _compared_figures(self.runs)
 
     @property
@@ -417,8 +437,8 @@ class Comparison(Answer):
         if self._mixed:
             names = ", ".join(f"{each.label} is a {each.model}" for each in self.runs)
             texts.append(
-                f"the runs are of different brakes ({names}): bywire compares only the parameters "
-                "and signals that they share"
+                f"the runs use different brakes ({names}). bywire compares only the parameters and "
+                "signals that they share"
             )
         texts += self._spans()
         grouped = self._groups
@@ -429,9 +449,9 @@ class Comparison(Answer):
             if not any(each.recordings[label] is r for g in grouped.values() for r in g)
         ]
         if left_out:
-            texts.append(f"not drawn, because no other run has them: {', '.join(left_out)}")
+            texts.append(f"recordings that only one run has are not drawn: {', '.join(left_out)}")
         texts += [
-            f"{each.label}: its parameter set is unknown here, so its values have no units; load "
+            f"{each.label}: its parameter set is not loaded, so its values have no units. Load "
             f"your brake with {'--system PATH' if is_command_line() else 'bywire.load_system'}"
             for each in self.runs
             if not each.has_units
@@ -439,30 +459,56 @@ class Comparison(Answer):
         return texts
 
     def document(self) -> Document:
-        """Return differences, key figures, verdicts and curves."""
+        """Return the differences, key figures, verdicts and curves."""
         settings, figures = self._tables()
         verdicts = [TableBlock(_verdict_table(self.runs), title="Requirements:")]
         verdicts = verdicts if any(each.verdicts for each in self.runs) else []
         sources = [f"{each.label}: {each.source}" for each in self.runs]
         changed = self._changed()
         changes = [Listing(changed, "Also changed:")] if changed else []
+        conclusion = self._conclusion()
         return Document(
             "Comparison of " + ", ".join(each.label for each in self.runs),
-            f"{len(self.runs)} runs; values in the order of the command",
+            f"{len(self.runs)} runs, with values in the order of the command",
             sections=lambda: [
-                Section("Differing settings", [Listing(sources), *settings, *changes]),
                 *([Section("Requirements", verdicts)] if verdicts else []),
+                Section("Differing settings", [Listing(sources), *settings, *changes]),
                 Section("Curves", self._curves()),
                 *([Section("Differences", apart)] if (apart := self._differences()) else []),
                 Section("Key figures", figures),
             ],
-            brief=spaced([*settings, *changes, *figures, *verdicts]),
+            brief=spaced([f"{conclusion}.", *verdicts, *settings, *figures, *changes]),
             data=self._data(),
+            banner=Banner(conclusion, self._overall()),
             record="compare.json",
         )
 
+    def _conclusion(self) -> str:
+        """Return who meets the requirements, the worst run first, and what differs most."""
+        parts = []
+        judged = [each for each in self.runs if each.verdicts]
+        for each in sorted(judged, key=lambda run: -len(_not_met(run))):
+            open_ = [f"{v.kpi} {v.outcome}" for v in _not_met(each)]
+            met = f"{len(each.verdicts) - len(open_)} of {len(each.verdicts)} requirements"
+            missed = f" ({', '.join(open_)})" if open_ else ""
+            parts.append(f"{each.label} meets {met}{missed}")
+        distinct = [each for each in self.figures if each.differs and each.is_distinct]
+        count = f"{len(distinct)} of {len(self.figures)} key figures differ"
+        most = max(distinct, key=lambda each: each.ratio, default=None)
+        if most is not None and math.isfinite(most.ratio) and most.ratio > 0.0:
+            pairs = zip(most.values, most.errors, strict=True)
+            values = (measured_amount(v, most.unit, e, like=most.largest) for v, e in pairs)
+            count += f", {most.name} the most ({', '.join(values)})"
+        return "; ".join([*parts, count])
+
+    def _overall(self) -> Literal["good", "bad", "open", "none"]:
+        outcomes = {v.outcome for each in self.runs for v in each.verdicts}
+        if "missed" in outcomes:
+            return "bad"
+        return "none" if not outcomes else "open" if "undecided" in outcomes else "good"
+
     def _changed(self) -> list[str]:
-        """Return the changes of the runs, without settings that differ between them."""
+        """Return the changes of the runs, except settings that differ between the runs."""
         differing = {each.name for each in self.settings if each.differs}
         runs_by_text: dict[str, list[str]] = {}
         for each in self.runs:
@@ -480,7 +526,7 @@ class Comparison(Answer):
 
     @cached_property
     def _groups(self) -> dict[str, tuple[xr.Dataset, ...]]:
-        """Corresponding recordings over time: by label, or each run's only one."""
+        """Recordings over time that correspond to each other, by label or as the only one."""
         over_time = [
             {label: r for label, r in each.recordings.items() if r.sizes.get("time", 0) > 1}
             for each in self.runs
@@ -492,7 +538,7 @@ class Comparison(Answer):
 
     @cached_property
     def labels(self) -> tuple[str, ...]:
-        """Legend entries: each run's label, and its differing settings if these are few."""
+        """Legend entries: each run's label, with its differing settings if there are few."""
         if self._mixed:
             return tuple(each.label for each in self.runs)
         differing = [s for s in self.settings if s.differs and s.name not in _NOT_NAMED]
@@ -510,7 +556,7 @@ class Comparison(Answer):
 
     def _spans(self) -> list[str]:
         spans = {
-            each.label: tuple(f"{duration(float(t))}" for t in recordings["time"].values[[0, -1]])
+            each.label: tuple(amount(float(t), "s") for t in recordings["time"].values[[0, -1]])
             for group in self._groups.values()
             for each, recordings in zip(self.runs, group, strict=True)
         }
@@ -518,12 +564,12 @@ class Comparison(Answer):
             return []
         times = ", ".join(f"{label} {low} to {high}" for label, (low, high) in spans.items())
         return [
-            f"the runs cover different times ({times}): each curve ends with its run, and key "
-            "figures cover only their run's time"
+            f"the runs cover different times ({times}). Each curve ends with its run, and key "
+            "figures cover only the time of their run"
         ]
 
     def _tables(self) -> tuple[list[Flat], list[Flat]]:
-        """Return the blocks of settings and of key figures."""
+        """Return the tables of settings and of key figures."""
         labels = [each.label for each in self.runs]
         blocks_of: list[list[Flat]] = []
         for title, shown, rows in (
@@ -537,9 +583,9 @@ class Comparison(Answer):
                 caption = f"{title} that differ."
                 blocks.append(TableBlock(rows(labels, differing), caption, f"{caption[:-1]}:"))
             else:
-                blocks.append(Paragraph(f"{title}: all {len(same)} are the same."))
+                blocks.append(Paragraph(f"{title}: all {len(same)} are equal."))
             if same and self.is_full:
-                caption = f"{title} that are the same."
+                caption = f"{title} that are equal."
                 blocks.append(TableBlock(rows(labels, same), caption, f"{caption[:-1]}:"))
             blocks_of.append(blocks)
         return blocks_of[0], blocks_of[1]
@@ -555,10 +601,10 @@ class Comparison(Answer):
             )
             for label, group in self._groups.items()
             if can_overlay(group)
-        ] or [Paragraph("The runs share no signal over time, so there are no curves to compare.")]
+        ] or [Paragraph("The runs share no signals over time, so there are no curves to compare.")]
 
     def _differences(self) -> list[Block]:
-        """Return figures of each run's difference from the first over time, where possible."""
+        """Return figures of each run's difference from the first run over time, where possible."""
         from bywire.report.time_traces import difference_figure
 
         first, *_ = self.runs
@@ -568,13 +614,13 @@ class Comparison(Answer):
             figure = difference_figure(dict(zip(labels, group, strict=True)))
             if figure is not None:
                 of = f", {label}" if label else ""
-                caption = f"Differences of the other runs from {first.label}{of}."
+                caption = f"Other runs minus {first.label}{of}."
                 name = f"difference-{label}" if label else "difference"
                 blocks.append(FigureBlock(figure, caption, name))
         return blocks
 
     def _step(self) -> tuple[str, StepLimits] | None:
-        """Return signal and limits of the step that judges all runs, if they share it."""
+        """Return the signal and limits of the step by which all runs are judged, if shared."""
         from bywire.report.step_response import step_limits
 
         steps = [
@@ -629,7 +675,7 @@ def _drawn(recordings: Mapping[str, xr.Dataset], step: tuple[str, StepLimits] | 
     return overlaid_panels(recordings, step=step)
 
 
-# --- Runs to compare: result folders are read, all others are run
+# --- Runs to compare: read from result folders, or computed
 
 Comparable = Bench | Result | str | Path
 Run = TypeVar("Run", bound=Comparable)
@@ -642,9 +688,9 @@ def compared(
     progress: Progress | None,
     estimate_error: bool,
 ) -> Comparison:
-    """Return a comparison of runs; see `bywire.compare`."""
+    """Compare runs (see `bywire.compare`)."""
     require_comparable(runs, overrides)
-    # Folders first, so that an incomplete one fails before the computation.
+    # Folders first, so that an incomplete one raises an error before the computation.
     read = {k: kept(Path(str(each))) for k, each in enumerate(runs) if _is_folder(each)}
     shown = [
         read.get(k) or _resolved(each, overrides, progress, estimate_error)
@@ -654,17 +700,17 @@ def compared(
 
 
 def require_comparable(runs: Sequence[Run], overrides: Mapping[str, str]) -> list[Run]:
-    """Return the runs that are still to be computed, which changes can affect.
+    """Return the runs that must still be computed, which changes can affect.
 
     Raises
     ------
     ParameterError
-        For fewer than two runs, and changes without effect.
+        For fewer than two runs, or changes without effect.
     """
     if len(runs) < 2:
         raise ParameterError(
-            f"a comparison needs at least two runs, not {len(runs)}: name bench files, experiments "
-            "or result folders",
+            f"a comparison needs at least two runs, not {len(runs)}. Specify bench files, "
+            "experiments or result folders",
             name="runs",
             value=str(len(runs)),
             valid="at least two",
@@ -672,14 +718,15 @@ def require_comparable(runs: Sequence[Run], overrides: Mapping[str, str]) -> lis
     benches = [each for each in runs if not _was_run(each)]
     if overrides and not benches:
         raise ParameterError(
-            f"{', '.join(overrides)} would have no effect, because all runs are already computed",
+            f"{', '.join(overrides)} would have no effect, because all runs are already computed. "
+            "Remove the changes, or compare bench files",
             name=", ".join(overrides),
         )
     return benches
 
 
 def _was_run(source: Comparable) -> bool:
-    """Return whether a source is already computed."""
+    """Return whether a run is already computed."""
     return isinstance(source, Result) or _is_folder(source)
 
 
@@ -699,7 +746,7 @@ def _resolved(
     progress: Progress | None,
     estimate_error: bool,
 ) -> ComparedRun:
-    """Return a computed bench, run now unless it already was."""
+    """Return a run, computed now unless it already was."""
     if isinstance(source, Result):
         result, text = source, "given"
     else:
@@ -721,7 +768,7 @@ def _reported(progress: Progress, name: str, label: str, share: float) -> None:
 
 
 def _told_apart(runs: Sequence[ComparedRun]) -> list[ComparedRun]:
-    """Return runs with unique labels: their names, otherwise sources, otherwise numbers."""
+    """Return runs with unique labels: names if they differ, otherwise sources or numbers."""
     labels = [clean(each.label) for each in runs]
     if len(set(labels)) < len(runs):
         labels = [clean(each.source) for each in runs]

@@ -1,4 +1,4 @@
-"""Conversion of a measurement file to another format, also to one time axis."""
+"""Conversion of a measurement file to another format, or to a common time axis."""
 
 from __future__ import annotations
 
@@ -15,28 +15,29 @@ from bywire.core.errors import not_valid
 from bywire.report.answer import Answer
 from bywire.report.document import Document, Section, TableBlock
 from bywire.report.tables import Cell, Table, text_table
+from bywire.report.wording import amount
 
 if TYPE_CHECKING:
     from bywire.data.channel_quality import AlignedChannel, AlignmentReport, Stretch
 
 _LISTED = 20
-"""longest list of stretches per kind and channel in the JSON object, which counts all of them"""
+"""longest list of stretches of a kind in a channel in the JSON object, which counts all"""
 
-_ROUNDING = 1e-9  # steps; smaller jitter is rounding, not the clock's
+_ROUNDING = 1e-9  # steps; smaller jitter is rounding and does not come from the clock
 
 
 @dataclass(frozen=True)
 class Conversion(Answer):
-    """A converted measurement.
+    """Converted measurement.
 
     Parameters
     ----------
     source, target
-        The files read and written.
+        The input file and the output file.
     recording
-        Its signals, SI.
+        Signals in SI units.
     alignment
-        Resampling to one time axis; None if the signals keep their own.
+        Resampling to a common time axis, or None if each signal keeps its own.
     remarks
         Notes from reading the file.
     """
@@ -49,11 +50,11 @@ class Conversion(Answer):
 
     @property
     def notes(self) -> list[str]:
-        """Notes on omitted, missing or guessed content of the file."""
+        """Notes on content of the file that bywire omitted, missed or guessed."""
         return list(self.remarks)
 
     def document(self) -> Document:
-        """Return the signals, and the findings of the alignment."""
+        """Return the signals and the alignment's findings."""
         report = self.alignment
         table = TableBlock(self._signal_table() if report is None else _channel_table(report))
         head, foot = ([], []) if report is None else _around(report)
@@ -122,7 +123,7 @@ def aligned(
     exclude: Sequence[str] | None,
     max_gap: str,
 ) -> tuple[xr.Dataset, AlignmentReport]:
-    """Return the signals on one time axis, with a report; see `bywire.convert`.
+    """Return the signals on a common time axis, with a report (see `bywire.convert`).
 
     Raises
     ------
@@ -159,7 +160,7 @@ def _channel(channel: AlignedChannel) -> dict[str, Any]:
 
 
 def _stretches(stretches: tuple[Stretch, ...]) -> dict[str, Any]:
-    """Return count, total length, and the longest stretches in the order of time."""
+    """Return count, total length and the longest stretches in order of time."""
     longest = sorted(stretches, key=lambda stretch: -stretch.length)[:_LISTED]
     return {
         "count": len(stretches),
@@ -172,15 +173,15 @@ def _stretches(stretches: tuple[Stretch, ...]) -> dict[str, Any]:
 
 
 def _around(report: AlignmentReport) -> tuple[list[str], list[str]]:
-    """Return the lines above and below the table of an alignment."""
+    """Return the lines above and below an alignment's table."""
     head = (
         f"{report.samples} samples every {units.shown(report.interval, 's')} from "
         f"{units.shown(report.start, 's')} to {units.shown(report.stop, 's')}, method "
         f"{report.method}; excluded: {', '.join(report.exclude) or 'nothing'}"
     )
     folded = (
-        f"sampled faster than the time axis: {', '.join(report.folded)}; content above half the "
-        f"axis's rate aliases to low frequencies, unless {option('method', 'average')}"
+        f"sampled faster than the time axis: {', '.join(report.folded)}. Content above half the "
+        f"new sample rate aliases to low frequencies unless you use {option('method', 'average')}"
     )
     return [head], [folded] if report.folded else []
 
@@ -192,8 +193,8 @@ def _channel_table(report: AlignmentReport) -> Table:
 
 def _row(channel: AlignedChannel) -> tuple[str | Cell, ...]:
     quality = channel.quality
-    jitter = f"{1e3 * quality.jitter:.3g} ms" if quality.jitter * quality.rate > _ROUNDING else "-"
-    delay = f"{1e3 * channel.delay:.4g} ms" if channel.delay else "-"
+    jitter = amount(quality.jitter, "s", 3) if quality.jitter * quality.rate > _ROUNDING else "-"
+    delay = amount(channel.delay, "s") if channel.delay else "-"
     return (
         channel.name,
         Cell(f"{quality.rate:.6g} Hz", value=quality.rate, unit="Hz"),
@@ -208,4 +209,5 @@ def _in_short(stretches: tuple[Stretch, ...]) -> str:
     if not stretches:
         return "-"
     longest = max(stretches, key=lambda stretch: stretch.length)
-    return f"{len(stretches)}, longest {longest.length:.3g} s at {longest.start:.4g} s"
+    length, start = amount(longest.length, "s", 3), amount(longest.start, "s")
+    return f"{len(stretches)}, longest {length} at {start}"

@@ -1,4 +1,4 @@
-"""Descriptions of names (methods, experiments, signals), and search for words."""
+"""Descriptions of names (methods, experiments, signals), and a search for words."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from bywire.report.document import Document, Flat, Paragraph, Section, TableBloc
 from bywire.report.tables import Table, text_table
 from bywire.report.wording import unit_text
 
-_SHOWN = 12  # rows on a terminal
+_SHOWN = 12  # rows in a terminal
 _WORD = re.compile(r"[^\W\d_]{2,}|\w+")
 
 
 class Mention(NamedTuple):
-    """Something with a name, and its declared meaning."""
+    """Name with its declared meaning."""
 
     kind: str
     name: str
@@ -34,28 +34,28 @@ class Mention(NamedTuple):
 
 @dataclass(frozen=True)
 class Mentioned(Answer):
-    """Results of a search for words.
+    """Results of a search.
 
     Parameters
     ----------
     words
-        The searched words.
+        Words of the search.
     mentions
-        Things that mention the words, first those with the words in their name.
+        Things that mention the words. Those with the words in their name come first.
     """
 
     words: str
     mentions: tuple[Mention, ...]
 
     def document(self) -> Document:
-        """Return kind, name and meaning of each; on a terminal as many as fit on a screen."""
+        """Return kind, name and meaning of each result. A terminal shows one screen of them."""
         rows = [(mention.kind, mention.name, mention.meaning) for mention in self.mentions]
         more = len(rows) - _SHOWN
         table, start = (
             text_table(("kind", "name", "meaning"), each) for each in (rows, rows[:_SHOWN])
         )
-        left = [f"and {more} more: add words to narrow the search"] if more > 0 else []
-        head = f"nothing has the name {quoted(self.words)}; these mention it"
+        left = [f"and {more} more. Add words to narrow the search"] if more > 0 else []
+        head = f"nothing is named {quoted(self.words)}, but these entries mention it"
         return Document(
             self.words,
             head,
@@ -73,10 +73,10 @@ class Mentioned(Answer):
 
 
 def mentions(words: str) -> list[Mention]:
-    """Return everything that mentions all of some words, first those with them in the name.
+    """Return everything that mentions all given words, matches in the name first.
 
-    A word matches the beginning of a declared word in names and meanings (docstrings, labels,
-    summaries). Units must match completely.
+    A word matches the beginning of a word in names and meanings (docstrings, labels, summaries).
+    Units must match completely.
     """
     asked = [word.lower() for word in _WORD.findall(words)]
     known = dict.fromkeys(_known()) if asked else {}
@@ -87,7 +87,7 @@ def mentions(words: str) -> list[Mention]:
 
 
 def _nearest_words(name: str) -> Sequence[str]:
-    """Return the declared words closest to an unknown one."""
+    """Return the declared words that are closest to an unknown word."""
     words = {word for mention in _known() for word in _WORD.findall(mention.meaning)}
     return get_close_matches(name, [word for word in words if len(word) > 3], n=2, cutoff=0.75)
 
@@ -102,7 +102,7 @@ def _begins(text: str, word: str) -> bool:
 
 
 def _known() -> Iterator[Mention]:
-    """Yield everything that has a name, groups of parameters first for orientation."""
+    """Yield everything that has a name, starting with groups of parameters for orientation."""
     assemblies = dict.fromkeys(each.assembly for each in PARAMETER_SETS.all().values())
     classes = [PARAMETER_SETS.find(main_set(name)).parameter_class for name in assemblies]
     for cls in classes:
@@ -132,18 +132,18 @@ def _groups(cls: type[ParameterSet], prefix: str = "") -> Iterator[Mention]:
 # --- All about a name
 
 _LINES = ("parts", "assembly", "system", "at", "unit", "range", "experiment", "records", "source")
-"""keys of an object shown as lines, before those of an assembly"""
+"""keys of an object that are shown as lines, before the keys of an assembly"""
 _LONGEST = 200  # characters of a search
 _TABLES = ("drives", "signals", "found in", "values", "estimates", "kpis")
 
 
 def described(name: str) -> list[Object]:
-    """Return an object for each thing with a name, for instance a method and an experiment.
+    """Return an object for each thing with this name, for instance a method and an experiment.
 
     Raises
     ------
     UnknownNameError
-        If there is none, with the closest matches.
+        If there is no such thing, with the closest matches.
     """
     objects: list[Object] = [
         {"kind": kind.title, "name": name, **kind.describe(things[name])}
@@ -158,13 +158,13 @@ def described(name: str) -> list[Object]:
 
 @dataclass(frozen=True)
 class Description(Answer):
-    """Description of a name as plain data, with an object for each kind of thing."""
+    """Description of a name as plain data, with one object for each kind of thing."""
 
     name: str
     objects: tuple[Object, ...]
 
     def document(self) -> Document:
-        """Return lines and tables of each."""
+        """Return the lines and tables of each object."""
         blocks = [_blocks(thing) for thing in self.objects]
         titles = [f"{thing['kind']} {thing['name']}" for thing in self.objects]
         spaced = [part for k, each in enumerate(blocks) for part in ([""] * (k > 0) + each)]
@@ -183,16 +183,16 @@ class Description(Answer):
 
 @checked
 def describe(name: str) -> Description | Mentioned:
-    """Return all about a listed thing, a parameter, a group of parameters, or a signal.
+    """Describe a listed thing, a parameter, a group of parameters, or a signal.
 
-    For other words, return everything whose declared meaning mentions them.
+    For other words, list everything whose declared meaning mentions them.
 
     Parameters
     ----------
     name
         Name of an assembly, element, experiment, loop, plant, study, method, parameter set,
         stimulus, key figure, parameter (``"motor.R_m"``), group of parameters, or signal; or
-        words, such as ``"battery"``.
+        search words, such as ``"battery"``.
 
     Returns
     -------
@@ -206,7 +206,7 @@ def describe(name: str) -> Description | Mentioned:
     """
     if len(name) > _LONGEST:
         raise UnknownNameError(
-            f"{quoted(name)} is too long: give a name or a few words with at most {_LONGEST} "
+            f"{quoted(name)} is too long. Specify a name or a few words with at most {_LONGEST} "
             "characters",
             name="name",
             value=quoted(name),
@@ -222,7 +222,7 @@ def describe(name: str) -> Description | Mentioned:
 
 
 def _blocks(thing: Object) -> list[str | Flat]:
-    """Return an object as lines and tables, separated by empty lines."""
+    """Return an object's lines and tables, separated by empty lines."""
     there = [kind.topic.replace("_", " ") for kind in thing_kinds() if kind.has_assembly]
     lines = [f"{thing['kind']} {thing['name']}: {thing['summary']}"]
     lines += [
@@ -251,7 +251,7 @@ def _blocks(thing: Object) -> list[str | Flat]:
 
 
 def _option_table(rows: Sequence[Mapping[str, Any]], heading: str) -> Table:
-    """Return options as a table, with a heading for their values."""
+    """Return a table of options, with a heading for their values."""
     columns = ["name", "value", "range", "meaning"]
     if all(row["value"] is None for row in rows):
         columns.remove("value")

@@ -1,7 +1,8 @@
-"""Design of a loop's gains, or of a gain schedule, from requirements, also for drawn models."""
+"""Design of gains or gain schedules from requirements, optionally for randomly drawn models."""
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -33,11 +34,13 @@ from bywire.report.document import (
     Attachment,
     Banner,
     Block,
+    Details,
     Document,
     FigureBlock,
     Listing,
     Paragraph,
     Section,
+    TableBlock,
 )
 from bywire.report.tables import Cell, text_table
 from bywire.studies.plan import CHUNK, StudyPlan
@@ -68,24 +71,24 @@ if TYPE_CHECKING:
 
     from bywire.report.loop_curves import DesignCurve
 
-_JUDGES = 512  # further models, which judge the gains
+_JUDGES = 512  # additional models, which judge the gains
 _MOST = 1000
 
 
 @dataclass(frozen=True)
 class DrawnModels:
-    """Models drawn as a study draws its cases.
+    """Models drawn in the way a study draws its cases.
 
     Parameters
     ----------
     study
-        The study's name.
+        Name of the study.
     cases
-        Models for which the gains are chosen.
+        Models for which bywire chooses the gains.
     lacking
-        Number of models drawn for the gains that do not exist.
+        Number of draws for the gains for which no model exists.
     judges
-        Further models, which judge the gains; None for a model that does not exist.
+        Additional models that judge the gains. None where no model exists.
     confidence
         Confidence level of intervals.
     """
@@ -99,7 +102,7 @@ class DrawnModels:
 
 @dataclass(frozen=True)
 class Probability:
-    """Probability that gains meet their requirements, on linear models.
+    """Probability that the gains meet their requirements on linear models.
 
     Parameters
     ----------
@@ -108,9 +111,9 @@ class Probability:
     requirements
         The requirements.
     judged
-        Number of judging models that meet each.
+        Number of judging models that meet each requirement.
     wanted
-        Required probability of all requirements together, or None.
+        Required probability of meeting all requirements together, or None.
     """
 
     drawn: DrawnModels
@@ -120,12 +123,12 @@ class Probability:
 
     @property
     def together(self) -> Share:
-        """Probability to meet all requirements, with its interval."""
+        """Probability of meeting all requirements, with its interval."""
         return self._share(self.judged.all_met)
 
     @property
     def outcome(self) -> Outcome | None:
-        """Whether the required probability is reached; None if there is none."""
+        """Verdict on the required probability, or None if none is required."""
         if self.wanted is None:
             return None
         return judged(self.together, self.together, self.wanted)
@@ -134,7 +137,7 @@ class Probability:
         return share(count, self.judged.models, self.drawn.confidence)
 
     def parts(self) -> Sequence[Part]:
-        """Return a table and sentences."""
+        """Return a table and text lines."""
         interval = f"{100.0 * self.drawn.confidence:g} % interval"
         rows: list[tuple[str | Cell, ...]] = [
             (str(wanted), *self._words(self._share(count)), figure_cell(wanted.figure, worst))
@@ -146,21 +149,21 @@ class Probability:
             rows.append(("all together", *self._words(self.together), "-"))
         lines: list[Part] = [
             f"gains chosen for {len(self.drawn.cases)} models drawn from study "
-            f"{self.drawn.study!r}, judged by {self.judged.models} others",
+            f"{self.drawn.study!r}, and judged on {self.judged.models} other models",
             text_table(["of other models", "met by", "probability", interval, "worst"], rows),
         ]
         if self.judged.unstable:
             lines.append(
-                f"{self.judged.unstable} of them are unstable or do not exist; they count as "
-                "missing every requirement"
+                f"{self.judged.unstable} of these other models are unstable or do not exist. They "
+                "count as missing every requirement"
             )
         if self.drawn.lacking:
-            lines.append(f"{self.drawn.lacking} more models drawn for the gains do not exist")
+            lines.append(f"for {self.drawn.lacking} more draws, no model exists")
         return [*lines, self.verdict] if self.wanted is not None else lines
 
     @property
     def verdict(self) -> str:
-        """Verdict on the required probability, as a sentence."""
+        """Verdict on the required probability as text."""
         wanted = "" if self.wanted is None else f" with {100.0 * self.wanted:.10g} %"
         return f"all requirements{wanted}: {self.outcome or 'no probability is required'}"
 
@@ -172,7 +175,7 @@ class Probability:
         )
 
     def data(self) -> dict[str, Any]:
-        """Return everything as plain data."""
+        """Return all results as plain data."""
 
         def said(told: Share) -> dict[str, Any]:
             return {
@@ -201,23 +204,23 @@ class Probability:
 
 
 def _drawn_models(case: LoopCase, file: str | Path, count: int) -> DrawnModels:
-    """Return models of a loop whose parameters vary as in a study file.
+    """Draw models of a loop whose parameters vary as in a study file.
 
-    Only the study's varied parameters count, not its cases, requirements or experiment.
+    The study's cases, requirements and experiment are ignored.
 
     Parameters
     ----------
     case
         The loop, its parameters and operating point.
     file
-        Study file; shares in it refer to the values of its bench.
+        Study file. Relative values in it refer to the values of its bench.
     count
-        Number of models for which the gains are chosen.
+        Number of models for which bywire chooses the gains.
 
     Raises
     ------
     InputError
-        For a study file that does not fit the loop, an invalid count, and if no model exists.
+        If the study file does not fit the loop, the count is invalid, or no model exists.
     """
     if not 1 <= count <= _MOST:
         raise not_valid("drawn", f"{count}", f"1 to {_MOST} models")
@@ -232,18 +235,22 @@ def _drawn_models(case: LoopCase, file: str | Path, count: int) -> DrawnModels:
     ]
     designed = tuple(each for each in models[:count] if each is not None)
     if not designed:
-        raise ParameterError(f"{file}: none of {count} models drawn from it exists", name=str(file))
+        raise ParameterError(
+            f"{file}: for none of its {count} draws does a model exist. Narrow its [vary]",
+            name=str(file),
+            value=str(count),
+        )
     judges = tuple(models[count : count + _JUDGES])
     return DrawnModels(plan.name, designed, count - len(designed), judges, plan.confidence)
 
 
 def _probability(text: str) -> float | None:
-    """Return the required probability; None for an empty text.
+    """Return the required probability, or None for an empty text.
 
     Raises
     ------
     ParameterError
-        If the text is not a probability between 0 and 1.
+        If the text is not a probability between 0 and 100 %.
     """
     if not text:
         return None
@@ -256,15 +263,17 @@ def _probability(text: str) -> float | None:
 def _require_fitting(case: LoopCase, plan: StudyPlan, file: str | Path) -> None:
     if type(plan.bench.par) is not type(case.par):
         raise ParameterError(
-            f"{file}: its bench is of {plan.bench.system}, but loop {case.loop.name!r} belongs to "
-            "another brake: name a study of that brake",
+            f"{file}: its bench runs {plan.bench.system}, but loop {case.loop.name!r} belongs to "
+            f"{case.loop.assembly}. Choose a study of {case.loop.assembly}",
             name=str(file),
+            value=plan.bench.system,
+            valid=case.loop.assembly,
         )
     for name in (name for v in plan.varied for name in (v.name, *v.together)):
         if name.startswith(OPTION):
             raise ParameterError(
-                f"{file}: {name} is an option of the experiment, but the loop does not have it: "
-                "leave it out",
+                f"{file}: {name} is an option of the experiment, but the loop has no such option. "
+                "Remove it",
                 name=name,
             )
         require_given(case.loop, name)
@@ -277,7 +286,7 @@ def _model(case: LoopCase, values: Mapping[str, Any], number: int) -> LinearCase
         return None
 
 
-# --- What a design starts from
+# --- Inputs of a design
 
 Spans = Mapping[str, tuple[float, float]]
 
@@ -290,7 +299,7 @@ def requirements_of(file: str | Path | None, texts: Sequence[str]) -> tuple[Limi
 def _left_to_choose(
     loop: str, spans: Spans, changes: Mapping[str, Any]
 ) -> dict[str, tuple[float, float]]:
-    """Return the gains to choose, without those that the user has set.
+    """Return the gains to choose, except those that the user has set.
 
     Raises
     ------
@@ -298,11 +307,15 @@ def _left_to_choose(
         If no gain is left.
     """
     if not spans:
-        raise ParameterError(f"loop {loop!r} has no gains to design", name="loop", value=loop)
+        raise ParameterError(
+            f"loop {loop!r} declares no gains to design. Choose another loop",
+            name="loop",
+            value=loop,
+        )
     left = {name: span for name, span in spans.items() if name not in changes}
     if not left:
         raise ParameterError(
-            f"{option('overrides')} fixes all gains ({', '.join(spans)}): leave out those that "
+            f"{option('overrides')} fixes all gains ({', '.join(spans)}). Remove those that "
             "bywire should choose",
             name=option("overrides"),
             value=", ".join(spans),
@@ -313,10 +326,10 @@ def _left_to_choose(
 def _for_ecu(
     case: LoopCase, changes: Mapping[str, Any], free: bool
 ) -> tuple[LoopCase, dict[str, Any], Spans]:
-    """Return a case, its changes, and the spans of gains that an ECU can realize.
+    """Return a case, its changes, and the spans of gains that an ECU can implement.
 
-    Parameters that the user has set have no span. A parameter whose span is a single value gets it
-    in the case, and in the changes as a text with its unit. With ``free``, there are no limits.
+    Parameters that the user has set have no span. If a parameter's span is a single value, the case
+    gets this value, and the changes get it as a text with its unit. ``free`` removes all limits.
     """
     if free:
         return case, dict(changes), {}
@@ -328,12 +341,12 @@ def _for_ecu(
 
 
 def _narrowed(spans: Spans, limits: Spans) -> Spans:
-    """Return spans, replaced by the limits where these exist."""
+    """Return the spans, replaced by limits where these exist."""
     return {name: limits.get(name, span) for name, span in spans.items()}
 
 
 def _tunables_of(case: LoopCase) -> Spans:
-    """Return the loop's tunables; with an active schedule, those of the region."""
+    """Return the loop's tunables, or those of the region if a schedule is active."""
     schedule = case.loop.schedule
     if schedule is None or not schedule.is_on(case.par):
         return case.loop.tunables
@@ -341,7 +354,7 @@ def _tunables_of(case: LoopCase) -> Spans:
 
 
 def _trial_of(case: LoopCase, changes: Mapping[str, Any], amplitudes: str) -> Trial:
-    """Return the trial of the design on the bench; ``amplitudes`` are the sines', with units."""
+    """Return the trial on the bench, with ``amplitudes`` of the sines as text with units."""
     loop = case.loop
     sizes = spread(amplitudes, case.input_unit, "amplitudes") if amplitudes else loop.amplitudes[1:]
     bench = Bench(loop.proof, case.name, changes) if loop.proof else None
@@ -349,13 +362,13 @@ def _trial_of(case: LoopCase, changes: Mapping[str, Any], amplitudes: str) -> Tr
 
 
 def _from_file(path: Path | None) -> list[str]:
-    """Return the requirements of a TOML file: ``figure = "<= limit"``, or a list of limits."""
+    """Read requirements from a TOML file: ``figure = "<= limit"``, or a list of limits."""
     if path is None:
         return []
     section = read_toml(path, "file of requirements").get("requirements")
     if not isinstance(section, dict) or not section:
         raise ParameterError(
-            f'{path} needs a section [requirements], with lines such as bandwidth = ">= 10 Hz"',
+            f'{path} needs a section [requirements] with lines such as bandwidth = ">= 10 Hz"',
             name="[requirements]",
         )
     wanted = []
@@ -363,9 +376,10 @@ def _from_file(path: Path | None) -> list[str]:
         for limit in limits if isinstance(limits, list) else [limits]:
             if not isinstance(limit, str):
                 raise ParameterError(
-                    f'{path}: {figure} = {limit}: write a text such as ">= 10 Hz"',
+                    f'{path}: {figure} = {limit} is not a text such as ">= 10 Hz"',
                     name=figure,
                     value=str(limit),
+                    valid='a text such as ">= 10 Hz"',
                 )
             wanted.append(f"{figure} {limit}")
     return wanted
@@ -373,25 +387,25 @@ def _from_file(path: Path | None) -> list[str]:
 
 # --- The answer
 
-_STEPS, _SETTLED = 5.0, 1.2  # drawn length of a step: periods of the bandwidth, settling times
+_STEPS, _SETTLED = 5.0, 1.2  # drawn length of a step, in bandwidth periods and settling times
 
 
 @dataclass(frozen=True)
 class DesignAnswer(Answer):
-    """Common part of designs of gains and of gain schedules.
+    """Common part of the designs of gains and of gain schedules.
 
     Parameters
     ----------
     case
-        The loop, its parameters before the design, and its operating point.
+        Loop, its parameters before the design, and its operating point.
     overrides
-        Parameters that the user set.
+        Parameters that the user has set.
     requirements
         The requirements.
     limits
-        Spans [SI] within which an ECU can realize the gains; empty with ``free_derivative``.
+        Spans [SI] within which an ECU can implement the gains. Empty with ``free_derivative``.
     tried
-        The design on the nonlinear bench; None if it was skipped or nothing is feasible.
+        The design on the nonlinear bench, or None if it was skipped or no gains are feasible.
     """
 
     case: LoopCase
@@ -408,19 +422,19 @@ class DesignAnswer(Answer):
     @property
     @abstractmethod
     def points(self) -> str:
-        """The operating points as text."""
+        """Operating points as text."""
 
     @abstractmethod
     def parts(self) -> Sequence[Part]:
-        """Return tables and sentences of the result, in their order."""
+        """Return the result's tables and text lines in their order."""
 
     @abstractmethod
     def data(self) -> dict[str, Any]:
-        """Return everything as plain data."""
+        """Return all results as plain data."""
 
     @property
     def gains(self) -> Mapping[str, float]:
-        """The gains [SI] by dotted name, retuned on the bench if it was tried."""
+        """Gains [SI] by dotted name, retuned on the bench unless it was skipped."""
         return self.linear.gains if self.tried is None else self.tried.final.gains
 
     @property
@@ -431,22 +445,22 @@ class DesignAnswer(Answer):
 
     @property
     def notes(self) -> list[str]:
-        """Side of corners of the linear models."""
+        """Notes on the linear models' side of kinks."""
         loop, par = self.case.loop, self.case.par.replace(self.gains)
         return corner_notes([loop.closed(par, self.case.value).corners])
 
     @property
     def partial(self) -> str:
-        """Meaning of an interrupted design's results."""
+        """Meaning of the result if the design was interrupted."""
         return "the result is the best so far"
 
     @property
     def holds(self) -> bool:
-        """Whether the requirements are met, also on the bench if it was tried."""
+        """Whether the requirements are met, including on the bench unless it was skipped."""
         return self.linear.status == "met" and (self.tried is None or self.tried.met)
 
     def document(self) -> Document:
-        """Return result, figures, and the gains as a bench file."""
+        """Return the result, the figures, and the gains as a bench file."""
         loop, status, tried = self.case.loop, self.linear.status, self.tried
         parts = [*self.parts(), *design_parts.limit_lines(self.case, self.limits)]
         verdict = f"requirements {status} on the linear model"
@@ -462,7 +476,7 @@ class DesignAnswer(Answer):
                 Section("Figures", self._figures()),
                 self.case.subject.provenance("Parameters before the design."),
             ],
-            brief=design_parts.brief_blocks(parts),
+            brief=self._brief(parts, verdict),
             data={**self.data(), "kept_for_the_ecu": {k: list(v) for k, v in self.limits.items()}},
             banner=Banner(verdict, "good" if self.holds else "bad"),
             attachments=[Attachment(f"{loop.name}-design.toml", self._write_bench)],
@@ -470,10 +484,33 @@ class DesignAnswer(Answer):
             changes=self.case.subject.changes,
         )
 
+    def _brief(self, parts: Sequence[Part], verdict: str) -> list[str | Block]:
+        """Return verdict, requirements and gains; the rest is for ``--verbose``."""
+        table = design_parts.requirement_table(self.requirements, self.worst, self.tried)
+        first = self.first_parts(parts)
+        rest = [part for part in parts if not any(part is each for each in first)]
+        point = f"loop {self.case.loop.name} of {self.case.name} at {self.points}: {verdict}"
+        return [
+            point,
+            "",
+            TableBlock(table),
+            "",
+            *design_parts.as_brief(first),
+            Details("", design_parts.as_blocks(rest)),
+        ]
+
+    @abstractmethod
+    def worst(self, figure: str) -> float:
+        """Return the worst value of a figure on the linear model; NaN for none."""
+
+    def first_parts(self, parts: Sequence[Part]) -> list[Part]:
+        """Return the gains, their limits, and what requirements that exclude each other reach."""
+        return [part for part in parts if design_parts.is_brief(part)]
+
     def _remarks(self) -> list[str]:
         if self.status == "infeasible":
             return [
-                "no gains meet all requirements together: the lines above give the best achievable "
+                "no gains meet all requirements together. The lines above show the best achievable "
                 "values"
             ]
         if self.tried is not None and not self.tried.met:
@@ -485,11 +522,11 @@ class DesignAnswer(Answer):
 
     @staticmethod
     def _missed_floors(tried: Verification) -> list[Limit]:
-        """Return the enforced figures that the gains miss, which the verdict counts."""
+        """Return the enforced figures that the gains miss, which count in the verdict."""
         return [each for each in tried.kept if tried.final.slacks[str(each)] < 0.0]
 
     def _write_bench(self, path: Path) -> Path:
-        """Write the gains as a bench file."""
+        """Write the gains to a bench file."""
         from bywire.report.drawing import write_bytes
 
         case, tried = self.case, self.tried
@@ -517,10 +554,10 @@ class DesignAnswer(Answer):
             return [Paragraph(f"{NO_LOOP}.")]
         limits = {(each.figure, each.is_upper): each.bound for each in self.requirements}
         captions = {
-            "loop-gain": "Loop gain of the nominal linear model; spans show the phase margins.",
+            "loop-gain": "Loop gain of the nominal linear model. Spans show the phase margins.",
             "sensitivity": "Sensitivity S = 1/(1 + L) and complementary sensitivity T = L/(1 + L), "
             "with the usual limits (Skogestad and Postlethwaite, section 2.4.3).",
-            "step": "Unit step of the nominal linear model, at the sampling instants.",
+            "step": "Unit step response of the nominal linear model at the sampling instants.",
         }
         return [
             FigureBlock(
@@ -541,14 +578,14 @@ class DesignAnswer(Answer):
 
 @dataclass(frozen=True)
 class LoopDesign(DesignAnswer):
-    """Gains of a loop from requirements.
+    """Gains of a loop, designed from requirements.
 
     Parameters
     ----------
     designed
         The linear design.
     probability
-        Probability to meet the requirements over drawn models; None without drawn models.
+        Probability of meeting the requirements over drawn models, or None without them.
     """
 
     designed: Design
@@ -556,7 +593,7 @@ class LoopDesign(DesignAnswer):
 
     @property
     def holds(self) -> bool:
-        """Whether the requirements are met, also on the bench, and as probably as required."""
+        """Whether requirements are met, on the bench too and with the required probability."""
         is_probable = self.probability is None or self.probability.outcome in (None, "met")
         return super().holds and is_probable
 
@@ -572,23 +609,34 @@ class LoopDesign(DesignAnswer):
 
     @property
     def points(self) -> str:
-        """The operating point as text."""
+        """Operating point as text."""
         return shown(self.case.value, self.case.loop.at.unit)
 
     def parts(self) -> Sequence[Part]:
-        """Return tables and sentences of the result."""
+        """Return the result's tables and text lines."""
         parts = design_parts.as_parts(self.case, self.requirements, self.designed, self.tried)
         return parts if self.probability is None else [*parts, *self.probability.parts()]
 
+    def worst(self, figure: str) -> float:
+        """Return the worst value of a figure on the linear model."""
+        return self.designed.worst[figure][0]
+
+    def first_parts(self, parts: Sequence[Part]) -> list[Part]:
+        """Return also the probabilities over drawn models."""
+        first = super().first_parts(parts)
+        count = 0 if self.probability is None else len(self.probability.parts())
+        end = len(parts) - len(design_parts.limit_lines(self.case, self.limits))
+        return [*first, *parts[end - count : end]]
+
     def data(self) -> dict[str, Any]:
-        """Return everything as plain data."""
+        """Return all results as plain data."""
         data = design_parts.as_object(self.case, self.requirements, self.designed, self.tried)
         return data | ({} if self.probability is None else {"drawn": self.probability.data()})
 
 
 @dataclass(frozen=True)
 class LoopScheduleDesign(DesignAnswer):
-    """Gains of a loop by region; ``retuned`` is the loop across regions with the bench's gains."""
+    """Gains of a loop by region. ``retuned`` is the loop across regions with the bench's gains."""
 
     designed: ScheduleDesign
     retuned: tuple[Across, ...]
@@ -598,18 +646,22 @@ class LoopScheduleDesign(DesignAnswer):
         """The design on the linear model."""
         return self.designed
 
+    def worst(self, figure: str) -> float:
+        """Return the value of a figure at the worst point on the linear model."""
+        return float(self.designed.worst.figures.get(figure, math.nan))
+
     @property
     def points(self) -> str:
-        """The operating points as text."""
+        """Operating points as text."""
         unit = self.case.loop.at.unit
         return ", ".join(shown(v, unit) for values in self.designed.points.values() for v in values)
 
     def parts(self) -> Sequence[Part]:
-        """Return tables and sentences of the result."""
+        """Return the result's tables and text lines."""
         return design_parts.schedule_as_parts(self.case, self.designed, self.tried, self.retuned)
 
     def data(self) -> dict[str, Any]:
-        """Return everything as plain data."""
+        """Return all results as plain data."""
         return design_parts.schedule_as_object(
             self.case, self.requirements, self.designed, self.tried, self.retuned
         )
@@ -645,17 +697,19 @@ def designed_at_point(
     seed: int,
     progress: Progress | None,
 ) -> LoopDesign:
-    """Return gains of a loop at its operating point, over ranges, and for drawn models.
+    """Design a loop's gains at its operating point, over ranges, and for drawn models.
 
-    ``wanted``: the requirements; ``amplitudes``: None without the nonlinear bench; for the others
+    ``wanted`` are the requirements. ``amplitudes`` is None without the nonlinear bench. For others,
     see `bywire.design`.
     """
     least = _probability(probability)
     if least is not None and not vary:
         raise ParameterError(
-            f"probability needs drawn models: name a study file, {option('vary')} FILE",
+            f"{option('probability')} needs drawn models. Add {option('vary')} FILE with a study "
+            "file",
             name="probability",
             value=probability,
+            valid=option("vary"),
         )
     case, overrides, limits = _for_ecu(case, overrides, free_derivative)
     tunables = _left_to_choose(case.loop.name, _narrowed(_tunables_of(case), limits), overrides)
@@ -690,9 +744,9 @@ def designed_by_region(
     progress: Progress | None,
     side: str,
 ) -> LoopScheduleDesign:
-    """Return gains by region of the operating point.
+    """Design gains for each region of the operating point.
 
-    ``wanted``: the requirements; ``amplitudes``: None without the nonlinear bench; for the others
+    ``wanted`` are the requirements. ``amplitudes`` is None without the nonlinear bench. For others,
     see `bywire.design`.
     """
     schedule = scheduled(LOOPS.find(name))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from bywire.analysis.loop_figures import LOOP_FIGURES
@@ -13,7 +13,7 @@ from bywire.core.callers import option
 from bywire.core.parameters import leaf_fields
 from bywire.core.units import shown
 from bywire.report.document import Block, Flat, Listing, TableBlock
-from bywire.report.tables import Cell, Table, amount_cell, text_table
+from bywire.report.tables import OUTCOMES, Cell, Table, amount_cell, text_table
 from bywire.report.wording import amount
 from bywire.synthesis.bench_figures import BenchFigures
 from bywire.synthesis.outcome import Across, Design, ScheduleDesign
@@ -21,16 +21,16 @@ from bywire.synthesis.schedules import scheduled
 from bywire.synthesis.verification import Candidate, Verification
 
 Part = str | Table
-"""a sentence or a table of a result"""
+"""text line or table of a result"""
 _PAIRS = 6
 
 
 def verification_parts(
     case: LoopCase, nominal: Mapping[str, float], tried: Verification
 ) -> list[Part]:
-    """Return tables and sentences on the linear design and the retuned gains on the bench.
+    """Return tables and text lines on the linear design and the retuned gains on the bench.
 
-    ``nominal`` are the figures of the linear design's nominal model.
+    ``nominal`` contains the figures of the linear design's nominal model.
     """
     columns = [("linear design", tried.linear)]
     if tried.tuning is not None:
@@ -56,7 +56,7 @@ def verification_parts(
     labels = tried.final.corners
     if labels:
         worst = f" (worst of {tried.corners} corners)" if len(labels) < tried.corners else ""
-        parts.append(f"tried on the bench at the nominal point and at {'; '.join(labels)}{worst}")
+        parts.append(f"tested on the bench at the nominal point and at {'; '.join(labels)}{worst}")
     kept = {str(requirement) for requirement in tried.kept}
     for text, slack in tried.final.slacks.items():
         verdict = "met" if slack >= 0.0 else "NOT met"
@@ -67,14 +67,14 @@ def verification_parts(
     conflict = tried.conflict()
     if conflict is not None:
         first, other, edge = conflict
-        middle = sorted(sorted(edge, key=min)[-_PAIRS:])  # where both are almost met
+        middle = sorted(sorted(edge, key=min)[-_PAIRS:])  # where both requirements are almost met
         pairs = "; ".join(f"{100 * a:+.1f} % and {100 * b:+.1f} %" for a, b in middle)
-        parts.append(f"tradeoff of {first} and {other}, as margins to the limits: {pairs}")
+        parts.append(f"tradeoff between {first} and {other}, as margins to the limits: {pairs}")
     return parts
 
 
 def judged_on(candidate: Candidate, text: str) -> str:
-    """Return where a requirement was judged, as text."""
+    """Return a text on where a requirement was judged."""
     shown, possible = candidate.shown[text]
     if not shown:
         return "on the linear model"
@@ -84,7 +84,7 @@ def judged_on(candidate: Candidate, text: str) -> str:
 
 
 def verdict_text(requirements: Sequence[Limit], tried: Verification) -> str:
-    """Return the verdict on requirements, on the bench and on the linear model."""
+    """Return the verdict on the requirements on the bench and on the linear model."""
     final = tried.final
     on_bench = [str(each) for each in requirements if final.shown[str(each)][0]]
     linear = [str(each) for each in requirements if not final.shown[str(each)][0]]
@@ -102,12 +102,12 @@ def verdict_text(requirements: Sequence[Limit], tried: Verification) -> str:
 
 
 def figure_cell(name: str, value: float) -> Cell:
-    """Return the cell of a figure; see `_figure_text`."""
+    """Return the cell of a figure (see `_figure_text`)."""
     return Cell(_figure_text(name, value), value=value, unit=LOOP_FIGURES[name].unit)
 
 
 def _figure_text(name: str, value: float) -> str:
-    """Return a figure with its unit; a gain margin as a factor and in dB."""
+    """Return a figure with its unit, and a gain margin also in dB."""
     text = amount(value, LOOP_FIGURES[name].unit, 3)
     if LOOP_FIGURES[name].in_decibel and math.isfinite(value) and value > 0.0:
         text += f" ({20.0 * math.log10(value):.3g} dB)"
@@ -117,12 +117,15 @@ def _figure_text(name: str, value: float) -> str:
 def _figure_rows(
     case: LoopCase, where: str, columns: list[BenchFigures | None]
 ) -> list[list[str | Cell]]:
-    """Return rows of one trial: figures of the sines and the step, a column for each design."""
+    """Return a trial's rows: figures of the sines and the step, with a column for each design."""
 
     def cell(figures: BenchFigures | None, k: int, name: str) -> Cell:
         if figures is None or not figures.small:
             return Cell("-")
-        return amount_cell(getattr(figures.small[k], name), LOOP_FIGURES[name].unit, 3)
+        value, unit = getattr(figures.small[k], name), LOOP_FIGURES[name].unit
+        if name == "crossover" and math.isinf(value):
+            return Cell("none", value=value, unit=unit)
+        return amount_cell(value, unit, 3)
 
     sizes = next(
         ([s.amplitude for s in figures.small] for figures in columns if figures and figures.small),
@@ -147,7 +150,7 @@ def _figure_rows(
 
 
 def _reasons(case: LoopCase, tries: Sequence[BenchFigures]) -> list[Part]:
-    """Return why figures are not defined, each reason once."""
+    """Return the reasons for undefined figures, each reason once."""
     texts = [
         f"{n}, {case.loop.proof}, is not defined: {why}"
         for figures in tries
@@ -157,7 +160,7 @@ def _reasons(case: LoopCase, tries: Sequence[BenchFigures]) -> list[Part]:
         if not math.isnan(size.phase_margin):
             continue
         if case.loop.laws is None:
-            why = "the loop declares no laws"
+            why = "the loop declares no control laws"
         elif size.peak == 0.0:
             why = "the output does not move"
         else:
@@ -170,7 +173,7 @@ def _reasons(case: LoopCase, tries: Sequence[BenchFigures]) -> list[Part]:
 
 
 def _verification_object(case: LoopCase, tried: Verification) -> dict[str, Any]:
-    """Return the verification as plain data."""
+    """Return a verification as plain data."""
     conflict = tried.conflict()
     return {
         "met": tried.met,
@@ -275,7 +278,7 @@ def as_parts(
     design: Design,
     tried: Verification | None,
 ) -> list[Part]:
-    """Return tables and sentences of a design."""
+    """Return a design's tables and text lines."""
     at = case.loop.at
     point = f"{at.name} = {amount(case.value, at.unit)}"
     parts: list[Part] = [
@@ -317,15 +320,15 @@ def as_parts(
 
 
 def _kept_lines(design: Design) -> list[str]:
-    """Return a sentence on figures enforced in addition to the requirements, or none."""
+    """Return a line on the figures that are enforced in addition to the requirements, if any."""
     if not design.kept:
         return []
     texts = ", ".join(str(requirement) for requirement in design.kept)
-    return [f"also enforced: {texts} (to change a limit, require another one)"]
+    return [f"also enforced: {texts} (to change a limit, add a requirement)"]
 
 
 def _unsound_lines(design: Design) -> list[str]:
-    """Return a sentence for each reason why models have no figures."""
+    """Return a line for each reason why models have no figures."""
     states = dict.fromkeys(design.unsound.values())
     return [
         f"{state}, at {', '.join(k for k, why in design.unsound.items() if why == state)}"
@@ -334,7 +337,7 @@ def _unsound_lines(design: Design) -> list[str]:
 
 
 def limit_lines(case: LoopCase, limits: Mapping[str, tuple[float, float]]) -> list[str]:
-    """Return a sentence on the limits that an ECU needs, or none."""
+    """Return a line on the limits that an ECU needs, if any."""
     if not limits:
         return []
     texts = [
@@ -343,7 +346,7 @@ def limit_lines(case: LoopCase, limits: Mapping[str, tuple[float, float]]) -> li
         else f"{name} >= {_gain_text(case, name, low)}"
         for name, (low, high) in limits.items()
     ]
-    return [f"limited for an ECU: {', '.join(texts)} ({option('free_derivative')} removes this)"]
+    return [f"{_LIMITED}: {', '.join(texts)} ({option('free_derivative')} removes the limit)"]
 
 
 def _unit_of(case: LoopCase, name: str) -> str:
@@ -352,25 +355,53 @@ def _unit_of(case: LoopCase, name: str) -> str:
 
 
 def _gain_text(case: LoopCase, name: str, value: float) -> str:
-    """Return a gain with its unit."""
+    """Return a gain with its unit as text."""
     return amount(value, _unit_of(case, name))
 
 
-def brief_blocks(parts: Sequence[Part]) -> list[str | Block]:
-    """Return parts for a terminal, with only those loop figures that have a limit."""
-    blocks: list[str | Block] = []
-    for part in parts:
-        if isinstance(part, str):
-            blocks.append(part)
-            continue
-        is_limited = part.columns[-1].heading == "limit"
-        limited = sum(bool(row[-1].text) for row in part.rows) if is_limited else 0
-        blocks.append(TableBlock(part, most=limited))
-    return blocks
+def requirement_table(
+    requirements: Sequence[Limit], worst: Callable[[str], float], tried: Verification | None
+) -> Table:
+    """Return one row per requirement, and per figure enforced as well, with the verdict first.
+
+    ``worst(figure)``: worst value on the linear model, which decides if the bench was skipped.
+    """
+    every = [*requirements, *(() if tried is None else tried.kept)]
+    rows = []
+    for each in every:
+        text, value = str(each), worst(each.figure) if each.figure in LOOP_FIGURES else math.nan
+        linear = "-" if math.isnan(value) else figure_cell(each.figure, value)
+        if tried is None:
+            is_met, room, where = bool(each.is_met(value)), "-", "on the linear model"
+        else:
+            is_met = tried.final.slacks[text] >= 0.0
+            room = f"{100.0 * tried.final.room(text):+.1f} %"
+            where = judged_on(tried.final, text)
+        verdict = OUTCOMES["met" if is_met else "missed"]
+        rows.append([verdict, text, linear, room, where])
+    heading = ["verdict", "requirement", "linear model, worst", "margin to the limit", "judged"]
+    return text_table(heading, rows)
+
+
+def is_brief(part: Part) -> bool:
+    """Return whether a terminal shows a part without ``--verbose``: gains, limits, conflicts."""
+    if isinstance(part, str):
+        return ": at best " in part or part.startswith(_LIMITED)
+    return part.columns[0].heading in _GAINS
+
+
+_LIMITED = "limited for an ECU"
+_GAINS = ("gain", "linear design", "retuned on the bench")
+"""first headings of tables of gains: of one point, and of regions"""
+
+
+def as_brief(parts: Sequence[Part]) -> list[str | Block]:
+    """Return parts for a terminal."""
+    return [part if isinstance(part, str) else TableBlock(part) for part in parts]
 
 
 def as_blocks(parts: Sequence[Part]) -> list[Flat]:
-    """Return tables, and the sentences between them as lists."""
+    """Return the tables, and the text lines between them as lists."""
     blocks: list[Flat] = []
     lines: list[str] = []
     for part in [*parts, None]:
@@ -454,10 +485,10 @@ def schedule_as_parts(
     tried: Verification | None,
     retuned: Sequence[Across],
 ) -> list[Part]:
-    """Return tables and sentences of a gain schedule.
+    """Return a gain schedule's tables and text lines.
 
-    ``retuned`` is the loop across the regions with the gains of the bench; empty if these are the
-    linear design's.
+    ``retuned`` is the loop across the regions with the bench's gains. It is empty if these gains
+    equal those of the linear design.
     """
     at, leaves = case.loop.at, case.par.leaves()
     borders = " and ".join(
@@ -485,7 +516,7 @@ def schedule_as_parts(
         ]
     for title, across in (("linear design", design.across), ("retuned gains", retuned)):
         if across:
-            parts.append(f"{title}, frozen gains, linear model, margin as a share of the limit:")
+            parts.append(f"{title}, frozen gains, linear model, margin in % of the limit:")
             parts += _frozen(case, across)
     if tried is not None:
         parts += verification_parts(case, design.nominal, tried)
@@ -513,7 +544,7 @@ def _frozen(case: LoopCase, across: Sequence[Across]) -> list[Part]:
 
 
 def _gains(case: LoopCase, design: ScheduleDesign, gains: Mapping[str, float], title: str) -> Table:
-    """Return a table of gains, a column for each region."""
+    """Return a table of gains with one column for each region."""
     regions = scheduled(case.loop).regions
     cells: dict[str, dict[str, str]] = {}
     for region, spans in regions.items():

@@ -1,4 +1,4 @@
-"""Exports of a bench: the C of its ECU, functional mock-up units, WebAssembly, a page."""
+"""Exports of a bench: C code of its ECU, functional mock-up units, WebAssembly, a page."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 @contextmanager
 def export_folder(out: str | Path) -> Iterator[Path]:
-    """Yield the folder of an export; new folders are removed if nothing is written.
+    """Yield the folder of an export, and remove new folders if nothing is written.
 
     Raises
     ------
@@ -43,7 +43,7 @@ def export_folder(out: str | Path) -> Iterator[Path]:
             yield folder
     except OSError as error:
         raise FileError(
-            f"{folder} cannot be written: {error.strerror or error}; make room there, or name "
+            f"cannot write to {folder}: {error.strerror or error}. Free some space, or choose "
             "another folder",
             name=str(folder),
         ) from None
@@ -55,7 +55,7 @@ GOALS: Mapping[tuple[str, str], Mapping[str, int]] = {
     ("Cortex-M4F", "single"): {"rom": 2048, "ram": 128, "stack": 128, "instructions": 400},
     ("Cortex-M4F", "double"): {"instructions": 10_000},
 }
-"""limits of an ECU's tick, by processor and precision: bytes, instructions"""
+"""limits of an ECU's tick in bytes and instructions, by processor and precision"""
 _HEADINGS = {
     "rom": "ROM [B]",
     "ram": "RAM [B]",
@@ -66,16 +66,16 @@ _HEADINGS = {
 
 @dataclass(frozen=True)
 class ControllerCheck:
-    """Check of an exported ECU.
+    """Check of an ECU's exported code.
 
     Parameters
     ----------
     trials
-        One for every tried processor and precision, this machine first.
+        One trial for each processor and precision, starting with this machine.
     vectors
-        Test vectors of all tasks.
+        Number of test vectors of all tasks.
     skipped
-        Skipped trials, with the reason and what to install.
+        Skipped trials, each with the reason and the missing tool.
     inexact
         Precisions that call functions of the C library whose last digit may differ.
     """
@@ -86,13 +86,13 @@ class ControllerCheck:
     inexact: tuple[str, ...] = ()
 
     def is_identical(self, trial: Trial) -> bool:
-        """Return whether a processor's results equal the first one's in every bit."""
+        """Return whether a processor's results are bit-identical to the first processor's."""
         first = next(each for each in self.trials if each.precision == trial.precision)
         return trial.bits == first.bits
 
     @property
     def holds(self) -> bool:
-        """Whether values equal Python's, bits agree where they must, and contracts are kept."""
+        """Whether values equal Python's, bits agree where they must, and contracts are met."""
         return all(
             each.differing == each.breaches == 0
             and (self.is_identical(each) or each.precision in self.inexact)
@@ -100,7 +100,7 @@ class ControllerCheck:
         )
 
     def table(self) -> TableBlock:
-        """Return a table with one row per trial."""
+        """Return a table with one trial per row."""
         figures = (Column(each, True) for each in _HEADINGS.values())
         columns = [
             Column("processor"),
@@ -113,8 +113,10 @@ class ControllerCheck:
         rows = tuple(self._row(each) for each in self.trials)
         caption = (
             f"{self.vectors} vectors: values that differ from Python's, breaches of the contract "
-            "in README.txt, bits compared with the first row. Instructions and stack are those of "
-            "the most expensive task, with calls."
+            "in "
+            "README.txt, and bits compared with the first row. Instructions and stack belong to "
+            "the "
+            "most expensive task, including its calls."
         )
         return TableBlock(Table(tuple(columns), rows), caption)
 
@@ -152,7 +154,7 @@ class ControllerCheck:
 
 
 def figures_of(trial: Trial) -> dict[str, int]:
-    """Return the figures of a trial that have limits; none on the host."""
+    """Return a trial's figures that have limits. On the host there are none."""
     if trial.rom is None or trial.ram is None or not trial.tasks:
         return {}
     return {
@@ -173,19 +175,19 @@ def _measured(value: int | None, goal: int | None) -> Cell:
 
 
 def check_controller(case: Case, cited: Mapping[str, Cited], count: int) -> ControllerCheck:
-    """Compile the ECU of a case in both precisions, and run it wherever tools are installed.
+    """Compile a case's ECU in both precisions, and run it on every processor with installed tools.
 
     Parameters
     ----------
     cited
-        Values of the parameter set with their provenance.
+        Values of the parameter set with their sources.
     count
-        Test vectors per task.
+        Number of test vectors per task.
 
     Raises
     ------
     CompilerError
-        If nothing can be compiled, or a compiler fails.
+        If there is no compiler, or a compiler fails.
     """
     from bywire.export.controller.c_text import PRECISIONS
     from bywire.export.controller.files import files
@@ -201,13 +203,15 @@ def check_controller(case: Case, cited: Mapping[str, Cited], count: int) -> Cont
     compiler, missing = find_compiler(), missing_tools()
     if compiler is None and missing:
         raise CompilerError(
-            f"nothing can be checked: there is no C compiler, and {missing}; to get a compiler, "
-            "install the extra bywire[compiler]"
+            f"bywire cannot check the export: there is no C compiler, and {missing}. Install a "
+            "compiler with the extra bywire[compiler]",
+            name="check",
+            valid="bywire[compiler]",
         )
     skipped = [f"Cortex-M3, M4F and M7 were skipped: {missing}"] if missing else []
     if compiler is None:
         skipped.append(
-            "this machine was skipped: there is no C compiler; install the extra bywire[compiler]"
+            "this machine was skipped: it has no C compiler. Install the extra bywire[compiler]"
         )
     trials: list[Trial] = []
     inexact, tried = [], 0
@@ -238,22 +242,22 @@ def check_controller(case: Case, cited: Mapping[str, Cited], count: int) -> Cont
 
 @dataclass(frozen=True)
 class ControllerExport(Answer):
-    """An ECU exported as C.
+    """ECU exported as C.
 
     Parameters
     ----------
     folder
-        Its folder.
+        Folder of the export.
     files
-        Names of its files.
+        Names of the files.
     program
-        The translated program.
+        Translated program.
     vectors
-        Test vectors per task.
+        Number of test vectors per task.
     bench
         Bench of the ECU.
     check
-        Check on processors; None if it was not requested.
+        Check on processors, or None if it was not requested.
     """
 
     folder: Path
@@ -265,16 +269,16 @@ class ControllerExport(Answer):
 
     @property
     def holds(self) -> bool:
-        """Whether all checked processors agree with Python."""
+        """Whether all processors in the check agree with Python."""
         return self.check is None or self.check.holds
 
     @property
     def notes(self) -> list[str]:
-        """Skipped parts of the check, and what to install for them."""
+        """Skipped parts of the check, each with the missing tool."""
         return [] if self.check is None else list(self.check.skipped)
 
     def document(self) -> Document:
-        """Return the written files, and how to test them."""
+        """Return the files, and the command that tests them."""
         tasks = ", ".join(f"{s.task.name} ({s.task.period:.9g} s)" for s in self.program.steps)
         what = Paragraph(
             f"{self.program.name}_ecu.c: {len(self.program.functions)} functions, "
@@ -322,27 +326,27 @@ _KINDS: dict[Causality, str] = {
     "local": "others",
 }
 _NO_START = (
-    "this experiment's rest state is unknown for other parameters: with changed parameters the "
-    "unit starts at the exported rest state, and settles"
+    "this experiment's rest state is unknown for other parameters. With changed parameters, the "
+    "unit starts from the exported rest state and settles"
 )
 _EXCHANGED = (
-    "the client's solver integrates the states and locates the events; between events, contacts "
-    "and frictions keep their modes"
+    "the client's solver integrates the states and locates the events. Between events, contacts "
+    "and dry friction keep their modes"
 )
 
 
 @dataclass(frozen=True)
 class ExportedFmu(Answer):
-    """An exported FMU.
+    """Exported FMU.
 
     Parameters
     ----------
     path
-        Its file.
+        File of the unit.
     unit
-        Its contents: run, variables, sources.
+        Contents of the unit: run, variables, source files.
     targets
-        Platforms of its binaries.
+        Platforms of the binaries.
     compilers
         Compiler of each binary.
     """
@@ -354,11 +358,11 @@ class ExportedFmu(Answer):
 
     @property
     def notes(self) -> list[str]:
-        """Note on its start."""
+        """Note on the unit's start."""
         return [] if self.unit.begins_anywhere else [_NO_START]
 
     def document(self) -> Document:
-        """Return its contents, and its steps."""
+        """Return the unit's contents and steps."""
         unit = self.unit
         schedule = unit.made.schedule
         table = TableBlock(self._table())
@@ -414,7 +418,7 @@ class ExportedFmu(Answer):
 
 
 def _some(names: list[str], most: int = 6) -> str:
-    """Return the first of some names."""
+    """Return a few of the names."""
     return ", ".join(names[:most]) + (" ..." if len(names) > most else "")
 
 
@@ -423,16 +427,16 @@ def _some(names: list[str], most: int = 6) -> str:
 
 @dataclass(frozen=True)
 class ExportedWasm(Answer):
-    """An exported module.
+    """Exported WebAssembly module.
 
     Parameters
     ----------
     files
-        Module, description (JSON), loader and types.
+        Module, its description (JSON), loader and types.
     made
-        The run that it computes.
+        Run that is computed.
     size
-        Bytes of the module.
+        Size of the module in bytes.
     """
 
     files: tuple[Path, ...]
@@ -466,16 +470,16 @@ class ExportedWasm(Answer):
 
 @dataclass(frozen=True)
 class BenchPage(Answer):
-    """An exported page.
+    """Exported page.
 
     Parameters
     ----------
     file
-        The page.
-    made
-        The run that it computes.
+        File of the page.
+        made
+    Run that the page computes.
     size, compressed
-        Bytes of the file, uncompressed and compressed (gzip).
+        Size of the file in bytes, uncompressed and compressed (gzip).
     """
 
     file: Path

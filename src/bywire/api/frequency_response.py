@@ -1,4 +1,4 @@
-"""A closed loop's response by amplitude: friction, limits and sampling included."""
+"""Closed-loop response by amplitude, including friction, limits and sampling."""
 
 from __future__ import annotations
 
@@ -58,14 +58,14 @@ if TYPE_CHECKING:
 def response_warnings(
     response: xr.Dataset, variants: Sequence[Variant], unit: str, tolerance: float
 ) -> list[str]:
-    """Return warnings on exceeded ranges, sticking outputs, and aperiodic windows.
+    """Return warnings about exceeded ranges, sticking outputs and aperiodic windows.
 
     Parameters
     ----------
     response
-        Response.
+        Response of the loop.
     variants
-        Its cases.
+        Cases of the response.
     unit
         SI unit of the amplitudes.
     tolerance
@@ -75,7 +75,7 @@ def response_warnings(
     empty = [variant for variant in variants if not variant.has_loop]
     if empty:
         count = f" at {len(empty)} of {len(variants)} values" if len(variants) > 1 else ""
-        texts.append(f"{NO_LOOP}{count}; crossover and margins are not defined")
+        texts.append(f"{NO_LOOP}{count}, so crossover and margins are not defined")
     for k, size in enumerate(response["amplitude"].values):
         row = response.isel(amplitude=k)
         label = f"amplitude {amount(float(size), unit, 3)}"
@@ -84,40 +84,44 @@ def response_warnings(
             texts.append(f"{label}: set points leave the brake's range: {reason}")
         still, restless = np.isnan(row["gain"].values), row["settled"].values == 0
         if still.any():
-            texts.append(f"{label}: the output sticks at {_cases(response, still)}: no gain")
+            texts.append(
+                f"{label}: the output sticks at {_cases(response, still)}, where it has no gain"
+            )
         shaken = restless & ~still
         if shaken.any():
             scatter = float(np.nanmax(row["scatter"].values[shaken]))
             cases = _cases(response, shaken)
             texts.append(
                 f"{label}: successive windows do not agree within {100 * tolerance:g} % at "
-                f"{cases} (a limit cycle, a drift, or the encoder's resolution). Results are means "
-                "of the last windows; their root mean square deviation from the mean is up to "
+                f"{cases} (limit cycle, drift, or encoder resolution). Results are means of the "
+                "last "
+                "windows. The windows' root-mean-square deviation from the mean is up to "
                 f"{amount(100 * scatter, 'percent', 2)}"
             )
     if response.attrs.get("unestimated"):
         texts.append(
-            "the numerical error of the response is unknown: it cannot be measured in half steps "
+            "the response's numerical error is unknown, because bywire cannot measure it in half "
+            "steps "
             f"({response.attrs['unestimated']})"
         )
     if response["unsettled_substeps"].values.any():
-        texts.append("some substeps hit the cap of the contact iteration: take a smaller step")
+        texts.append("some substeps hit the contact iteration's limit. Use a smaller step")
     return texts
 
 
 def purity(response: xr.Dataset) -> str:
-    """Return a line on the least coherence by amplitude, in terms of the excitation.
+    """Return a line on the lowest coherence at each amplitude, worded for the excitation.
 
     Parameters
     ----------
     response
-        Response to sines, or to all frequencies together, averaged over windows.
+        Response to single sines or to all frequencies together, averaged over windows.
     """
     lowest = response["coherence"].min(dim="frequency").values[0]
     shares = ", ".join("-" if np.isnan(share) else f"{share:.3f}" for share in lowest)
     if response.attrs["excitation"] == "sine":
         return (
-            f"least share of the output's power at the sine's frequency: {shares} (the rest is "
+            f"smallest share of output power at the sine's frequency: {shares} (the rest is "
             "harmonics, dither and ripple)"
         )
     return f"lowest coherence of set point and output: {shares}"
@@ -134,25 +138,25 @@ def _cases(response: xr.Dataset, which: NDArray[np.bool_]) -> str:
 
 @dataclass(frozen=True)
 class FrequencyResponse(Answer):
-    """The measured response of a closed loop, and the exact linear one.
+    """Measured response of a closed loop, and its exact linear response.
 
     Parameters
     ----------
     case
         The loop, its parameters and its operating point.
     data
-        Gain and phase over variant, amplitude and frequency, with bandwidths and shares of the
-        time in saturation; variables with ``units`` and ``long_name``.
+        Gain and phase over variant, amplitude and frequency, with bandwidths and shares of time in
+        saturation. Its variables have ``units`` and ``long_name``.
     linear
-        The linear response of the first variant, complex, shape (frequencies,).
+        Complex linear response of the first variant, shape (frequencies,).
     variants
-        The cases of the range; a single one without a range.
+        Cases of the range, or a single case without a range.
     range
-        Name and SI unit of the varied quantity; an empty name without a range.
+        Name and SI unit of the varied quantity. The name is empty without a range.
     unit
         SI unit of the amplitudes.
     note
-        Settings that allow long excitation of the loop; may be empty.
+        Settings that allow long excitation of the loop. May be empty.
     tolerance
         Relative tolerance within which successive windows must agree.
     """
@@ -168,17 +172,17 @@ class FrequencyResponse(Answer):
 
     @property
     def notes(self) -> list[str]:
-        """Side of corners of the linear models."""
+        """Notes on the linear models' side of kinks."""
         models = (case.loop.closed(case.par, case.value) for case in self.variants)
         return corner_notes(model.corners for model in models)
 
     @property
     def warnings(self) -> list[str]:
-        """Warnings on exceeded ranges, sticking outputs, and aperiodic windows."""
+        """Warnings about exceeded ranges, sticking outputs and aperiodic windows."""
         return response_warnings(self.data, self.variants, self.unit, self.tolerance)
 
     def document(self) -> Document:
-        """Return gain and phase, bandwidths by amplitude, and the Bode plot."""
+        """Return gain and phase, bandwidth by amplitude, and the Bode plot."""
         loop, response = self.case.loop, self.data
         table = TableBlock(
             _table(response, self.linear, self.unit), "Gain and phase by frequency and amplitude."
@@ -216,7 +220,7 @@ class FrequencyResponse(Answer):
             worst = _worst_line(response, self.variants, self.range, self.unit)
             return [f"{head}: bandwidth (-3 dB) by amplitude", over, worst]
         excitation = response.attrs["excitation"]
-        peaks = [f"excitation: {excitation}, amplitudes are its peaks"]
+        peaks = [f"excitation: {excitation}, amplitudes are peak values"]
         return [
             f"{head}: gain and phase by amplitude",
             *(peaks if excitation != "sine" else []),
@@ -228,12 +232,14 @@ class FrequencyResponse(Answer):
         ]
 
     def _bandwidths(self) -> list[Block]:
-        """Return the blocks on bandwidths."""
-        note = f"{_NOTE[0].upper()}{_NOTE[1:]}.{self._first(' Of the first case: ', '.')}"
+        """Return the tables and figures of bandwidths."""
+        note = f"{_NOTE[0].upper()}{_NOTE[1:]}.{self._first(' For the first case: ', '.')}"
         blocks: list[Block] = [TableBlock(_figures_table(self.data, self.unit), note)]
         if not self.range[0]:
             return blocks
-        caption = "Bandwidth over the range; rings: worst cases. Other figures show the first case."
+        caption = (
+            "Bandwidth over the range. Rings mark worst cases. Other figures show the first case."
+        )
         over = TableBlock(
             _over_table(self.data, self.variants, self.range, self.unit), "Bandwidth by amplitude."
         )
@@ -241,7 +247,7 @@ class FrequencyResponse(Answer):
         return [*blocks, FigureBlock(self._over_range, caption, name), over]
 
     def _first(self, before: str, after: str = "") -> str:
-        """Return a text on the first case of a range; empty without a range."""
+        """Return a text on the first case of a range, or no text without a range."""
         if not self.range[0]:
             return ""
         label = amount(self.variants[0].label, self.range[1])
@@ -325,16 +331,16 @@ def measured_response(
     *,
     estimate_error: bool,
 ) -> FrequencyResponse:
-    """Return the response of a loop, with its numerical error if requested.
+    """Measure a loop's response, with its numerical error if requested.
 
     Parameters
     ----------
     case, overrides
-        The loop at its operating point, and the user's changes.
+        Loop at its operating point, and the user's changes.
     frequencies, amplitudes
-        Frequencies and amplitudes of the input [Hz, SI].
+        Frequencies [Hz] and amplitudes [SI] of the input.
     over
-        Name, unit and values of the range for bandwidths; an empty name without a range.
+        Name, unit and values of the range for bandwidths. The name is empty without a range.
     excitation, progress, estimate_error
         See `bywire.frequency_response`.
 
@@ -374,9 +380,9 @@ def measured_response(
 
 
 def _sustained(case: LoopCase, changes: Mapping[str, Any]) -> tuple[Variant, str]:
-    """Return the loop with settings for long excitation, and a note on these changes.
+    """Return the loop with settings for long excitation, and a note on these settings.
 
-    The user's settings stay.
+    The user's settings take precedence.
     """
     loop = case.loop
     par = case.par.replace({k: v for k, v in loop.sustained.items() if k not in changes})
@@ -387,12 +393,15 @@ def _sustained(case: LoopCase, changes: Mapping[str, Any]) -> tuple[Variant, str
         for name, value in after.items()
         if value != before[name]
     ]
-    note = f"set to allow long excitation: {', '.join(texts)}; override with {option('overrides')}"
+    note = (
+        f"changed to allow long excitation: {', '.join(texts)}. To use other values, set them with "
+        f"{option('overrides')}"
+    )
     return Variant(loop, par, case.value), note if texts else ""
 
 
 def _variants(base: Variant, over: tuple[str, str, list[float]]) -> list[Variant]:
-    """Return the cases of a range, or the single case without a range.
+    """Return the cases of a range, or a single case without a range.
 
     Raises
     ------
@@ -419,7 +428,7 @@ def _with_step_errors(
     excitation: str,
     progress: Progress,
 ) -> xr.Dataset:
-    """Return a response with its numerical errors, or with the reason why they are unknown."""
+    """Return a response with its numerical errors, or with the reason that they are unknown."""
     share = OTHER_STEPS[0]
     try:
         finer = _measured(variants, sweep, excitation, progress, share)
@@ -436,9 +445,9 @@ def _measured(
     progress: Progress,
     share: float = 1.0,
 ) -> xr.Dataset:
-    """Return the response of all cases, each around its operating point.
+    """Measure the response of all cases, each around its operating point.
 
-    ``share``: step of the runs, as a share of the loop's step.
+    ``share`` is the step of the runs divided by the loop's step.
     """
     runs = [variant.point.run() for variant in variants]
     points = [replace(run, step=share * run.step) for run in runs]
@@ -449,11 +458,12 @@ def _measured(
     return broadband_response(points[0], sweep, kind, progress, points=points)
 
 
-# --- Bandwidths by amplitude, of one case or over a range, as tables and as JSON
+# --- Bandwidth by amplitude for one case or a range, as tables and as JSON
 
 _NOTE = (
-    "bandwidth: -3 dB; crossover and margins: from the describing function of the loop gain; "
-    "shares of the time: largest over all frequencies"
+    "bandwidth is at -3 dB, crossover and margins come from the loop gain's describing function, "
+    "and "
+    "shares of time are the largest over all frequencies"
 )
 
 
@@ -461,20 +471,20 @@ _WIDTHS = ("bandwidth", "crossover", "phase_margin", "gain_margin", "lower_gain_
 
 
 def shares(response: xr.Dataset) -> dict[str, str]:
-    """Return the shares of time in a response, with the headings of their columns."""
+    """Return a response's shares of time, with their column headings."""
     names = [str(name) for name in response if str(name).startswith("share_")]
     return {name: _title(name.removeprefix("share_")) for name in names}
 
 
 def _title(flag: str) -> str:
-    """Return the heading of a mode; ``sat_`` denotes a limit."""
+    """Return the heading of a mode, where ``sat_`` denotes a limit."""
     if flag.startswith("sat_"):
         return f"at {flag.removeprefix('sat_').replace('_', ' ')} limit"
     return flag.replace("_", " ")
 
 
 def _figures_table(response: xr.Dataset, unit: str) -> Table:
-    """Return bandwidth, crossover, margins and limits of the first variant by amplitude."""
+    """Return the first variant's bandwidth, crossover, margins and limits by amplitude."""
     known = shares(response)
     heading = [
         "amplitude",
@@ -509,7 +519,7 @@ def _figures_table(response: xr.Dataset, unit: str) -> Table:
 def _worst_line(
     response: xr.Dataset, variants: Sequence[Variant], range_: tuple[str, str], unit: str
 ) -> str:
-    """Return the worst case of every amplitude over a range as a line; see `_over_table`."""
+    """Return a line on each amplitude's worst case over a range (see `_over_table`)."""
     texts = []
     for j, size in enumerate(response["amplitude"].values):
         k = narrowest(response, j)
@@ -522,12 +532,12 @@ def _worst_line(
 def _over_table(
     response: xr.Dataset, variants: Sequence[Variant], range_: tuple[str, str], unit: str
 ) -> Table:
-    """Return the bandwidths over a range by amplitude.
+    """Return a table of bandwidths over a range, by amplitude.
 
     Parameters
     ----------
     response
-        Response with its widths.
+        Response with its bandwidths.
     variants
         Cases of the range.
     range_
@@ -550,7 +560,7 @@ def _over_table(
 
 
 def _figures_object(response: xr.Dataset, variant: int) -> list[dict[str, Any]]:
-    """Return the figures of a variant by amplitude; null beyond the measured frequencies."""
+    """Return a variant's figures by amplitude, null beyond the measured frequencies."""
     rows = []
     for j, size in enumerate(response["amplitude"].values):
         case = response.isel(variant=variant, amplitude=j)
@@ -571,7 +581,7 @@ def _figures_object(response: xr.Dataset, variant: int) -> list[dict[str, Any]]:
 
 
 def _over_object(response: xr.Dataset, variants: Sequence[Variant], name: str) -> dict[str, Any]:
-    """Return the figures of all cases of a range, and the worst of every amplitude."""
+    """Return the figures of all cases in a range, and each amplitude's worst case."""
     cases = [
         {
             name: variant.label,
@@ -611,7 +621,7 @@ def _step_error(case: xr.Dataset, name: str) -> float:
 
 
 def _bounded(case: xr.Dataset, name: str) -> dict[str, float | None]:
-    """Return a frequency, or null with its known bound."""
+    """Return a frequency, or null with a bound."""
     value, f = float(case[name]), case["frequency"].values
     if math.isinf(value):
         return {name: None, f"{name}_above": float(f[-1])}

@@ -1,4 +1,4 @@
-"""Identification of parameters with their confidence, by a brake's method or a general one."""
+"""Identification of parameters and their confidence, by a brake's or a general method."""
 
 from __future__ import annotations
 
@@ -55,22 +55,22 @@ if TYPE_CHECKING:
     from bywire.identification.method import Method
 
 Source = str | Path | xr.Dataset
-"""a measurement: a file, or a result of `bywire.read_measurement`"""
+"""measurement: a file, or a result of `bywire.read_measurement`"""
 
 
 @dataclass(frozen=True)
 class ChosenMethod:
-    """A method with its parameters and options.
+    """Method with its parameters and options.
 
     Parameters
     ----------
     method, options
-        The method and its options.
+        Method and its options.
     name, par
-        Parameter set and values at which the search begins; empty and None for a method of any
+        Parameter set and values at which the search starts. Empty and None for a method of any
         assembly.
     changes
-        Changes of the parameter set by dotted name, SI.
+        Changes of the parameter set by dotted name [SI].
     """
 
     method: Method
@@ -81,7 +81,7 @@ class ChosenMethod:
 
     @property
     def subject(self) -> Subject | None:
-        """The method's brake for reports; None for a method of any assembly."""
+        """The method's brake for reports, or None for a method of any assembly."""
         method = self.method
         if method.bench is not None:
             return Subject.of_bench(
@@ -95,7 +95,7 @@ class ChosenMethod:
 
     @property
     def changed(self) -> tuple[Change, ...]:
-        """The user's changes of the bench or parameter set, and of the method's options."""
+        """The user's changes of the bench or parameter set and of the method's options."""
         return self._option_changes if self.subject is None else self.subject.changes
 
     @property
@@ -116,18 +116,18 @@ def choose(
     time: str = "",
     progress: Progress = silent,
 ) -> ChosenMethod:
-    """Return a method by name, with its parameters and options.
+    """Find a method by name, and read its parameters and options.
 
     Parameters
     ----------
     name
-        Method of ``bywire list``.
+        Method that ``bywire list`` shows.
     parameters, overrides, options
-        Parameter set, and changes of it and of the method's options.
+        Parameter set, changes of it, and changes of the method's options.
     question
-        Inputs of methods of any bench.
+        Inputs of methods for any bench.
     measurements, mapping, time
-        Measurements, the meaning of their columns, and their time column; none for simulated ones.
+        Measurements, the meaning of their columns, and their time column. Empty for simulated data.
     progress
         Called with a label and the finished share.
 
@@ -147,7 +147,7 @@ def choose(
         method = _on_bench(bench_method, question, {**chosen, **overrides}, mapping, time, progress)
     if len(measurements) > 1 and not method.several:
         raise ParameterError(
-            f"{name} takes one measurement, not {len(measurements)}",
+            f"{name} needs exactly one measurement, not {len(measurements)}",
             name="measurements",
             value=str(len(measurements)),
             valid="one",
@@ -155,7 +155,7 @@ def choose(
     idle = [key for key in options if key.split(".")[0] in method.simulated]
     if measurements and idle:
         raise ParameterError(
-            f"option {idle[0]} of {name} affects only simulated experiments: omit it for "
+            f"option {idle[0]} of {name} affects only simulated experiments. Remove it if you use "
             "measurement files",
             name=idle[0],
         )
@@ -164,20 +164,20 @@ def choose(
 
 
 def _require_columns_alone(method: Method, question: Question) -> None:
-    """Reject inputs of general methods, except columns of the method's signals.
+    """Reject inputs of general methods, except columns for the method's signals.
 
     Raises
     ------
     InputError
-        For any other input, and signals that the method does not take.
+        For any other input, and for signals that the method does not use.
     """
     noisy = any(question.noise.values())
     beyond = [name for name in question.given if name not in ("inputs", "outputs")]
     if beyond or noisy:
         raise ParameterError(
-            f"{option(beyond[0] if beyond else 'outputs')}{'' if beyond else ' with a noise'} is "
-            f"only for methods of any bench "
-            f"({', '.join(BENCH_METHODS.all())}): leave it out for {method.name}",
+            f"{option(beyond[0] if beyond else 'outputs')}{'' if beyond else ' with a noise'} "
+            f"applies only to methods for any bench ({', '.join(BENCH_METHODS.all())}). Remove "
+            f"{'it' if beyond else 'the noise'} for {method.name}",
             name=option(beyond[0] if beyond else "outputs"),
         )
     signals = {**method.signals, **method.optional}
@@ -187,12 +187,12 @@ def _require_columns_alone(method: Method, question: Question) -> None:
 
 
 def _columns_of(method: Method, question: Question, time: str) -> NamedColumns:
-    """Return the columns of measurement files that a question names.
+    """Return the columns of measurement files that a question lists.
 
     Parameters
     ----------
     method
-        Method that takes the signals.
+        Method that uses the signals.
     question
         Columns of outputs and inputs.
     time
@@ -201,7 +201,7 @@ def _columns_of(method: Method, question: Question, time: str) -> NamedColumns:
     Raises
     ------
     ParameterError
-        If one name means two columns.
+        If one name stands for two columns.
     """
     outputs = question.columns
     units = {**method.optional, **method.signals}
@@ -216,7 +216,7 @@ def _with_parameters(
     if not method.assembly:
         if parameters or overrides:
             raise ParameterError(
-                f"{method.name} needs no parameters: leave out {option('parameters')} and "
+                f"{method.name} uses no parameters. Remove {option('parameters')} and "
                 f"{option('overrides')}",
                 name=option("parameters" if parameters else "overrides"),
             )
@@ -237,26 +237,28 @@ def _with_parameters(
 
 
 def _options(method: Method, values: Mapping[str, Any]) -> ParameterSet:
-    """Return a method's options with changes."""
+    """Return a method's options with the user's changes."""
     try:
         given = parsed(method.options, values, f"option of {method.name}")
         return method.defaults.replace(given)
     except InputError as error:
-        raise error.reworded(f"{error}; 'bywire list {method.name}' shows the options") from None
+        raise error.reworded(f"{error}. 'bywire list {method.name}' shows the options") from None
 
 
 def _require_not_fitted(holdout: Source, measurements: Sequence[Source]) -> None:
-    """Reject a held-out measurement that is also fitted, or without a fitted one."""
+    """Reject a held-out measurement that is also fitted, or that has no fitted one beside it."""
     if not measurements:
         raise ParameterError(
-            f"{option('holdout')} is only for measurement files: leave it out",
+            f"{option('holdout')} applies only to measurement files. Remove it",
             name=option("holdout"),
+            value=str(holdout),
         )
     for fitted in measurements:
         if isinstance(holdout, xr.Dataset) or isinstance(fitted, xr.Dataset):
             if isinstance(fitted, xr.Dataset) and fitted is holdout:
                 raise ParameterError(
-                    f"{option('holdout')} is also fitted: choose a record that is not fitted",
+                    f"{option('holdout')} is also a fitted record. Choose a record that is not "
+                    "fitted",
                     name=option("holdout"),
                 )
             continue
@@ -267,7 +269,7 @@ def _require_not_fitted(holdout: Source, measurements: Sequence[Source]) -> None
         if equal:
             same = "is" if Path(fitted).samefile(holdout) else "has the same content as"
             raise ParameterError(
-                f"{option('holdout')} {holdout} {same} {fitted}, which is fitted: choose a record "
+                f"{option('holdout')} {holdout} {same} {fitted}, a fitted record. Choose a record "
                 "that is not fitted",
                 name=option("holdout"),
                 value=str(holdout),
@@ -282,12 +284,13 @@ def _on_bench(
     time: str,
     progress: Progress,
 ) -> Method:
-    """Return a general method for the bench of the question."""
+    """Return a general method for the question's bench."""
     if question.bench is None:
         raise ParameterError(
-            f"{method.name} needs {option('bench')}: a bench file (TOML), or an experiment of "
-            "'bywire list'",
+            f"{method.name} needs {option('bench')} with a bench file (TOML) or an experiment "
+            "(see 'bywire list experiments')",
             name=option("bench"),
+            valid="a bench file (TOML) or an experiment",
         )
     bench = driven_bench(question.bench, changes)
     on_bench = method.on(bench, replace(question, holdout=None))
@@ -309,9 +312,9 @@ def _on_bench(
 # --- Identification
 
 _STARTS = "starts.jsonl"
-"""file of the output folder that keeps finished starts"""
+"""file in the output folder that stores finished starts"""
 
-_FAR = 30.0  # factor above which a wrong unit is the first suspect
+_FAR = 30.0  # factor above which a wrong unit is the likely cause
 
 
 def identified(
@@ -327,7 +330,7 @@ def identified(
     seed: int,
     progress: Progress,
 ) -> Identification:
-    """Identify measurements, or a simulated one, by a method; see `bywire.identify`."""
+    """Identify parameters from measurements or a simulated experiment (see `bywire.identify`)."""
     method = chosen.method
     named = _columns_of(method, question, time)
     _require_one_source(chosen, sources, synthetic, mapping, time)
@@ -367,15 +370,16 @@ def identified(
 
 
 def _far_off(estimates: Mapping[str, float], before: Mapping[str, float]) -> list[str]:
-    """Return a note on every parameter far from its earlier value, as with a wrong unit."""
+    """Return a note on each parameter far from its earlier value, which suggests a wrong unit."""
     notes = []
     for name, value in estimates.items():
         known = before.get(name, 0.0)
         ratio = abs(value / known) if known else 1.0
         if ratio > _FAR or ratio * _FAR < 1.0:
             notes.append(
-                f"{name} is {ratio:.3g} times its earlier value: are the units of the measurement "
-                "right (the map's 'unit')?"
+                f"{name} is {ratio:.3g} times its earlier value. Check the measurement's units "
+                "('unit' "
+                "in the map)"
             )
     return notes
 
@@ -387,30 +391,34 @@ def _require_one_source(
     mapping: str | Path | None,
     time: str,
 ) -> None:
-    """Require either a measured or a simulated experiment, with matching arguments.
+    """Require either measured or simulated data, with matching arguments.
 
     Raises
     ------
     ParameterError
-        With the missing or excess argument.
+        If an argument is missing or must be removed.
     """
     method = chosen.method
     study = f"{option('study') if is_command_line() else 'bywire.trust, with count'} COUNT"
     if sources and synthetic is not None:
         raise ParameterError(
-            f"{method.name}: give only one of measurement files, {option('synthetic')} SEED, "
-            f"{study}"
+            f"{method.name} accepts only one of measurement files, {option('synthetic')} SEED, or "
+            f"{study}",
+            name=option("synthetic"),
+            valid=f"only one of measurement files, {option('synthetic')} SEED, or {study}",
         )
     if not sources and synthetic is None:
         signals = ", ".join(f"{n} [{unit}]" for n, unit in method.signals.items())
         raise ParameterError(
-            f"{method.name} needs one of: measurement files with the signals {signals}, "
-            f"{option('synthetic')} SEED, or {study}"
+            f"{method.name} needs one of measurement files with the signals {signals}, "
+            f"{option('synthetic')} SEED, or {study}",
+            name=option("synthetic"),
+            valid=f"measurement files with the signals {signals}",
         )
     for name, given in {"mapping": mapping is not None, "time": bool(time)}.items():
         if given and not sources:
             raise ParameterError(
-                f"{option(name)} is only for measurement files: leave it out", name=option(name)
+                f"{option(name)} applies only to measurement files. Remove it", name=option(name)
             )
 
 
@@ -422,7 +430,7 @@ def _data_of(
     synthetic: int | None,
     progress: Progress,
 ) -> tuple[Measured, str]:
-    """Return the measurement, and one line on its source."""
+    """Return the measurement and a line on its source."""
     method = chosen.method
     if synthetic is None:
         read = measured(
@@ -444,7 +452,7 @@ def _data_of(
 
 
 def _start_of(chosen: ChosenMethod, synthetic: int | None) -> ParameterSet | None:
-    """Return the parameters at which the search begins, displaced for a simulated measurement."""
+    """Return the parameters at which the search starts, perturbed for a simulated measurement."""
     if synthetic is None or chosen.par is None:
         return chosen.par
     return displaced(chosen.par, chosen.method.unknowns, Effort().spread, synthetic)
@@ -453,7 +461,7 @@ def _start_of(chosen: ChosenMethod, synthetic: int | None) -> ParameterSet | Non
 def _search(
     chosen: ChosenMethod, start: ParameterSet | None, data: xr.Dataset, effort: Effort
 ) -> Identified:
-    """Run the method; an interrupted search names the file of its finished starts.
+    """Run the method. If interrupted, report the file with the finished starts.
 
     Raises
     ------
@@ -467,19 +475,19 @@ def _search(
         if effort.store is None or not effort.store.exists():
             raise
         raise KeyboardInterrupt(
-            f"finished starts are in {effort.store}: repeat the command to continue"
+            f"finished starts are saved in {effort.store}. Rerun the command to continue"
         ) from None
 
 
 def _begun_at(
     chosen: ChosenMethod, start: ParameterSet | None, identified: Identified
 ) -> dict[str, float]:
-    """Return the values at which the search began, by label."""
+    """Return the values at which the search started, by label."""
     if start is None:
         return {}
     if chosen.method.bench is None:
         return start.leaves()
-    # If the range excludes the bench's value, the search begins elsewhere.
+    # If the range excludes the bench's value, the search starts elsewhere.
     return start.leaves() | {
         u.label: u.start for e in identified.estimates.values() for u in e.all_unknowns
     }
@@ -497,19 +505,19 @@ def parameter_file(
     changes: Mapping[str, Any],
     comment: str = "",
 ) -> str:
-    """Return the text of a bench file.
+    """Return the text of a bench file with identified parameters.
 
     Parameters
     ----------
     experiment
-        Experiment that the file runs; another one of the same assembly if it needs more than
-        parameters.
+        Experiment that the file runs. If it needs more than parameters, the file runs another
+        experiment of the same assembly.
     parameters
-        Name of the changed parameter set.
+        Name of the parameter set to change.
     par
-        Parameters of that set, for units.
+        Parameters of this set, for their units.
     changes
-        Dotted name -> value, SI, or choice. Changes without effect in the experiment become
+        Dotted name -> value [SI] or choice. Changes without effect in the experiment become
         comments.
     comment
         First line.
@@ -520,7 +528,9 @@ def parameter_file(
         for other in _alternatives(parameters):
             accepted, left, trouble = _accepted(other, parameters, changes)
             if not trouble:
-                notes.append(f"experiment {experiment!r} needs more than this file has: {problem}")
+                notes.append(
+                    f"experiment {experiment!r} needs more than this file contains: {problem}"
+                )
                 experiment, wanted, left_out = other, accepted, left
                 break
     lines = [f"# {line}" for line in notes]
@@ -536,7 +546,7 @@ def parameter_file(
 def _accepted(
     experiment: str, parameters: str, changes: Mapping[str, Any]
 ) -> tuple[dict[str, Any], list[str], str]:
-    """Return effective changes, names of the others, and the reason why the bench is invalid."""
+    """Return changes with effect, names of the others, and why the bench is invalid, if so."""
     wanted: dict[str, Any] = dict(changes)
     left_out: list[str] = []
     while True:
@@ -553,7 +563,7 @@ def _accepted(
 
 
 def _alternatives(parameters: str) -> list[str]:
-    """Return the experiments of a parameter set's assembly that need no stimulus."""
+    """Return the experiments of a parameter set's assembly that need no stimulus section."""
     assembly = PARAMETER_SETS.find(parameters).assembly
     return [
         experiment.name
@@ -582,54 +592,55 @@ def _nodes(value: Any) -> tuple[float, ...]:
 # --- Earlier identifications and studies in the folder of ``--out``
 
 _ESTIMATE = "estimate.json"
-"""file of the output folder with its method and its further files"""
+"""file in the output folder that lists the method and the other files"""
 
 STUDY = "study.json"
-"""file of the output folder with a study's method and results"""
+"""file in the output folder with a study's method and results"""
 
 _OURS = (".html", ".nc", ".png", ".toml")
 
 
 def require_own(out: Path, method: str) -> None:
-    """Reject a folder with a result or a study of another method.
+    """Reject a folder that contains a result or a study of another method.
 
     Raises
     ------
     FileError
-        If there is one, or the files cannot be read.
+        If there is such a result, or its files cannot be read.
     """
     for path, what in ((out / _ESTIMATE, "result"), (out / STUDY, "study")):
         earlier = _read(path)
         if earlier is None or earlier.get("method") == method:
             continue
         raise FileError(
-            f"{out} contains a {what} of {earlier.get('method') or 'something else'}: name another "
-            f"folder with {option('folder')} for {method}, or remove {path} and its files",
+            f"{out} contains a {what} of {earlier.get('method') or 'something else'}. For "
+            f"{method}, "
+            f"choose another folder with {option('folder')}, or remove {path} and its files",
             name=option("folder"),
             value=str(out),
         )
 
 
 def remove_study(out: Path) -> None:
-    """Remove the result of an earlier study; the experiments that it finished stay.
+    """Remove an earlier study's result, but not its finished experiments.
 
     Raises
     ------
     FileError
-        If it cannot be removed.
+        If the result cannot be removed.
     """
     _unlink(out / STUDY)
 
 
 def _remove(out: Path, keep: Sequence[Path]) -> None:
-    """Remove the files of an earlier result, so that they do not mix with the new one.
+    """Remove an earlier result's files, so that they do not mix with the new files.
 
     Parameters
     ----------
     out
-        Folder.
-    keep
-        Files to keep: the current measurements.
+        Folder of the results.
+        keep
+        Current measurement files, which must not be removed.
 
     Raises
     ------
@@ -640,7 +651,7 @@ def _remove(out: Path, keep: Sequence[Path]) -> None:
     if earlier is None:
         return
     kept = {path.resolve() for path in keep}
-    # Only names within the folder, which may have moved. The list itself is removed last.
+    # The folder may have moved, so use only names within it. Remove the list itself last.
     names = [Path(str(text)).name for text in earlier.get("files", [])]
     written = [out / name for name in names if Path(name).suffix in _OURS]
     for path in (*written, out / _ESTIMATE):
@@ -654,13 +665,14 @@ def _unlink(path: Path) -> None:
             path.unlink()
     except OSError as error:
         raise FileError(
-            f"cannot remove {path} from an earlier result: {error.strerror}; name another folder "
-            f"with {option('folder')}"
+            f"cannot remove {path} of an earlier result: {error.strerror}. Choose another folder "
+            f"with {option('folder')}",
+            name=str(path),
         ) from None
 
 
 def _read(path: Path) -> dict[str, Any] | None:
-    """Return an earlier result, or None."""
+    """Read an earlier result. Return None if there is none."""
     if not path.exists():
         return None
     try:
@@ -669,8 +681,8 @@ def _read(path: Path) -> dict[str, Any] | None:
             raise ValueError("it is not a result of bywire identify")
     except (OSError, ValueError) as error:
         raise FileError(
-            f"{path} cannot be read ({error}): name another folder with {option('folder')}, or "
-            "remove it",
+            f"cannot read {path} ({error}). Choose another folder with {option('folder')}, or "
+            "remove this file",
             name=str(path),
         ) from None
     return earlier
@@ -681,28 +693,28 @@ def _read(path: Path) -> dict[str, Any] | None:
 
 @dataclass(frozen=True)
 class Identification(Answer):
-    """An identification with its inputs.
+    """Result of an identification, with its inputs.
 
     Parameters
     ----------
     chosen
-        The method with its parameters and options.
+        Method with its parameters and options.
     identified
         Result of the method.
     data
-        The measurement, over ``time`` [s].
+        Measurement over ``time`` [s].
     source
-        The measurement in one line.
+        Description of the measurement in one line.
     start
-        Values at which the search began, by the estimates' labels, SI.
+        Values [SI] at which the search started, by the estimates' labels.
     put_in
-        True values of a simulated measurement, by the same labels; empty for a measured one.
+        True values of a simulated measurement by the same labels. Empty for a real measurement.
     data_notes
-        Notes on the processing of the measurement, and on doubtful data.
-    is_simulated
-        Whether the measurement is simulated, and written with the result.
+        Notes on how bywire processed the measurement, and on doubtful data.
+        is_simulated
+        Whether the measurement is simulated. If so, it is written with the result.
     files
-        Measurement files, which stay if an earlier result is removed.
+        Measurement files, which remain if an earlier result is removed.
     """
 
     chosen: ChosenMethod
@@ -717,7 +729,7 @@ class Identification(Answer):
 
     @property
     def parameters(self) -> dict[str, float]:
-        """Identified parameters by dotted name, SI, as overrides of a bench."""
+        """Identified parameters [SI] by dotted name, as overrides for a bench."""
         return dict(self.identified.parameters)
 
     @property
@@ -727,28 +739,28 @@ class Identification(Answer):
 
     @property
     def notes(self) -> list[str]:
-        """Notes on the processing of the measurement, and on doubtful data."""
+        """Notes on how bywire processed the measurement, and on doubtful data."""
         return list(self.data_notes)
 
     @property
     def failures(self) -> list[str]:
-        """The checks that failed, with their meaning."""
+        """Failed checks, with their meaning."""
         return [
             f"check failed: {check.name}: {check.note}"
-            + (f"; next, {check.next_step}" if check.next_step else "")
+            + (f". Next step: {check.next_step}" if check.next_step else "")
             for check in self.identified.checks
             if not check.holds
         ]
 
     @property
     def holds(self) -> bool:
-        """Whether every check holds."""
+        """Whether every check passed."""
         return not self.failures
 
     def bench_file(self) -> str:
-        """Return the text of a bench file with the parameters, headed by failed checks.
+        """Return a bench file with the identified parameters, headed by failed checks.
 
-        It is empty without usable parameters of an assembly.
+        The text is empty if there are no usable parameters of an assembly.
         """
         method, par = self.chosen.method, self.chosen.par
         if par is None or not self.identified.parameters:
@@ -759,7 +771,7 @@ class Identification(Answer):
             for c in self.identified.checks
             if not c.holds
         ]
-        lines.append(f"identified by {method.name} from {self.source}")
+        lines.append(f"identified with {method.name} from {self.source}")
         for estimate in self.identified.estimates.values():
             lines += [f"not determined by the data: {k.unknown.label}" for k in estimate.kept]
             lines += [f"at its bound: {label}" for label in estimate.at_bounds()]
@@ -772,7 +784,7 @@ class Identification(Answer):
         return parameter_file(method.experiment, self.chosen.name, par, changes, comment)
 
     def document(self) -> Document:
-        """Return parameters, checks, curves, residuals, correlations, and settings."""
+        """Return parameters, checks, curves, residuals, correlations and settings."""
         method, subject = self.chosen.method, self.chosen.subject
         head = f"{method.name}, {self.source}: {method.summary}"
         return Document(
@@ -838,8 +850,8 @@ class Identification(Answer):
         blocks: list[Block] = [
             FigureBlock(
                 partial(correlation_matrix, estimate),
-                f"{name}: correlations of the estimates. Near 1 or -1 the data determine a "
-                "combination of the two rather than either.",
+                f"{name}: correlations of the estimates. Near 1 or -1, the data determine only a "
+                "combination of the two unknowns.",
                 key,
             )
             for key, name, estimate in self._keyed("correlation")
@@ -848,7 +860,7 @@ class Identification(Answer):
         return blocks or [Paragraph("A single unknown has no correlations.")]
 
     def _keyed(self, kind: str) -> Iterator[tuple[str, str, Estimate]]:
-        """Yield file name of a figure, capitalized name of an estimate, and the estimate."""
+        """Yield a figure's file name, an estimate's capitalized name, and the estimate."""
         several = len(self.identified.estimates) > 1
         for k, (name, estimate) in enumerate(self.identified.estimates.items(), 1):
             yield f"{kind}-{k}" if several else kind, f"{name[:1].upper()}{name[1:]}", estimate
@@ -871,8 +883,8 @@ class Identification(Answer):
             return Banner(f"Do not use this result: {', '.join(failed)} failed.", "bad")
         if undetermined:
             names = ", ".join(undetermined)
-            return Banner(f"All checks hold; not determined by the data: {names}.", "none")
-        return Banner("All checks hold.", "good")
+            return Banner(f"All checks passed. Not determined by the data: {names}.", "none")
+        return Banner("All checks passed.", "good")
 
     def _data(self) -> dict[str, Any]:
         method, identified = self.chosen.method, self.identified
@@ -907,7 +919,7 @@ class Identification(Answer):
         }
 
     def _of_estimates(self, values: Mapping[str, float]) -> dict[str, float]:
-        """Return the values of all unknowns, estimated or not."""
+        """Return the values of all unknowns, including those that were not estimated."""
         labels = [u.label for e in self.identified.estimates.values() for u in e.all_unknowns]
         return {label: values[label] for label in labels if label in values}
 
@@ -923,7 +935,7 @@ class Identification(Answer):
         return write_measurement(self.data, path, overwrite=True)
 
     def _file_notes(self) -> list[str]:
-        """Return a note on the bench file, or why there is none."""
+        """Return a note on the bench file, or on why there is none."""
         method = self.chosen.method
         if self.identified.parameters and self.chosen.par is not None:
             return [f"parameters.toml: {method.bench_note}"] if method.bench_note else []
@@ -931,10 +943,10 @@ class Identification(Answer):
         reason = (
             "no estimate is usable"
             if asked
-            else f"{method.name} gives no parameters of an assembly; its figures are in "
+            else f"{method.name} does not identify parameters of an assembly. Its figures are in "
             "estimate.json"
         )
-        return [f"bywire writes no parameters.toml: {reason}"]
+        return [f"no parameters.toml: {reason}"]
 
     def _prepare(self, folder: Path) -> None:
         require_own(folder, self.chosen.method.name)
@@ -943,10 +955,10 @@ class Identification(Answer):
 
 def _residual_caption(name: str, estimate: Estimate) -> str:
     follows = (
-        "Neighboring residuals are correlated: the model's errors last longer than a sample, and "
-        "the intervals account for that"
+        "Neighboring residuals are correlated. The model's errors last longer than a sample, and "
+        "the intervals account for this"
         if estimate.colored
-        else "Neighboring residuals are independent, like noise"
+        else "Neighboring residuals are independent, as for noise"
     )
     return (
         f"{name}: residuals of {estimate.residuals.size} measured values, root mean square "

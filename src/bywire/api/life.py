@@ -1,4 +1,4 @@
-"""Life of a brake: slow states over thousands of stops, and the end of life."""
+"""A brake's life: slow states over thousands of stops, and the end of life."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from bywire.report.tables import KpiRow, Table, amount_cell, kpi_table, paramete
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_MOST = 100_000  # largest number of stops to run one by one
+_MOST = 100_000  # largest number of stops to simulate one by one
 _PROJECTION = ("stops", "seed", "share", "tolerance", "longest")
 
 
@@ -47,9 +47,9 @@ class LifeResult(Answer):
     Parameters
     ----------
     projection
-        Slow states and margins to the limits over stops, SI.
+        Slow states and margins to the limits over stops [SI].
     checked
-        Slow states of stops run one by one, shape (stops + 1,) each; may be empty.
+        Slow states of stops simulated one by one, shape (stops + 1,) each. May be empty.
     """
 
     projection: Projection
@@ -57,7 +57,7 @@ class LifeResult(Answer):
 
     @property
     def warnings(self) -> list[str]:
-        """Warnings of the runs; of those that differ only in numbers, the first."""
+        """Warnings of the runs, the first of those that differ only in numbers."""
         kinds: dict[str, list[str]] = {}
         for text in self.projection.warnings:
             kinds.setdefault(re.sub(r"-?\d[\d.e+-]*", "#", text), []).append(text)
@@ -68,7 +68,7 @@ class LifeResult(Answer):
 
     @property
     def data(self) -> xr.Dataset:
-        """Slow states and margins to the limits after each stop, dimension ``stop``, SI."""
+        """Slow states and margins to the limits [SI] after each stop, dimension ``stop``."""
         life, made = self.projection.plan.life, self.projection
         told = {**life.states, **{f"left_{name}": each for name, each in life.limits.items()}}
         values = {**made.states, **{f"left_{name}": each for name, each in made.left.items()}}
@@ -81,9 +81,9 @@ class LifeResult(Answer):
         )
 
     def deviation(self, name: str) -> float:
-        """Return the relative error of a state's projected change, against stops one by one.
+        """Return the relative error of a state's projected change, from stops simulated one by one.
 
-        NaN if no stops were run one by one, or the state does not change.
+        The error is NaN without such stops, or if the state does not change.
         """
         if not self.checked:
             return math.nan
@@ -93,7 +93,7 @@ class LifeResult(Answer):
         return made / change - 1.0 if change else math.nan
 
     def document(self) -> Document:
-        """Return the stops until the end of life, its cause, slow states, and settings."""
+        """Return the stops until the end of life, its cause, slow states and settings."""
         plan = self.projection.plan
         subject = Subject.of_bench(
             plan.bench,
@@ -153,7 +153,7 @@ class LifeResult(Answer):
                 "interval",
                 made.error,
                 "1",
-                f"Half width of its {100 * CONFIDENCE:g} % interval, from the sample of "
+                f"Half width of its {100 * CONFIDENCE:g} % interval, from a sample of "
                 f"{made.plan.count} stop{'s' * (made.plan.count > 1)}.",
             ),
             KpiRow("runs", float(runs), "1", "Simulated stops."),
@@ -165,8 +165,8 @@ class LifeResult(Answer):
                         f"deviation_{name}",
                         100.0 * share,
                         "%",
-                        f"Projected change of the {each.label} against "
-                        f"{len(self.checked[name]) - 1} stops run one by one.",
+                        f"Relative error of the {each.label}'s projected change, from "
+                        f"{len(self.checked[name]) - 1} stops simulated one by one.",
                     )
                 )
         return rows
@@ -239,13 +239,13 @@ class LifeResult(Answer):
 
 
 _CAPTION = (
-    "Slow states over stops, with dots at simulated stops, and margins to the limits. Life ends "
-    "where the first margin reaches zero."
+    "Slow states and margins to the limits over stops. Dots mark simulated stops. Life ends when "
+    "the first margin reaches zero."
 )
 
 
 def _wear_changes(plan: LifePlan) -> tuple[Change, ...]:
-    """Return a life file's settings of wear, of the conditions of stops, and of the projection."""
+    """Return a life file's settings of wear, stop conditions and projection."""
     life, wear = plan.life, plan.life.defaults()
     origins = {name: ", ".join(filter(None, (c.kind, c.where))) for name, c in life.values.items()}
     of = f"the life {life.name}"
@@ -263,18 +263,19 @@ def _wear_changes(plan: LifePlan) -> tuple[Change, ...]:
 
 
 def require_checkable(check: int, plan: LifePlan) -> None:
-    """Reject a number of stops one by one that cannot check the projection.
+    """Reject a number of individual stops that cannot check the projection.
 
     Raises
     ------
     ParameterError
-        If it is invalid, too large, or below the number that represents the population.
+        If the number is invalid, too large, or smaller than the population's sample.
     """
     whole_number("check", check, 0, _MOST)
     if 0 < check < plan.count:
         raise ParameterError(
-            f"check = {check} is not valid: it must be 0 or >= {plan.count}, the number of stops "
-            "that represent the population",
+            f"check = {check} is not valid: it must be 0 or >= {plan.count}, the size of the "
+            "sample "
+            "that represents the population",
             name="check",
             value=f"{check}",
             valid=f"0 or >= {plan.count}",

@@ -1,4 +1,4 @@
-"""Texts and JSON objects of linear models: poles, reductions, root loci, dither."""
+"""Texts and JSON objects of linear models: poles, reduced models, root loci, dither."""
 
 from __future__ import annotations
 
@@ -25,14 +25,15 @@ from bywire.report.document import Attachment, Flat, Paragraph, TableBlock
 from bywire.report.tables import Cell, Table, text_table
 from bywire.report.wording import amount
 
-_SAME = 1e-9  # of half the sampling frequency
+_SAME = 1e-9  # times half the sampling frequency
 
 
 def rate_table(model: LinearModel) -> Table:
-    """Return the poles as a table: rate, frequency, damping ratio; one row per pair.
+    """Return a table of the poles: rate, frequency and damping ratio, with one row per pair.
 
-    A negative real pole of a sampled model oscillates at half the sampling frequency. It is marked,
-    because it is single and has no damping ratio. Poles at zero are omitted, see `left_out`.
+    A negative real pole of a sampled model oscillates at half the sampling frequency. The table
+    marks this pole, which is single and has no damping ratio. It omits poles at zero (see
+    `left_out`).
     """
     rows = []
     for s in rates(model):
@@ -54,7 +55,7 @@ def rate_table(model: LinearModel) -> Table:
 
 
 def left_out(model: LinearModel) -> list[str]:
-    """Return a line on the poles that `rate_table` omits, if there are any."""
+    """Return a line on the poles that `rate_table` omits, if any."""
     speeds = rates(model)
     still, dead = int(np.sum(np.abs(speeds) < STILL)), len(model.states) - len(speeds)
     parts = []
@@ -69,12 +70,12 @@ def left_out(model: LinearModel) -> list[str]:
 
 
 def poles_block(model: LinearModel, caption: str = "") -> list[Flat]:
-    """Return the table of a model's poles, and a line on those omitted."""
+    """Return a table of a model's poles, and a line on omitted poles."""
     return [TableBlock(rate_table(model), caption), *map(Paragraph, left_out(model))]
 
 
 def json_file(name: str, content: Mapping[str, Any]) -> Attachment:
-    """Return a file with a JSON object."""
+    """Return a file that contains a JSON object."""
     return Attachment(name, partial(_write_json, content))
 
 
@@ -85,12 +86,12 @@ def _write_json(content: Mapping[str, Any], path: Path) -> Path:
 
 
 def matrices(model: LinearModel) -> dict[str, Any]:
-    """Return matrices, names and poles of a model, and zeros, poles and factor of each path."""
+    """Return a model's matrices, names and poles, and each path's zeros, poles and factor."""
     return {**state_space(model), "transfer_functions": transfers(model)}
 
 
 def state_space(model: LinearModel) -> dict[str, Any]:
-    """Return matrices, names, units and poles of a model."""
+    """Return a model's matrices, names, units and poles."""
     return {
         "period": model.period,
         "A": model.A.tolist(),
@@ -108,7 +109,7 @@ def state_space(model: LinearModel) -> dict[str, Any]:
 
 
 def transfers(model: LinearModel) -> list[dict[str, Any]]:
-    """Return zeros, poles and factor of every path of a model."""
+    """Return the zeros, poles and factor of each path of a model."""
     rows = []
     for output in model.outputs:
         for input in model.inputs:
@@ -127,26 +128,28 @@ def transfers(model: LinearModel) -> list[dict[str, Any]]:
 
 
 def pairs(values: Any) -> list[list[float]]:
-    """Return complex numbers as lists of two."""
+    """Return complex numbers as lists [real, imaginary]."""
     return [[float(z.real), float(z.imag)] for z in np.asarray(values, dtype=complex)]
 
 
 def reduced(model: LinearModel, text: str, band: float | None = None) -> Reduced:
-    """Return the reduced model that a text requests.
+    """Reduce a model to an order or a band.
 
     Parameters
     ----------
     model
         Full model.
     text
-        An order, ``"4"``, or a band, ``"150 Hz"``, in which the error must be at most 1 %.
+        Order, such as ``"4"``, or band, such as ``"150 Hz"``, over which the error must be at most
+        1 %.
     band
-        Frequency [Hz] up to which the error of an order is estimated; by default the model's.
+        Frequency [Hz] up to which the error is estimated if the text is an order. Default: the
+        model's band.
 
     Raises
     ------
     ParameterError
-        If the text is neither, or out of range.
+        If the text is neither an order nor a band, or is out of range.
     UnitError
         If the band has a wrong unit.
     """
@@ -154,8 +157,9 @@ def reduced(model: LinearModel, text: str, band: float | None = None) -> Reduced
         order = read_count(text)
         if not order:
             raise ParameterError(
-                f"{option('reduce')} {quoted(text)}: an order is a whole number >= 1 of at most "
-                f"{DIGITS} digits; a band has a unit, for instance '150 Hz'",
+                f"{option('reduce')} {quoted(text)} is not valid: an order must be a whole number "
+                ">= 1 "
+                f"with at most {DIGITS} digits. A band needs a unit, for example '150 Hz'",
                 name=option("reduce"),
                 value=quoted(text),
                 valid="a whole number >= 1",
@@ -185,19 +189,19 @@ def reduced_object(reduced: Reduced) -> dict[str, Any]:
 
 
 def corner_notes(corners: Iterable[Sequence[str]]) -> list[str]:
-    """Return a note on each corner's side of linear models, without repetitions."""
+    """Return one note on each side of a kink that linear models use."""
     texts = dict.fromkeys(text for each in corners for text in each)
-    return [f"the operating point lies on a corner: the linear model is {each}" for each in texts]
+    return [f"the operating point lies on a kink, and the linear model is {each}" for each in texts]
 
 
 def reduced_line(reduced: Reduced) -> str:
-    """Return order and error of a reduced model as a line."""
-    kept = f", of which {reduced.kept} unstable ones are kept" if reduced.kept else ""
-    return f"reduced to {len(reduced.model.states)} states{kept}; {error_line(reduced.error)}"
+    """Return a line on a reduced model's order and error."""
+    kept = f" ({reduced.kept} of them unstable and unchanged)" if reduced.kept else ""
+    return f"reduced to {len(reduced.model.states)} states{kept}, {error_line(reduced.error)}"
 
 
 def error_object(error: ReductionError) -> dict[str, Any]:
-    """Return the JSON object of an error over a band."""
+    """Return the JSON object of a reduction error over a band."""
     return {
         "band_Hz": [error.low, error.high],
         "relative": error.relative,
@@ -211,12 +215,12 @@ def error_object(error: ReductionError) -> dict[str, Any]:
 
 
 def error_line(error: ReductionError) -> str:
-    """Return an error over a band as a line."""
+    """Return a line on a reduction error over a band."""
     return (
         f"largest error up to {error.high:.4g} Hz: {_percent(error.relative)} "
         f"({error.gain:.2g} dB, {error.phase:.2g} degrees), at {error.at:.3g} Hz"
-        + (f" in {error.channel[0]} by {error.channel[1]}" if error.channel[0] else "")
-        + ("" if math.isnan(error.poles) else f"; error of its poles there {_percent(error.poles)}")
+        + (f" from {error.channel[1]} to {error.channel[0]}" if error.channel[0] else "")
+        + ("" if math.isnan(error.poles) else f", error of its poles there {_percent(error.poles)}")
     )
 
 
@@ -225,7 +229,7 @@ def _percent(share: float) -> str:
 
 
 def locus_object(locus: Locus) -> dict[str, Any]:
-    """Return values, poles by value [real, imaginary], and borders of stability."""
+    """Return values, poles [real, imaginary] at each value, and stability limits."""
     return {
         "over": locus.name,
         "unit": locus.unit,
@@ -241,7 +245,7 @@ def locus_object(locus: Locus) -> dict[str, Any]:
 
 
 def locus_lines(locus: Locus) -> list[str]:
-    """Return a text on each border of stability over the range."""
+    """Return a line on each stability limit over the range."""
     from bywire.report.poles import border_text
 
     if not locus.borders:
@@ -251,7 +255,7 @@ def locus_lines(locus: Locus) -> list[str]:
 
 
 def dithered_object(model: PeriodicModel) -> dict[str, Any]:
-    """Return the JSON object of the averaged map and its periodic motion."""
+    """Return the JSON object of an averaged map and its periodic motion."""
     linear = model.averaged
     shown = state_space(linear)
     names = ("period", "A", "B", "C", "D", "states", "inputs", "outputs", "poles")
@@ -268,7 +272,7 @@ def dithered_object(model: PeriodicModel) -> dict[str, Any]:
 
 
 def dithered_line(model: PeriodicModel) -> str:
-    """Return a line on the periodic motion about which the model is linearized."""
+    """Return a line on the periodic motion about which a model is linearized."""
     linear = model.averaged
     unit = signals_of(model.run.model.Output)[model.output].unit
     stable = "stable" if linear.is_stable else "UNSTABLE"
@@ -281,19 +285,19 @@ def dithered_line(model: PeriodicModel) -> str:
 
 
 def small_sines(model: PeriodicModel, band: tuple[float, float]) -> Array:
-    """Return five frequencies of a band [Hz], below the Nyquist frequency."""
+    """Return five frequencies [Hz] of a band, all below the Nyquist frequency."""
     return np.geomspace(band[0], min(band[1], 0.5 / model.averaged.period), 5)
 
 
 def small_gains_line(model: PeriodicModel, band: tuple[float, float], error: float) -> str:
-    """Return a line on the gain to small sines at five frequencies of a band [Hz].
+    """Return a line on the gain for small sines at five frequencies of a band [Hz].
 
-    ``error``: the largest numerical error of these gains, as a share.
+    ``error`` is the largest relative numerical error of these gains.
     """
     frequencies = small_sines(model, band)
-    known = f"{100 * error:.1g} %" if math.isfinite(error) else "unknown, no periodic motion"
+    known = f"{100 * error:.1g} %" if math.isfinite(error) else "unknown, because not periodic"
     gains = ", ".join(
         f"{abs(h):.3g} at {f:.3g} Hz"
         for f, h in zip(frequencies, model.response(frequencies), strict=True)
     )
-    return f"gain to small sines: {gains} (numerical error, from half steps: {known})"
+    return f"gain for small sines: {gains} (numerical error, from half steps: {known})"

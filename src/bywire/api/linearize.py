@@ -1,4 +1,4 @@
-"""Exact linear models of closed loops and of plants: poles, responses, loci, dither."""
+"""Exact linear models of closed loops and plants: poles, responses, root loci, dither."""
 
 from __future__ import annotations
 
@@ -47,21 +47,21 @@ from bywire.report.wording import amount, unit_text
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_MADE = "Exact linear model of the plant, sources in place of its controllers."
+_MADE = "Exact linear model of the plant, with sources in place of controllers."
 
 
 @dataclass(frozen=True)
 class PlantCase:
-    """A plant with the requested parameters and operating point.
+    """Plant with the requested parameters and operating point.
 
     Parameters
     ----------
     plant
-        The plant.
-    name, par
-        Name of the parameter set, and the values in use.
-    point
-        Operating point, and the state of friction there.
+        Plant to linearize.
+        name, par
+        Name of the parameter set, and its values in use.
+        point
+        Operating point, with the friction state there.
     """
 
     plant: Plant
@@ -71,7 +71,7 @@ class PlantCase:
 
     @property
     def point_text(self) -> str:
-        """The operating point and the state of friction there."""
+        """Operating point and friction state as text."""
         point = self.point
         moving = f" at {point.speed:g} rad/s" if point.speed else ""
         value = amount(point.value, point.quantity.unit)
@@ -79,23 +79,23 @@ class PlantCase:
 
     @property
     def subject(self) -> Subject:
-        """Plant and operating point for reports."""
+        """Plant and operating point for the report."""
         plant = self.plant
         return Subject(plant.name, plant.summary, self.name, self.par, self.point_text)
 
 
 @dataclass(frozen=True)
 class LinearizedPlant(Answer):
-    """The linear model of a plant.
+    """Linear model of a plant.
 
     Parameters
     ----------
     case
-        The plant, its parameters and its operating point.
+        Plant, its parameters and its operating point.
     model
-        Model from its inputs to its outputs; ``model.state_space()`` is python-control's.
+        Model from inputs to outputs. ``model.state_space()`` returns a python-control system.
     reduced
-        The reduced model; None if it was not requested.
+        Reduced model, or None if it was not requested.
     """
 
     case: PlantCase
@@ -104,23 +104,23 @@ class LinearizedPlant(Answer):
 
     @property
     def notes(self) -> list[str]:
-        """Side of corners of the model."""
+        """Notes on the linear model's side of kinks."""
         return texts.corner_notes([self.model.corners])
 
     @cached_property
     def exact(self) -> LinearModel | None:
-        """The exact model of a simplified one; None if the model is exact."""
+        """The exact model if ``model`` is simplified, otherwise None."""
         return self.case.plant.exact(self.case.par, self.case.point)
 
     @cached_property
     def error(self) -> ReductionError | None:
-        """Error against the exact model; None if the model is exact."""
+        """Error relative to the exact model, or None if the model is exact."""
         if self.exact is None:
             return None
         return reduction_error(self.exact, self.model, self.case.plant.band)
 
     def document(self) -> Document:
-        """Return poles and responses, with those of the exact and the reduced model."""
+        """Return poles and responses, including those of the exact and the reduced model."""
         case, model = self.case, self.model
         head = (
             f"plant {case.plant.name} of {case.name} at {case.point_text}: {len(model.states)} "
@@ -142,12 +142,12 @@ class LinearizedPlant(Answer):
         return [texts.reduced_line(self.reduced), *texts.poles_block(self.reduced.model)]
 
     def _notes(self) -> list[str]:
-        """Return a note on stuck friction, or on the error against the full plant."""
+        """Return a note on stuck friction, or on the error relative to the full plant."""
         if not self.model.effective():
-            return ["the inputs move no output, because friction holds the plant at rest"]
+            return ["friction holds the plant at rest, so the inputs do not move any output"]
         if self.error is None:
             return []
-        return [f"against the full plant: {texts.error_line(self.error)}"]
+        return [f"relative to the full plant: {texts.error_line(self.error)}"]
 
     def _sections(self) -> list[Section]:
         case, notes = self.case, self._notes()
@@ -168,7 +168,7 @@ class LinearizedPlant(Answer):
         ]
         return [
             Section("Poles", poles),
-            Section("Figures", figures or [Paragraph("No output answers the first input.")]),
+            Section("Figures", figures or [Paragraph("No output responds to the first input.")]),
             case.subject.provenance(_MADE),
         ]
 
@@ -192,13 +192,13 @@ class LinearizedPlant(Answer):
 
 @dataclass(frozen=True)
 class PlantLocus(Answer):
-    """The poles of a plant over a range of a parameter or of its operating point."""
+    """Poles of a plant over a range of a parameter or of its operating point."""
 
     case: PlantCase
     locus: Locus
 
     def document(self) -> Document:
-        """Return borders of stability, and the root locus."""
+        """Return the stability limits and the root locus."""
         case, point = self.case, self.case.point
         name = case.plant.name
         listing = Listing(texts.locus_lines(self.locus))
@@ -253,20 +253,20 @@ def _plant_case(
     speed: str,
     side: str = "",
 ) -> PlantCase:
-    """Return a plant with its parameters and its operating point.
+    """Find a plant, and read its parameters and operating point.
 
     Parameters
     ----------
     name
-        Plant.
-    parameters
-        Parameter set; empty for the main one of the plant's brake.
+        Name of the plant.
+        parameters
+        Parameter set. If empty, the main one of the plant's brake.
     at
-        Operating point; its unit selects the quantity. Empty for the plant's nominal one.
+        Operating point, whose unit selects the quantity. If empty, the plant's nominal point.
     overrides
         Parameters by dotted name, with units.
     friction, speed
-        State of dry friction, and speed of the motors; empty: removed, at rest.
+        State of dry friction, and motor speed. If empty, friction is removed and the motors rest.
     side
         See `loop_case`.
 
@@ -293,7 +293,7 @@ def _operating_point(plant: Plant, at: str) -> tuple[Quantity, float]:
             continue
     known = ", ".join(f"{quantity.name} in {quantity.unit}" for quantity in plant.at)
     raise UnitError(
-        f"{option('at')} {at!r}: {plant.name} takes one of {known}",
+        f"{option('at')} {at!r} is not valid: for {plant.name} it must be {known}",
         name=option("at"),
         value=repr(at),
         valid=known,
@@ -308,16 +308,17 @@ def _friction(friction: str, speed: str) -> tuple[Friction, float]:
     omega = number(speed, "rad/s", option("speed")) if speed else 0.0
     if kind == "sliding" and omega == 0.0:
         raise ParameterError(
-            f"{option('friction', 'sliding')}: friction at rest has no slope; give the motors' "
-            f"speed with {option('speed')}, for instance '5 rad/s', positive toward clamping",
+            f"{option('friction', 'sliding')} needs a motor speed, because friction at rest has no "
+            f"slope. Add {option('speed')}, for example '5 rad/s', positive toward clamping",
             name=option("speed"),
         )
     if kind != "sliding" and omega != 0.0:
         raise ParameterError(
-            f"{option('speed')} {speed}: only sliding friction depends on the speed: add "
-            f"{option('friction', 'sliding')}, or leave {option('speed')} out",
+            f"{option('speed')} {speed} has no effect, because only sliding friction depends on "
+            f"speed. Add {option('friction', 'sliding')}, or remove {option('speed')}",
             name=option("speed"),
             value=speed,
+            valid=option("friction", "sliding"),
         )
     return kind, omega
 
@@ -331,29 +332,29 @@ def _draw_locus(locus: Locus) -> Figure:
 # --- Closed loops
 
 _LOWEST = 1e-2  # lower end of the search for the bandwidth, Hz
-_NYQUIST = 0.998  # of half the sampling frequency
+_NYQUIST = 0.998  # times half the sampling frequency
 _POINTS = 600
 _DEPTH = 80.0  # shown range of the closed loop's gain, dB
 
 
 @dataclass(frozen=True)
 class LinearizedLoop(Answer):
-    """The linear model of a closed loop.
+    """Linear model of a closed loop.
 
     Parameters
     ----------
     case
-        The loop, its parameters and its operating point.
+        Loop, its parameters and its operating point.
     model
-        Sampled model from input to output; ``model.state_space()`` is python-control's.
+        Sampled model from input to output. ``model.state_space()`` returns a python-control system.
     locus
-        Its poles over a range; None if they were not requested.
+        Poles over a range, or None if they were not requested.
     reduced
-        The reduced model; None if it was not requested.
-    dithered
-        The loop about its motion under dither; None if it was not requested.
-    dithered_error
-        Largest numerical error of its gains to small sines, as a share; infinite if the motion is
+        Reduced model, or None if it was not requested.
+        dithered
+    Loop linearized about its motion under dither, or None if it was not requested.
+        dithered_error
+        Largest relative numerical error of its gains for small sines. Infinite if the motion is
         not periodic in half steps.
     """
 
@@ -366,25 +367,25 @@ class LinearizedLoop(Answer):
 
     @property
     def notes(self) -> list[str]:
-        """Side of corners of the model."""
+        """Notes on the linear model's side of kinks."""
         return texts.corner_notes([self.model.corners])
 
     @cached_property
     def state(self) -> str:
-        """``"stable"``, ``"unstable"``, or a text that there is no loop."""
+        """``"stable"``, ``"unstable"``, or a text which states that there is no loop."""
         gain, closed = self.case.loop.gain_and_closed(self.case.par, self.case.value)
         if not LoopFigures(gain, closed).has_loop:
             return NO_LOOP
         return "stable" if self.model.is_stable else "unstable"
 
     def document(self) -> Document:
-        """Return poles, responses, locus, reduction and motion under dither."""
+        """Return poles, responses, root locus, reduced model and motion under dither."""
         loop, model = self.case.loop, self.model
         poles = texts.poles_block(model, "Poles, slowest first.")
         stable = "UNSTABLE" if self.state == "unstable" else self.state
         head = (
             f"closed loop {loop.name} of {self.case.name} at {self.case.point}: {stable}, sampled "
-            f"with {model.period * 1e3:g} ms"
+            f"every {model.period * 1e3:g} ms"
         )
         over = [] if self.locus is None else [self._locus_listing(self.locus)]
         return Document(
@@ -394,8 +395,9 @@ class LinearizedLoop(Answer):
                 Section("Poles", [*poles, *self._dithered_blocks(), *over]),
                 Section("Figures", self._figures()),
                 self.case.subject.provenance(
-                    f"Exact linear model, sampled with {model.period * 1e3:g} ms: plant, filters "
-                    "and controllers, without dry friction."
+                    f"Exact linear model, sampled every {model.period * 1e3:g} ms. It includes "
+                    "plant, "
+                    "filters and controllers, but not dry friction."
                 ),
             ],
             brief=[head, *poles, *over, *self._brief_reduced(), *self._brief_dithered()],
@@ -432,14 +434,16 @@ class LinearizedLoop(Answer):
         blocks = [
             FigureBlock(
                 partial(_poles, model, width),
-                "Poles of the closed loop as rates; rays of equal damping ratio, circles of equal "
-                "frequency; shaded: the unstable half; f_s: the sampling frequency. Of a pair, one "
-                "pole is shown.",
+                "Poles of the closed loop as rates, one of each pair. Rays have equal damping "
+                "ratio, "
+                "and circles have equal frequency. The unstable half is shaded. f_s is the "
+                "sampling "
+                "frequency.",
                 f"{name}-poles",
             ),
             FigureBlock(
                 partial(_response, model, width, self.dithered),
-                "Frequency response of the closed loop, down to 80 dB below its largest gain.",
+                "Frequency response of the closed loop, down to 80 dB below its peak gain.",
                 f"{name}-closed-loop",
             ),
         ]
@@ -492,7 +496,7 @@ class LinearizedLoop(Answer):
 
 
 def _closed_bandwidth(model: LinearModel) -> float:
-    """Return the -3 dB bandwidth of a closed loop [Hz]; NaN for an unstable one."""
+    """Return the -3 dB bandwidth of a closed loop [Hz], NaN if the loop is unstable."""
     if not model.is_stable:
         return math.nan
     return bandwidth(lambda f: model.response(f)[:, 0, 0], (_LOWEST, _NYQUIST * model.nyquist))
@@ -519,27 +523,28 @@ def _response(model: LinearModel, width: float, dithered: PeriodicModel | None) 
     return bode(lines, gain_unit=unit, marks=marks, depth=_DEPTH)
 
 
-# --- Linear models of either
+# --- Linear models of loops and plants
 
 
 def linearized(
     case: LoopCase | PlantCase, locus: str, reduce: str, dither: bool
 ) -> LinearizedLoop | LinearizedPlant | PlantLocus:
-    """Return the linear model of a loop or of a plant, or the poles of a plant over a range.
+    """Linearize a loop or a plant, or compute a plant's poles over a range.
 
-    ``locus``, ``reduce``, ``dither``: see `bywire.linearize`.
+    For ``locus``, ``reduce`` and ``dither``, see `bywire.linearize`.
     """
     if isinstance(case, LoopCase):
         return _linearized_loop(case, locus, reduce, dither)
     if dither:
         raise ParameterError(
-            f"{option('dither', True)} is only for loops: leave it out, or name a loop",
+            f"{option('dither', True)} applies only to loops. Remove it, or choose a loop",
             name=option("dither", True),
         )
     if locus and reduce:
         raise ParameterError(
-            f"give either {option('reduce')} or {option('locus')}, not both",
+            f"use either {option('reduce')} or {option('locus')}, not both",
             name=option("reduce"),
+            value=reduce,
         )
     return _plant_locus(case, locus) if locus else _linearized_plant(case, reduce)
 
@@ -566,7 +571,7 @@ def linear_case(
     speed: str,
     side: str = "",
 ) -> LoopCase | PlantCase:
-    """Return the loop or the plant to linearize, with its parameters and operating point.
+    """Find the loop or plant to linearize, and read its parameters and operating point.
 
     Parameters
     ----------
@@ -585,8 +590,8 @@ def linear_case(
     for argument, text in (("friction", friction), ("speed", speed)):
         if text:
             raise ParameterError(
-                f"{option(argument)} is only for plants ({', '.join(PLANTS.all())}): loops are "
-                "linearized without dry friction; leave it out",
+                f"{option(argument)} {text} applies only to plants ({', '.join(PLANTS.all())}), "
+                "because bywire linearizes loops without dry friction. Remove it",
                 name=option(argument),
                 value=text,
             )
@@ -594,7 +599,7 @@ def linear_case(
 
 
 def locus_range(case: LoopCase | PlantCase, range_: str) -> tuple[str, str, list[float]]:
-    """Return name, unit and values of the range of a root locus.
+    """Return name, unit and values of a root locus' range.
 
     Raises
     ------
@@ -613,8 +618,9 @@ def _followed(case: LoopCase, range_: str) -> Locus:
 def _dithered(case: LoopCase) -> PeriodicModel:
     if not case.loop.whole(case.par):
         raise ParameterError(
-            f"{option('dither', True)}: loop {case.loop.name!r} of {case.name} has no dither; name "
-            f"a loop with dither ({_dithered_loops()}), switched on in the parameters of its ECU",
+            f"{option('dither', True)}: loop {case.loop.name!r} of {case.name} has no dither. "
+            "Choose "
+            f"a loop with dither ({_dithered_loops()}), and switch it on in the ECU's parameters",
             name=option("dither", True),
             valid=_dithered_loops(),
         )
@@ -622,7 +628,7 @@ def _dithered(case: LoopCase) -> PeriodicModel:
 
 
 def _gain_error(case: LoopCase, model: PeriodicModel) -> float:
-    """Return the numerical error of gains to small sines, as a share, from half steps."""
+    """Return the relative numerical error of gains for small sines, from half steps."""
     share, frequencies = OTHER_STEPS[0], texts.small_sines(model, case.loop.band)
     try:
         finer = dithered_loop(case.loop, case.par, case.value, share * model.run.step)

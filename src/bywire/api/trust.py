@@ -174,6 +174,6 @@ def trust(
         if store is None or not store.exists():
             raise
         raise KeyboardInterrupt(
-            f"finished experiments are in {store}: repeat the command to continue"
+            f"finished experiments are in {store}: rerun the command to continue"
         ) from None
     return TrustStudy(chosen, recovered)

@@ -28,7 +28,7 @@ from bywire.bench.step_error import (
 )
 from bywire.bench.stimulus import Stimulus
 from bywire.core.errors import ParameterError, unknown_name
-from bywire.core.interrupts import interrupt_heard, interrupts_deferred
+from bywire.core.interrupts import interrupt_handled, interrupts_deferred
 from bywire.core.signals import signals_of
 from bywire.simulation.engine import prepare
 from bywire.simulation.run import Run, Trajectory, simulate
@@ -148,7 +148,7 @@ def run(
             except NO_ESTIMATE as error:
                 failures[factor] = error
     except KeyboardInterrupt:  # outside the engine, which handles interrupts itself
-        interrupt_heard()
+        interrupt_handled()
         kpis = judged(bench, recordings).kpis if is_complete else ()
         return Result(bench, recordings, kpis, (), "interrupted")
     result = judged(bench, recordings, others)

@@ -30,7 +30,7 @@ OTHER_STEPS = (0.5, 2.0)
 MOST_WORK = 5.0
 """work relative to the original run, above which a run with another step is abandoned"""
 NO_ESTIMATE = (StepError, RunError)
-"""errors that runs with other steps may raise: the step is no divisor, or it is too coarse"""
+"""errors of runs with other steps: the step does not divide a sample time, or is too coarse"""
 ROUNDING = 1e-11
 """accumulated rounding error, relative to the largest value of a signal"""
 _STEPS = {0.5: "half the step", 2.0: "twice the step"}

@@ -1,4 +1,4 @@
-"""``python -m bywire.cli``: the same as the command ``bywire``."""
+"""Entry point of ``python -m bywire.cli``, which does the same as the command ``bywire``."""
 
 from bywire.cli.main import process
 

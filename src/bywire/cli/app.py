@@ -1,4 +1,4 @@
-"""The commands of ``bywire``: those of all use cases, and a few others."""
+"""All commands of ``bywire``: one or more for each use case, and a few others."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from bywire.cli.output import INTERRUPTED, message, result
 from bywire.cli.show import JsonFlag, show
 from bywire.cli.use_case_commands import command_of
 from bywire.core.errors import InputError, ParameterError
-from bywire.core.interrupts import interrupt_heard
+from bywire.core.interrupts import interrupt_handled
 from bywire.server.address import PORT
 from bywire.usecases import use_cases
 
@@ -29,13 +29,13 @@ def list_command(
         str | None,
         typer.Argument(
             metavar="[TOPIC|NAME|WORD]",
-            help="A topic; or a name, to show its options, signals, units; or a word to search.",
+            help="Topic, name or search word. A name shows its options, signals and units.",
             autocompletion=completion.names_of(),
         ),
     ] = None,
     json: JsonFlag = False,
 ) -> None:
-    """List topics, the names of a topic, or all about a name."""
+    """List all topics, the names in a topic, or the details of a name."""
     from bywire.api.overview import is_topic, overview
 
     if name is None or is_topic(name):
@@ -49,27 +49,27 @@ def list_command(
 def benchmark_command(
     parts: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[PART]...", help="What to measure, e.g. commands; by default all."),
+        typer.Argument(metavar="[PART]...", help="Benchmark to run, e.g. commands. Default: all."),
     ] = None,
     json: JsonFlag = False,
 ) -> None:
-    """Measure speed against hand-written C and other simulators."""
+    """Measure bywire's speed against hand-written C and other simulators."""
     show(lambda progress: _benchmarks().measure(progress, parts or ()), as_json=json)
 
 
 def _benchmarks() -> ModuleType:
-    """Load the benchmarks, which are next to ``src`` in a clone of the repository.
+    """Load the benchmarks, a folder next to ``src`` in a clone of the repository.
 
     Raises
     ------
     InputError
-        If bywire does not run from a clone.
+        If bywire is not running from a clone.
     """
     clone = Path(__file__).parents[3]
     if not (clone / "benchmarks" / "suite.py").is_file():
         raise InputError(
-            "the benchmarks need a clone of bywire's repository: run python3 tasks.py demo there, "
-            "then .venv/bin/bywire benchmark"
+            "bywire is not running from a clone of its repository, which contains the benchmarks. "
+            "In a clone, run 'python3 tasks.py demo' and then '.venv/bin/bywire benchmark'"
         )
     sys.path.insert(0, str(clone))
     return import_module("benchmarks.suite")
@@ -87,28 +87,26 @@ def serve_command(
             autocompletion=completion.names_of(
                 "experiments", "generic_experiments", ending=".toml"
             ),
-            help="Bench file, experiment or folder; the current folder by default.",
+            help="Bench file, experiment or folder. Default: the current folder.",
         ),
     ] = None,
-    port: Annotated[int, typer.Option(help="Port; 0 for any free port.")] = PORT,
+    port: Annotated[int, typer.Option(help="Port. 0 selects a free port.")] = PORT,
     folder: Annotated[
         Path | None,
-        typer.Option(
-            help="Folder to serve; by default the folder of the bench file.", show_default=False
-        ),
+        typer.Option(help="Folder to serve. Default: the bench file's folder.", show_default=False),
     ] = None,
 ) -> None:
-    """Show and run benches and studies in a browser on this machine, with their results."""
+    """Run benches and studies in a browser on this machine, and view their results."""
     from bywire.server.serving import serve
 
     def say(link: str) -> None:
-        message("open this link in a browser on this machine; Ctrl-C ends the server")
+        message("open this link in a browser on this machine. Press Ctrl-C to stop the server")
         result(link)
 
     try:
         serve(subject or "", port=port, folder=folder or "", say=say)
     except KeyboardInterrupt:  # typer would exit without a message
-        interrupt_heard()
+        interrupt_handled()
         message("interrupted")
         raise typer.Exit(INTERRUPTED) from None
 
@@ -119,12 +117,18 @@ _SIZE = "size"
 
 
 class StudyGroup(TyperGroup):
-    """Commands of studies; the name of a sizing study stands for ``size NAME``."""
+    """Commands of studies. The name of a sizing study is short for ``size NAME``."""
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:  # types of typer's own click
         """Return the command of the first word; see click."""
         if args and args[0].endswith(".toml"):
-            raise ParameterError(f"to run a study file, type 'bywire study run {args[0]}'")
+            raise ParameterError(
+                f"{args[0]} is not a command of 'bywire study'. To run this study file, type "
+                f"'bywire study run {args[0]}'",
+                name="study",
+                value=args[0],
+                valid=f"bywire study run {args[0]}",
+            )
         if args and not args[0].startswith("-") and args[0] not in self.commands:
             args = [_SIZE, *args]
         return super().resolve_command(ctx, args)
@@ -138,11 +142,11 @@ margins, life, faults, design, convert, identify, replay, check, new,
 study run, study resume, study extend, study report, study status, study surrogate, study size,
 export controller, export fmu, export wasm
 """
-"""commands in the order of the help; any others follow"""
+"""commands in the order in which the help lists them, before all others"""
 _GROUPS: dict[str, dict[str, Any]] = {
     "study": {
         "cls": StudyGroup,
-        "help": "Run a study of many cases (run FILE), or compare designs of a brake (NAME).",
+        "help": "Run a study with many cases (run FILE), or compare brake designs (NAME).",
     },
     "export": {"help": "Export parts of a bench for other tools."},
 }
@@ -151,14 +155,14 @@ _GROUPS: dict[str, dict[str, Any]] = {
 
 @cache
 def program() -> Any:
-    """Return the command line as a callable of its arguments, built once."""
+    """Return the command line as a callable, built once."""
     found = typer.main.get_command(app())
     _keep_brackets(found)
     return found
 
 
 def app() -> typer.Typer:
-    """Return the commands as a typer application."""
+    """Return all commands as a typer application."""
     made = typer.Typer(
         name="bywire",
         help="A virtual test bench for brake-by-wire actuators.",
@@ -179,7 +183,7 @@ def app() -> typer.Typer:
 
 
 def _keep_brackets(command: Any) -> None:
-    """Make help show brackets, as in ``Pressure [bar]``, which Rich would take for markup."""
+    """Make help show brackets as in ``Pressure [bar]``, which Rich would treat as markup."""
     for option in command.params:
         if getattr(option, "help", None):
             option.help = option.help.replace("[", r"\[")
@@ -188,7 +192,7 @@ def _keep_brackets(command: Any) -> None:
 
 
 def _commands() -> Iterator[tuple[str, Callable[..., None]]]:
-    """Yield every command with the words after ``bywire``."""
+    """Yield every command and the words to type after ``bywire``."""
     yield "list", list_command
     yield "serve", serve_command
     yield "benchmark", benchmark_command
@@ -199,14 +203,14 @@ def _commands() -> Iterator[tuple[str, Callable[..., None]]]:
 
 def _root(
     context: typer.Context,
-    version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
+    version: Annotated[bool, typer.Option("--version", help="Print the version and exit.")] = False,
     system: Annotated[
         list[str] | None,
         typer.Option(
             "--system",
             metavar="PATH",
-            help="Load your own brake, a file or a package; bywire executes its code. "
-            "Before or after the command.",
+            help="Load your own brake from a Python file or package. bywire executes its code. "
+            "Allowed before or after the command.",
         ),
     ] = None,
 ) -> None:
@@ -218,7 +222,7 @@ def _root(
     if system:
         from bywire.core.brake import load_system
 
-        with redirect_stdout(sys.stderr):  # output of its code is not a result
+        with redirect_stdout(sys.stderr):  # its own output is not a result
             for path in system:
                 load_system(path)
         if context.invoked_subcommand is None:

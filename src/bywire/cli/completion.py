@@ -1,4 +1,4 @@
-"""Tab completion in the shell: names from the cached index, and files."""
+"""Tab completion in the shell for names of the cached index and for files."""
 
 from __future__ import annotations
 
@@ -7,18 +7,18 @@ from glob import escape, iglob
 from os.path import isdir
 
 Completed = list[tuple[str, str]]
-"""words that a shell offers, each with its meaning"""
+"""words that a shell suggests, each with its meaning"""
 
 
 def names_of(*kinds: str, ending: str = "") -> Callable[[str], Completed]:
-    """Return a completer for names of some kinds of things, and for files of an ending.
+    """Return a completer for names in some topics, and for files with a given suffix.
 
     Parameters
     ----------
     kinds
-        Kinds of things, for instance ``"experiments"``, see `bywire.overview`; all by default.
+        Topics, for instance ``"experiments"`` (see `bywire.overview`). Default: all.
     ending
-        Ending of files, for instance ``".toml"``; no files if empty.
+        Suffix of files, for instance ``".toml"``. If empty, no files are completed.
     """
 
     def completed(incomplete: str) -> Completed:
@@ -42,7 +42,7 @@ def _texts(things: dict[str, str] | list[str]) -> dict[str, str]:
 
 
 def _files(incomplete: str, ending: str) -> Completed:
-    """Return folders, and files of an ending, whose paths start with the incomplete one."""
+    """Return folders, and files with a suffix, whose paths start with the incomplete one."""
     paths = sorted(iglob(f"{escape(incomplete)}*"))
     return [
         (f"{path}/" if isdir(path) else path, "")
@@ -52,9 +52,9 @@ def _files(incomplete: str, ending: str) -> Completed:
 
 
 def changeable(args: list[str], incomplete: str) -> Completed:
-    """Complete the key of ``KEY=VALUE``: parameters and options of the named bench.
+    """Complete the key of ``KEY=VALUE`` from a bench's parameters and options.
 
-    If the command names no bench but a loop, for instance, complete those of all parameter sets.
+    For commands without a bench, such as those of loops, complete from all parameter sets.
     """
     from bywire.core.errors import BywireError
 
@@ -69,12 +69,12 @@ def changeable(args: list[str], incomplete: str) -> Completed:
 
 
 def varied(args: list[str], incomplete: str) -> Completed:
-    """Complete the name of a parameter."""
+    """Complete a parameter's name."""
     return [(key.removesuffix("="), text) for key, text in changeable(args, incomplete)]
 
 
 def _keys_of(bench: str) -> dict[str, str]:
-    """Return parameters and options of a bench with their values."""
+    """Return a bench's parameters and options with their values."""
     from bywire.bench.bench_file import read
     from bywire.bench.changes import OPTION
 

@@ -1,6 +1,7 @@
 """The command ``bywire``.
 
-It loads fast, so that Ctrl-C works from the start; ``app`` imports what commands need.
+This module loads fast, so that Ctrl-C works from the start. ``app`` imports the modules that
+commands need.
 """
 
 from __future__ import annotations
@@ -26,14 +27,14 @@ from bywire.core.machine import address_space
 
 FAILED = 3
 GARBAGE = 50_000
-"""objects between two garbage collections; Python's 700 make a short run a tenth longer"""
+"""objects between two garbage collections; with Python's 700, a short run takes 10 % longer"""
 
 
 def process() -> None:
-    """Run the process of the command line, and exit without Python's finalization.
+    """Run the command line in this process, and exit without Python's finalization.
 
-    After all output, finalization would take a sixth of a warm run, and a library's thread that
-    still runs after Ctrl-C may abort it. Functions registered for the exit still run.
+    Finalization after all output would take a sixth of a warm run's time. A library's thread that
+    is still running after Ctrl-C might abort it. Functions registered with ``atexit`` still run.
     """
     status: list[object] = []
 
@@ -56,11 +57,11 @@ def process() -> None:
 
 
 def main() -> None:
-    """Run the command line; errors for the user become one message and an exit status."""
+    """Run the command line, and turn user errors into one message and an exit status."""
     from bywire.core.callers import command_line
     from bywire.core.sources import command
 
-    # During finalization all output is written; Ctrl-C would then end the process by the signal.
+    # All output is written before finalization, where Ctrl-C would kill the process by its signal.
     atexit.register(signal.signal, signal.SIGINT, signal.SIG_IGN)
     gc.set_threshold(GARBAGE, *gc.get_threshold()[1:])
     open_streams()
@@ -71,23 +72,25 @@ def main() -> None:
     except KeyboardInterrupt:  # before the first output, or during the last
         message("interrupted")
         status = INTERRUPTED
-    # In executed text, as in creating a named tuple, CPython records a KeyboardInterrupt as
-    # unhandled and later ends ``python -m`` by the signal. Creating another tuple resets this.
+    # If a KeyboardInterrupt hits text that CPython executes, as for a named tuple, CPython records
+    # it as unhandled and later kills ``python -m`` by the signal. Another named tuple resets this.
     namedtuple("Reset", ())
     raise SystemExit(status)
 
 
 def _system_error(error: OSError) -> str:
-    """Return the operating system's error, its place, and what to do about it."""
+    """Return the operating system's error with its path and a remedy."""
     reason = error.strerror or str(error) or type(error).__name__
     place = f"{error.filename}: " if error.filename else ""
     if error.errno in (errno.ENOSPC, errno.EDQUOT):
-        return f"{place}{reason}: make room there, or name another folder with --out or TMPDIR"
-    return f"{place}{reason}: check that it exists and that you may read and write it"
+        return f"{place}{reason}. Free some space, or choose another folder with --out or TMPDIR"
+    return (
+        f"{place}{reason}. Check that it exists and that you have permission to read and write it"
+    )
 
 
 def _foreign_line(error: Exception) -> str:
-    """Return an error with its line if a user's brake raised it; otherwise an empty text."""
+    """Return an error and its line if the code of a user's brake raised it, otherwise no text."""
     from bywire.core.brake import foreign_line
 
     return foreign_line(error)
@@ -96,12 +99,16 @@ def _foreign_line(error: Exception) -> str:
 def _path_of(rest: Iterator[str]) -> str:
     path = next(rest, "")
     if not path:
-        raise ParameterError("--system needs a PATH: a Python file, or a folder with __init__.py")
+        raise ParameterError(
+            "--system needs the path of a Python file or of a folder with __init__.py",
+            name="--system",
+            valid="a Python file or of a folder",
+        )
     return path
 
 
 def systems_first(arguments: Sequence[str]) -> list[str]:
-    """Return arguments with every ``--system PATH`` in front of the command.
+    """Move every ``--system PATH`` in front of the command.
 
     Examples
     --------
@@ -124,7 +131,7 @@ def systems_first(arguments: Sequence[str]) -> list[str]:
 
 
 def _status(was_interrupted: Callable[[], bool]) -> int | str | None:
-    """Return the exit status; 130 after Ctrl-C, whatever libraries convert it to."""
+    """Return the exit status, 130 after Ctrl-C even if a library converts the interrupt."""
     try:
         status = _warned()
     except BaseException as error:
@@ -142,12 +149,12 @@ _OURS = ("BrakeWarning", "MeasurementWarning")
 
 
 def _warned() -> int | str:
-    """Run the command; show a brake's warnings as messages."""
+    """Run the command, and print a brake's warnings as messages."""
     with warnings.catch_warnings():
         show_otherwise = warnings.showwarning
 
         def show(text: Warning | str, category: type[Warning], *place: Any) -> None:
-            if category.__name__ in _OURS:  # their modules load only when needed
+            if category.__name__ in _OURS:  # by name, because their modules may not be loaded
                 message(f"warning: {text}")
             else:
                 show_otherwise(text, category, *place)
@@ -160,7 +167,7 @@ def _warned() -> int | str:
         except SystemExit as done:
             return done.code or 0
         except Exception as error:
-            # Typer's usage errors; their module differs between its versions.
+            # Typer's usage errors, whose module differs between its versions.
             if not hasattr(error, "format_message"):
                 raise
             return _misused(error)
@@ -168,7 +175,7 @@ def _warned() -> int | str:
 
 
 def _misused(error: Any) -> int:
-    """Print one line on what is wrong with a command line, and return the exit status."""
+    """Print one line about a usage error, and return the exit status."""
     text = error.format_message().strip().rstrip(".")
     if "\n" in text:
         error.show()  # the help of a command group
@@ -176,22 +183,22 @@ def _misused(error: Any) -> int:
         context = getattr(error, "ctx", None)
         command = context.command_path if context is not None else "bywire"
         name = f"{words}: " if (words := command.partition(" ")[2]) else ""
-        message(f"error: {name}{text[0].lower()}{text[1:]}: see '{command} -h'")
+        message(f"error: {name}{text[0].lower()}{text[1:]}. For help, type '{command} -h'")
     return int(error.exit_code)
 
 
 def _explained(error: BaseException) -> int:
-    """Print what went wrong, and return the exit status."""
+    """Print an error's message, and return the exit status."""
     if isinstance(error, BywireError):
         message(f"error: {error}")
         return error.exit_status
     if isinstance(error, MemoryError):
         limit = address_space()
         why = (
-            f"the address space of this process is limited to {limit / 2**30:.3g} GiB (ulimit -v): "
-            "raise that limit"
+            f"this process's address space is limited to {limit / 2**30:.3g} GiB. Raise the limit "
+            "with ulimit -v"
             if limit
-            else "free some memory, or compute less at a time"
+            else "free some memory, or reduce the number of cases or workers"
         )
         message(f"error: out of memory: {why}")
         return FAILED
@@ -202,7 +209,7 @@ def _explained(error: BaseException) -> int:
     if foreign:
         message(f"error: {foreign}")
         return ModelError.exit_status
-    # Python's own status for this, 1, would mean that a requirement is not met.
+    # Python would exit with status 1, which means that a requirement is not met.
     traceback.print_exception(error)
-    message("error: this is a defect of bywire; please report it with the lines above")
+    message("error: this is a bug in bywire. Please report it with the lines above")
     return FAILED

@@ -1,4 +1,4 @@
-"""Output of a command: results on standard output, everything else on standard error."""
+"""A command's output: results on standard output, everything else on standard error."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ INTERRUPTED = 130
 
 
 def open_streams() -> None:
-    """Make both streams exist and able to show any text."""
-    # Otherwise, messages for a closed standard error would appear among the results.
+    """Make sure that both streams exist and can print any text."""
+    # Otherwise, with standard error closed, messages would appear among the results.
     sys.stdout = sys.stdout or io.StringIO()
     sys.stderr = sys.stderr or io.StringIO()
     for stream in (sys.stdout, sys.stderr):
@@ -26,7 +26,7 @@ def open_streams() -> None:
 
 
 def result(text: str) -> None:
-    """Print on standard output immediately; a closed pipe (``| head``) is not an error.
+    """Print to standard output without buffering, and ignore a closed pipe (``| head``).
 
     Raises
     ------
@@ -40,15 +40,16 @@ def result(text: str) -> None:
     except OSError as error:
         _abandon()
         raise FileError(
-            f"cannot write to standard output: {error.strerror}: make room there, or redirect it "
-            "elsewhere"
+            f"cannot write to standard output: {error.strerror}. Free some space, or redirect the "
+            "output elsewhere",
+            name="standard output",
         ) from None
 
 
 def message(text: str) -> None:
-    """Print a line for the user on standard error, with control characters escaped.
+    """Print a line for the user to standard error, with control characters escaped.
 
-    A long text is shortened in its middle, because the next step is at its end.
+    A long text loses its middle, because the advice is at its end.
     """
     from bywire.report.wording import clean
 
@@ -57,7 +58,7 @@ def message(text: str) -> None:
 
 
 def flush() -> None:
-    """Flush standard output if its reader is still there."""
+    """Flush standard output, and ignore a closed pipe."""
     try:
         sys.stdout.flush()
     except OSError:
@@ -65,6 +66,6 @@ def flush() -> None:
 
 
 def _abandon() -> None:
-    """Redirect standard output to nowhere, so that its buffer does not fail again at exit."""
+    """Discard further output, so that flushing the buffer at exit cannot fail again."""
     with contextlib.suppress(OSError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

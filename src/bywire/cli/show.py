@@ -1,4 +1,4 @@
-"""Output of every command's answer: progress, messages, files, the exit status."""
+"""Output of a command's answer: progress, messages, files and exit status."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from bywire.cli import output
-from bywire.core.callers import heard_warnings
+from bywire.core.callers import collected_warnings
 from bywire.core.errors import BywireError, FileError
-from bywire.core.interrupts import interrupt_heard
+from bywire.core.interrupts import interrupt_handled
 from bywire.core.scratch import made_folder
 
 if TYPE_CHECKING:
     from bywire.core.typing import Progress
     from bywire.report.answer import Answer
 
-JsonFlag = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output.")]
+JsonFlag = Annotated[bool, typer.Option("--json", help="Print one JSON object to standard output.")]
 VerboseFlag = Annotated[
     bool, typer.Option("--verbose", help="Also show definitions, explanations and all rows.")
 ]
@@ -31,12 +31,12 @@ VerboseFlag = Annotated[
 
 # --- Progress
 
-_INTERVAL = 0.1  # s between two drawings of the bar
+_INTERVAL = 0.1  # s between two updates of the bar
 
 
 @contextmanager
 def progress_bar() -> Iterator[Progress]:
-    """Yield a function that shows the finished share of a labeled piece of work."""
+    """Yield a function that shows a label and the finished share of the work."""
     if not sys.stderr.isatty():
         yield lambda label, share: None
         return
@@ -51,7 +51,7 @@ def progress_bar() -> Iterator[Progress]:
         TimeRemainingColumn(),
         console=console,
         transient=True,
-        auto_refresh=False,  # its thread would prevent a fork of this process
+        auto_refresh=False,  # its thread would keep this process from forking
     )
     tasks = {}
     with bar:
@@ -73,7 +73,7 @@ def progress_bar() -> Iterator[Progress]:
 
 
 def folder(text: str) -> Path:
-    """Return the path that ``--out`` names; an empty text does not mean the current folder.
+    """Return the path given to ``--out``, which must not be empty.
 
     Raises
     ------
@@ -81,20 +81,25 @@ def folder(text: str) -> Path:
         If the text is empty.
     """
     if not text.strip():
-        raise FileError("--out '': name a folder; '.' is the current folder", name="--out")
+        raise FileError(
+            "--out '' is empty. Specify a folder; '.' is the current folder",
+            name="--out",
+            value="''",
+            valid="a folder",
+        )
     return Path(text)
 
 
-ANOTHER = "name another one with --out"
-"""next step if a folder is not writable"""
+ANOTHER = "Choose another folder with --out"
+"""advice if a folder is not writable"""
 
 
 @contextmanager
 def output_folder(out: Path, advice: str = ANOTHER) -> Iterator[None]:
-    """Create the output folder before the computation, so that an unwritable one fails early.
+    """Create the output folder before the computation, so that a write error appears early.
 
-    Folders created here are removed if they stay empty. ``advice`` is the next step if the folder
-    is not writable.
+    Folders created here are removed if they stay empty. ``advice`` tells the user what to do if the
+    folder is not writable.
 
     Raises
     ------
@@ -108,7 +113,9 @@ def output_folder(out: Path, advice: str = ANOTHER) -> Iterator[None]:
                 pass
         except OSError as error:
             raise FileError(
-                f"cannot write to the output folder {out}: {error.strerror or error}; {advice}"
+                f"cannot write to the output folder {out}: {error.strerror or error}. {advice}",
+                name="--out",
+                value=str(out),
             ) from None
         yield
 
@@ -123,25 +130,25 @@ def show(
     advice: str = ANOTHER,
     verbose: bool = False,
 ) -> None:
-    """Compute an answer and show it; print the numbers even if the disk is full.
+    """Compute an answer and show it, and print the numbers even if the disk is full.
 
     Parameters
     ----------
     compute
         ``compute(progress)``: the use case.
     out
-        Folder for recordings, figures and the report; without it, no files are written.
+        Folder for recordings, figures and the report. If None, no files are written.
     as_json
         Whether to print one JSON object.
     advice
-        Next step if the folder is not writable.
+        Advice if the folder is not writable.
     verbose
-        Whether a terminal also shows definitions, explanations and all rows.
+        Whether to also show definitions, explanations and all rows in a terminal.
 
     Raises
     ------
     BywireError
-        If the use case raises it; if files cannot be written, after the numbers are shown.
+        If the use case raises it, or, after the numbers are shown, if files cannot be written.
     typer.Exit
         With status 1 if a requirement is not met, and 130 after an interrupt.
     """
@@ -157,7 +164,7 @@ def show(
         load_matplotlib()
     files: list[Path] = []
     trouble: BywireError | None = None
-    with heard_warnings() as caught:
+    with collected_warnings() as caught:
         try:
             with nullcontext() if out is None else output_folder(out, advice):
                 with progress_bar() as progress:
@@ -169,7 +176,7 @@ def show(
                     except BywireError as error:
                         trouble = error
         except KeyboardInterrupt as stop:  # typer would exit without a message
-            interrupt_heard()
+            interrupt_handled()
             for text in (*stop.args, "interrupted"):
                 output.message(str(text))
             raise typer.Exit(output.INTERRUPTED) from None
@@ -191,7 +198,7 @@ def show(
         raise trouble
     interrupted = getattr(answer, "status", "") == "interrupted"
     if interrupted:
-        kept = f"; finished results are in {out}" if out else ""
+        kept = f". Finished results are in {out}" if out else ""
         output.message(f"interrupted{answer.partial and f': {answer.partial}'}{kept}")
     elif out is not None:
         written = [f"written: {path}" for path in files]

@@ -1,4 +1,4 @@
-"""Commands of use cases, generated from their declarations."""
+"""Commands generated from the declarations of use cases."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from bywire.core.pairs import changes, named
 from bywire.usecases.asks import OUT
 from bywire.usecases.declare import Argument, Command, UseCase
 
-_REPEATED = ("changes", "lines", "names", "pairs")  # flags that may be given several times
+_REPEATED = ("changes", "lines", "names", "pairs")  # flags that the user may repeat
 
 
 def command_of(case: UseCase, command: Command) -> Callable[..., None]:
-    """Return a command of a use case as a function for typer."""
+    """Return a use case's command as a function for typer."""
     arguments = [a for a in case.arguments if a.name not in command.without]
 
     def run(**given: Any) -> None:
@@ -55,11 +55,11 @@ def command_of(case: UseCase, command: Command) -> Callable[..., None]:
 
 
 def help_of(case: UseCase, command: Command) -> str:
-    """Return a command's help, with the meaning of exit status 1 if it has one."""
+    """Return a command's help, including the meaning of exit status 1 if it has one."""
     text = command.help or case.summary
     if not command.status_1:
         return text
-    return f"{text.rstrip('.')}; exit status 1 {command.status_1}."
+    return f"{text} Exits with status 1 {command.status_1}."
 
 
 def _parameter(name: str, kind: Any, default: Any) -> Parameter:
@@ -67,7 +67,7 @@ def _parameter(name: str, kind: Any, default: Any) -> Parameter:
 
 
 def _typer(argument: Argument, command: Command) -> tuple[Any, Any]:
-    """Return type and default of an argument for typer."""
+    """Return an argument's type and default for typer."""
     ask, kind, default = argument.ask, argument.kind, argument.default
     if ask.is_folder:
         return _folder(ask, default)
@@ -84,13 +84,13 @@ def _typer(argument: Argument, command: Command) -> tuple[Any, Any]:
     taken = _taken(argument, is_required)
     if argument.is_positional:
         return Annotated[taken, typer.Argument(**more)], default
-    # For a truth value with default True typer makes two flags, unless one is named.
+    # Typer creates two flags for a bool with default True, unless one is specified.
     flags = [] if kind == "flag" and default is True else [argument.flag]
     return Annotated[taken, typer.Option(*flags, **more)], default
 
 
 def _taken(argument: Argument, is_required: bool) -> Any:
-    """Return the type to which typer converts the typed text."""
+    """Return the type to which typer converts the user's text."""
     if argument.kind == "lines" and argument.ask.is_listing:
         return str
     if argument.kind in _REPEATED:
@@ -121,7 +121,7 @@ def _completed(ask: Any) -> Callable[..., completion.Completed] | None:
 
 
 def _read(argument: Argument, value: Any) -> Any:
-    """Convert a typed value to what the function takes."""
+    """Convert typer's value to the type that the function accepts."""
     if argument.kind in ("changes", "pairs"):
         return changes(value, argument.flag)
     if argument.kind == "names":
@@ -132,7 +132,7 @@ def _read(argument: Argument, value: Any) -> Any:
 
 
 def _listed(text: str, argument: Argument) -> Any:
-    """Split at commas; those within brackets belong to a name, as in ``ans(2,:)``."""
+    """Split at commas, except those within brackets, as in ``ans(2,:)``."""
     if text == "nothing" and argument.default is None:
         return []
     parts = [part.strip() for part in re.split(r",(?![^(\[]*[)\]])", text)]

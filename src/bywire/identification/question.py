@@ -52,7 +52,7 @@ class Question:
     bench
         A `Bench`, the path of a bench file, or an experiment's name.
     inputs
-        Stimulus of the model -> measured signal, or column such as ``"Demand [bar]"``; by default
+        Stimulus of the model -> measured signal, or column such as ``"Demand [bar]"``; default:
         all of the same name.
     outputs
         Output of the model -> standard deviation of its noise, such as ``"0.02 bar"``, its column,
@@ -243,8 +243,8 @@ def unknowns_of(case: Case, known: ParameterSet, question: Question) -> tuple[Un
     """
     if not question.ranges:
         raise ParameterError(
-            f"there is no unknown. Add {option('unknowns')} PARAMETER for each unknown, for instance "
-            f"{option('unknowns')} {next(iter(leaf_fields(type(case.par))))}",
+            f"there is no unknown. Add {option('unknowns')} PARAMETER for each unknown, for "
+            f"instance {option('unknowns')} {next(iter(leaf_fields(type(case.par))))}",
             name="unknowns",
         )
     for name in question.priors:

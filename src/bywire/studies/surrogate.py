@@ -186,7 +186,7 @@ def surrogate_of(findings: Findings, kpi: str) -> Surrogate:
             valid=str(_FEWEST),
         )
     if np.ptp(y) == 0.0:
-        raise ParameterError(f"{kpi} is the same in all cases: there is nothing to fit", name=kpi)
+        raise ParameterError(f"{kpi} is the same in all cases and cannot be fitted", name=kpi)
     errors, best = min(
         (_of_unseen(plan.varied, x, y, degree, 0) for degree in _degrees(x.shape)),
         key=lambda told: float(np.mean(told[0] ** 2)),

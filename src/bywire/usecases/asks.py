@@ -10,7 +10,7 @@ from bywire.usecases.declare import Ask
 if TYPE_CHECKING:
     from bywire.bench.bench import Bench
 
-LoopName = Annotated[str, Ask("Loop, see 'bywire list'.", "Loop", known=("loops",))]
+LoopName = Annotated[str, Ask("Loop (see 'bywire list').", "Loop", known=("loops",))]
 ParameterSetName = Annotated[
     str, Ask("Parameter set, e.g. roberts2003.", "Parameter set", known=("parameter_sets",))
 ]

@@ -9,6 +9,7 @@ help of the command, the form and the reference show. Messages name an argument 
 from __future__ import annotations
 
 import inspect
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -33,6 +34,10 @@ Kind = Literal[
     "things",
 ]
 """kinds of a form's fields; see `bywire.server.field`"""
+_EXAMPLE = re.compile(
+    r"(?:e\.g\.|such as|for example|:) '([^']+)'"
+    r"|(?:e\.g\.|such as|for example) (\S+?)(?=[,;.)]*(?:\s|$))"
+)
 NOTHING: Mapping[str, Any] = MappingProxyType({})
 """default of an argument that maps names to values"""
 
@@ -106,6 +111,12 @@ class Ask:
     shown_default: str | bool | None = None
     panel: str | None = None
 
+    @property
+    def example(self) -> str:
+        """The first example in the help, which an empty field of the form shows; may be empty."""
+        found = _EXAMPLE.search(self.help)
+        return (found[1] or found[2]) if found else ""
+
 
 @dataclass(frozen=True)
 class Command:
@@ -161,7 +172,7 @@ class Form:
     name
         Name of the task; the words of the command by default.
     fields
-        Fields in their order; by default all arguments with a label.
+        Fields in their order; default: all arguments with a label.
     is_listed
         Whether the start page links to a separate page for it.
     is_kept

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from bywire.identification.question import Question
 
 _ANY_BENCH = "Methods of any bench"
-MethodName = Annotated[str, Ask("Method, see 'bywire list'.", "Method", known=("methods",))]
+MethodName = Annotated[str, Ask("Method (see 'bywire list').", "Method", known=("methods",))]
 Measurements = Annotated[
     Sequence[Path],
     Ask(
@@ -41,7 +41,7 @@ Measurements = Annotated[
 MethodOptions = Annotated[
     Mapping[str, Any],
     Ask(
-        "Option of the method, see 'bywire list METHOD'.",
+        "Option of the method (see 'bywire list METHOD').",
         "Options of the method",
         name="option",
         metavar="KEY=VALUE",

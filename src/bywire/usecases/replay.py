@@ -28,7 +28,7 @@ ModelChanges = Annotated[Mapping[str, Any], BENCH_CHANGES]
 Outputs = Annotated[
     Sequence[str] | Mapping[str, str],
     Ask(
-        "Signals to compare, e.g. 'p_mc=Pressure [psi]'; by default all.",
+        "Signals to compare, e.g. 'p_mc=Pressure [psi]'; all by default.",
         "Outputs",
         name="output",
         kind="names",
@@ -111,10 +111,10 @@ def replay(
     mapping
         File with the meaning of the columns of a measurement file.
     inputs
-        Stimulus of the model -> measured signal, or column such as ``"Demand [bar]"``; by default
+        Stimulus of the model -> measured signal, or column such as ``"Demand [bar]"``; default:
         all of the same name.
     outputs
-        Signals to compare; by default all measured ones that show how well the model fits. A
+        Signals to compare; default: all measured ones that show how well the model fits. A
         mapping names their columns: ``{"p_mc": "Pressure [psi]"}``, empty for the same name.
     time
         Time column, such as ``"Zeit [s]"``, or a sample rate. By default as the file declares it.

@@ -19,7 +19,7 @@ Over = Annotated[str, Ask("Run for each value, e.g. motor.R_m=0.2ohm:0.6ohm:9.")
 Faults = Annotated[
     Sequence[str],
     Ask(
-        "Fault to inject, see 'bywire list faults'.",
+        "Fault to inject (see 'bywire list faults').",
         "Faults",
         name="fault",
         metavar="NAME[=VALUE][@ONSET]",

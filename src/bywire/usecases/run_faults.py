@@ -93,7 +93,7 @@ def run_faults(
             raise
         kept = len(store.kept(plan))
         raise KeyboardInterrupt(
-            f"{kept} of {len(plan.faults)} faults are kept: repeat the command to continue"
+            f"{kept} of {len(plan.faults)} faults are kept: rerun the command to continue"
         ) from None
     nominal = running.run(plan.bench, estimate_error=False)
     return FaultCampaign(findings, None if store is None else store.folder, nominal)

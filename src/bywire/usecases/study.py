@@ -1,20 +1,317 @@
-"""Sizing study: designs of a brake compared at equal demands."""
+"""Studies: run, continued, reported, estimated between cases; and sizing studies."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from bywire.core.errors import UnknownNameError, unknown_name
 from bywire.core.libraries import on_one_thread
-from bywire.usecases.asks import ParameterSetName
+from bywire.usecases.asks import (
+    STUDY_FOLDER,
+    BenchChanges,
+    Cases,
+    ClusterAddress,
+    EngineName,
+    ParameterSetName,
+    StudyFolder,
+    Workers,
+    require_study_folder,
+)
 from bywire.usecases.declare import NOTHING, Ask, Command, Form, use_case
 
 if TYPE_CHECKING:
     from bywire.api.study import AskedStudy, StudyResult
+    from bywire.api.study_run import StudyRun
+    from bywire.api.study_surrogate import StudySurrogates
     from bywire.core.typing import Progress
 
+StudyFile = Annotated[
+    str | Path, Ask("Study file (TOML).", "Study", metavar="FILE", offered=("studies",))
+]
+FolderOfStudy = Annotated[
+    str | Path | None,
+    Ask("Folder of the study; by default named like the file.", is_folder=True),
+]
+
+
+def _read_file(study: Path, overrides: Mapping[str, str], cases: int | None) -> None:
+    from bywire.core.arguments import whole_number
+    from bywire.studies.designs import MOST
+    from bywire.studies.study_file import read_study
+
+    if cases is not None:
+        whole_number("cases", cases, 1, MOST)
+
+    read_study(study, overrides)
+
+
+def _require_study_file(study: Path, **others: Any) -> None:
+    from bywire.studies.meant_study import require_study_file
+
+    del others
+    require_study_file(study)
+
+
+def _named_as_file(study: Path, **others: Any) -> Path:
+    del others
+    return Path(study.stem)
+
+
+@use_case(
+    Command("study run", before=_require_study_file, default_folder=_named_as_file),
+    form=Form(
+        "Run the study",
+        "Run or continue",
+        "study",
+        name="study",
+        fields=("study", "cases", "set"),
+        is_listed=False,
+        is_kept=True,
+    ),
+    check=_read_file,
+)
+def run_study(
+    study: StudyFile,
+    out: FolderOfStudy = None,
+    overrides: BenchChanges = NOTHING,
+    *,
+    cases: Cases = None,
+    workers: Workers = None,
+    cluster: ClusterAddress = "",
+    engine: EngineName = "auto",
+    progress: "Progress | None" = None,
+) -> "StudyRun":
+    """Run a bench for many values of varied quantities: probabilities, spread, main influences.
+
+    Results in the study's folder are not computed again. The same call therefore continues a study
+    that was interrupted or killed.
+
+    Parameters
+    ----------
+    study
+        Study file; see ``docs/studies.md``.
+    out
+        Folder of the study; by default the file's name without its ending, in the current folder.
+    overrides
+        Changes of the bench, as texts with units; kept with the study.
+    cases
+        Number of cases, in place of the file's, up to 10 million. A number larger than so far
+        extends the study, a smaller one drops cases not yet computed. If the folder has more cases
+        than the file asks for, all are judged.
+    workers
+        Processes; by default one per core, if the work justifies their start.
+    cluster
+        Address of a Dask scheduler that runs the cases.
+    engine
+        Engine; ``auto`` takes the bench's engine, ``cuda`` a graphics processor.
+    progress
+        Called with a label and the finished share, 0 to 1.
+
+    Returns
+    -------
+    StudyRun
+        Probabilities of the requirements with intervals, the spread of key figures in SI units,
+        the main influences, the worst cases.
+
+    Raises
+    ------
+    InputError
+        For an invalid study file, and a folder that contains another study.
+    RunError
+        If the nominal bench fails, or workers are lost. A failed case only lacks a result.
+    KeyboardInterrupt
+        If interrupted; finished chunks stay.
+    """
+    from bywire.api.study_run import completed, with_engine
+    from bywire.studies.meant_study import require_study_file
+    from bywire.studies.store import Origin, StudyStore, with_cases
+    from bywire.studies.study_file import read_study
+
+    source = Path(study)
+    require_study_file(source)
+    store = StudyStore(Path(out) if out is not None else Path(source.stem))
+    plan = with_cases(with_engine(engine, read_study(source, overrides)), store, cases)
+    return completed(Origin(source, overrides), plan, store, workers, cluster, progress)
+
+
+# --- Continuation of a study: interrupted, killed, or with more cases
+
+
+@use_case(
+    Command("study resume", without=("cases",), **STUDY_FOLDER),
+    Command(
+        "study extend",
+        "Add cases to a study, from the same sequence of points.",
+        required={"cases": "Total number of cases."},
+        **STUDY_FOLDER,
+    ),
+)
+def resume_study(
+    folder: StudyFolder,
+    *,
+    cases: Cases = None,
+    workers: Workers = None,
+    cluster: ClusterAddress = "",
+    engine: EngineName = "auto",
+    progress: "Progress | None" = None,
+) -> "StudyRun":
+    """Continue a study that was interrupted or killed.
+
+    Parameters
+    ----------
+    folder
+        Folder of the study.
+    cases
+        Number of cases, in place of the number so far. A larger number extends the study by points
+        of the same sequence, a smaller one drops cases not yet computed.
+    workers, cluster, engine, progress
+        See `run_study`.
+
+    Returns
+    -------
+    StudyRun
+        See `run_study`; values in SI units.
+
+    Raises
+    ------
+    InputError
+        If the folder contains no study, or the study file is missing or has changed.
+    RunError
+        If workers are lost.
+    KeyboardInterrupt
+        If interrupted; finished chunks stay.
+    """
+    from pathlib import Path
+
+    from bywire.api.study_run import completed, kept_plan, with_engine
+    from bywire.studies.store import StudyStore, require_extensible, with_cases
+
+    store = StudyStore(Path(folder))
+    plan, origin = kept_plan(store)
+    plan = with_engine(engine, plan)
+    if cases is not None:
+        require_extensible(plan, cases)
+        plan = with_cases(plan, store, cases)
+    return completed(origin, plan, store, workers, cluster, progress)
+
+
+# --- Progress and results of a study so far
+
+
+@use_case(
+    Command(
+        "study report",
+        "Judge the results of a study so far by its file's requirements, and write its report.",
+        **STUDY_FOLDER,
+    ),
+    Command("study status", before=require_study_folder, writes=""),
+)
+def study_report(folder: StudyFolder) -> "StudyRun":
+    """Show the progress of a study and its results so far, without writing anything.
+
+    The requirements are those that are now in the study file.
+
+    Parameters
+    ----------
+    folder
+        Folder of the study.
+
+    Returns
+    -------
+    StudyRun
+        See `run_study`; values in SI units.
+
+    Raises
+    ------
+    InputError
+        If the folder contains no study, or the study file is missing or has changed.
+    """
+    from bywire.api.study_run import kept_study
+
+    return kept_study(folder)
+
+
+# --- Polynomial surrogates of key figures between the cases of a study
+
+KeyFigures = Annotated[
+    str | Sequence[str],
+    Ask("Key figure; by default those of requirements.", name="kpi", metavar="NAME"),
+]
+Values = Annotated[
+    Mapping[str, Any],
+    Ask("Values at which to estimate, e.g. motor.R_m=0.4ohm.", metavar="KEY=VALUE"),
+]
+
+
+@use_case(Command("study surrogate", before=require_study_folder, writes=""))
+def study_surrogates(
+    folder: StudyFolder,
+    kpis: KeyFigures = (),
+    at: Values = NOTHING,
+) -> "StudySurrogates":
+    """Estimate key figures between the cases of a study by polynomials, with their error.
+
+    Parameters
+    ----------
+    folder
+        Folder of the study.
+    kpis
+        Key figure, or several; by default those with a requirement, or all.
+    at
+        Values of the varied quantities at which to estimate: SI numbers, texts with units, or
+        changes such as ``"+5 %"`` of the bench's value. The others are as in the bench.
+
+    Returns
+    -------
+    StudySurrogates
+        Each surrogate with its error in the key figure's unit; ``.surrogates["overshoot"]`` is
+        called with values or arrays [SI].
+
+    Raises
+    ------
+    InputError
+        If the folder contains no study or too few cases, for unknown names, values outside the
+        range of the cases or between the values of a discrete quantity. Also for designs that do
+        not determine what lies between their points, and if structural choices vary.
+    """
+    from bywire.api.study_run import kept_study
+    from bywire.api.study_surrogate import StudySurrogates
+    from bywire.api.study_tables import shown_figures
+    from bywire.bench.changes import share_of
+    from bywire.core.errors import ParameterError, unknown_name
+    from bywire.core.values import number
+    from bywire.studies.surrogate import Surrogate, require_fittable, surrogate_of
+
+    report = kept_study(folder)
+    require_fittable(report.plan)  # before values are read: those of a choice are not numbers
+    findings = report.findings
+    quantities = {v.name: v for v in report.plan.varied}
+    values: dict[str, float] = {}
+    for name, text in at.items():
+        if name not in quantities:
+            raise unknown_name("quantity of the study", name, quantities)
+        share = share_of(text)
+        change = (1.0 + share) * quantities[name].nominal if share is not None else text
+        values[name] = number(change, quantities[name].unit or "1", name)
+    surrogates: dict[str, Surrogate] = {}
+    refused: dict[str, str] = {}
+    wanted = [kpis] if isinstance(kpis, str) else kpis
+    required = [each.figure for each in report.plan.demands]
+    for kpi in wanted or shown_figures(findings) or required:
+        try:
+            surrogates[kpi] = surrogate_of(findings, kpi)
+        except ParameterError as error:
+            refused[kpi] = str(error)
+    if not surrogates:
+        why = "; ".join(dict.fromkeys(refused.values()))
+        raise ParameterError(why or f"{folder}: no case is computed yet")
+    return StudySurrogates(report, surrogates, values, refused)
+
+
+# --- Sizing study: designs of a brake compared at equal demands
+
 SizingName = Annotated[
-    str, Ask("Sizing study, see 'bywire list'.", "Sizing study", known=("studies",))
+    str, Ask("Sizing study (see 'bywire list').", "Sizing study", known=("studies",))
 ]
 SizingChanges = Annotated[
     Mapping[str, Any],
@@ -27,7 +324,7 @@ SizingChanges = Annotated[
 ]
 
 
-def _read(name: str, parameters: str, overrides: Mapping[str, Any]) -> "AskedStudy":
+def _read_sizing(name: str, parameters: str, overrides: Mapping[str, Any]) -> "AskedStudy":
     from bywire.api.study import asked_study
 
     return asked_study(name, parameters, overrides)
@@ -61,7 +358,7 @@ def _require_sizing(name: str, **others: Any) -> None:
 @use_case(
     Command("study size", before=_require_sizing),
     form=Form("Sizing study", "Compare designs", "name", name="size"),
-    check=_read,
+    check=_read_sizing,
 )
 @on_one_thread()
 def study(
@@ -98,6 +395,6 @@ def study(
     from bywire.api.study import StudyResult
     from bywire.core.typing import silent
 
-    definition, named, par, options = _read(name, parameters, overrides)
+    definition, named, par, options = _read_sizing(name, parameters, overrides)
     findings = definition.compute(par, options, progress or silent)
     return StudyResult(definition, named, par, options, findings)

@@ -14,7 +14,7 @@ from bywire.api.exports import ExportedFmu
 from bywire.bench.running import run_of
 from bywire.core.errors import CompilerError, FileError, ParameterError, UnknownNameError
 from bywire.export.fmu import archive
-from bywire.usecases.export_fmu import export_fmu
+from bywire.usecases.export import export_fmu
 from export.fmu.clients import Client
 
 MOTORCYCLE = bywire.Bench(
@@ -301,6 +301,6 @@ def test_what_cannot_be_exported_is_said(tmp_path: Path, monkeypatch: pytest.Mon
     monkeypatch.setattr(archive, "find_compiler", lambda: None)
     with pytest.raises(CompilerError):
         export_fmu(MOTORCYCLE, tmp_path / "a" / "folder")
-    with pytest.raises(FileError, match="null character; make room there, or name another folder"):
+    with pytest.raises(FileError, match="null character"):
         export_fmu(MOTORCYCLE, f"{tmp_path}/a\0b")
     assert list(tmp_path.iterdir()) == []

@@ -142,8 +142,8 @@ def _require_known(case: Case, question: Question) -> None:
     outputs, stimuli = signals_of(case.model.Output), signals_of(case.model.Stimulus)
     if not question.noise:
         raise ParameterError(
-            f"there is no output. Add {option('outputs')} SIGNAL for each output of the model in the "
-            f"record, for instance {', '.join(list(outputs)[:6])}",
+            f"there is no output. Add {option('outputs')} SIGNAL for each output of the model in "
+            f"the record, for instance {', '.join(list(outputs)[:6])}",
             name="outputs",
             valid=", ".join(outputs),
         )
