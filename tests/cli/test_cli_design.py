@@ -201,7 +201,7 @@ def test_a_gain_schedule_as_a_bench_file_that_runs(bywire, tmp_path):
     ("arguments", "texts"),
     [
         (("momment", "--require", "bandwidth >= 5 Hz"), ("did you mean 'moment'",)),
-        (("moment",), ("needs a requirement", "bandwidth >= 10 Hz")),
+        (("moment",), ("needs at least one requirement", "bandwidth >= 10 Hz")),
         (("moment", "--require", "bandwith >= 5 Hz"), ("bandwidth",)),
         (
             ("moment", "--require", "bandwidth >= 10 Hz", "--require", "bandwidth <= 5 Hz"),

@@ -202,7 +202,7 @@ def test_what_sticks_is_said_and_has_no_gain(bywire):
         (("frequency-response", "moment", "--frequencies", "600 Hz"), ("Nyquist",)),
         (("agreement", "moment", "--amplitudes", "1 Nm"), ("two amplitudes, the small one first",)),
         (("linearize", "moment", "--locus", "wedge.mu_B"), ("--locus", "LOW:HIGH:COUNT")),
-        (("linearize", "moment", "--locus", "wedge.mu_B=0.3"), ("two values or more",)),
+        (("linearize", "moment", "--locus", "wedge.mu_B=0.3"), ("at least two values",)),
         (("frequency-response", "moment", "--frequencies", "5"), ("Hz",)),
         (("frequency-response", "moment", "--excitation", "sin"), ("did you mean 'sine'",)),
         (
@@ -247,7 +247,7 @@ def test_a_stated_side_of_a_corner_is_taken(bywire):
     for name in ("gain", "phase", "crossover", "bandwidth"):
         assert found[name] == pytest.approx(usual[name], rel=1e-6)
     assert "plant/pressure_sensor.py:" in found["corners"][0]
-    assert "below the corner of" in below.err
+    assert "below the kink of" in below.err
     assert not above.object["margins"]["has_loop"]
     refused(bywire(*asked, "left"), "side = 'left': write 'above' or 'below'")
 

@@ -68,7 +68,7 @@ def test_what_a_library_prints_is_no_result(capsys, monkeypatch, tmp_path, error
     monkeypatch.setattr(mdf4, "library", loud)
     data = xr.Dataset({"p": ("time", np.zeros(3), {"units": "Pa"})}, {"time": [0.0, 1.0, 2.0]})
     with pytest.raises(
-        FileError, match=r"cannot write .*a\.mf4: .*: free some space there, or choose"
+        FileError, match=r"cannot write .*a\.mf4: .*. Free some space there, or choose"
     ):
         write_measurement(data, tmp_path / "a.mf4")
     assert capsys.readouterr().out == ""

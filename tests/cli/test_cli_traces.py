@@ -50,9 +50,9 @@ def test_absolute_path_is_taken_as_it_is(bywire, bench, ride, tmp_path):
         (HEADER, ["too few rows", "at least two"]),
         (HEADER + "0,9\n", ["too few rows", "at least two"]),
         (HEADER + "0,9\n0.01,fast\n", ["line 3, column 'pedal'", "'fast' is not a finite number"]),
-        (HEADER + "0,9\n0.01,\n", ["line 3, column 'pedal'", "blank"]),
-        (HEADER + "0,9\n0.01,nan\n", ["line 3, column 'pedal'", "not a measured value"]),
-        (HEADER + "0,9\n0.02,9\n0.01,9\n", ["line 4", "comes after", "sort the rows"]),
+        (HEADER + "0,9\n0.01,\n", ["line 3, column 'pedal'", "blank or NaN"]),
+        (HEADER + "0,9\n0.01,nan\n", ["line 3, column 'pedal'", "the value is missing"]),
+        (HEADER + "0,9\n0.02,9\n0.01,9\n", ["line 4", "comes after", "Sort the rows"]),
         (HEADER + "0,9\n0.01,9\n0.01,9\n", ["line 4", "is repeated"]),
         (HEADER + "0,9\n0.01,9\n0.02,9\n2,9\n", ["line 5", "a gap of 1.98 s", "max_gap"]),
         ("time [s],pedal\n0,9\n1,9\n", ["column 'pedal'", "has no unit"]),
@@ -61,8 +61,8 @@ def test_absolute_path_is_taken_as_it_is(bywire, bench, ride, tmp_path):
             ["column 'pedal'", "'bar'", "cannot be converted to m"],
         ),
         ("time [s],lever [mm]\n0,9\n0.01,9\n", ["none of its columns 'lever'", "pedal [mm]"]),
-        ("clock [s],pedal [mm]\n0,9\n0.01,9\n", ["does not state when", "'time [s]'"]),
-        ("0,9\n0.01,9\n", ["none of its columns '1, 2'", "add a first row"]),
+        ("clock [s],pedal [mm]\n0,9\n0.01,9\n", ["has no time column", "'time [s]'"]),
+        ("0,9\n0.01,9\n", ["the columns '1, 2' have no names", "Add a first row"]),
         (b"time [s],pedal [m\xfc]\n0,1\n", ["line 1", "not UTF-8"]),
         (bytes(200), ["contains something else"]),
         (HEADER + '0,"9\n0.01,9\n', ["quotation marks"]),
@@ -121,7 +121,7 @@ def test_ride_up_to_the_stop_is_a_run_like_any_other(bywire, ride, tmp_path):
 
 
 def test_bench_file_given_as_a_trace(bywire, ride):
-    refused(bywire("run", ride(PEDAL, name="other.toml")), "none of its columns")
+    refused(bywire("run", ride(PEDAL, name="other.toml")), "have no names")
 
 
 def test_a_mapping_file_says_which_column_of_which_file_is_the_pedal(bywire, bench, tmp_path):

@@ -132,12 +132,12 @@ def test_jitter_is_the_largest_distance_from_the_median_step():
     ("options", "kind", "text"),
     [
         ({"interval": "0 s"}, ParameterError, "interval = '0 s' is not valid"),
-        ({"interval": 1e-12}, ParameterError, "would make 2e[+]12 samples of each signal"),
-        ({"interval": 2e-9}, ParameterError, r"14.9 GiB, and .* GiB are the limit"),
+        ({"interval": 1e-12}, ParameterError, "12 samples of each signal"),
+        ({"interval": 2e-9}, ParameterError, r"14\.9 GiB"),
         (
             {"interval": 0.1, "signals": ["high"], "exclude": ["clipped"]},
             ParameterError,
-            "high has no values left after excluding clipped: check its limits",
+            "high has no values left after excluding clipped",
         ),
         ({"interval": 1, "max_gap": -1}, ParameterError, "max_gap = -1"),
         ({"interval": 1, "method": "linaer"}, UnknownNameError, "did you mean 'linear'"),
@@ -178,7 +178,7 @@ def test_lag_outside_of_the_range_is_told():
     t = np.arange(0, 1, 1e-3)
     data = measurement(a=(t, np.tanh(50 * (t - 0.4))), b=(t, np.tanh(50 * (t - 0.6))))
     assert estimate_lag(data, "a", "b", largest="50 ms").at_limit
-    with pytest.raises(ParameterError, match="does not move"):
+    with pytest.raises(ParameterError, match="does not change"):
         estimate_lag(measurement(a=(t, t), b=(t, 0 * t)), "a", "b")
     with pytest.raises(UnknownNameError, match="unknown signal 'c'"):
         estimate_lag(data, "a", "c")

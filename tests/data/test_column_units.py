@@ -61,5 +61,5 @@ def test_a_column_is_converted_to_its_si_unit(tmp_path, title, number, value, sy
 def test_a_column_of_another_unit_is_refused_with_the_unit(tmp_path, unit):
     path = tmp_path / "a.csv"
     path.write_text(f"t [s],x [{unit}]\n0,1\n1,2\n")
-    with pytest.raises(UnitError, match=r"column 'x': the unit .*write the unit in a mapping"):
+    with pytest.raises(UnitError, match=r"column 'x': the unit .*Specify the unit in a mapping"):
         read_measurement(path)

@@ -35,10 +35,10 @@ def read(tmp_path):
 @pytest.mark.parametrize(
     ("wish", "text"),
     [
-        ("crash", r"a\.odd: the library that reads an odd file failed on it \(SIGSEGV\)"),
-        ("abort", r"failed on it \(SIGABRT\): it is damaged, or needs more than .* GiB"),
-        ("killed", r"failed on it \(SIGKILL\)"),
-        ("memory", "takes more than .* GiB of memory to read: .* choose fewer signals"),
+        ("crash", r"a\.odd: the library that reads an odd file failed"),
+        ("abort", "is damaged, or needs more than.* GiB"),
+        ("killed", r"\(SIGKILL\)"),
+        ("memory", "needs more than .*GiB of memory to read.*fewer signals"),
         (
             "raise",
             r"a\.odd is damaged: .* as an odd file .*\(its parts are inconsistent\)",
@@ -72,7 +72,7 @@ def test_a_child_that_forks_has_a_single_thread(tmp_path, monkeypatch, name):
 @pytest.mark.parametrize("wish", ["hang", "spin"])
 def test_a_reader_without_an_end_is_ended(read, when, wish):
     started = time.monotonic()
-    with pytest.raises(FileError, match=r"no progress for 1 s: .* local disk"):
+    with pytest.raises(FileError, match=r"no progress for 1 s.* local disk"):
         read(f"{when} {wish}", seconds=1.0)
     assert time.monotonic() - started < 10.0
     assert read("")["t"].size == 1000
@@ -86,7 +86,7 @@ def test_numbers_that_do_not_come_are_missed(read):
 def test_memory_is_counted_from_what_the_library_takes_itself(read, monkeypatch):
     monkeypatch.setattr(limited_source, "MOST_MEMORY", 2**24)
     assert read("")["y"].size == 1000
-    with pytest.raises(FileError, match=r"takes more than 0.0156 GiB of memory"):
+    with pytest.raises(FileError, match=r"needs more than 0.0156 GiB of memory"):
         read("late memory")
 
 
@@ -102,7 +102,7 @@ def test_other_systems_get_a_time_limit_and_a_warning(read, monkeypatch, tmp_pat
     monkeypatch.setattr(limited_source, "_idle", {})
     with pytest.warns(UserWarning, match="limits only the time to read an odd file"):
         assert read("")["y"].size == 1000
-    for wish, text in {"crash": r"failed on it \(SIGSEGV\)", "hang": "no progress for 1 s"}.items():
+    for wish, text in {"crash": r"\(SIGSEGV\)", "hang": "no progress for 1 s"}.items():
         with pytest.warns(UserWarning, match="not the mem"), pytest.raises(FileError, match=text):
             read(f"late {wish}", seconds=1.0 if wish == "hang" else 20.0)
     assert not any(limited_source._idle.values())  # one for each file

@@ -52,7 +52,7 @@ def test_cut_files(tmp_path, name):
     [
         ("{:.4f}", ".", 1, "'4.812' without a line end, .* have more decimals"),
         ("{:.4f}", ",", 2, "'4,81' without a line end, .* have more decimals"),
-        ("{!r}", ".", 9, "without a line end, but all numbers above in that column are longer"),
+        ("{!r}", ".", 9, "without a line end, but all numbers above it are longer"),
         ("{:.5e}", ".", 4, "'4.81260' without a line end"),
     ],
 )
@@ -64,7 +64,7 @@ def test_a_table_that_ends_within_a_number(tmp_path, number, mark, lost, text):
     path.write_text(whole)
     assert read_measurement(path)["y"].size == 40
     path.write_text(whole[:-lost])
-    with pytest.raises(FileError, match=rf"line 41: .*{text}"):
+    with pytest.raises(FileError, match=rf"line 41 .*{text}"):
         read_measurement(path)
     path.write_text(whole[:-lost] + "\n")
     assert read_measurement(path)["y"].size == 40
@@ -80,7 +80,7 @@ def test_a_cut_shows_beside_a_number_that_is_as_short(tmp_path):
         cells = ["0", "0", *(number(0.1 + 0.1 * v) for v in rng.uniform(size=70))]
         rows = [f"{0.01 * k:.2f},{cell}" for k, cell in enumerate([*cells, "0.12"])]
         path.write_text("\n".join(["time [s],y [m]", *rows]))
-        with pytest.raises(FileError, match=rf"line 74: .*'0.12' .*all but 1 numbers .* {text}"):
+        with pytest.raises(FileError, match=rf"line 74 .*'0.12' .*all but 1 numbers .* {text}"):
             read_measurement(path)
     rows = [f"{0.01 * k:.2f},{0.5 * k:g}" for k in range(60)]
     path.write_text("\n".join(["time [s],y [m]", *rows, "0.60,30"]))
@@ -133,7 +133,7 @@ def test_mat_elements_that_lie(tmp_path, monkeypatch):
         (mat_element((1, -2), numbers), 14, "no column 'y'|damaged"),
         (mat_element((1, 2), struct.pack("<II", 99, 16) + bytes(16)), 14, "SIGSEGV|damaged"),
         (mat_element((1, 2), struct.pack("<II", 9, 2**31) + bytes(16)), 14, "memory|damaged"),
-        (mat_bomb(), 15, "takes more than 0.25 GiB of memory"),
+        (mat_bomb(), 15, "needs more than 0.25 GiB of memory"),
     ]
     for element, kind, text in lies:
         with pytest.raises(FileError, match=text) as caught:
@@ -211,7 +211,7 @@ def test_netcdf_files_are_not_read_as_bare_hdf5(tmp_path, ending):
         engine="netcdf4",
         encoding={"x_mc": {"dtype": "i2", "scale_factor": 1e-3, "_FillValue": -32768}},
     )
-    with pytest.raises(FileError, match="is a NetCDF file: rename it"):
+    with pytest.raises(FileError, match=r"is a NetCDF file. Rename it"):
         read_measurement(path)
     np.testing.assert_allclose(
         read_measurement(path, {"format": "netcdf"})["x_mc"], measurement()["x_mc"], atol=6e-4
@@ -245,10 +245,10 @@ def mdf_with(tmp_path, block, offset, layout, value):
         (b"##DG", 24, "<Q", "itself", "no progress for 0.5 s|of memory"),
         (b"##CN", 24, "<Q", "itself", "no progress for 0.5 s|of memory"),
         (b"##DG", 32, "<Q", 2**40, "is damaged: bywire cannot read it as an MDF file"),
-        (b"##CG", 24 + 48 + 8, "<Q", HUGE, "and 8 GiB are the limit"),
-        (b"##CG", 24 + 48 + 8, "<Q", 401, "401 records .* but 400 could be read"),
-        (b"##CN", 24 + 64 + 4, "<I", 2**20, "reaches to byte 1048584 of records of"),
-        (b"##CN", 24 + 64 + 4, "<I", 20, "reaches to byte 28 of records of 24"),
+        (b"##CG", 24 + 48 + 8, "<Q", HUGE, "the limit is 8 GiB"),
+        (b"##CG", 24 + 48 + 8, "<Q", 401, "401 records .*400 could be read"),
+        (b"##CN", 24 + 64 + 4, "<I", 2**20, "reaches to byte 1048584"),
+        (b"##CN", 24 + 64 + 4, "<I", 20, "reaches to byte 28"),
         (b"##CN", 8, "<Q", HUGE, "is damaged: bywire cannot read it as an MDF file"),
     ],
 )
@@ -277,7 +277,7 @@ def test_mdf_records_in_a_block_that_cannot_be_inflated(tmp_path):
         path.write_bytes(data)
         with (
             KNOWN.find("mdf4").open(path, ReadOptions()) as source,
-            pytest.raises(FileError, match=r"6000 records .* but [1-9]\d+ could be read"),
+            pytest.raises(FileError, match=r"6000 records .* but .*could be read"),
         ):
             list(source.pieces(["y"]))
     finally:
@@ -314,7 +314,7 @@ def test_a_classic_netcdf_file_that_is_cut(tmp_path, size):
 
 @pytest.mark.parametrize(
     ("head", "text"),
-    [(b"UnFinMF ", "was not finished"), (b"MDF     3.30    ", "is MDF 3.30: convert it to MDF 4")],
+    [(b"UnFinMF ", "is incomplete"), (b"MDF     3.30    ", "is MDF 3.30. Convert it to MDF 4")],
 )
 def test_other_mdf_files(tmp_path, head, text):
     pytest.importorskip("asammdf")

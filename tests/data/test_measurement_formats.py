@@ -71,7 +71,7 @@ def test_more_than_may_be_read_is_refused_first(tmp_path, name):
     path = file_of(tmp_path, name)
     if name in ("csv", "tsv"):
         return  # only reading tells how much there is
-    with pytest.raises(FileError, match="choose fewer signals"):
+    with pytest.raises(FileError, match="Read fewer signals"):
         read_measurement(path, largest=1000)
 
 
@@ -79,7 +79,7 @@ def test_the_ending_must_not_lie(tmp_path, name):
     path = file_of(tmp_path, name)
     lie = tmp_path / ("lie.csv" if name not in ("csv", "tsv") else "lie.parquet")
     path.rename(lie)
-    with pytest.raises(FileError, match="rename it, or give format"):
+    with pytest.raises(FileError, match="Rename it, or specify format"):
         read_measurement(lie)
     same(read_measurement(lie, {"format": name}), measurement())
 
@@ -96,9 +96,9 @@ def test_missing_library_names_the_extra(tmp_path, name, monkeypatch):
 
 def test_files_are_not_replaced_unasked(tmp_path):
     path = file_of(tmp_path, "csv")
-    with pytest.raises(FileError, match="exists already"):
+    with pytest.raises(FileError, match="already exists"):
         write_measurement(measurement(), path)
-    with pytest.raises(FileError, match=r"belongs to no format: use \.csv"):
+    with pytest.raises(FileError, match=r"not the ending of a known format. Use \.csv"):
         write_measurement(measurement(), tmp_path / "a.xyz")
     with pytest.raises(UnknownNameError, match="did you mean 'mdf4'"):
         write_measurement(measurement(), tmp_path / "a.x", format="mdf")

@@ -113,7 +113,7 @@ def test_a_rate_replaces_the_instants_of_the_file(tmp_path):
     assert found["time"].values.tolist() == [1.0, 1.5, 2.0]
     path = written(tmp_path, "t [s],x [m]\n0,7\n1,8\n")
     assert list(read_measurement(path, {"rate": "2 Hz"}).data_vars) == ["x"]
-    with pytest.raises(InputError, match="'time' has the name of a time axis"):
+    with pytest.raises(InputError, match="the same name as a time axis"):
         read_measurement(path, {"signals": {"time": {"column": "x"}}})
 
 
@@ -128,7 +128,7 @@ def test_a_temperature_is_no_time(tmp_path, header):
 @pytest.mark.parametrize(
     ("content", "text"),
     [
-        ("t [s],x [m]\n0,1\n1,2\n1,3\n", "line 4: 1 s is repeated: time must increase"),
+        ("t [s],x [m]\n0,1\n1,2\n1,3\n", "line 4: 1 s is repeated"),
         ("t [s],x [m]\n0,1\n\n2,2\n1,3\n", "line 5: 1 s comes after 2"),
         ("t [s],x [m]\n0,1\n,2\n1,3\n", "line 3: nan s is not an instant"),
         ("t [s],x [m]\n0,1\n1,fast\n", "line 3, column 'x': 'fast' is not a finite number"),
@@ -138,8 +138,8 @@ def test_a_temperature_is_no_time(tmp_path, header):
         ('t [s],x [m]\n0,1\n1,"2\n', "line 3: .*quotation marks"),
         ("t [s];x [m]\n0;1.5\n1;2,5\n", "mixes decimal comma and decimal point"),
         ("t [s],x [m]\n0,1\n", r"too few rows \(1\)"),
-        ("x [m],y [m]\n0,1\n1,2\n", "does not state when it was measured: .* its columns are x, y"),
-        (b"t [s],x [m]\n0,1\n1,2\xb5\n", "line 3: it is not UTF-8"),
+        ("x [m],y [m]\n0,1\n1,2\n", " its columns are x, y"),
+        (b"t [s],x [m]\n0,1\n1,2\xb5\n", "is not UTF-8"),
         (b"", r"is empty \(0 bytes\)"),
     ],
 )
@@ -152,7 +152,7 @@ def test_doubtful_tables_are_refused_with_the_place(tmp_path, content, text):
 
 def test_a_column_without_a_unit_is_refused(tmp_path):
     path = written(tmp_path, "t [s],x\n0,1\n1,2\n")
-    with pytest.raises(UnitError, match=r"column 'x': it has no unit.*\[signals.x\] unit"):
+    with pytest.raises(UnitError, match=r"the column 'x' has no unit.*\[signals\.x\] unit"):
         read_measurement(path)
 
 

@@ -98,7 +98,7 @@ def test_rows_as_to_file_writes_them(tmp_path, rows):
     np.testing.assert_array_equal(found["y"], (rows - 1) * FIRST)
     assert "The first one increases, so bywire reads it as time in s" in notes[0]
     savemat(tmp_path / "a.mat", {"ans": np.stack([FIRST * 0, SECOND])})
-    with pytest.raises(FileError, match="does not state when it was measured"):
+    with pytest.raises(FileError, match="has no time column"):
         read_with_notes(tmp_path / "a.mat", {"signals": {"y": {"column": "ans(2,:)", "unit": "m"}}})
 
 
@@ -112,9 +112,7 @@ def test_a_series_as_a_struct_and_what_is_left_out(tmp_path):
             "wide": np.ones((100, 100)),
         },
     )
-    with pytest.raises(
-        FileError, match=r"'cube' .signals.c.column. is not read: it has 3 dimensions"
-    ):
+    with pytest.raises(FileError, match="it has 3 dimensions"):
         read_with_notes(tmp_path / "a.mat", {"signals": {"c": {"column": "cube", "unit": "m"}}})
     found, _ = read_with_notes(tmp_path / "a.mat", {"signals": {"ts": {"unit": "bar"}}})
     np.testing.assert_array_equal(found["time"], TIME)
@@ -166,9 +164,7 @@ def test_structs_and_objects_of_version_7_3(tmp_path):
     np.testing.assert_allclose(found["p_mc"], 1e5 * FIRST, rtol=1e-15)
     np.testing.assert_array_equal(found["u"], 2 * SECOND)
     np.testing.assert_array_equal(found["y"], 3 * FIRST)
-    with pytest.raises(
-        FileError, match=r"'ts' .* is an object of MATLAB.* t = ts.Time; y = ts.Data"
-    ):
+    with pytest.raises(FileError, match=r"'ts' .*object.* t = ts\.Time and y = ts\.Data"):
         read_with_notes(path, {"signals": {"a": {"column": "ts", "unit": "m"}}})
 
 
@@ -213,7 +209,7 @@ def test_codes_with_a_text_are_no_pressures(tmp_path, codes):
     np.testing.assert_allclose(found["p"], wanted, rtol=1e-12)
     assert any(note.startswith("p: missing samples: ") for note in notes)
     assert any("'f': a formula converts it" in note for note in notes)
-    assert any("'text': it holds text" in note for note in notes)
+    assert any("'text': it contains text" in note for note in notes)
 
 
 def test_states_keep_their_numbers_and_lack_only_what_was_not_there(tmp_path):
@@ -249,14 +245,14 @@ def test_samples_that_are_marked_as_invalid_are_counted(tmp_path):
 @pytest.mark.parametrize(
     ("name", "head", "text"),
     [
-        ("a.tdms", b"TDSm\x0e", "is a TDMS file of LabVIEW, .*: export it as CSV or LVM"),
-        ("a.csv", b"TDSm\x0e", "is a TDMS file"),
-        ("a.blf", b"LOGG", "is a BLF file .*export its signals as MDF 4"),
-        ("a.xlsx", b"PK\x03\x04", "ZIP archive, as .xlsx and .ods are.*'CSV UTF-8'"),
+        ("a.tdms", b"TDSm\x0e", "TDMS file.*it as CSV or LVM"),
+        ("a.csv", b"TDSm\x0e", "TDMS file"),
+        ("a.blf", b"LOGG", "BLF file.*Export its signals as MDF 4"),
+        ("a.xlsx", b"PK\x03\x04", r"ZIP archive \(like \.xlsx and \.ods\).*'CSV UTF-8'"),
         ("a.xls", b"\xd0\xcf\x11\xe0", "Excel workbook"),
         ("a.asc", b"date Mon\nbase hex\n", "log of bus messages"),
         ("a.mat", bytes(4), "MAT file of version 4, save it with '-v7'"),
-        ("a.csv.gz", b"\x1f\x8b", "unpack it first"),
+        ("a.csv.gz", b"\x1f\x8b", "Unpack it first"),
     ],
 )
 def test_what_is_recognized_and_not_read_is_named_with_the_way_out(tmp_path, name, head, text):
@@ -293,7 +289,7 @@ def test_a_limit_of_address_space_is_no_obstacle_or_is_named_at_once(tmp_path):
     )
     size, message = done.stdout.splitlines()
     assert size == "400"
-    assert re.search(r"limited to 0\.125 GiB .ulimit -v.*raise that limit", message)
+    assert re.search(r"limited to 0\.125 GiB .ulimit -v.*raise the limit", message)
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="limits of time")

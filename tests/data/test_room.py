@@ -19,8 +19,8 @@ def test_half_of_the_memory_and_never_more_than_8_gib(monkeypatch):
 def test_a_small_machine_refuses_early_unless_asked(tmp_path, monkeypatch):
     path = file_of(tmp_path, "mat")
     monkeypatch.setattr(file_format, "machine_memory", lambda: 12_000.0)
-    with pytest.raises(FileError, match="are the limit: choose fewer signals"):
+    with pytest.raises(FileError, match="fewer signals"):
         read_measurement(path)
     run = read_measurement(path, largest=10_000)
-    with pytest.raises(ParameterError, match="are the limit: choose a larger one"):
+    with pytest.raises(ParameterError, match="a larger"):
         resample(run, "1 ms")

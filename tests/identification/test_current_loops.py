@@ -135,7 +135,7 @@ def test_a_demand_at_rest_is_refused(method: Method, signal: str) -> None:
     par = WEDGE if method is DRIVE else MOTORCYCLE
     data = method.synthetic(par, method.defaults, 1)
     still = data.assign({signal: ("time", np.full(data.sizes["time"], 1.0))})
-    with pytest.raises(ParameterError, match=f"{signal} of record 1 does not move"):
+    with pytest.raises(ParameterError, match=f"{signal} of record 1 does not change"):
         method.identify(still, par, method.defaults, Effort())
 
 

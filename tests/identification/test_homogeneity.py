@@ -37,7 +37,7 @@ def test_the_record_and_the_parameter_that_do_not_fit_are_named() -> None:
     with pytest.warns(MisfitWarning, match=r"records disagree: m is 2\.[34]\d* kg .* in run_3"):
         fit = joint(masses)
     (note,) = (note for note in fit.notes if "records disagree" in note)
-    assert "no joint interval holds" in note
+    assert "no joint interval" in note
 
 
 def test_records_that_agree_are_not_warned_of() -> None:
@@ -58,5 +58,5 @@ def test_estimates_made_one_by_one_are_compared() -> None:
     assert {worst.value > worst.others, worst.record == "tuesday"} in ({True}, {False})
     assert worst.apart > 5.0
     assert disagreements({"monday": fits["monday"], "again": joint({"again": 2.0}, 7)}) == ()
-    with pytest.raises(ParameterError, match="give one for each record"):
+    with pytest.raises(ParameterError, match="one for each record"):
         disagreements({"monday": fits["monday"]})

@@ -181,13 +181,13 @@ def test_a_model_that_does_not_fit_is_not_sent_for_excitation() -> None:
     y = np.linspace(0.0, 5.0, 50)
     unknown = Unknown("x", 1.0, scale=1e-3)
     poor = Problem((unknown,), lambda v: ((v[0] - y) / 0.01, np.full((50, 1), 100.0)))
-    with pytest.raises(ParameterError, match=r"the model does not fit.*check sign and unit"):
+    with pytest.raises(ParameterError, match="the model does not fit"):
         estimate(poor)
     fair = Problem((unknown,), lambda v: ((v[0] - y) / 2.0, np.full((50, 1), 0.5)))
-    with pytest.raises(ParameterError, match="excite the system more"):
+    with pytest.raises(ParameterError, match="Excite the system more"):
         estimate(fair)
     off = Problem((unknown,), lambda v: (y - 2.5, np.zeros((50, 1))), silent={"x": "law = none"})
-    with pytest.raises(ParameterError, match=r"depends on it \(law = none\); switch it on"):
+    with pytest.raises(ParameterError, match=r"depends on it \(law = none\)\. Switch it on"):
         estimate(off)
 
 

@@ -93,7 +93,9 @@ def test_motion_one_way_is_refused_with_its_count() -> None:
     data = METHOD.synthetic(None, SHORT, 1)
     back = np.flatnonzero(data["speed"].values < 0.0)
     one_way = data.isel(time=np.setdiff1d(np.arange(data.sizes["time"]), back[7:]))
-    with pytest.raises(ParameterError, match=r"backward \(\d{3} forward, 7 back.* to and fro"):
+    with pytest.raises(
+        ParameterError, match=r"backward \(\d{3} forward, 7 back.* in both directions"
+    ):
         METHOD.identify(one_way, None, SHORT, Effort())
     lost = data.assign(friction=data["friction"] * np.nan)
     with pytest.raises(ParameterError, match="slide forward and backward"):

@@ -42,7 +42,7 @@ def test_records_survive_a_file(tmp_path: Path) -> None:
 
 
 def test_records_of_different_signals_are_refused() -> None:
-    with pytest.raises(ParameterError, match=r"a and b differ in their signals \(q\)"):
+    with pytest.raises(ParameterError, match=r"signals \(q\)"):
         joined({"a": record(9, 1.0), "b": record(9, 1.0).assign(q=record(9, 1.0)["p"])})
 
 
@@ -54,7 +54,7 @@ def test_files_become_records_and_uneven_time_is_resampled_and_said(tmp_path: Pa
     paths = [write_measurement(uneven, tmp_path / f"{k}.nc") for k in "ab"]
     found = measured(paths, None, {"p": "Pa"})
     assert len(found.notes) == 2
-    assert "resampled to" in found.notes[0]
+    assert "resampled, because" in found.notes[0]
     one = split(found.data)["a"]
     np.testing.assert_allclose(np.diff(one["p"].values), 0.02, rtol=1e-9)
 
@@ -68,7 +68,7 @@ def test_missing_signals_samples_and_wrong_units_are_refused(tmp_path: Path) -> 
         measured([path], None, {"p": "A"})
     data["p"][7] = np.nan
     path = write_measurement(data, tmp_path / "gap.nc")
-    with pytest.raises(ParameterError, match=r"p misses 1 samples, the first at 5\.07 s"):
+    with pytest.raises(ParameterError, match=r"1 samples, the first at 5\.07 s"):
         measured([path], None, {"p": "Pa"})
     assert np.isnan(measured([path], None, {"p": "Pa"}, gaps=True).data["p"]).sum() == 1
 

@@ -218,7 +218,7 @@ def test_the_same_seed_gives_the_same_gains() -> None:
         (("phase margin >= 200 deg",), ParameterError, "0 to 180"),
         (("sensitivity peak <= 0.5",), ParameterError, "above 1"),
         (("overshoot <= 15",), UnitError, "percent"),
-        ((), ParameterError, "needs a requirement"),
+        ((), ParameterError, "needs at least one requirement"),
     ],
 )
 def test_requirements_that_are_refused(texts: Any, error: type[InputError], match: str) -> None:
@@ -246,7 +246,7 @@ def test_a_requirement_may_name_a_figure_as_margins_do(margin: str) -> None:
 
 def test_problems_that_are_refused() -> None:
     loop, par = of("moment")
-    with pytest.raises(ParameterError, match="cannot also vary"):
+    with pytest.raises(ParameterError, match="cannot vary because"):
         cases_of(loop, par, 200.0, {"control.moment.f_c": [5.0]})
     with pytest.raises(UnknownNameError, match="mu_B"):
         cases_of(loop, par, 200.0, {"wedge.mu_b": [0.3]})
@@ -254,7 +254,7 @@ def test_problems_that_are_refused() -> None:
         cases_of(loop, par, 200.0, {"moment": [200.0, 5000.0]})
     with pytest.raises(ParameterError, match="less than 500 Hz"):
         designed("moment", ("bandwidth >= 600 Hz",))
-    with pytest.raises(ParameterError, match="left to tune"):
+    with pytest.raises(ParameterError, match="all tunable parameters"):
         design({}, read(["bandwidth >= 5 Hz"]), cases_of(loop, par, 200.0, {}), {})
 
 

@@ -128,7 +128,7 @@ def locus_of(
     """
     if len(values) < 2:
         raise ParameterError(
-            f"{name}: a locus needs two values or more, got {len(values)}",
+            f"{name}: a locus needs at least two values, got {len(values)}",
             name=name,
             value=str(len(values)),
             valid=">= 2 values",

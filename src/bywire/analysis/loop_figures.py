@@ -103,7 +103,7 @@ LOOP_FIGURES: Mapping[str, LoopFigure] = {
         LoopFigure(
             "gain_margin",
             "1",
-            "factor by which the loop gain may grow; also in dB",
+            "factor by which the loop gain may increase, also accepted in dB",
             low=1.0,
             margin="gain",
             in_decibel=True,
@@ -111,7 +111,7 @@ LOOP_FIGURES: Mapping[str, LoopFigure] = {
         LoopFigure(
             "lower_gain_margin",
             "1",
-            "factor to which the loop gain may fall; also in dB, below 0",
+            "factor to which the loop gain may decrease, also accepted in dB (below 0)",
             high=1.0,
             is_less_better=True,
             margin="lower_gain",
@@ -141,7 +141,7 @@ LOOP_FIGURES: Mapping[str, LoopFigure] = {
         LoopFigure(
             "noise_gain",
             "1",
-            "rms of the output over that of white noise of each measured sample",
+            "rms of the output, relative to that of white noise in each measured sample",
             is_less_better=True,
         ),
         LoopFigure(

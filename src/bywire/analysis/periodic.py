@@ -99,7 +99,9 @@ class Stroboscope:
     def __init__(self, run: Run, inputs: Sequence[str], signals: Sequence[str]) -> None:
         compiler = find_compiler()
         if compiler is None:
-            raise CompilerError("derivatives need a C compiler: install the extra bywire[compiler]")
+            raise CompilerError(
+                "derivatives need a C compiler. Install the extra bywire[compiler]", name="compiler"
+            )
         require_unchanged(run.changes, "derivatives of a stroboscope")
         self._schedule = _by_substeps(window_schedule(run))
         self._open = replace(self._schedule, frames=self._schedule.frames + 1)
@@ -109,8 +111,8 @@ class Stroboscope:
         self._kernel = _kernel(program, compiler)
         if self._kernel.rounds:
             raise ParameterError(
-                "a sampled value is rounded to whole codes, through which derivatives are zero: "
-                "choose the law without rounding (adc.law = 'ideal')",
+                "the converter rounds sampled values to whole codes, so derivatives are zero. Use "
+                "the law without rounding (adc.law = 'ideal')",
                 name="adc.law",
                 valid="'ideal'",
             )
@@ -293,8 +295,7 @@ def period_of(frequencies: Sequence[float], intervals: Sequence[float], step: fl
         if abs(count - round(count)) > 1e-6 * count:
             raise ParameterError(
                 f"a period of 1/({f:g} Hz) = {1e3 / f:.6g} ms is not a multiple of the step of "
-                f"{step * 1e6:g} us, and never repeats with it: take a frequency that divides the "
-                "sample rate",
+                f"{step * 1e6:g} us. Use a frequency that divides the sample rate",
                 name="frequency",
                 value=f"{f:g} Hz",
             )
@@ -342,10 +343,10 @@ def find_orbit(stroboscope: Stroboscope, run: Run) -> PeriodicOrbit:
             )
     apart = np.abs((stroboscope.advance(z).end - z) / scale)
     raise SolverError(
-        f"{run.model.name}: no motion repeats itself with the period {run.duration * 1e3:g} ms: "
-        f"after {periods} periods {stroboscope.names[int(np.argmax(apart))]} still changes by "
-        f"{apart.max():.2g} of its usual magnitude per period; it hunts or drifts, like a loop "
-        "whose dither is too weak to keep it moving: raise the dither's gain, or move the "
+        f"{run.model.name}: no motion repeats with the period {run.duration * 1e3:g} ms. After "
+        f"{periods} periods, {stroboscope.names[int(np.argmax(apart))]} still changes by "
+        f"{apart.max():.2g} of its usual magnitude per period. The loop hunts or drifts, for "
+        "instance because its dither is too weak. Increase the dither's gain, or move the "
         "operating point",
         name=stroboscope.names[int(np.argmax(apart))],
     )
@@ -619,8 +620,8 @@ def require_moving(model: PeriodicModel) -> None:
     """
     if model.orbit.stuck == 1.0:
         raise SolverError(
-            f"{model.run.model.name}: it sticks during the whole period, and does not respond to "
-            "small signals: raise the dither's gain",
+            f"{model.run.model.name} sticks during the whole period, so it does not respond to "
+            "small signals. Increase the dither's gain",
             name=model.run.model.name,
         )
 

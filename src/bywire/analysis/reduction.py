@@ -230,8 +230,8 @@ def frequencies(full: LinearModel, reduced: LinearModel, high: float) -> Array:
     same = ("inputs", "outputs", "period")
     if any(getattr(full, name) != getattr(reduced, name) for name in same):
         raise ParameterError(
-            f"{full.name} and {reduced.name} have different inputs, outputs or sample times: only "
-            "models with the same signals can be compared",
+            f"{full.name} and {reduced.name} cannot be compared because their inputs, outputs or "
+            "sample times differ",
             name=reduced.name,
         )
     nyquist = 0.5 / full.period if full.period else math.inf
@@ -316,14 +316,14 @@ def residualized(
     if second and (np.any(size == 0.0) or np.linalg.cond(inner / size[:, None]) > _NO_REST):
         names = ", ".join(model.states[k] for k in second)
         raise ParameterError(
-            f"{model.name}: the states left out ({names}) have no steady state, as one of them "
-            "integrates: keep it",
+            f"{model.name}: the omitted states ({names}) have no steady state because one of them "
+            "integrates. Keep the integrating state",
             name="states",
             value=names,
         )
     if corrected and model.period:
         raise ParameterError(
-            f"{model.name}: only continuous models can be corrected, but this one is sampled",
+            f"{model.name} is a sampled model, but bywire can correct only continuous models",
             name=model.name,
         )
     A21, A12 = model.A[np.ix_(second, first)], model.A[np.ix_(first, second)]
@@ -433,15 +433,15 @@ def reduce(
     high, n = _band(full, band), len(acting)
     if not acting:
         raise ParameterError(
-            f"{full.name}: no input reaches an output, for instance because of stiction, so "
-            "it cannot be reduced",
+            f"{full.name} cannot be reduced because no input affects an output, for instance "
+            "because of stiction",
             name=full.name,
         )
     lasts = lasting(full)
     kept = sum(lasts(pole) for pole in full.poles())
     least = max(kept, 1)
     if order is not None and not least <= order <= n:
-        states = f"as {full.name} has {n} effective states, {kept} of them not stable"
+        states = f"because {full.name} has {n} effective states, {kept} of them not stable"
         raise not_valid("order", str(order), f">= {least} and <= {n}", states)
     if not 0.0 < tolerance < 1.0:
         raise not_valid("tolerance", f"{tolerance:g}", "> 0 and < 1")
@@ -454,8 +454,8 @@ def reduce(
             return Reduced(rung.model, error, kept, rung.hankel, rung.bound)
         best = min(best, error.relative)
     raise ParameterError(
-        f"{full.name}: no order has an error below {100.0 * tolerance:g} % up to {high:g} Hz, the "
-        f"least is {100.0 * best:.2g} %; allow more, or take a lower band",
+        f"{full.name}: no order has an error below {100.0 * tolerance:g} % up to {high:g} Hz (the "
+        f"smallest error is {100.0 * best:.2g} %). Increase the tolerance, or use a lower band",
         name="tolerance",
         value=f"{100.0 * tolerance:g} %",
         valid=f">= {100.0 * best:.2g} %",

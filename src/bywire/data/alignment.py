@@ -209,7 +209,7 @@ def _quality(measurement: xr.Dataset, name: str, longest: float | None) -> Chann
     signal = measurement[name]
     if signal.ndim != 1:
         raise ParameterError(
-            f"{name} has the dimensions {', '.join(map(str, signal.dims))}: choose one case",
+            f"{name} has the dimensions {', '.join(map(str, signal.dims))}. Select one case",
             name=name,
             value=", ".join(map(str, signal.dims)),
         )
@@ -220,14 +220,16 @@ def _quality(measurement: xr.Dataset, name: str, longest: float | None) -> Chann
             _instants_of(measurement, name), signal.values, max_gap=longest, limits=limits
         )
     except ValueError as error:
-        raise ParameterError(f"{name} has {error}: at least two are needed", name=name) from None
+        raise ParameterError(
+            f"{name} has {error}, but at least two are needed", name=name
+        ) from None
 
 
 def _axis(qualities: dict[str, ChannelQuality], step: float, method: str) -> NDArray[np.float64]:
     """Return the multiples of the step within all channels."""
     margin = step / 2.0 if method == "average" else 0.0
     if not qualities:
-        raise ParameterError("no signal was chosen: name at least one", name="signals")
+        raise ParameterError("signals is empty. Specify at least one signal", name="signals")
     last_start = max(qualities, key=lambda name: qualities[name].start)
     first_stop = min(qualities, key=lambda name: qualities[name].stop)
     start, stop = qualities[last_start].start + margin, qualities[first_stop].stop - margin
@@ -236,16 +238,16 @@ def _axis(qualities: dict[str, ChannelQuality], step: float, method: str) -> NDA
         raise ParameterError(
             f"no interval of {step:g} s fits between the start of {last_start} at "
             f"{qualities[last_start].start:g} s and the end of {first_stop} at "
-            f"{qualities[first_stop].stop:g} s: choose a smaller interval, or signals that overlap",
+            f"{qualities[first_stop].stop:g} s. Use a smaller interval, or signals that overlap",
             name="interval",
             value=f"{step:g} s",
         )
     size = 8 * (last - first + 1) * (len(qualities) + 1)
     if size > room():
         raise ParameterError(
-            f"interval = {step:g} s would make {last - first + 1:.3g} samples of each signal, "
-            f"{size / 2**30:.3g} GiB, and {room() / 2**30:.3g} GiB are the limit: choose a "
-            "larger one, or fewer signals",
+            f"interval = {step:g} s would give {last - first + 1:.3g} samples of each signal, "
+            f"which need {size / 2**30:.3g} GiB of memory. The limit is {room() / 2**30:.3g} GiB. "
+            "Use a larger interval, or fewer signals",
             name="interval",
             value=f"{step:g} s",
         )
@@ -276,7 +278,7 @@ def _on_axis(
             flawed[_inside(stretch, axis, step, reach, ends=flaw == "clipped")] = True
     if flawed.all():
         raise ParameterError(
-            f"{name} has no values left after excluding {', '.join(left_out)}: check its limits, "
+            f"{name} has no values left after excluding {', '.join(left_out)}. Check its limits, "
             "or exclude less",
             name=name,
         )

@@ -67,18 +67,18 @@ class NoClockError(FileError):
 
 def _missing_units(file: Path, signals: Mapping[str, str], clock: str = "") -> MissingUnitsError:
     columns = [*map(quoted, signals.values()), *([quoted(clock)] if clock else [])]
-    each = "it has" if signals else "the time has"
+    only = "column" if signals else "time column"
     lacking = (
-        f"{file}, columns {', '.join(columns)}: they have no unit"
+        f"{file}: the columns {', '.join(columns)} have no unit"
         if len(columns) > 1
-        else f"{file}, column {columns[0]}: {each} no unit"
+        else f"{file}: the {only} {columns[0]} has no unit"
     )
     title, inside = f"{clock} [ms]", f'time = {{ column = "{clock}", unit = "ms" }}'
     for name, column in signals.items():
         title, inside = f"{column} [mm]", f"[signals.{name}] unit = 'mm'"
     text = (
-        f"{lacking}: write it after the title, as '{title}', or in a mapping, as "
-        f"{inside}; write '1' for a pure number"
+        f"{lacking}. Write the unit after the title, for instance '{title}', or in a mapping, for "
+        f"instance {inside}. The unit of a pure number is '1'"
     )
     return MissingUnitsError(text, lacking, signals, clock)
 
@@ -127,9 +127,9 @@ class Chosen:
             values += self.mapping.offset
         if unit_of(self.unit).reference == "absolute":
             notes.append(
-                f"{self.mapping.name}: its unit {self.unit!r} means absolute pressure, but "
-                "pressures of brakes are relative to ambient: offset = '-1.013 bar' in the mapping "
-                "subtracts a usual one"
+                f"{self.mapping.name} is an absolute pressure ({self.unit!r}), but brake pressures "
+                "are relative to ambient. Use offset = '-1.013 bar' in the mapping to subtract a "
+                "typical ambient pressure"
             )
         return notes
 
@@ -189,7 +189,7 @@ def choose(
     if not wanted:
         why = "; ".join(left_out_note(source.left_out))
         raise FileError(
-            f"{file} contains no signal: {_listing(source.columns)}" + (f"; {why}" if why else ""),
+            f"{file} contains no signal: {_listing(source.columns)}" + (f", {why}" if why else ""),
             name=str(file),
         )
     chosen: list[Chosen] = []
@@ -269,8 +269,10 @@ def _known_unit(unit: str, where: str) -> Scale:
         return unit_of(unit)
     except UnitError as error:
         raise UnitError(
-            f"{where}: {error}: write the unit in a mapping, for instance unit = 'bar', or '1' for "
-            "a pure number"
+            f"{where}: {error}. Specify the unit in a mapping, for instance unit = 'bar', or '1' "
+            "for a pure number",
+            name="unit",
+            value=unit,
         ) from None
 
 
@@ -281,9 +283,9 @@ def _require_same(signal: SignalMapping, column: Column, where: str) -> None:
     if (unit.factor, unit.zero, unit.powers) == (said.factor, said.zero, said.powers):
         return
     raise UnitError(
-        f"{where}: the file has {column.unit!r} and the mapping {signal.unit!r}: remove "
-        f"signals.{signal.name}.unit, or give signals.{signal.name}.scale, which states how "
-        f"many {signal.unit} the number 1 is",
+        f"{where}: the unit is {column.unit!r} in the file but {signal.unit!r} in the mapping. "
+        f"Remove signals.{signal.name}.unit, or set signals.{signal.name}.scale to the value of "
+        f"the number 1 in {signal.unit}",
         name=signal.name,
         value=str(signal.unit),
         valid=column.unit,
@@ -300,13 +302,12 @@ def _clock(file: Path, source: Source, column: Column, given: Clock | None) -> C
         name = column.clock or usual_clock(source)
         if name is None:
             before = (
-                "; if other lines precede the table, give their number as skip_lines in a mapping"
+                ". If other lines precede the table, set skip_lines in a mapping to their number"
             )
             why = "; ".join(("", *left_out_note(source.left_out)))
             raise NoClockError(
-                f"{file} does not state when it was measured: name a column 'time [s]', or write "
-                "in a mapping "
-                'time = { column = "t", unit = "ms" } or rate = "1 kHz"; '
+                f"{file} has no time column. Rename a column 'time [s]', or add "
+                'time = { column = "t", unit = "ms" } or rate = "1 kHz" to a mapping: '
                 + _listing(source.columns)
                 + (before if len(source.columns) == 1 or source.remarks else "")
                 + why,
@@ -319,7 +320,7 @@ def _clock(file: Path, source: Source, column: Column, given: Clock | None) -> C
         raise _missing_units(file, {}, clock.name)
     if not measures(_known_unit(unit, where), "s"):
         raise UnitError(
-            f"{where}: {unit!r} is not a unit of time: choose another column",
+            f"{where}: {unit!r} is not a unit of time. Choose another column",
             name=clock.name,
             value=unit,
         )
@@ -354,7 +355,7 @@ def _column(file: Path, source: Source, name: str, key: str, number: int = 0) ->
     if number:
         if number > len(order):
             raise FileError(
-                f"{file} has no column {number} ({key}): it has {len(order)} columns",
+                f"{file} has no column {number} ({key}), only {len(order)} columns",
                 name=key,
                 value=str(number),
                 valid=str(len(order)),
@@ -368,7 +369,9 @@ def _column(file: Path, source: Source, name: str, key: str, number: int = 0) ->
     reason = source.left_out.get(name) or source.left_out.get(title)
     if reason is not None:
         raise FileError(
-            f"{file}: the column {quoted(name)} ({key}) is not read: {reason}", name=key, value=name
+            f"{file}: bywire does not read the column {quoted(name)} ({key}): {reason}",
+            name=key,
+            value=name,
         )
     many = [other for other in columns if other.rpartition("@")[0] == name]
     near = many or get_close_matches(name, columns, n=3, cutoff=0.5)

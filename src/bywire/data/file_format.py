@@ -192,8 +192,9 @@ def library(name: str, what: str, extra: str = "measurements") -> ModuleType:
         return importlib.import_module(name)
     except ImportError:
         raise FileError(
-            f"{what} need the library {name.partition('.')[0]}, which is not installed; "
-            f"{how_to_install(extra)}"
+            f"{what} need the library {name.partition('.')[0]}, which is not installed. "
+            f"Install it {how_to_install(extra)}",
+            name=name.partition(".")[0],
         ) from None
 
 
@@ -230,8 +231,8 @@ def require_room(
     size = 8 * sum(source.columns[name].length or 0 for name in wanted)
     if size > most:
         raise FileError(
-            f"{file} declares {size / 2**30:.3g} GiB of numbers in {len(wanted)} columns,"
-            f" and {most / 2**30:.3g} GiB are the limit: choose fewer signals, or check the "
-            "file where it is much smaller",
+            f"{file} declares {size / 2**30:.3g} GiB of numbers in {len(wanted)} columns, but the "
+            f"limit is {most / 2**30:.3g} GiB. Read fewer signals. If the file itself is much "
+            "smaller, it is damaged",
             name=str(file),
         )

@@ -14,18 +14,18 @@ _HEAD = 1024
 
 # Known files that bywire does not read, by their first bytes: description and alternative.
 _NOT_READ = (
-    (b"TDSm", "a TDMS file of LabVIEW", "export it as CSV or LVM, or as MDF 4 with DIAdem"),
-    (b"LOGG", "a BLF file of Vector", "export its signals as MDF 4, which CANoe and CANalyzer do"),
-    (b"TDEX", "a TDX file of DIAdem", "export it as CSV or MDF 4 with DIAdem"),
-    (b"|CF,", "a FAMOS file of imc", "export it as CSV or MDF 4 with FAMOS"),
-    (b"\xd0\xcf\x11\xe0", "an Excel workbook (.xls)", "save its sheet as 'CSV UTF-8'"),
-    (b"PK\x03\x04", "a ZIP archive, as .xlsx and .ods are", "save its sheet as 'CSV UTF-8'"),
-    (b"\x1f\x8b", "compressed with gzip", "unpack it first"),
-    (b"7z\xbc\xaf", "compressed with 7-Zip", "unpack it first"),
-    (b"#ROSBAG", "a bag of ROS", "export its topics as CSV"),
-    (b"\x89MCAP", "an MCAP file of ROS 2", "export its topics as CSV"),
-    (b"SQLite format 3", "an SQLite database", "export its table as CSV"),
-    (b"%PDF", "a PDF file", "ask for its source data"),
+    (b"TDSm", "a LabVIEW TDMS file", "Export it as CSV or LVM, or as MDF 4 with DIAdem"),
+    (b"LOGG", "a Vector BLF file", "Export its signals as MDF 4 with CANoe or CANalyzer"),
+    (b"TDEX", "a DIAdem TDX file", "Export it as CSV or MDF 4 with DIAdem"),
+    (b"|CF,", "an imc FAMOS file", "Export it as CSV or MDF 4 with FAMOS"),
+    (b"\xd0\xcf\x11\xe0", "an Excel workbook (.xls)", "Save its sheet as 'CSV UTF-8'"),
+    (b"PK\x03\x04", "a ZIP archive (like .xlsx and .ods)", "Save its sheet as 'CSV UTF-8'"),
+    (b"\x1f\x8b", "compressed with gzip", "Unpack it first"),
+    (b"7z\xbc\xaf", "compressed with 7-Zip", "Unpack it first"),
+    (b"#ROSBAG", "a ROS bag", "Export its topics as CSV"),
+    (b"\x89MCAP", "a ROS 2 MCAP file", "Export its topics as CSV"),
+    (b"SQLite format 3", "an SQLite database", "Export its table as CSV"),
+    (b"%PDF", "a PDF file", "Request the source data"),
 )
 _ASC_OF_VECTOR = (b"date ", b"base ")  # how an ASC log of a bus begins
 
@@ -54,7 +54,8 @@ def format_to_read(path: Path, name: str = "") -> FileFormat:
     head = head_of(path)
     if not head:
         raise FileError(
-            f"{path} is empty (0 bytes): was the recording stopped or the copy cut?", name=str(path)
+            f"{path} is empty (0 bytes). The recording or the copy may have been interrupted",
+            name=str(path),
         )
     _require_readable(path, head)
     holds = [kind for kind in FORMATS.all().values() if kind.recognizes(head)]
@@ -63,18 +64,20 @@ def format_to_read(path: Path, name: str = "") -> FileFormat:
             return kind
     if not wanted:
         raise FileError(
-            f"{path} is in no known format: known are {_names()}", name=str(path), valid=_names()
+            f"{path} is not in a known format. Known formats are {_names()}",
+            name=str(path),
+            valid=_names(),
         )
     said = f"format = {name!r}" if name else f"its ending {path.suffix!r}"
     if holds:
-        content, hint = holds[0].title, f"rename it, or give format = {holds[0].name!r}"
+        content, hint = holds[0].title, f"Rename it, or specify format = {holds[0].name!r}"
     else:
         content = f"something else (it begins with {quoted(head[:8])})"
-        hint = "export it again from the program that recorded it"
+        hint = "Export it again from the program that recorded it"
         if wanted[0].name == "mat":
-            hint = "if it is a MAT file of version 4, save it with '-v7' in MATLAB"
+            hint = "If it is a MAT file of version 4, save it with '-v7' in MATLAB"
     raise FileError(
-        f"{path} contains {content}, not {wanted[0].title} as {said} declares: {hint}",
+        f"{path} contains {content}, not {wanted[0].title} as {said} declares. {hint}",
         name=str(path),
     )
 
@@ -83,10 +86,10 @@ def _require_readable(path: Path, head: bytes) -> None:
     """Reject files that bywire cannot read, with an alternative."""
     for mark, what, way in _NOT_READ:
         if head.startswith(mark):
-            raise FileError(f"{path} is {what}, which bywire does not read: {way}", name=str(path))
+            raise FileError(f"{path} is {what}, which bywire does not read. {way}", name=str(path))
     if head[:5].lower() in _ASC_OF_VECTOR and b"base hex" in head.lower():
         raise FileError(
-            f"{path} is an ASC log of bus messages, whose signals are not decoded: export its "
+            f"{path} is an ASC log of bus messages, which bywire does not decode. Export its "
             "signals as MDF 4 with the program that recorded it",
             name=str(path),
         )
@@ -108,7 +111,7 @@ def format_to_write(path: Path, name: str = "") -> FileFormat:
         return kind
     endings = ", ".join(dict.fromkeys(e for kind in FORMATS.all().values() for e in kind.endings))
     raise FileError(
-        f"{path}: the ending {path.suffix!r} belongs to no format: use {endings}",
+        f"{path}: {path.suffix!r} is not the ending of a known format. Use {endings}",
         name=str(path),
         value=path.suffix,
         valid=endings,
@@ -139,12 +142,12 @@ def head_of(path: Path) -> bytes:
     try:
         if path.exists() and not path.is_file():
             raise FileError(
-                f"{path} is not a file: give the path of a measurement file", name=str(path)
+                f"{path} is not a file. Specify the path of a measurement file", name=str(path)
             )
         with path.open("rb") as stream:
             return stream.read(_HEAD)
     except (OSError, ValueError) as error:  # ValueError: a null character in the path
         reason = error.strerror if isinstance(error, OSError) else NULL_CHARACTER
         raise FileError(
-            f"{path} cannot be read ({reason}): check the path and its permissions", name=str(path)
+            f"{path} cannot be read ({reason}). Check the path and its permissions", name=str(path)
         ) from None

@@ -223,9 +223,9 @@ class LimitedSource:
             if limit := address_space():
                 raise self._too_small(limit)
             raise FileError(
-                f"{self._path} takes more than {self._memory / 2**30:.3g} GiB of memory to read: "
-                "it is damaged or malicious; if it is intact, choose fewer signals, "
-                "or write it again in smaller pieces",
+                f"{self._path} needs more than {self._memory / 2**30:.3g} GiB of memory to read, "
+                "so it may be damaged or malicious. If the file is intact, read fewer signals, or "
+                "write it again in smaller pieces",
                 name=str(self._path),
             )
         if "ended" in answer:
@@ -238,15 +238,15 @@ class LimitedSource:
             most = min(self._seconds, self._kind.opening) if is_quick else self._seconds
             return FileError(
                 f"{self._path}: {'reading' if self._is_open else 'opening'} made no progress for "
-                f"{most:g} s: it is damaged or malicious; "
-                "if it is intact, copy it to a local disk or choose fewer signals",
+                f"{most:g} s, so the file may be damaged or malicious. If it is intact, copy it to "
+                "a local disk, or read fewer signals",
                 name=str(self._path),
             )
         if limit := address_space():
             return self._too_small(limit)
         return FileError(
-            f"{self._path}: the library that reads {self._kind.title} failed on it ({reason}): "
-            f"it is damaged, or needs more than {self._memory / 2**30:.3g} GiB of memory: copy or "
+            f"{self._path}: the library that reads {self._kind.title} failed ({reason}). The file "
+            f"is damaged, or needs more than {self._memory / 2**30:.3g} GiB of memory. Copy or "
             "export it again",
             name=str(self._path),
         )
@@ -260,15 +260,15 @@ class LimitedSource:
     def _torn(self, name: str, size: int, declared: int) -> FileError:
         return FileError(
             f"{self._path} is damaged: {name!r} declares {declared} numbers, but {size} "
-            "were read: copy it again, or export it again from its source",
+            "were read. Copy it again, or export it again from its source",
             name=name,
         )
 
 
 def _limited_to(limit: int) -> str:
     return (
-        f"; the address space of this process is limited to {limit / 2**30:.3g} GiB (ulimit -v): "
-        "if the file is intact, raise that limit, for example with ulimit -v unlimited"
+        f". The address space of this process is limited to {limit / 2**30:.3g} GiB (ulimit -v). "
+        "If the file is intact, raise the limit, for example with ulimit -v unlimited"
     )
 
 
@@ -295,15 +295,15 @@ def limited(path: Path, kind: FileFormat, seconds: float | None = None) -> Itera
         library = name.partition(".")[0]
         if find_spec(library) is None:
             raise FileError(
-                f"{path}: {kind.title} needs the library {library}, which is not installed; "
-                f"{how_to_install('measurements')}",
+                f"{path}: {kind.title} needs the library {library}, which is not installed. "
+                f"Install it {how_to_install('measurements')}",
                 name=library,
             )
     memory = min(MOST_MEMORY, int(machine_memory() / 2))
     if not _IS_LINUX:
         warnings.warn(
-            f"on this system bywire limits only the time to read {kind.title}, not the memory: "
-            "open untrusted files on Linux only",
+            f"on this system bywire limits only the time to read {kind.title}, not the memory. "
+            "Open untrusted files on Linux only",
             stacklevel=2,
         )
     module = kind.open.__module__

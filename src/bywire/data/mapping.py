@@ -198,7 +198,7 @@ class MappingFile(_Marked):
     decimal: Annotated[Literal["", ".", ","], Hint("it must be '.' or ','")] = ""
     skip_lines: Annotated[int, Field(ge=0, le=10_000)] = 0
     titles: Annotated[
-        bool | None, Hint("it must be true or false, whether the first row holds titles")
+        bool | None, Hint("it must be true or false: whether the first row contains titles")
     ] = None
     encoding: _Quoted = ""
 
@@ -260,7 +260,7 @@ def _signal(name: str, section: SignalSection, place: str) -> SignalMapping:
     symbol = si_symbol(unit_of(unit)) if unit else ""
     needs_unit = [key for key in ("offset", "limits") if key in section.given and not symbol]
     if needs_unit:
-        text = f"{where}{needs_unit[0]} needs a unit: give the unit of the signal"
+        text = f"{where}{needs_unit[0]} needs the signal's unit. Add the key unit"
         raise UnitError(text, name="unit")
     if section.scale == 0.0:
         raise not_valid(f"{where}scale", "0", "another number", "or all values are equal")
@@ -298,7 +298,7 @@ def _difference(value: Any, symbol: str, where: str) -> float:
     unit = units.split(value)[1] if isinstance(value, str) else ""
     if unit and units.has_own_zero(unit, symbol):
         raise UnitError(
-            f"{where}offset = {quoted(value)}: give the difference in {symbol}",
+            f"{where}offset = {quoted(value)} is ambiguous. Specify the difference in {symbol}",
             name="offset",
             value=quoted(value),
             valid=symbol,
@@ -318,20 +318,22 @@ def _clock(
     number, column = _numbered(time.column)
     if bool(column) == (rate is not None):
         raise ParameterError(
-            f"{where}time.column or {where}rate: give exactly one of them, as "
+            f"{where}needs either time or rate, for instance "
             'time = { column = "t", unit = "ms" } or rate = "1 kHz"',
             name="time",
         )
     unit = _unit(time.unit, f"{where}time.")
     if unit and si_symbol(unit_of(unit)) != "s":
         raise UnitError(
-            f"{where}time.unit = {quoted(unit)} is not a unit of time: write for instance 'ms'",
+            f"{where}time.unit = {quoted(unit)} is not a unit of time. Use for instance 'ms'",
             name="time.unit",
             value=quoted(unit),
+            valid="'ms'",
         )
     if column and start is not None:
         raise ParameterError(
-            f"{where}start needs a rate: a time column has its own instants", name="start"
+            f"{where}start is valid only with a rate, as a time column defines its own instants",
+            name="start",
         )
     return Clock(column, unit, rate or 0.0, start or 0.0, number)
 
@@ -342,8 +344,10 @@ def _unit(text: str, where: str) -> str:
             unit_of(text.strip())
     except UnitError as error:
         raise UnitError(
-            f"{where}unit = {quoted(text)}: {error}: write for instance 'bar', or '1' for a pure "
-            "number"
+            f"{where}unit = {quoted(text)}: {error}. Use for instance 'bar', or '1' for a pure "
+            "number",
+            name="unit",
+            value=quoted(text),
         ) from None
     return text.strip()
 

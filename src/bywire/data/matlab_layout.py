@@ -31,8 +31,8 @@ _SIMULINK = re.compile(_SIGNAL.format("signals", "values"))
 _DSPACE = re.compile(_SIGNAL.format("Y", "Data"))
 _SERIES = re.compile(r"(?P<scope>.+)\.(?:Data|data)(?P<column>\(:,[0-9]+\)|\([0-9]+,:\))?")
 OBJECT = (
-    "it is an object of MATLAB, such as a timeseries or a Dataset, which only MATLAB can read: "
-    "save its times and values as arrays, as t = ts.Time; y = ts.Data"
+    "it is a MATLAB object, such as a timeseries or a Dataset, which only MATLAB can read. Save "
+    "its times and values as arrays, for instance t = ts.Time and y = ts.Data"
 )
 """reason to skip an object"""
 
@@ -212,7 +212,8 @@ def described(dataset: xr.Dataset, path: Path) -> dict[str, dict[str, str]]:
         if not _NAME.fullmatch(name) or name in (*NOTES, CLOCKS):
             raise FileError(
                 f"cannot write {path}: {quoted(name)} is not a valid variable name in MATLAB "
-                "(letters, digits and _ after a letter): choose another name in a mapping"
+                "(letters, digits and _ after a letter). Choose another name in a mapping",
+                name=name,
             )
     structs = {
         struct: {n: str(dataset[n].attrs.get(key, "")) for n in (*signals, *axes)}

@@ -82,16 +82,19 @@ def instants(
     else:
         if column.size != key.length:
             raise FileError(
-                f"{file}: {column.size} instants in {clock.column!r} for signals of {key.length} "
-                "samples: choose the right time for each in a mapping, as "
-                '[signals.NAME] time = { column = "t" }'
+                f"{file}: the time column {clock.column!r} has {column.size} instants, but its "
+                f"signals have {key.length} samples. Specify the right time column of each signal "
+                'in a mapping, for instance [signals.NAME] time = { column = "t" }',
+                name=clock.column,
+                value=str(column.size),
+                valid=str(key.length),
             )
         time = _measured(file, source, clock, column)
         if key.delay:
             time -= key.delay
     if time.size < 2:
         raise FileError(
-            f"{file} has too few rows ({time.size}): it needs at least two",
+            f"{file} has too few rows ({time.size}), as at least two are needed",
             name=str(file),
             value=str(time.size),
         )
@@ -109,10 +112,11 @@ def _measured(
         now, before = float(time[bad]), float(time[bad - 1]) if bad else np.nan
         if np.isfinite(now):
             what = "is repeated" if now == before else f"comes after {before:.10g}"
-            fix = "time must increase: sort the rows, remove repeated ones"
+            fix = "Time must increase. Sort the rows, and remove repeated ones"
         else:
-            what, fix = "is not an instant", "remove the row"
-        raise FileError(f"{where}: {now:.10g} {clock.unit} {what}: {fix}")
+            what, fix = "is not an instant", "Remove the row"
+        value = f"{now:.10g} {clock.unit}"
+        raise FileError(f"{where}: {value} {what}. {fix}", name=clock.column, value=value)
     convert_in_place(time, unit_of(clock.unit), "s")
     return time
 
@@ -265,12 +269,12 @@ def opened(file: Path, meaning: MeasurementMapping) -> Iterator[Source]:
         raise
     except MemoryError:
         raise FileError(
-            f"{file} does not fit into memory: read fewer signals at a time", name=str(file)
+            f"{file} does not fit into memory. Read fewer signals at a time", name=str(file)
         ) from None
     except OSError as error:
         reason = error.strerror or str(error)
         raise FileError(
-            f"{file} cannot be read ({reason}): it may be damaged or cut", name=str(file)
+            f"{file} cannot be read ({reason}). It may be damaged or incomplete", name=str(file)
         ) from None
 
 
@@ -331,8 +335,8 @@ def _timed(
     """Return the numbers that have instants; numbers after the end of a clock must be blank."""
     if not np.isnan(numbers[count:]).all():
         raise FileError(
-            f"{file}, column {signal.column!r}: it has numbers after the last instant of "
-            f"{signal.clock.column!r}: give the signal its own time in a mapping",
+            f"{file}: the column {signal.column!r} has numbers after the last instant of "
+            f"{signal.clock.column!r}. Specify its own time column in a mapping",
             name=signal.column,
         )
     return numbers[:count]
@@ -347,8 +351,8 @@ def _dimensions(chosen: Sequence[Chosen], keys: Sequence[_AxisKey]) -> dict[_Axi
     for signal in chosen:
         if signal.mapping.name in dimensions.values():
             raise ParameterError(
-                f"signal {quoted(signal.mapping.name)} has the name of a time axis: "
-                "give it another one in a mapping",
+                f"signal {quoted(signal.mapping.name)} has the same name as a time axis. "
+                "Choose another name in a mapping",
                 name=signal.mapping.name,
             )
     return dimensions
@@ -455,8 +459,8 @@ def _names(file: Path, source: Source, meaning: MeasurementMapping) -> tuple[str
     if not names:
         there = ", ".join(source.columns)
         raise FileError(
-            f"{file}: none of its columns {quoted(there)} beside time has a name: add a first row, "
-            "as 'time [s], pedal [mm]', or name them in a mapping",
+            f"{file}: the columns {quoted(there)} have no names. Add a first row such as "
+            "'time [s], pedal [mm]', or specify names in a mapping",
             name=str(file),
         )
     return names
@@ -470,9 +474,8 @@ def _chosen(file: Path, source: Source, meaning: MeasurementMapping, name: str) 
     near = [c for c in source.columns if c.casefold() == said.column.casefold()]
     if len(near) > 1:
         raise FileError(
-            f"{file}, column {quoted(said.column)}: the name occurs twice (upper and lower "
-            "case count as equal): rename "
-            "one of them",
+            f"{file} has two columns named {quoted(said.column)} (case is ignored). Rename one of "
+            "them",
             name=said.column,
         )
     return replace(said, column=near[0]) if near else said
@@ -483,8 +486,8 @@ def _require_quantity(file: Path, source: Source, signal: xr.DataArray, symbol: 
         column = signal.attrs["column"]
         unit = source.columns[column].unit or signal.attrs["units"]
         raise UnitError(
-            f"{file}, column {quoted(column)}: {quoted(unit)} has the wrong unit, it cannot be "
-            f"converted to {symbol}: choose a column in {display_unit(symbol)} or a unit like it",
+            f"{file}, column {quoted(column)}: {quoted(unit)} cannot be converted to {symbol}. "
+            f"Choose a column in {display_unit(symbol)}, or in another unit of this quantity",
             name=column,
             value=unit,
             valid=symbol,
@@ -498,8 +501,9 @@ def _require_whole(file: Path, source: Source, signal: xr.DataArray, longest: fl
     missing = np.flatnonzero(np.isnan(signal.values))
     if missing.size:
         raise FileError(
-            f"{file}, {source.place(column, int(missing[0]))}, column {quoted(column)}: blank or "
-            "NaN is not a measured value: fill it in or remove the row"
+            f"{file}, {source.place(column, int(missing[0]))}, column {quoted(column)}: the value "
+            "is missing (blank or NaN). Fill it in, or remove the row",
+            name=column,
         )
     time = signal[signal.dims[0]].values
     steps = np.diff(time)
@@ -509,8 +513,10 @@ def _require_whole(file: Path, source: Source, signal: xr.DataArray, longest: fl
         most = float(np.max(steps[gaps]))
         raise FileError(
             f"{file}, {source.place(column, k + 1)}: a gap of {steps[k]:.4g} s after "
-            f"{time[k]:.6g} s ({gaps.size} in the file, the longest {most:.4g} s; max_gap is "
-            f"{longest:g} s): fill it in, or, to bridge it with a straight line, allow "
-            f'it with max_gap="{1.01 * most:.3g} s"',
-            name=column,
+            f"{time[k]:.6g} s exceeds max_gap = {longest:g} s ({gaps.size} in the file, the "
+            f"longest {most:.4g} s). Fill it in, or bridge it with a straight line: "
+            f'max_gap="{1.01 * most:.3g} s"',
+            name="max_gap",
+            value=f"{longest:g} s",
+            valid=f"{1.01 * most:.3g} s",
         )

@@ -127,7 +127,9 @@ def renamed(data: xr.Dataset, named: NamedColumns) -> xr.Dataset:
         When a time column is named, since signals in memory already have instants.
     """
     if named.time:
-        raise ParameterError(f"{option('time')} is for measurement files: remove it", name="time")
+        raise ParameterError(
+            f"{option('time')} is valid only for measurement files. Leave it out", name="time"
+        )
     for name, column in named.signals.items():
         if column not in data:
             raise unknown_name("signal", column, [str(each) for each in data.data_vars])
@@ -168,10 +170,10 @@ def _shown_units(named: NamedColumns | None) -> Iterator[None]:
         yield
     except MissingUnitsError as error:
         typed = _options(error.signals, error.clock, named)
-        raise UnitError(f"{error.lacking}: type {typed}, {_BRACKETS}") from None
+        raise UnitError(f"{error.lacking}. Use {typed}, {_BRACKETS}", name="unit") from None
     except NoClockError as error:
         typed = _options(error.signals, "COLUMN", named)
-        raise FileError(f"{error}; or type {typed}, {_BRACKETS}") from None
+        raise FileError(f"{error}. Or use {typed}, {_BRACKETS}", name="time") from None
 
 
 def _options(signals: Mapping[str, str], clock: str, named: NamedColumns | None) -> str:

@@ -61,7 +61,7 @@ def write_recording(recording: xr.Dataset, path: str | Path) -> Path:
     except (OSError, RuntimeError, ValueError) as error:  # RuntimeError: from the HDF library
         reason = getattr(error, "strerror", None) or str(error)
         raise FileError(
-            f"cannot write {path}: {reason}: free some space there, or choose a writable folder",
+            f"cannot write {path}: {reason}. Free some space there, or choose a writable folder",
             name=str(path),
         ) from None
     return path
@@ -89,8 +89,8 @@ def read_recording(path: str | Path) -> xr.Dataset:
     file = Path(path)
     if not NETCDF.recognizes(head_of(file)):
         raise FileError(
-            f"cannot read recording {file}: it is not a NetCDF file; bywire convert and "
-            "read_measurement read other formats",
+            f"cannot read recording {file}: it is not a NetCDF file. Use bywire convert or "
+            "read_measurement for other formats",
             name=str(file),
         )
     with limited(file, FORMAT) as source:

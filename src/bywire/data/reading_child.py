@@ -83,7 +83,7 @@ def main(module: str, is_forking: bool) -> None:
     while (request := receive(requests)) is not None:
         if missing:
             what = f"{request['path']}: the library that reads {kind.title} cannot be loaded"
-            text = f"{what} ({missing}): install it again"
+            text = f"{what} ({missing}). Install it again"
             send(answers, {"error": text, "is_of_library": True})
         elif not is_forking:
             _serve(kind, request, requests, answers)
@@ -141,11 +141,11 @@ def _serve(
         if isinstance(error, LookupError) or not reason:
             reason = "its parts are inconsistent"
         what = f"{path} is damaged: bywire cannot read it as {kind.title} ({reason})"
-        hint = "copy it again, or export it again from its source"
+        hint = "Copy it again, or export it again from its source"
         if getattr(error, "errno", None) == errno.ENOSPC:
             what = f"{path} cannot be read: there is no space for the library's temporary files"
-            hint = "free some space there, or set TMPDIR to another folder"
-        send(answers, {"error": f"{what}: {hint}", "is_of_library": True})
+            hint = "Free some space there, or set TMPDIR to another folder"
+        send(answers, {"error": f"{what}. {hint}", "is_of_library": True})
 
 
 def _limit(memory: int) -> None:

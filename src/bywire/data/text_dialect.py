@@ -151,7 +151,8 @@ class Head:
             return cells_of(self.plain(line), separator)
         except csv.Error as error:
             raise FileError(
-                f"{self.path}, line {line + 1}: {error}: check its quotation marks"
+                f"{self.path}, line {line + 1}: {error}. Check its quotation marks",
+                name=str(self.path),
             ) from None
 
     def table(
@@ -210,9 +211,16 @@ def dialect_of(head: Head) -> Dialect:
     while begin < len(head.lines) and (head.is_blank(begin) or _is_comment(head.plain(begin))):
         begin += 1
     if begin >= len(head.lines):
-        raise FileError(f"{path} has no rows after {options.skip_lines} skipped lines")
+        raise FileError(
+            f"{path} has no rows after {options.skip_lines} skipped lines", name=str(path)
+        )
     if chosen and chosen not in SEPARATORS:
-        raise FileError(f"{path}: its first line names the separator {quoted(chosen)}: use ';'")
+        raise FileError(
+            f"{path}: the separator {quoted(chosen)} in the first line is not valid. Use ';'",
+            name=str(path),
+            value=quoted(chosen),
+            valid="';'",
+        )
     dialect = None
     if first is not None and options.titles is None:
         dialect, begin = _from_numbers(head, at, begin, *first)
@@ -221,12 +229,13 @@ def dialect_of(head: Head) -> Dialect:
         dialect = _headed(head, begin, separator, options.titles)
     if dialect.separator == "," and options.decimal == ",":
         raise FileError(
-            f"{path}: a comma cannot be both column separator and decimal mark: write decimal = '.'"
+            f"{path}: a comma cannot be both column separator and decimal mark. Set decimal = '.'",
+            name="decimal",
         )
     before = [k for k in range(at, begin) if not head.is_blank(k)]
     if before:
         note = (
-            f"{len(before)} lines before the table are skipped, from line {before[0] + 1} "
+            f"bywire skips {len(before)} lines before the table, from line {before[0] + 1} "
             f"({quoted(head.plain(before[0]).strip())}) to {before[-1] + 1}"
         )
         dialect = replace(dialect, notes=(note, *dialect.notes))
@@ -276,9 +285,11 @@ def with_mark(path: Path, dialect: Dialect, indices: Sequence[int]) -> Dialect:
         before, (number, k, cell) = sorted(first.values())
         raise FileError(
             f"{path}, line {number}, column {quoted(dialect.label(k))}: {quoted(cell)} mixes "
-            f"decimal comma and decimal point ({quoted(before[2])} in line {before[0]}), columns "
-            f"separated by {SEPARATORS[dialect.separator]}: write all numbers with one of them, "
-            "without a thousands separator"
+            f"decimal comma and decimal point ({quoted(before[2])} in line {before[0]}). Columns "
+            f"are separated by {SEPARATORS[dialect.separator]}. Use one decimal mark for all "
+            "numbers, and no thousands separator",
+            name=dialect.label(k),
+            value=quoted(cell),
         )
     return replace(dialect, decimal=next(iter(first), "."))
 
@@ -343,13 +354,13 @@ def _from_numbers(
         titles, units = _titles_of(rows[start], rows[alike[-1]] if has_units else [])
         notes += _doubtful_titles(titles, start)
         if _is_comment(head.plain(start)):
-            notes.append(f"line {start + 1} is a comment, but read as titles")
+            notes.append(f"bywire reads the comment in line {start + 1} as titles")
     elif above and above[-1] == begin:
         return None, begin  # a header that does not match the rows
     elif above and start > begin:
         notes.append(
-            f"the columns have no titles, since line {above[-1] + 1} does not match the rows "
-            "below it: they are named 1, 2, ..."
+            f"line {above[-1] + 1} does not match the rows below it, so the columns have no titles "
+            "and their names are 1, 2, ..."
         )
     # Sentences contain blanks too; with this separator, a row must start with its number.
     first_ones = 1 if separator == " " else None
@@ -373,8 +384,8 @@ def _doubtful_titles(titles: list[str], line: int) -> list[str]:
     if number is None:
         return []
     return [
-        f"line {line + 1} is read as titles although it holds numbers ({quoted(number)}): "
-        "titles = false in the mapping reads it as a row"
+        f"bywire reads line {line + 1} as titles although it contains numbers ({quoted(number)}). "
+        "Set titles = false in the mapping to read it as a row"
     ]
 
 
@@ -504,8 +515,9 @@ def _lvm(head: Head) -> Dialect:
     ends = [k for k in range(len(head.lines)) if head.lines[k].startswith(END_OF_HEADER)]
     if len(ends) < 2:
         raise FileError(
-            f"{head.path}: it is a file of LabVIEW without a table: its header has no second "
-            f"line {END_OF_HEADER!r}"
+            f"{head.path} is a LabVIEW file without a table: its header has no second line "
+            f"{END_OF_HEADER!r}",
+            name=str(head.path),
         )
     for k in range(ends[1]):
         words = head.plain(k).replace(",", "\t").replace(";", "\t").split("\t")
@@ -543,7 +555,11 @@ def _lvm(head: Head) -> Dialect:
     if columns == "No":
         step = _number(head, entries, "Delta_X", 0.0)
         if not step > 0.0:
-            raise FileError(f"{head.path}: it has no X columns, and its Delta_X is {step:g}")
+            raise FileError(
+                f"{head.path} has no X columns, and its Delta_X = {step:g} is not valid",
+                name="Delta_X",
+                value=f"{step:g}",
+            )
         raster = (_number(head, entries, "X0", 0.0), step)
     mark = _first(entries, "Decimal_Separator")
     named = zip((*titles, *[""] * width), dialect.kinds, strict=False)
@@ -572,7 +588,9 @@ def _number(head: Head, entries: dict[str, list[str]], name: str, default: float
         return float(text) if text else default
     except ValueError:
         raise FileError(
-            f"{head.path}: {name} = {quoted(text)} in its header is not a number"
+            f"{head.path}: {name} = {quoted(text)} in its header is not a number",
+            name=name,
+            value=quoted(text),
         ) from None
 
 
@@ -583,7 +601,9 @@ def _vbox(head: Head) -> Dialect:
         (k for k in range(len(head.lines)) if head.lines[k].strip().casefold() == "[data]"), None
     )
     if begin is None or not names:
-        raise FileError(f"{head.path}: it is a file of a VBOX without column names or [data]")
+        raise FileError(
+            f"{head.path} is a VBOX file without column names or [data]", name=str(head.path)
+        )
     at = begin + 1
     while at < len(head.lines) and head.is_blank(at):
         at += 1

@@ -94,8 +94,10 @@ def blocks_of(path: Path, encoding: str, size: int = _BLOCK) -> Iterator[bytes]:
             except UnicodeDecodeError as error:
                 line = lines + 1 + block[: error.start].count(b"\n")
                 raise FileError(
-                    f"{path}, line {line}: it is not text in {encoding}: give the right encoding "
-                    "in the mapping, as encoding = 'cp1252'"
+                    f"{path}, line {line} is not {encoding} text. Specify the right encoding in "
+                    "the mapping, for instance encoding = 'cp1252'",
+                    name="encoding",
+                    value=encoding,
                 ) from None
             lines += text.count("\n")
             if text:
@@ -119,9 +121,14 @@ def head_text(path: Path, named: str, size: int) -> tuple[list[str], str, bool]:
     if goes_on:
         content = content[: content.rfind(b"\n") + 1]
         if not content:
-            raise FileError(f"{path}, line 1: it is longer than {size} bytes: is this a table?")
+            raise FileError(
+                f"{path}: line 1 is longer than {size} bytes, so this is not a table",
+                name=str(path),
+            )
     if b"\r" in content and b"\n" not in content:
-        raise FileError(f"{path}: its lines end with a bare carriage return: save it with LF ends")
+        raise FileError(
+            f"{path}: lines end with CR alone. Save the file with LF line ends", name=str(path)
+        )
     raw = content.splitlines(keepends=True)
     try:
         return [line.decode() for line in raw], encoding, goes_on
@@ -133,9 +140,11 @@ def head_text(path: Path, named: str, size: int) -> tuple[list[str], str, bool]:
 def not_utf8(path: Path, line: int) -> FileError:
     """Return the error for a line that is not UTF-8."""
     return FileError(
-        f"{path}, line {line}: it is not UTF-8: give its encoding in a mapping, as "
-        "encoding = 'cp1252' (Windows) or 'latin-1', or save it as UTF-8 (in spreadsheets: "
-        "'CSV UTF-8')"
+        f"{path}, line {line} is not UTF-8 text. Specify the encoding in a mapping, for instance "
+        "encoding = 'cp1252' (Windows) or 'latin-1', or save the file as UTF-8 (in spreadsheets: "
+        "'CSV UTF-8')",
+        name="encoding",
+        valid="'cp1252' (Windows) or 'latin-1'",
     )
 
 

@@ -41,7 +41,7 @@ def read_toml(
     missing
         Returns the next step for a missing file.
     too_large
-        Next step for a file that is too large, with a semicolon in front.
+        Next step for a file that is too large, with a period in front.
 
     Raises
     ------
@@ -52,7 +52,7 @@ def read_toml(
     text = _text(file, kind, missing, too_large)
     if _LONG_KEY.search(text):
         raise FileError(
-            f"{file} contains a dotted key of more than {_KEY_PARTS} parts: shorten it",
+            f"{file} contains a dotted key of more than {_KEY_PARTS} parts. Shorten it",
             name=str(file),
         )
     try:
@@ -60,7 +60,7 @@ def read_toml(
         _require_numbers(content, file, "")
     except RecursionError:
         raise FileError(
-            f"{file} is not a {kind}: it is nested too deeply", name=str(file)
+            f"{file} is not a valid {kind}: it is nested too deeply", name=str(file)
         ) from None
     except ValueError as error:  # TOMLDecodeError, or a number of thousands of digits
         raise FileError(f"{file} is not valid TOML: {error}", name=str(file)) from None
@@ -77,10 +77,11 @@ def _require_numbers(value: Any, file: Path, key: str) -> None:
             _require_numbers(each, file, key)
     elif isinstance(value, int) and value.bit_length() >= sys.float_info.max_exp:
         raise FileError(
-            f"{file}: {key} = {quoted(value)}: write any finite number, below 1.8e308",
+            f"{file}: {key} = {quoted(value)} is not valid: it must be a finite number, below "
+            "1.8e308",
             name=key,
             value=quoted(value),
-            valid="finite number",
+            valid="a finite number",
         )
 
 
@@ -101,7 +102,7 @@ def _text(file: Path, kind: str, missing: Callable[[Path], str], too_large: str)
         return data.decode("utf-8-sig").replace("\r\n", "\n")
     except UnicodeDecodeError:
         raise FileError(
-            f"cannot read {kind} {file}: it is not UTF-8 text: give a TOML file", name=str(file)
+            f"cannot read {kind} {file}: it is not UTF-8 text. Specify a TOML file", name=str(file)
         ) from None
 
 
@@ -114,7 +115,7 @@ _COMMANDS = {
     LIFE: "bywire life",
     CAMPAIGN: "bywire faults",
 }
-_WORDS = {BENCH: "a bench", STUDY: "a study", LIFE: "a life", CAMPAIGN: "a campaign of faults"}
+_WORDS = {BENCH: "a bench", STUDY: "a study", LIFE: "a life", CAMPAIGN: "a fault campaign"}
 HEADS = {BENCH: "experiment", STUDY: "bench", LIFE: "life", CAMPAIGN: "bench"}
 """required key of each kind"""
 _OF_CAMPAIGNS = ("campaign", "criteria")
@@ -171,7 +172,7 @@ def require_kind(content: Mapping[str, Any], wanted: str, file: Path) -> None:
     if not kind or kind == wanted or (head in content and head != HEADS[kind]):
         return
     raise ParameterError(
-        f"this is {_WORDS[kind]}, not {_WORDS[wanted]}: use '{_COMMANDS[kind]} {file}'",
+        f"this is {_WORDS[kind]}, not {_WORDS[wanted]}. Use '{_COMMANDS[kind]} {file}'",
         name=str(file),
         value=kind,
         valid=wanted,

@@ -69,7 +69,7 @@ def write_measurement(
         raise
     except MemoryError:
         raise FileError(
-            f"cannot write {target}: {kind.title} of this size does not fit into memory: write "
+            f"cannot write {target}: {kind.title} of this size does not fit into memory. Write "
             "fewer signals at a time",
             name=str(target),
         ) from None
@@ -77,7 +77,7 @@ def write_measurement(
         reason = getattr(error, "strerror", None) or " ".join(str(error).split())[:200]
         reason = reason or type(error).__name__
         raise FileError(
-            f"cannot write {target}: {reason}: free some space there, or choose a writable folder",
+            f"cannot write {target}: {reason}. Free some space there, or choose a writable folder",
             name=str(target),
         ) from None
     return target
@@ -102,29 +102,30 @@ def require_free(target: Path, *, overwrite: bool) -> None:
     """
     with contextlib.suppress(OSError, ValueError):  # writing will raise the error
         if target.is_dir():
-            raise FileError(f"{target} is a folder: name a file in it", name=str(target))
+            raise FileError(f"{target} is a folder. Specify a file in it", name=str(target))
         if target.exists() and not overwrite:
             raise FileError(
-                f"{target} exists already: name another file, or use {option('force', True)}",
+                f"{target} already exists. Specify another file, or use {option('force', True)}",
                 name=str(target),
             )
         if not target.parent.is_dir():
             raise FileError(
-                f"cannot write {target}: there is no folder {target.parent}: create it",
+                f"cannot write {target}: the folder {target.parent} does not exist. Create it",
                 name=str(target),
             )
 
 
 def _require_fit(dataset: xr.Dataset, target: Path, kind: FileFormat) -> None:
     if not dataset.data_vars:
-        raise FileError(f"cannot write {target}: there is no signal", name=str(target))
+        raise FileError(f"cannot write {target}: there is no signal to write", name=str(target))
     for name, signal in dataset.data_vars.items():
         if signal.ndim != 1 or signal.dims[0] not in dataset.coords:
             dims = ", ".join(map(str, signal.dims)) or "none"
             raise FileError(
-                f"cannot write {target}: {name} has the dimensions {dims}: a measurement file "
-                "contains signals over time; choose one case of each",
+                f"cannot write {target}: {name} has the dimensions {dims}, but a measurement file "
+                "contains signals over time alone. Select one case",
                 name=str(name),
+                value=str(dims),
             )
         if not np.issubdtype(signal.dtype, np.number) and signal.dtype != np.bool_:
             raise FileError(
@@ -144,14 +145,14 @@ def _require_fit(dataset: xr.Dataset, target: Path, kind: FileFormat) -> None:
         return
     if len(axes) == 1:
         raise FileError(
-            f"cannot write {target}: the signals' dimension is {axes[0]!r}: rename it 'time'",
+            f"cannot write {target}: the signals' dimension is {axes[0]!r}. Rename it 'time'",
             name=str(target),
             value=str(axes[0]),
             valid="time",
         )
     raise FileError(
         f"cannot write {target}: the signals were measured at different instants "
-        f"({', '.join(axes)}), and a {kind.name} file has one time: resample them to one time axis "
-        "(bywire convert --rate, or resample), or write mat, mdf4 or netcdf",
+        f"({', '.join(axes)}), but a {kind.name} file has only one time axis. Resample them "
+        "(bywire convert --rate, or resample), or use mat, mdf4 or netcdf",
         name=str(target),
     )

@@ -127,13 +127,13 @@ def computed(
 
 _EXPLAINED = 0.5  # of the variance: more than the residual
 _BETWEEN = (
-    "; outputs were measured at uneven instants and interpolated: this adds errors where "
-    "they move fast from sample to sample"
+    ". Outputs were measured at uneven instants and interpolated, which adds errors if they "
+    "change fast from sample to sample"
 )
 _FEW = 0.02  # largest share of residuals that may be outliers
 _SEVERAL, _MET = 4, 2  # starts: least number for the check, and of those at the minimum
 _CAPTIONS = {
-    "fit": "measured and modeled with the estimates",
+    "fit": "measured, and modeled with the estimates",
     "validation": "held-out record: measured, and modeled with the estimates",
 }
 
@@ -210,14 +210,14 @@ def _checks_of(
             limit=_EXPLAINED,
             at_least=True,
             note="share of the outputs' variance, over their noise, that the model predicts",
-            next_step=f"check that {option('inputs')} drove the record, and its unit and "
-            "sign; 'bywire replay' plots both",
+            next_step=f"check that {option('inputs')} drove the record, and check its unit and "
+            "sign ('bywire replay' plots both)",
         ),
         Check(
             "parameters_without_meaning",
             float(len(vague)),
             limit=0.0,
-            note=said or "none at its bound, none with a 95 % interval wider than +-100 %",
+            note=said or "no value is at its bound or has a 95 % interval wider than +-100 %",
             next_step=f"remove these {option('unknowns')}, add a {option('priors')}, or record "
             "a motion that depends on them",
         ),
@@ -237,10 +237,10 @@ def _missing(fit: Estimate) -> str:
     worst = max(left, key=lambda each: each.rms / (each.noise or 1.0))
     name = worst.label.rpartition(":")[2]
     return (
-        f"look at {worst.label}, which has the largest residual: if its curves are shifted, add "
-        f"{option('unknowns')} offset.{name}; if they differ at the beginning, "
-        f"{option('states')}; if another parameter explains the residual, add it as "
-        f"{option('unknowns')}; if it only scatters, give its noise with "
+        f"check {worst.label}, which has the largest residual. If its curves are shifted, add "
+        f"{option('unknowns')} offset.{name}. If they differ at the beginning, use "
+        f"{option('states')}. If another parameter explains the residual, add it with "
+        f"{option('unknowns')}. If the residual only scatters, specify its noise with "
         f"{option('outputs')} '{name}=...'"
     )
 
@@ -250,7 +250,7 @@ def _few(r: Array, far: NDArray[np.bool_], robust: bool) -> str:
     if robust or not 0.0 < float(far.mean()) < _FEW or robust_scale(r) > FAR:
         return ""
     advice = f"if they are outliers, use {option('loss', 'huber')}"
-    return f"; {far.sum()} of {far.size} are far off: {advice}"
+    return f", {far.sum()} of {far.size} are far off ({advice})"
 
 
 def _outliers(far: NDArray[np.bool_], options: Options) -> Check:
@@ -258,9 +258,9 @@ def _outliers(far: NDArray[np.bool_], options: Options) -> Check:
         "outliers",
         float(far.mean()),
         limit=options.most_outliers,
-        note=f"{far.sum()} of {far.size} residuals are at least {FAR:g} times the noise; "
-        "a share above the limit points to the model",
-        next_step="look where they occur: a cluster means a motion that the model lacks",
+        note=f"{far.sum()} of {far.size} residuals are at least {FAR:g} times the noise. A share "
+        "above the limit indicates a model error",
+        next_step="find where they occur: a cluster indicates a motion that the model lacks",
     )
 
 
@@ -283,7 +283,7 @@ def _noise_check(doubtful: Mapping[str, str], given: Mapping[str, str]) -> tuple
             float(len(doubtful)),
             limit=0.0,
             note=note,
-            next_step="record it at rest and give its standard deviation",
+            next_step="record it at rest and specify its standard deviation",
         ),
     )
 
@@ -295,7 +295,7 @@ def starts_check(reached: int, starts: int) -> tuple[Check, ...]:
     note = "starts that reached the lowest minimum"
     if reached < _MET:
         note += (
-            f": there may be a lower one; use more {option('starts')}, narrower ranges "
+            f". There may be a lower one. Use more {option('starts')}, narrower ranges "
             f"({option('unknowns')} "
             "NAME=LOW..HIGH), or fewer unknowns"
         )
@@ -333,7 +333,7 @@ def _validation_of(held: Prediction, options: Options) -> tuple[Check, ...]:
     for name in held.pairs:
         figures = held.figures(name)
         vaf = figures["vaf"] / 100.0
-        still = "" if math.isfinite(vaf) else "; the measured signal does not move"
+        still = "" if math.isfinite(vaf) else ", undefined because the measured signal is constant"
         checks += [
             Check(
                 f"validation.{name}.vaf",
@@ -341,7 +341,7 @@ def _validation_of(held: Prediction, options: Options) -> tuple[Check, ...]:
                 limit=options.least_vaf,
                 at_least=True,
                 note=f"variance accounted for in the held-out record{still}",
-                next_step="fit a record with the motions of the held-out one, or fewer unknowns",
+                next_step="fit a record with similar motions, or estimate fewer unknowns",
             ),
             Check(
                 f"validation.{name}.nrmse",
@@ -420,14 +420,15 @@ def _output_noise(measured: MeasuredRun, name: str, text: str) -> float:
     there = _finite(measured.data[name])
     if there.size < _FEWEST:
         raise ParameterError(
-            f"{name} has {there.size} samples: at least {_FEWEST} are needed to estimate its noise",
+            f"{name} has {there.size} samples, but the noise estimate needs at least {_FEWEST}",
             name=name,
+            value=str(there.size),
+            valid=str(_FEWEST),
         )
     span = float(np.ptp(there))
     if not span > 0.0:
         raise ParameterError(
-            f"{name} does not move: an output at rest determines nothing; remove it, or "
-            "excite the system",
+            f"{name} does not change, so it determines nothing. Remove it, or excite the system",
             name=name,
         )
     # Between uneven samples lie means of two, whose noise is smaller and no longer white.
@@ -477,7 +478,7 @@ def _overestimated(
         size = shown(float(f"{trial.noise[name]:.3g}"), unit)
         key = f"{trial.label}:{name}" if trial.label else name
         doubtful[key] = (
-            f"{key} {why}, so {size} is more than its noise: give the noise, "
+            f"{key} {why}, so {size} is more than its noise. Specify the noise with "
             f'{option("outputs")} "{name}=NOISE {display_unit(unit)}"'
         )
     return doubtful
@@ -645,7 +646,9 @@ class BenchFit:
             return None
         if not isinstance(data, xr.Dataset):
             raise ParameterError(
-                f"holdout = {data}: read it first with bywire.read_measurement", name="holdout"
+                f"holdout = {data} is a path. Read it first with bywire.read_measurement",
+                name="holdout",
+                value=str(data),
             )
         held = self.record(bench, data, options)
         # A label that no record has: only what all records share is known of it.
@@ -708,8 +711,8 @@ def _said(records: Mapping[str, MeasuredRun], options: Options, coarse: bool) ->
     period = min(task.period for task in case.model.tasks(case.par))
     if coarse and options.between == "held" and period < 0.5 * interval:
         said.append(
-            f"inputs are held for {1e3 * interval:.4g} ms from sample to sample, but act every "
-            f"{1e3 * period:.4g} ms: if they are smooth, use "
+            f"inputs stay constant for {1e3 * interval:.4g} ms from sample to sample, but act "
+            f"every {1e3 * period:.4g} ms. If they are smooth, use "
             f"{option('options', {'between': 'linear'})}"
         )
     return said

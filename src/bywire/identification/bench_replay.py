@@ -63,10 +63,9 @@ def _compared_outputs(
             notes = (f"not compared (flags, sums or constants): {', '.join(passed)}",)
     if not wanted:
         raise ParameterError(
-            "no measured signal is an output of the model: use the model's signal names "
-            f"({option('mapping')}), "
-            f"for instance {', '.join(list(signals)[:6])}; measured are "
-            f"{nearest_first(there, signals)}",
+            "no measured signal is an output of the model. Use the model's signal names "
+            f"({option('mapping')}), for instance {', '.join(list(signals)[:6])}. The measured "
+            f"signals are {nearest_first(there, signals)}",
             name="mapping",
             valid=", ".join(signals),
         )
@@ -90,8 +89,8 @@ def _missed_samples(data: xr.Dataset, compared: Sequence[str]) -> list[str]:
     counts = {name: int(np.isnan(data[name].values).sum()) for name in compared}
     total = data.sizes["time"]
     return [
-        f"{name} misses {count} of {total} samples ({100.0 * count / total:.2g} %), which are "
-        "not compared"
+        f"{name} lacks {count} of {total} samples ({100.0 * count / total:.2g} %), which bywire "
+        "does not compare"
         for name, count in counts.items()
         if count
     ]
@@ -103,7 +102,7 @@ def _require_measured(data: xr.Dataset, name: str, signal: Signal) -> None:
     unit = str(data[name].attrs.get("units", "1"))
     if unit != signal.unit and not measures(unit_of_symbol(unit), signal.unit):
         raise UnitError(
-            f"{name} is measured in {unit}, but must be in {signal.unit}: check the mapping",
+            f"{name} is in {unit}, but must be in {signal.unit}. Check the mapping",
             name=name,
             value=unit,
             valid=signal.unit,
@@ -205,8 +204,8 @@ def measured_run(
         if missing.size:
             at = float(data["time"].values[missing[0]])
             raise ParameterError(
-                f"{signal} drives the model and misses {missing.size} samples, the first at "
-                f"{at:.4g} s: cut the record there",
+                f"{signal} drives the model, but lacks {missing.size} samples, the first at "
+                f"{at:.4g} s. Trim the record there",
                 name=signal,
             )
     run = _run(bench, chosen, data, driven, between)
@@ -236,7 +235,7 @@ def case_of(bench: Bench, label: str) -> Case:
     cases = {case.label: case for case in bench.cases()}
     if not cases:
         raise ParameterError(
-            f"experiment {bench.experiment!r} does not make a run: choose another one",
+            f"experiment {bench.experiment!r} has no run. Choose another experiment",
             name="experiment",
             value=bench.experiment,
         )
@@ -252,9 +251,9 @@ def _inputs(case: Case, data: xr.Dataset, wanted: Mapping[str, str] | None) -> d
     driven = without_noise(stimuli)
     if not wanted:
         raise ParameterError(
-            f"no measured signal drives the model: give {option('inputs', {'STIMULUS': 'SIGNAL'})} "
-            f"with one of "
-            f"{', '.join(driven)} and one of {nearest_first(there, driven)}",
+            "no measured signal drives the model. Add "
+            f"{option('inputs', {'STIMULUS': 'SIGNAL'})}, where the stimulus is one of "
+            f"{', '.join(driven)} and the signal one of {nearest_first(there, driven)}",
             name="inputs",
             valid=", ".join(driven),
         )
@@ -300,8 +299,9 @@ def _on_grid(
         even, said = as_even(data, aligned.record)
         return even, aligned, tuple(said)
     raise StepError(
-        f"neither samples every {interval:g} s nor every {case.record:g} s fit steps of "
-        f"{bench.step:g} s: resample the measurement (bywire convert --rate)",
+        f"the step of {bench.step:g} s divides neither the measurement's {interval:g} s nor the "
+        f"recording interval of {case.record:g} s. Resample the measurement (bywire convert "
+        "--rate)",
         name="step",
         value=f"{bench.step:g} s",
     )

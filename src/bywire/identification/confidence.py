@@ -262,8 +262,8 @@ _FAR = 10.0  # times the noise: residuals that noise cannot explain
 _MISFIT = 4.0  # times the noise: filtered sensor noise gives up to 3
 _AS_ASSUMED = (0.5, 1.5)  # times the assumed noise, which then explains the residual
 _EXACT = (
-    "the residual is only rounding: the record agrees with the model to the last digits, so its "
-    "intervals are not valid for a measured record, which has noise"
+    "the residual is only rounding error: the record agrees with the model to the last digits. The "
+    "intervals are therefore not valid for a measured record, which contains noise"
 )
 _CONTRADICTED = 3.0  # standard deviations of a prior
 
@@ -296,8 +296,8 @@ def misfit(estimate: Estimate) -> str:
     size = shown(float(f"{worst.rms:.3g}"), difference_unit(worst.unit))
     return (
         f"{worst.label}: the residual is {size}, {worst.over_noise:.2g} times the noise between "
-        "neighboring samples: the model is incomplete or wrong, and the intervals are invalid, "
-        "since they assume a random residual"
+        "neighboring samples. The model is incomplete or wrong, and the intervals are invalid "
+        "because they assume a random residual"
     )
 
 
@@ -311,7 +311,7 @@ def least_determined(estimate: Estimate, J: Array) -> tuple[int, str] | None:
     if share < _FLAT:
         direction = np.linalg.svd(J, full_matrices=False)[2][-1]
         return int(np.argmax(np.abs(direction))), (
-            f"only a combination with others is determined ({reason})"
+            f"the data determine only its combination with others ({reason})"
         )
     relative = estimate.deviations / np.array([u.scale for u in estimate.unknowns])
     index = int(np.argmax(relative))
@@ -337,17 +337,17 @@ def advice(estimate: Estimate, silent: bool) -> str:
     left = robust_scale(estimate.residuals)
     if left > _FAR:
         return (
-            f"the model does not fit: its best residual is {left:.2g} times the noise; check sign "
-            f"and unit of the measured signals ({option('mapping')}), then the known parameters"
+            f"the model does not fit: its best residual is {left:.2g} times the noise. Check signs "
+            f"and units of the measured signals ({option('mapping')}), then the known parameters"
         )
-    return "switch it on, or name another unknown" if silent else "excite the system more"
+    return "Switch it on, or choose another unknown" if silent else "Excite the system more"
 
 
 def notes_of(estimate: Estimate) -> tuple[str, ...]:
     """Return notes about correlated unknowns, bounds, contradicted priors, and misfit."""
     notes = [
         f"{a} and {b} are correlated ({c:.3f}): the data determine their combination better "
-        "than either one"
+        "than either of them"
         for a, b, c in estimate.correlated()
     ]
     bounds = estimate.at_bounds()
@@ -362,7 +362,7 @@ def notes_of(estimate: Estimate) -> tuple[str, ...]:
             notes.append(
                 f"{u.label} = {shown(float(f'{value:.4g}'), u.unit)} is {away:.2g} standard "
                 f"deviations from its prior ({shown(mean, u.unit)} ± "
-                f"{shown(deviation, difference_unit(u.unit))}): the prior or the model is "
+                f"{shown(deviation, difference_unit(u.unit))}), so the prior or the model is "
                 "wrong"
             )
     if estimate.is_exact:
@@ -415,9 +415,9 @@ class Disagreement:
             )
         )
         return (
-            f"records disagree: {self.name} is {there} in {self.record} and {rest} in the "
-            f"others (standard deviations), {self.apart:.2g} of their difference's apart: look at "
-            "that record, or at what differs between them; no joint interval holds"
+            f"records disagree: {self.name} is {there} in {self.record} and {rest} in the others. "
+            f"The difference is {self.apart:.2g} times its standard deviation, so no joint "
+            "interval is valid. Check that record, and the differences between the records"
         )
 
 
@@ -456,7 +456,9 @@ def disagreements(estimates: Mapping[str, Estimate]) -> tuple[Disagreement, ...]
     W. G. Cochran, The combination of estimates from different experiments, Biometrics 10, 1954.
     """
     if len(estimates) < 2:
-        raise ParameterError("a single estimate cannot be compared: give one for each record")
+        raise ParameterError(
+            "a single estimate cannot be compared. Pass one for each record", name="estimates"
+        )
     tables = {
         label: {
             u.name: _Told(float(v), float(d), estimate.freedom, u.unit)

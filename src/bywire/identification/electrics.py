@@ -104,8 +104,8 @@ def require_steps(data: xr.Dataset, name: str, answer: str, label: str) -> None:
     demand, current = data[name].values, data[answer].values
     if not float(np.ptp(demand)) > 0.0:
         raise ParameterError(
-            f"{name} of record {label or '1'} does not move: a response at rest determines neither "
-            "winding nor gains; step it between several levels with the rotor locked",
+            f"{name} of record {label or '1'} does not change, so it determines neither winding "
+            "nor gains. Step it between several levels with the rotor locked",
             name=name,
         )
     together = float(np.corrcoef(demand, current)[0, 1]) if np.ptp(current) > 0.0 else 0.0
@@ -161,8 +161,8 @@ def checks_of(trials: Sequence[Trial], fit: Estimate) -> tuple[Check, ...]:
             explained(trials, fit),
             limit=_EXPLAINED,
             at_least=True,
-            note="share of the current's variance that the model predicts: do demand and "
-            "current belong together?",
+            note="share of the current's variance that the model predicts. A low share may mean "
+            "that demand and current do not belong together",
         ),
         Check(
             "residual_over_noise",
@@ -174,7 +174,7 @@ def checks_of(trials: Sequence[Trial], fit: Estimate) -> tuple[Check, ...]:
             "parameters_without_meaning",
             float(len(vague)),
             limit=0.0,
-            note=said or "none at its bound, none with a 95 % interval wider than +-100 %",
+            note=said or "no value is at its bound or has a 95 % interval wider than +-100 %",
         ),
     )
 
@@ -192,7 +192,7 @@ def as_curve(trial: Trial, fit: Estimate) -> Curve:
     columns = {"measured": trial.measured[signal], "modeled": modeled}
     data = over(("time", computed.time, "s", "time"), columns, "A", "current")
     name = f"current-{trial.label}" if trial.label else "current"
-    return Curve(name, "Current: measured, and modeled where it is fitted.", data, "time")
+    return Curve(name, "Measured current, and modeled current in the fitted part.", data, "time")
 
 
 class LoopOptions(ParameterSet):

@@ -62,7 +62,7 @@ class EquationError:
         model = equation.model
         if equation.state not in model.State._fields:
             raise ModelError(
-                f"{model.name} has no state {equation.state}: it has "
+                f"{model.name} has no state {equation.state}. Its states are "
                 f"{', '.join(model.State._fields)}",
                 name="state",
                 value=equation.state,
@@ -204,8 +204,10 @@ def inverse_dynamics(
         e, W = rows(seen)
         if len(e) <= len(values):
             raise ParameterError(
-                f"{len(e)} samples move faster than {equation.slowest:g}: too few for "
-                f"{len(values)} unknowns; move more, or lower the slowest speed"
+                f"only {len(e)} samples move faster than {equation.slowest:g}, too few for "
+                f"{len(values)} unknowns. Record more motion, or reduce the slowest speed",
+                name="slowest",
+                value=f"{equation.slowest:g}",
             )
         Z = W if other is None else rows(other)[1]
         _require_told(W, unknowns)
@@ -248,15 +250,15 @@ def _require_told(W: Array, unknowns: Sequence[Unknown]) -> None:
     silent = [u.label for u, s in zip(unknowns, size, strict=True) if s == 0.0]
     if silent:
         raise ParameterError(
-            f"the data do not determine {', '.join(silent)}: nothing that depends on it moves; "
-            "excite it, or treat it as known",
+            f"the data do not determine {', '.join(silent)} because no signal that depends on it "
+            "moves. Excite it, or treat it as known",
             name=", ".join(silent),
         )
     _, s, V = np.linalg.svd(W / size, full_matrices=False)  # U would have samples squared
     if s[-1] < 1e-10 * s[0]:
         together = [u.label for u, v in zip(unknowns, V[-1], strict=True) if abs(v) > 0.1]
         raise ParameterError(
-            f"the data determine only a combination of {', '.join(together)}: treat one of them as "
+            f"the data determine only a combination of {', '.join(together)}. Treat one of them as "
             "known, or excite them separately",
             name=", ".join(together),
         )

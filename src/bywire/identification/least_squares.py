@@ -262,8 +262,8 @@ def _exceeding(best: Estimate, errors: Array) -> list[str]:
     return [
         f"{u.label} has an error of about {shown(float(f'{error:.2g}'), difference_unit(u.unit))} "
         "from the simulation step, more than the half width of its 95 % interval, "
-        f"{shown(float(f'{reach:.2g}'), difference_unit(u.unit))}: "
-        "use a smaller step"
+        f"{shown(float(f'{reach:.2g}'), difference_unit(u.unit))}. "
+        "Use a smaller step"
         for u, error, reach in zip(best.unknowns, errors, half, strict=True)
         if error > max(reach, _SMALL * u.scale)
     ]
@@ -446,8 +446,8 @@ def estimate(
         problem = problem.held(index)
         if not problem.unknowns:
             raise ParameterError(
-                f"the data determine none of {', '.join(k.unknown.label for k in kept)}: of "
-                f"{kept[0].unknown.label}, {kept[0].reason}; "
+                f"the data determine none of {', '.join(k.unknown.label for k in kept)}: for "
+                f"{kept[0].unknown.label}, {kept[0].reason}. "
                 f"{advice(best, kept[0].unknown.name in problem.silent)}",
                 name=", ".join(k.unknown.label for k in kept),
             )
@@ -460,8 +460,8 @@ def _at_minimum(problem: Problem, solution: Solution, loss: Loss) -> tuple[Estim
     data = r.size - priors
     if data <= len(problem.unknowns):
         raise ParameterError(
-            f"{data} measured values cannot determine {len(problem.unknowns)} unknowns: "
-            "measure more",
+            f"{data} measured values cannot determine {len(problem.unknowns)} unknowns. Measure "
+            "more",
             name="unknowns",
             value=str(len(problem.unknowns)),
         )

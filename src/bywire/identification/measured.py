@@ -120,7 +120,7 @@ def joined(records: Mapping[str, xr.Dataset]) -> xr.Dataset:
         When there is no record, or their signals differ.
     """
     if not records:
-        raise ParameterError("there is no record: give at least one")
+        raise ParameterError("records is empty. Provide at least one record", name="records")
     first, *others = records
     if not others:
         return records[first]
@@ -130,7 +130,7 @@ def joined(records: Mapping[str, xr.Dataset]) -> xr.Dataset:
         if set(map(str, record.data_vars)) != wanted:
             differing = ", ".join(sorted(wanted ^ set(map(str, record.data_vars))))
             raise ParameterError(
-                f"records {first} and {label} differ in their signals ({differing}): records of "
+                f"records {first} and {label} have different signals ({differing}), but records of "
                 "one experiment need the same signals",
                 name=label,
             )
@@ -314,14 +314,14 @@ def require(data: xr.Dataset, signals: Mapping[str, str], where: str) -> tuple[s
     for name, unit in signals.items():
         if name not in there:
             kind = (
-                f"signal (needed of {where}; {option('inputs')}, {option('outputs')} or "
-                f"{option('mapping')} can name its column)"
+                f"signal (required in {where}; specify its column with {option('inputs')}, "
+                f"{option('outputs')} or {option('mapping')})"
             )
             raise unknown_name(kind, name, there)
         given = str(data[name].attrs.get("units", "1"))
         if unit not in ("", given) and not measures(unit_of_symbol(given), unit):
             raise UnitError(
-                f"{where}: {name} is in {given}, but must be in {unit}: check the mapping",
+                f"{where}: {name} is in {given}, but must be in {unit}. Check the mapping",
                 name=name,
                 value=given,
                 valid=unit,
@@ -353,7 +353,8 @@ def as_even(
         return data if dim == "time" else data.rename({dim: "time"}), []
     if "record" in data:
         raise ParameterError(
-            "several records in one file cannot be resampled: give one file per record"
+            "bywire cannot resample several records in one file. Use one file per record",
+            name="records",
         )
     if multiple is not None and interval is None:
         step = float(f"{max(round(step / multiple), 1) * multiple:.9g}")
@@ -367,10 +368,10 @@ def as_even(
 
 def _said(report: AlignmentReport) -> str:
     missing = max(channel.excluded for channel in report.channels)
-    left_out = f"; {missing} of them are in gaps and not used" if missing else ""
+    left_out = f", of which {missing} are in gaps and not used" if missing else ""
     return (
-        f"resampled to {report.samples} samples every {1e3 * report.interval:.6g} ms (its own "
-        f"instants are not evenly spaced){left_out}"
+        f"resampled, because its instants are not evenly spaced, to {report.samples} samples every "
+        f"{1e3 * report.interval:.6g} ms{left_out}"
     )
 
 
@@ -382,8 +383,8 @@ def _require_whole(data: xr.Dataset, where: str, gaps: bool) -> None:
         if missing.size:
             at = float(data["time"].values[missing[0]])
             raise ParameterError(
-                f"{where}: {name} misses {missing.size} samples, the first at {at:.4g} s: cut the "
-                "record there, or fill it deliberately with 'bywire convert --exclude nothing'",
+                f"{where}: {name} lacks {missing.size} samples, the first at {at:.4g} s. Trim the "
+                "record there, or fill the gap with 'bywire convert --exclude nothing'",
                 name=str(name),
             )
 
@@ -400,6 +401,6 @@ def wrong_sign(signal: str, other: str, evidence: str) -> ParameterError:
         Evidence, with its value.
     """
     return ParameterError(
-        f"{signal} moves against {other} ({evidence}): one of the two has the wrong sign; "
-        "write sign = -1 for it in the mapping"
+        f"{signal} moves against {other} ({evidence}). One of them has the wrong sign. Set "
+        "sign = -1 for it in the mapping"
     )

@@ -171,7 +171,10 @@ def _folds(records: Mapping[str, xr.Dataset]) -> tuple[list[_Fold], str]:
         for rows in np.array_split(np.arange(part.sizes["time"]), _BLOCKS)
     ]
     if min(b.sizes["time"] for b in blocks) < 2:
-        raise ParameterError("too few samples to hold some out: measure longer, or record more")
+        raise ParameterError(
+            "there are too few samples to hold some out. Measure longer, or add records",
+            name="records",
+        )
     folds = []
     for k in range(_FOLDS):
         held = [b for j, b in enumerate(blocks) if j % _FOLDS == k]

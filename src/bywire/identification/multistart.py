@@ -96,7 +96,7 @@ def multistart(
     led = search(problem, starts, loss, progress, store)
     note = f"{led.reached} of {count} starts reached the lowest minimum"
     if led.reached == 1 < count:
-        note += ": there may be a lower one; use more starts, narrower bounds or fewer unknowns"
+        note += ". There may be a lower one. Use more starts, narrower bounds or fewer unknowns"
     return estimate(problem, loss, led.best.values).noted((note,))
 
 
@@ -171,8 +171,9 @@ def search(
         raise refused[-1]
     if not solutions:
         raise SolverError(
-            "no start could be computed: start closer to the true values, "
-            "or measure at other points"
+            "the model failed from every start. Start closer to the true values, or measure at "
+            "other points",
+            name="starts",
         )
     return Search(tuple(solutions[k] for k in sorted(solutions)), len(starts) - len(solutions))
 

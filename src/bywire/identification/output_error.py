@@ -331,7 +331,7 @@ def even_interval(t: Array) -> float:
     steps = np.diff(t)
     if not steps.size or not steps.min() > 0.0:
         raise ParameterError(
-            "time does not increase from sample to sample: sort or cut the record", name="time"
+            "time does not increase from sample to sample. Sort or trim the record", name="time"
         )
     mean, middle = float(t[-1] - t[0]) / steps.size, float(np.median(steps))
     usual = float(f"{middle:.9g}")
@@ -343,7 +343,7 @@ def even_interval(t: Array) -> float:
         return usual
     raise ParameterError(
         f"time is not evenly spaced (steps of {steps.min():g} to {steps.max():g} s, and instants "
-        f"off an even grid by more than {UNEVEN:g} of the step): resample it first, as "
+        f"off an even grid by more than {UNEVEN:g} of the step). Resample the record first, with "
         f'bywire.resample(data, "{1e3 * float(f"{middle:.3g}"):g} ms")',
         name="time",
     )

@@ -243,8 +243,8 @@ def unknowns_of(case: Case, known: ParameterSet, question: Question) -> tuple[Un
     """
     if not question.ranges:
         raise ParameterError(
-            f"nothing is unknown: give {option('unknowns')} PARAMETER, once for each, for instance "
-            f"{option('unknowns')} {next(iter(leaf_fields(type(case.par))))}",
+            f"there is no unknown. Add {option('unknowns')} PARAMETER for each unknown, for "
+            f"instance {option('unknowns')} {next(iter(leaf_fields(type(case.par))))}",
             name="unknowns",
         )
     for name in question.priors:
@@ -278,28 +278,29 @@ def _bare(name: str, case: Case, known: ParameterSet, outputs: Iterable[str]) ->
         return Unknown(name, 0.0, scale=signal.nominal, unit=signal.unit)
     if name.startswith("initial."):
         raise ParameterError(
-            f"unknown {name}: each record has its own initial values; write "
+            f"unknown {name} is not valid because each record has its own initial values. Use "
             f"{option('states')} {name.removeprefix('initial.')}",
             name=name,
         )
     given, leaves = known.flat().get(name), leaf_fields(type(known))
     if name not in leaves and given is not None:
         raise ParameterError(
-            f"unknown {name}: it is a choice (here {quoted(given)}), not a number; try each with "
-            f"{option('overrides', {name: '...'})}",
+            f"unknown {name} is not valid because it is a choice (here {quoted(given)}), not a "
+            f"number. Try each value with {option('overrides', {name: '...'})}",
             name=name,
         )
     if isinstance(given, tuple):
         raise ParameterError(
-            f"unknown {name}: it is a table, whose nodes cannot be estimated; name a number",
+            f"unknown {name} is not valid because bywire cannot estimate the nodes of a table. "
+            "Choose a number",
             name=name,
         )
     if name not in leaves:
         raise unknown_name("parameter", name, [k for k in leaves if k in known.leaves()])
     if case.par.leaves()[name] != known.leaves()[name]:
         raise ParameterError(
-            f"unknown {name}: the experiment itself sets it, to "
-            f"{shown(case.par.leaves()[name], leaves[name].unit.symbol)}; name another one",
+            f"unknown {name} is not valid because the experiment sets it to "
+            f"{shown(case.par.leaves()[name], leaves[name].unit.symbol)}. Choose another parameter",
             name=name,
         )
     return parameters_of(case.par, [name])[0]
@@ -313,7 +314,7 @@ def _with_texts(unknown: Unknown, within: str, prior: str, leaf: Leaf | None) ->
     low, high = _pair(unknown, within, within.split(".."), "range", "..")
     if not low < high:
         raise ParameterError(
-            f"range of {unknown.name}: {quoted(within)} is empty; the lower end comes first",
+            f"range of {unknown.name}: {quoted(within)} is empty. Write the lower end first",
             name=f"range of {unknown.name}",
             value=quoted(within),
         )
@@ -340,7 +341,7 @@ def _pair(
     low, high = _EXAMPLES[kind]
     if len(parts) != 2 or not all(part.strip() for part in parts):
         raise ParameterError(
-            f"{kind} of {unknown.name}: {quoted(text)} is not valid; write for instance "
+            f"{kind} of {unknown.name}: {quoted(text)} is not valid. Use for instance "
             f"'{shown(low * unknown.scale, unknown.unit)}{sign}"
             f"{shown(high * unknown.scale, _second_unit(unknown, kind))}'",
             name=f"{kind} of {unknown.name}",

@@ -97,12 +97,12 @@ def estimate_lag(
     for name, values in ((first, a), (second, b)):
         if np.isnan(values).any():
             raise ParameterError(
-                f"{name} has gaps or missing values: choose a piece without them, for instance "
+                f"{name} has gaps or missing values. Select a part without them, for instance "
                 "measurement.sel(time=slice(0, 10))",
                 name=name,
             )
         if np.ptp(values) == 0.0:
-            raise ParameterError(f"{name} does not move: it has no lag", name=name)
+            raise ParameterError(f"{name} does not change, so it has no lag", name=name)
     most = int(np.ceil(reach / step))
     if not most >= 1 or a.size - most < _LEAST:
         overlap = f"leave an overlap of {_LEAST} steps in {a.size * step:g} s"
@@ -281,8 +281,8 @@ def found_in(demand: xr.DataArray, tolerances: Mapping[str, str]) -> list[Segmen
     merged.append(ends[-1])
     if len(merged) - 1 > _MOST:
         raise ParameterError(
-            f"the demand {demand.name} changes between holding and moving {len(merged) - 1} times: "
-            f"name the segments that matter in a file, {option('segments')} FILE",
+            f"the demand {demand.name} changes between holding and moving {len(merged) - 1} times. "
+            f"List the relevant segments in a file ({option('segments')} FILE)",
             name="segments",
         )
     counts = {"hold": 0, "move": 0}
@@ -326,7 +326,7 @@ def _from(content: Mapping[str, Any], tolerances: Mapping[str, str]) -> list[Seg
     file = SegmentFile.read(content, "a file of segments")
     if not file.segments:
         raise ParameterError(
-            "there is no segment: write [segments.NAME] with start and stop", name="segments"
+            "segments is empty. Add [segments.NAME] with start and stop", name="segments"
         )
     shared = {**tolerances, **file.tolerances}
     segments = []
@@ -364,8 +364,8 @@ def read_tolerances(texts: Sequence[str]) -> dict[str, str]:
         name, compare, bound = parted(text)
         if compare is None or not name or not bound:
             raise ParameterError(
-                f"{option('tolerances')} {text!r} is not valid: write for instance 'nrmse <= 5 "
-                "%' or 'p_mc.max_error <= 2 bar'",
+                f"{option('tolerances')} {text!r} is not valid. Use for instance 'nrmse <= 5 %' or "
+                "'p_mc.max_error <= 2 bar'",
                 name="tolerances",
                 value=text,
             )
@@ -433,8 +433,8 @@ def _limits(key: str, text: str, kpi: Kpi) -> list[Limit]:
     for limit in limits:
         if limit.bound < 0.0:
             raise ParameterError(
-                f"tolerance {limit} bounds the magnitude, which is never negative: add a "
-                f"lower limit, such as '{key} >= ...', so that both limits are signed",
+                f"tolerance {limit} applies to the magnitude, which is never negative. Add a "
+                f"lower limit such as '{key} >= ...' to make both limits signed",
                 name=key,
             )
     return [replace(limit, of_magnitude=True) for limit in limits]
@@ -494,8 +494,8 @@ def fit_figures(pair: xr.Dataset, segment: Segment) -> tuple[Kpi, ...]:
     there = np.isfinite(y) & np.isfinite(m)
     if there.sum() < 2:
         raise ParameterError(
-            f"segment {segment.name!r}, {segment.start:g} to {segment.stop:g} s, holds "
-            f"{int(there.sum())} samples: at least two are needed",
+            f"segment {segment.name!r}, {segment.start:g} to {segment.stop:g} s, contains "
+            f"{int(there.sum())} samples, but at least two are needed",
             name=segment.name,
         )
     y, m = y[there], m[there]
@@ -512,20 +512,20 @@ def fit_figures(pair: xr.Dataset, segment: Segment) -> tuple[Kpi, ...]:
             "nrmse",
             100.0 * rmse / span if span else math.nan,
             "%",
-            "Root mean square error over the measured range of the whole record.",
+            "Root mean square error, relative to the measured range of the whole record.",
             "" if span else still,
         ),
         Kpi(
             "vaf",
             100.0 * (1.0 - float(np.var(error)) / variance) if variance else math.nan,
             "%",
-            "Variance accounted for: 1 minus error variance over measured variance.",
+            "Variance accounted for: 1 minus the ratio of error variance to measured variance.",
             "" if variance else still,
         ),
         Kpi("max_error", float(np.abs(error).max()), unit, "Largest magnitude of the error."),
         Kpi("bias", float(error.mean()), unit, "Mean of modeled minus measured."),
         Kpi(
-            "lag", lag, "s", "Delay of the model against the measurement, by correlation.", lag_note
+            "lag", lag, "s", "Delay of the model behind the measurement, by correlation.", lag_note
         ),
     )
 
@@ -537,7 +537,7 @@ def _require_within(time: Array, segment: Segment) -> None:
     if segment.start < first - spare or segment.stop > last + spare:
         raise ParameterError(
             f"segment {segment.name!r}, {segment.start:g} to {segment.stop:g} s, extends beyond "
-            f"the record, which covers {first:.6g} to {last:.6g} s: correct its start or stop",
+            f"the record, which covers {first:.6g} to {last:.6g} s. Correct its start or stop",
             name=segment.name,
         )
 

@@ -63,8 +63,8 @@ def lack_of_fit(
         value,
         limit=float(special.fdtri(more, left, 1.0 - _LEVEL)),
         note=note,
-        next_step="see in the curve where it bends, and identify the straight part of the range, "
-        "or a law that bends",
+        next_step="find the bend in the curve, and identify the straight part of the range, or a "
+        "nonlinear law",
     )
 
 

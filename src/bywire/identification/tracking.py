@@ -101,14 +101,14 @@ def _find_relation(name: str, data: xr.Dataset, par: Any) -> Relation:
     relations = [r for r in relations if r.parameter in par.flat()]
     if not relations:
         raise ParameterError(
-            f"{name} is not a parameter here: track it on a brake that has it", name=name
+            f"{name} is not a parameter of this brake. Use a brake that has it", name=name
         )
     for relation in relations:
         if all(signal in data for signal in relation.signals):
             return relation
     wanted = " or ".join(", ".join(r.signals) for r in relations)
     raise ParameterError(
-        f"tracking {relations[0].parameter} needs the measured signals {wanted}; measured are "
+        f"tracking {relations[0].parameter} needs the measured signals {wanted}. The data contain "
         f"{nearest_first(map(str, data.data_vars), relations[0].signals)}",
         name=relations[0].parameter,
     )
@@ -309,8 +309,8 @@ def likeliest(
     p = regressors.shape[1]
     if counts.sum() < 10 * p:
         raise ParameterError(
-            f"{int(counts.sum())} samples are valid, too few to track {p} parameters: measure "
-            "longer, or where the relation holds",
+            f"{int(counts.sum())} valid samples are too few to track {p} parameters. Measure "
+            "longer, or under conditions in which the relation is valid",
             name="samples",
             value=str(int(counts.sum())),
         )

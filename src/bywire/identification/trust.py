@@ -71,7 +71,7 @@ def sensed(case: Case, sensors: Mapping[str, Sensor], random: np.random.Generato
 # about 95 times in 100.
 
 _TRIES = 20
-_KILLED = "with an output folder, finished experiments are kept and the same command continues"
+_KILLED = "with an output folder, bywire saves each experiment, and the same command continues"
 
 
 @dataclass(frozen=True)
@@ -122,7 +122,7 @@ def displaced(par: ParameterSet, names: Sequence[str], spread: float, seed: int)
         except ParameterError:
             continue
     raise ParameterError(
-        f"no valid parameters within {100 * spread:g} % of these: reduce it",
+        f"spread = {100 * spread:g} % gives no valid parameters. Reduce it",
         name="spread",
         value=f"{100 * spread:g} %",
     )

@@ -128,12 +128,12 @@ def peak(recording: xr.Dataset, name: str) -> float:
 
 _KINDS = (
     "Kinds of statements: 'printed' is in the source's text, tables or equations, or follows "
-    "from printed numbers by an equation that the note names; 'reading' is a sentence of the "
-    "source that we read as a number, see its note; 'axis' is the end of a figure's axis, "
-    "beyond which the source shows nothing; 'requirement' is a requirement on the design; "
-    "'physical bound' is a limit that we derive; 'ours' is a number without a counterpart. There "
-    "is no verdict if nothing is stated, if the value was tuned to the statement or is an input, "
-    "or if the verdict belongs to another statement."
+    "from printed numbers by an equation in the note. 'reading' is a sentence of the source that "
+    "we interpret as a number (see its note). 'axis' is the end of a figure's axis, beyond which "
+    "the source shows nothing. 'requirement' is a design requirement. 'physical bound' is a limit "
+    "that we derive. 'ours' is a number without a counterpart in the source. There is no verdict "
+    "if the source states nothing, if the value is an input or was tuned to the statement, or if "
+    "the verdict belongs to another statement."
 )
 
 

@@ -297,7 +297,9 @@ def _cited_values(
         if name == "group" and isinstance(entry, str):
             found |= pick(groups, entry, f"{here}: group of values")
         elif not isinstance(entry, Mapping):
-            raise ParameterError(f'{here}: write {{ chosen = ..., where = "..." }}', name=here)
+            raise ParameterError(
+                f'{here} is not valid. Write {{ chosen = ..., where = "..." }}', name=here
+            )
         elif "where" in entry:
             found[name] = _cited(entry, here, formulas)
         else:
@@ -311,7 +313,7 @@ def _cited(entry: Section, place: str, formulas: Mapping[str, Formula]) -> Cited
     where, given = entry["where"], [key for key in entry if key != "where"]
     if len(given) != 1 or given[0] not in kinds or not isinstance(where, str):
         raise ParameterError(
-            f"{place} takes one of {', '.join(kinds)}, and a text where",
+            f"{place} needs exactly one of {', '.join(kinds)}, and a text for where",
             name=place,
             valid=", ".join(kinds),
         )

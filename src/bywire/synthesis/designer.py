@@ -419,7 +419,7 @@ def design(
     """
     if not tunables:
         raise ParameterError(
-            "no parameter is left to tune: set fewer of the loop's parameters", name="parameters"
+            "all tunable parameters of the loop are set. Set fewer of them", name="parameters"
         )
     floors = linear_floors(requirements, largest_error(cases, start))
     problem = Problem(tunables, (*requirements, *floors), tuple(cases))
@@ -457,8 +457,8 @@ def _require_sampled(problem: Problem, start: Mapping[str, float]) -> None:
     for wanted in problem.requirements:
         if wanted.unit == "Hz" and not wanted.is_upper and wanted.bound >= 0.5 / period:
             raise ParameterError(
-                f"requirement {str(wanted)!r}: the loop is sampled every {period * 1e3:g} ms; "
-                f"require less than {0.5 / period:g} Hz",
+                f"requirement {str(wanted)!r} cannot be met because the loop's sample time is "
+                f"{period * 1e3:g} ms. Require < {0.5 / period:g} Hz",
                 name=wanted.figure,
                 value=wanted.text,
                 valid=f"< {0.5 / period:g} Hz",

@@ -72,7 +72,9 @@ def read(texts: Sequence[str]) -> tuple[Limit, ...]:
     """
     if not texts:
         raise ParameterError(
-            "a design needs a requirement, for instance 'bandwidth >= 10 Hz'", name="requirement"
+            "a design needs at least one requirement, for instance 'bandwidth >= 10 Hz'",
+            name="requirement",
+            valid="'bandwidth >= 10 Hz'",
         )
     requirements = tuple(_read(text) for text in texts)
     for first, second in combinations(requirements, 2):
@@ -84,7 +86,7 @@ def _read(text: str) -> Limit:
     word, compare, written = parted(text) if isinstance(text, str) else ("", None, "")
     if not word or compare is None or not written:
         raise ParameterError(
-            f"requirement {quoted(text)} cannot be read: write for instance 'bandwidth >= 10 Hz'",
+            f"requirement {quoted(text)} is not valid. Use for instance 'bandwidth >= 10 Hz'",
             name="requirement",
             value=text,
             valid="'bandwidth >= 10 Hz'",
@@ -100,8 +102,8 @@ def _read(text: str) -> Limit:
         low, high = figure.low, figure.high
         reach = f"above {low:g}" if high == math.inf else f"{low:g} to {high:g}"
         raise ParameterError(
-            f"requirement {quoted(text)}: every loop has a {figure.name} of {reach} {figure.unit}; "
-            "require a value in between",
+            f"requirement {quoted(text)} is not valid: {figure.name} is {reach} {figure.unit} for "
+            "every loop. Specify a value in between",
             name=figure.name,
             value=text,
             valid=f"{reach} {figure.unit}",
@@ -122,7 +124,7 @@ def _bound(text: str, figure: LoopFigure) -> float:
     if figure.unit == "deg":
         if re.fullmatch(r"[-+\d.eE]+", text):
             raise UnitError(
-                f"{name} = {quoted(text)} has no unit: write '{text} deg'",
+                f"{name} = {quoted(text)} has no unit. Use '{text} deg'",
                 name=name,
                 value=text,
                 valid=f"{text} deg",
@@ -136,15 +138,14 @@ def _require_compatible(first: Limit, second: Limit) -> None:
         return
     if first.is_upper == second.is_upper:
         raise ParameterError(
-            f"{first.figure} is required twice, {str(first)!r} and {str(second)!r}: "
-            "leave one of them out",
+            f"there are two requirements on {first.figure}, {str(first)!r} and {str(second)!r}. "
+            "Remove one of them",
             name=first.figure,
         )
     low, high = (second, first) if first.is_upper else (first, second)
     if low.bound > high.bound:
         raise ParameterError(
-            f"{str(low)!r} and {str(high)!r} contradict each other: no loop meets both; "
-            "change one of the limits",
+            f"{str(low)!r} and {str(high)!r} contradict each other. Change one of the limits",
             name=low.figure,
         )
 
@@ -243,8 +244,8 @@ def cases_of(
     combinations = list(product(*over.values())) if over else []
     if len(combinations) > _MOST:
         raise ParameterError(
-            f"the ranges have {len(combinations)} combinations, more than {_MOST}: take fewer "
-            "values",
+            f"the ranges have {len(combinations)} combinations, but the limit is <= {_MOST}. Use "
+            "fewer values",
             name="ranges",
             value=str(len(combinations)),
             valid=f"<= {_MOST}",
@@ -261,7 +262,7 @@ def cases_of(
 def require_given(loop: Loop, name: str) -> None:
     """Reject a varied parameter that the design chooses."""
     if name in loop.tunables or _scheduled(loop, name):
-        raise ParameterError(f"the design chooses {name}, which cannot also vary", name=name)
+        raise ParameterError(f"{name} cannot vary because the design chooses it", name=name)
 
 
 def _shown(loop: Loop, par: ParameterSet, name: str, value: float) -> str:

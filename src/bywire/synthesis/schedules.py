@@ -37,7 +37,7 @@ def scheduled(loop: Loop) -> LoopSchedule:
     """
     if loop.schedule is None:
         raise ParameterError(
-            f"loop {loop.name!r} has no gain schedule: leave out {option('schedule', True)}",
+            f"loop {loop.name!r} has no gain schedule. Leave out {option('schedule', True)}",
             name="schedule",
         )
     return loop.schedule
@@ -70,9 +70,9 @@ def points_by_region(
             borders = " and ".join(shown(leaves[each], at.unit) for each in schedule.borders)
             given = ", ".join(shown(each, at.unit) for each in points or schedule.points)
             raise ParameterError(
-                f"no operating point is in the region {name!r}: the borders are {borders}, the "
-                f"points {given}; give one {at.name} in each region with {option('at')}, or move "
-                f"the borders ({', '.join(schedule.borders)})",
+                f"the region {name!r} contains no operating point. The boundaries are {borders}, "
+                f"and the points are {given}. Specify one {at.name} in each region with "
+                f"{option('at')}, or move the boundaries ({', '.join(schedule.borders)})",
                 name=at.name,
                 value=given,
             )
@@ -118,7 +118,7 @@ def design_schedule(
     """
     schedule = scheduled(loop)
     if not any(tunables.values()):
-        raise ParameterError("no gain is left to tune in any region: set fewer gains", name="gains")
+        raise ParameterError("all gains are set in every region. Set fewer gains", name="gains")
     order = [schedule.main, *(name for name in schedule.regions if name != schedule.main)]
     order = [name for name in order if tunables[name]]
     gains: dict[str, float] = {}
@@ -216,7 +216,7 @@ def _ranges(
 ) -> dict[str, Sequence[float]]:
     if loop.at.name in over:
         raise ParameterError(
-            f"the schedule follows {loop.at.name}: give its operating points with {option('at')}",
+            f"the schedule depends on {loop.at.name}. Specify operating points with {option('at')}",
             name=loop.at.name,
         )
     return {loop.at.name: points, **over} if len(points) > 1 or over else {}

@@ -208,7 +208,7 @@ def edge_warnings(
         Share of an end that counts as equal.
     """
     return tuple(
-        f"the optimum lies at the edge of the designs, {name} = {shown(end, unit)}: widen the range"
+        f"the optimum is at the limit {name} = {shown(end, unit)}. Widen the range of {name}"
         for end in ends
         if math.isclose(value, end, rel_tol=within)
     )

@@ -32,7 +32,7 @@ def test_true_errors_lie_within_three_times_the_estimate(monkeypatch: pytest.Mon
     assert np.all(coarse.data["gain_step_error"].values > 0.0)
     figures = coarse.as_object()["figures"][0]
     assert figures["bandwidth_step_error"] == float(coarse.data["bandwidth_step_error"][0, 0])
-    assert "error from the step: up to" in str(coarse)
+    assert "the step: up to" in str(coarse)
 
 
 def test_half_steps_that_do_not_run_are_said_to(monkeypatch: pytest.MonkeyPatch) -> None:

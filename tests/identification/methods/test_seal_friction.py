@@ -63,12 +63,12 @@ def notes(data: xr.Dataset, **options: object) -> str:
 
 def test_the_record_that_does_not_fit_and_a_drift_are_named() -> None:
     data = METHOD.synthetic(None, METHOD.defaults, 1)
-    assert "off the fit of all other" not in notes(data)
+    assert "from the fit to all other" not in notes(data)
     assert "drifts" not in notes(data)
     third = data["record"] == 2.0
     said = notes(data.assign(F=data["F"] + 8.0 * third))
-    assert "level_2 is" in said
-    assert said.count("off the fit of all other") == 1
+    assert "level_2 deviates by" in said
+    assert said.count("from the fit to all other") == 1
     slow = (data["time"] - data["time"].where(third).min()) / 40.0
     drift = data.assign(F=data["F"] + 5.0 * third * slow)
     assert "N over the 4 strokes level_2 outward" in notes(drift)
@@ -90,7 +90,7 @@ def test_a_known_bore_shows_a_wrong_unit(signal: str, factor: float) -> None:
         result = METHOD.identify(record, None, chosen, Effort())
         (check,) = (c for c in result.checks if c.name == "area_off_bore")
         assert check.holds is holds
-    assert "units of pressure and force are not checked" in notes(data)
+    assert "cannot check the units of pressure and force" in notes(data)
     assert "not checked" not in notes(data, bore=chosen.bore)
 
 
@@ -112,7 +112,7 @@ def test_one_pressure_or_no_stroke_is_refused() -> None:
     with raises(ParameterError, name="f"):
         METHOD.identify(alone, None, METHOD.defaults, Effort())
     still = METHOD.defaults.replace({"x_low": 0.1, "x_high": 0.2})
-    with pytest.raises(ParameterError, match="no stroke crosses"):
+    with pytest.raises(ParameterError, match="no stroke covers the range"):
         METHOD.identify(parts["level_0"], None, still, Effort())
 
 

@@ -90,8 +90,8 @@ def read_sides(text: str) -> Sides:
         name, _, line = place.rpartition(":")
         if side not in (ABOVE, BELOW) or (equals and not (name and line.isdecimal())):
             raise ParameterError(
-                f"side = {quoted(part)}: write 'above' or 'below', or name operations by file and "
-                "line, for instance 'valve.py:42=below, above'",
+                f"side = {quoted(part)} is not valid: it must be 'above' or 'below', optionally "
+                "for operations by file and line, for instance 'valve.py:42=below, above'",
                 name="side",
                 value=part,
                 valid="'above' or 'below'",
@@ -287,9 +287,10 @@ def linear_models(of: Linearization) -> tuple[LinearModel, ...]:
     if limits and _STATED.get().usual != ABOVE:
         names = ", ".join(limits)
         raise CornerError(
-            f"{of.point.model.name}: at the operating point {names} is on its one-sided limit, and "
-            "cannot fall. Choose another operating point, or take the model of motions that rise: "
-            f"{option('side', 'above')}"
+            f"{of.point.model.name}: at the operating point, {names} is at its lower limit and "
+            "cannot decrease. Choose another operating point, or use the model for increasing "
+            f"motion: {option('side', 'above')}",
+            name=names,
         )
     corner = _Corner(of)
     models = corner.chosen() if corner.is_near() else of.models(of.point)
@@ -416,7 +417,7 @@ class _Corner:
                 break
             direction = moved
         kinks = self.kinks(direction)
-        texts = tuple(dict.fromkeys(f"{each.side} the corner of {each.place}" for each in kinks))
+        texts = tuple(dict.fromkeys(f"{each.side} the kink of {each.place}" for each in kinks))
         return tuple(replace(model, corners=texts) for model in self.models(direction))
 
     def kinks(self, direction: Array) -> list[Kink]:
@@ -470,16 +471,15 @@ class _Corner:
         name = self.of.point.model.name
         if not kinks:
             return (
-                f"{name}: the equations have no single finite slope at the operating point, and "
-                "no operation could be named: choose another point"
+                f"{name}: the equations have no unique finite slope at the operating point, and "
+                "bywire cannot find the operation that causes this. Choose another point"
             )
         places = "; ".join(
-            f"{each.place}, {quoted(each.source)} (corner at {each.corner:.6g}, SI)"
-            for each in kinks
+            f"{each.place}, {quoted(each.source)} (kink at {each.corner:.6g}, SI)" for each in kinks
         )
         return (
-            f"{name}: the operating point lies on a corner, and the linear models of its sides "
-            f"differ: {places}. Choose another operating point, or take a side: "
+            f"{name}: the operating point lies on a kink, and the linear models on both sides "
+            f"differ: {places}. Choose another operating point, or one side: "
             f"{option('side', 'above')}, {option('side', 'below')}, or "
             f"{option('side', f'{kinks[0].place}=above')}"
         )

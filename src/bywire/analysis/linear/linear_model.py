@@ -187,8 +187,8 @@ class LinearModel:
         if coupled and not held:
             names = ", ".join(self.states[k] for k in dropped)
             raise ParameterError(
-                f"{self.name}: the dropped states ({names}) act on the kept states: keep them, or "
-                "hold them with held=True",
+                f"{self.name}: the dropped states ({names}) affect the remaining states. Keep "
+                "them, or hold them with held=True",
                 name="states",
                 value=names,
             )
@@ -267,7 +267,7 @@ class LinearModel:
             step = expm(whole * period)
         if not np.isfinite(step).all():
             raise ParameterError(
-                f"a model with the sample time {period:g} s has no finite numbers: take a shorter "
+                f"the model has no finite numbers with the sample time {period:g} s. Use a shorter "
                 "sample time",
                 name="sample time",
                 value=f"{period:g} s",
@@ -586,7 +586,7 @@ class Transfer:
         if not error <= tolerance:
             raise ParameterError(
                 f"{self.name}: polynomials of degree {len(self.poles)} in z would have an error of "
-                f"{error:.1g}, above {tolerance:g}: use zeros, poles and factor, or state_space()",
+                f"{error:.1g}, above {tolerance:g}. Use zeros, poles and factor, or state_space()",
                 name="tolerance",
                 value=f"{error:.1g}",
                 valid=f"<= {tolerance:g}",

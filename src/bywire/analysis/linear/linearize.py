@@ -219,8 +219,8 @@ def _direction(name: str, state: NamedTuple) -> float:
     speed = float(getattr(state, name))
     if speed == 0.0:
         raise ParameterError(
-            f"{name} = 0: friction at rest has no slope; give a sliding speed, or use "
-            "friction='removed'",
+            f"{name} = 0 is not valid: friction at rest has no slope. Specify a sliding speed, or "
+            "use friction='removed'",
             name=name,
             value="0",
             valid="a sliding speed",
@@ -232,7 +232,7 @@ def _require_rest(name: str, state: NamedTuple) -> None:
     speed = float(getattr(state, name))
     if speed != 0.0:
         raise ParameterError(
-            f"{name} = {speed:g}: a moving state is not stuck; use friction='sliding'",
+            f"{name} = {speed:g} is not valid: a moving state is not stuck. Use friction='sliding'",
             name=name,
             value=f"{speed:g}",
             valid="0",
@@ -252,7 +252,8 @@ def _stiffness(
         if left < _TOUCH:
             raise ParameterError(
                 f"{model.name}: contact {at + int(np.argmin(slack))} just touches "
-                "at the operating point: choose a point at which it is clearly open or closed"
+                "at the operating point. Choose a point at which it is clearly open or closed",
+                name="contact",
             )
         blocks.append(K)
         at += len(C)
@@ -394,8 +395,8 @@ def equilibrium(
     if np.abs(left).max() > _LEFT:
         name = model.State._fields[still[int(np.argmax(np.abs(left)))]]
         raise ParameterError(
-            f"{model.name}: no equilibrium was found near the operating point: {name} does not "
-            "come to rest; choose another point",
+            f"{model.name} has no equilibrium near the operating point: {name} does not come to "
+            "rest. Choose another point",
             name=name,
         )
     return state, memory

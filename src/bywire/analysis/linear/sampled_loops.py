@@ -119,7 +119,7 @@ def sampled_models(
     """
     tasks = model.tasks(par)
     if not tasks:
-        raise ParameterError(f"{model.name} has no controller: use linearize()", name=model.name)
+        raise ParameterError(f"{model.name} has no controller. Use linearize()", name=model.name)
     for name in inputs:
         if name not in model.Stimulus._fields:
             raise unknown_name("signal of the stimulus", name, model.Stimulus._fields)
@@ -208,8 +208,8 @@ def stepped(model: LinearModel, period: float, step: float) -> LinearModel:
     count = round(period / step)
     if count < 1 or abs(count * step - period) > _WHOLE * step:
         raise StepError(
-            f"step = {step * 1e6:g} us does not divide the sample time of {period * 1e6:g} us: "
-            f"take for instance {period * 1e6 / max(count, 1):.12g} us",
+            f"step = {step * 1e6:g} us does not divide the sample time of {period * 1e6:g} us. "
+            f"Use for instance {period * 1e6 / max(count, 1):.12g} us",
             name="step",
             value=f"{step * 1e6:g} us",
             valid=f"{period * 1e6 / max(count, 1):.12g} us",
@@ -478,7 +478,7 @@ def _cut_writing(system: SampledSystem, row: int, cut: str) -> tuple[Jacobians, 
     if not taken:
         raise ParameterError(
             f"{cut} cannot be cut: neither the plant nor another controller reads it from "
-            f"{system.names[owner]}; cut a state that this controller reads",
+            f"{system.names[owner]}. Cut a state that this controller reads",
             name="cut",
             value=cut,
         )
@@ -502,8 +502,8 @@ def _alone(system: SampledSystem, tasks: list[int], refusal: str) -> int:
     if system.every[owner] != system.common:
         often = system.common // system.every[owner]
         raise ParameterError(
-            f"{refusal}, and no other may run more slowly: {system.names[owner]} runs {often} "
-            "times while the slowest one runs once",
+            f"{refusal}, and no other controller may run more slowly. {system.names[owner]} runs "
+            f"{often} times for each run of the slowest controller",
             name="cut",
         )
     return owner

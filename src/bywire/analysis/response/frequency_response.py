@@ -51,8 +51,8 @@ def require_stable(closed: LinearModel) -> None:
     outside = [z for z in closed.poles() if abs(z) > 1.0]
     rates = ", ".join(f"{math.log(abs(z)) / closed.period:.3g}" for z in outside)
     raise ParameterError(
-        f"{closed.name}: the closed loop is unstable and has no frequency response; its poles "
-        f"outside the unit circle grow with {rates} 1/s",
+        f"{closed.name}: the closed loop is unstable, so it has no frequency response. Growth "
+        f"rates of the unstable poles: {rates} 1/s",
         name=closed.name,
     )
 
@@ -249,7 +249,7 @@ def largest(response: xr.Dataset) -> str:
     decibel = 20.0 * float(np.log10(1.0 + known.max()))
     phase = response["phase_step_error"].values
     degree = float(phase[np.isfinite(phase)].max())
-    return f"error from the step: up to {decibel:.1g} dB and {degree:.1g}°"
+    return f"numerical error due to the step: up to {decibel:.1g} dB and {degree:.1g}°"
 
 
 # --- All frequencies at once

@@ -262,19 +262,22 @@ def _column(run: Run) -> Array:
 def _require_alike(run: Run, sweep: Sweep, points: Sequence[Run]) -> None:
     if sweep.variations:
         raise ParameterError(
-            "give either variations of one point or points, not both", name="variants"
+            "variants contains both variations and points. Specify only one of them",
+            name="variants",
         )
     if not points:
-        raise ParameterError("variants need at least one operating point", name="variants")
+        raise ParameterError("variants is empty: at least one is needed", name="variants")
     structure, tasks = structure_of(run.model, run.par), run.model.tasks(run.par)
     for k, variant in enumerate(points):
         if structure_of(variant.model, variant.par) != structure:
             raise ParameterError(
-                f"variant {k} has another model or another choice", name="variants", value=str(k)
+                f"variants: number {k} has a different model or a different choice",
+                name="variants",
+                value=str(k),
             )
         if [t.period for t in variant.model.tasks(variant.par)] != [t.period for t in tasks]:
             raise ParameterError(
-                f"variant {k} has other sample times, which cannot vary in a sweep",
+                f"variants: number {k} has different sample times, which cannot vary in a sweep",
                 name="variants",
                 value=str(k),
             )
@@ -315,8 +318,8 @@ def require_measurable(run: Run, sweep: Sweep) -> None:
     limit, highest = nyquist(run), max(sweep.frequencies)
     if highest >= limit:
         raise ParameterError(
-            f"frequency {highest:g} Hz is not below the Nyquist frequency of the controller, "
-            f"{limit:g} Hz: use lower frequencies",
+            f"frequency = {highest:g} Hz is not valid: it must be < {limit:g} Hz, the controller's "
+            "Nyquist frequency",
             name="frequency",
             value=f"{highest:g} Hz",
             valid=f"< {limit:g} Hz",
@@ -373,9 +376,9 @@ def _require_short(run: Run, length: float, f: float, periods: float) -> None:
     if not samples <= MOST_SAMPLES:
         lowest = periods / (MOST_SAMPLES * interval(run))
         raise ParameterError(
-            f"frequency {shown(f, 'Hz')}: its window would have {samples:.3g} samples, more than "
-            f"{MOST_SAMPLES:.0e}: use frequencies from {shown(float(f'{lowest:.2g}'), 'Hz')} on, "
-            "or a lower sample rate",
+            f"frequency = {shown(f, 'Hz')} is too low: its window would have {samples:.3g} "
+            f"samples, more than {MOST_SAMPLES:.0e}. Use frequencies "
+            f">= {shown(float(f'{lowest:.2g}'), 'Hz')}, or a lower sample rate",
             name="frequency",
             value=shown(f, "Hz"),
             valid=f">= {shown(float(f'{lowest:.2g}'), 'Hz')}",

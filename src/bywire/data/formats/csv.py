@@ -138,7 +138,9 @@ def _strict_columns(
                 seen.empty += 1
             line = first_line + reader.line_num
     except csv.Error as error:
-        raise FileError(f"{path}, line {line}: {error}: check its quotation marks") from None
+        raise FileError(
+            f"{path}, line {line}: {error}. Check its quotation marks", name=str(path)
+        ) from None
     values = np.array(rows, dtype=np.float64).reshape(-1, len(indices))
     return [np.ascontiguousarray(column) for column in values.T]
 
@@ -149,20 +151,26 @@ def _require_width(path: Path, line: int, cells: list[str], dialect: Dialect) ->
     if dialect.is_ragged:
         if cells[0].startswith(END_OF_HEADER) or cells[0] == "Channels":
             raise FileError(
-                f"{path}, line {line}: another table begins here: save each in a separate file"
+                f"{path}, line {line}: another table begins here. Save each table in a separate "
+                "file",
+                name=str(path),
             )
         cells += [""] * (dialect.width - len(cells))
     if len(cells) != dialect.width:
         fix = (
-            "complete the row: if blanks separate columns, a missing value needs a mark such as nan"
+            "Complete the row. If blanks separate columns, use a mark such as nan for a missing "
+            "value"
             if dialect.separator == " "
-            else "complete the row, or remove it if the recording was cut here; with decimal "
-            "commas, separate the columns by semicolons"
+            else "Complete the row, or remove it if the recording was interrupted here. With "
+            "decimal commas, separate the columns by semicolons"
         )
         raise FileError(
             f"{path}, line {line}: {len(cells)} cells, but the first row has {dialect.width} "
-            f"(separated by {SEPARATORS[dialect.separator]}): {fix}; if other lines "
-            "precede the table, give their number as skip_lines in the mapping"
+            f"(separated by {SEPARATORS[dialect.separator]}). {fix}. If other lines "
+            "precede the table, set skip_lines in the mapping to their number",
+            name=str(path),
+            value=str(len(cells)),
+            valid=str(dialect.width),
         )
 
 
@@ -176,7 +184,12 @@ def _number(path: Path, line: int, cell: str, column: int, dialect: Dialect, see
     if kind not in (NUMBER, DIGITS):
         stamp = nanoseconds(cell, kind)
         if stamp is None:
-            raise FileError(f"{where} is not a {kind} like those above it: correct it")
+            raise FileError(
+                f"{where} is not a {kind}, unlike the cells above it. Correct the cell",
+                name=dialect.label(column),
+                value=quoted(cell),
+                valid=kind,
+            )
         return (stamp - seen.origins[column]) / 1e9
     plain = cell if dialect.decimal == "." else cell.replace(",", ".")
     ok = _NUMBER.fullmatch(plain) and (dialect.decimal == "." or "." not in cell)
@@ -185,14 +198,19 @@ def _number(path: Path, line: int, cell: str, column: int, dialect: Dialect, see
         return value
     if is_stamp(cell):
         raise FileError(
-            f"{where} is a time stamp that bywire cannot read among these cells: write "
-            "09:12:33.5 or 2026-11-26T09:12:33.5 in all rows, or seconds from the start"
+            f"{where} is a time stamp that bywire cannot read. Use 09:12:33.5 or "
+            "2026-11-26T09:12:33.5 in all rows, or seconds from the start",
+            name=dialect.label(column),
+            value=quoted(cell),
         )
     other = "," if dialect.decimal == "." else "."
-    hint = f"; the decimal mark is {dialect.decimal!r} here" if other in cell else ""
+    hint = f" (the decimal mark is {dialect.decimal!r} here)" if other in cell else ""
     raise FileError(
-        f"{where} is not a finite number{hint}: correct it; if it marks a missing value, write "
-        f"missing = [{cell!r}] in the mapping"
+        f"{where} is not a finite number{hint}. Correct it. If it marks a missing value, add "
+        f"missing = [{cell!r}] to the mapping",
+        name=dialect.label(column),
+        value=quoted(cell),
+        valid="a finite number",
     )
 
 
@@ -238,9 +256,11 @@ def _require_whole_end(path: Path, block: bytes, last_line: int, dialect: Dialec
         few = f"all but {as_short}" if as_short else "all"
         cell = quoted(cells[-1].decode("utf-8", "replace"))
         raise FileError(
-            f"{path}, line {last_line}: it ends with {cell} without a line end, but {few} "
-            f"numbers above in that column {more}: remove the row if the recording was cut here, "
-            "or add a line end if it is complete"
+            f"{path}, line {last_line} ends with {cell} without a line end, but {few} numbers "
+            f"above it {more}. Remove the row if the recording was interrupted here, or add a "
+            "line end if the row is complete",
+            name=str(path),
+            value=cell,
         )
 
 
@@ -304,13 +324,11 @@ class TextSource:
             if self._kind(k) == CLOCK and is_dated:
                 column += columns[-1]
             elif self._kind(k) in (CLOCK, DIGITS) and (days := over_midnight(column)):
-                self.remarks.append(
-                    f"{self._dialect.label(k)}: it continues past midnight ({days} x)"
-                )
+                self.remarks.append(f"{self._dialect.label(k)} continues past midnight ({days} x)")
             if self._kind(k) == DIGITS:
                 column -= column[0] if column.size else 0.0
             if self._kind(k) in (*_STAMPS, DIGITS) and k < len(self._index) and k != self._day:
-                self.remarks.append(f"{self._dialect.label(k)}: it counts from the first row")
+                self.remarks.append(f"{self._dialect.label(k)} counts from the first row")
         self._remark()
         numbers = dict(zip(plain, columns, strict=False))
         if raster is not None:
@@ -369,16 +387,13 @@ class TextSource:
     def _why_left_out(self, column: int) -> str:
         kind = self._kind(column)
         if kind == TEXT:
-            return "it holds text"
+            return "it contains text"
         if kind == UNCLEAR:
-            return (
-                "its times or dates can be read in several ways: write 09:12:33.5, 2026-11-26, or "
-                "both"
-            )
+            return "its times or dates are ambiguous. Use 09:12:33.5, 2026-11-26, or both"
         if kind == DAY:
             clocks = [k for k, other in enumerate(self._dialect.kinds) if other == CLOCK]
             is_used = self._day == column and clocks
-            return "its dates belong to the times of day" if is_used else "it holds dates"
+            return "its dates belong to the times of day" if is_used else "it contains dates"
         return ""
 
     def _remark(self) -> None:
@@ -445,7 +460,10 @@ def _blocks(path: Path, dialect: Dialect) -> Iterator[bytes]:
         cut = block.rfind(b"\n") + 1
         rest = block[cut:]
         if len(rest) > HEAD:
-            raise FileError(f"{path}: a line is longer than {HEAD} bytes: is this a table?")
+            raise FileError(
+                f"{path}: a line is longer than {HEAD} bytes, so this is not a table",
+                name=str(path),
+            )
         if cut:
             yield block[:cut]
     if rest.strip():

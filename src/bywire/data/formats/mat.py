@@ -52,7 +52,9 @@ class MatSource:
             Counter(name for name, _, _ in variables).most_common(1)[0] if variables else ("", 0)
         )
         if count > 1:
-            raise FileError(f"{path} holds {quoted(name)} twice: save each variable once")
+            raise FileError(
+                f"{path} contains {quoted(name)} twice. Save each variable once", name=name
+            )
         self._inner: dict[str, NDArray[Any]] = {}
         found = Found()
         for name, shape, kind in variables:
@@ -75,7 +77,8 @@ class MatSource:
             numbers = self._inner[array] if array in self._inner else self._variable(array)
             if numbers.dtype.kind not in "iufb":
                 raise FileError(
-                    f"{self._path}: {quoted(array)} contains no real numbers: do not select it"
+                    f"{self._path}: {quoted(array)} does not contain real numbers. Leave it out",
+                    name=array,
                 )
             for name in names:
                 part = self._parts[name]
@@ -90,7 +93,9 @@ class MatSource:
 
         variable = loadmat(self._path, variable_names=[name], appendmat=False)[name]
         if not isinstance(variable, np.ndarray):
-            raise FileError(f"{self._path} is damaged: {quoted(name)} cannot be read ({variable})")
+            raise FileError(
+                f"{self._path} is damaged: {quoted(name)} cannot be read ({variable})", name=name
+            )
         return variable
 
     def _is_increasing(self, part: Part) -> bool:
@@ -143,7 +148,8 @@ def _write(dataset: xr.Dataset, path: Path, progress: Progress) -> None:
     if large is not None:
         raise FileError(
             f"cannot write {path}: {large!r} has {content[large].nbytes} bytes, more than this "
-            "format allows: use the format mat73"
+            "format allows. Use the format mat73",
+            name=large,
         )
     progress(f"writing {path.name}", 0.0)
     savemat(

@@ -80,7 +80,10 @@ class Mat73Source:
         import h5py
 
         if len(self._arrays) + len(found.texts) + len(found.scalars) > _MOST:
-            raise FileError(f"{self._path} holds more than {_MOST} arrays: choose another file")
+            raise FileError(
+                f"{self._path} contains more than {_MOST} arrays. Use another file",
+                name=str(self._path),
+            )
         if isinstance(item, h5py.Group):
             if depth < _DEEPEST:
                 self._walk(item, f"{name}.", depth + 1, found)
@@ -100,7 +103,7 @@ class Mat73Source:
             self._take_structs(item, name, depth, found)
         else:
             found.left_out[name] = (
-                "it is an array of cells" if kind == "cell" else "it holds no real numbers"
+                "it is an array of cells" if kind == "cell" else "it does not contain real numbers"
             )
 
     def _take_structs(self, item: Any, name: str, depth: int, found: Found) -> None:
@@ -147,8 +150,9 @@ class Mat73Source:
         """Reject numbers that are not in the file, which the library would read as zeros."""
         if array.is_virtual or array.external:
             raise FileError(
-                f"{self._path}: {name!r} is stored in other files, which bywire does not open: "
-                "save it in one file"
+                f"{self._path}: {name!r} is stored in other files, which bywire does not open. "
+                "Save it in one file",
+                name=name,
             )
         if array.chunks is None:
             is_whole = array.id.get_storage_size() >= array.nbytes
@@ -157,8 +161,9 @@ class Mat73Source:
             is_whole = array.id.get_num_chunks() >= math.prod(wanted)
         if not is_whole and not np.isnan(float(array.fillvalue)):
             raise FileError(
-                f"{self._path}: some of the {array.size} numbers of {name!r} were never written: "
-                "was the recording stopped? Save the written ones"
+                f"{self._path}: some of the {array.size} numbers of {name!r} were never written. "
+                "The recording may have been interrupted. Save only the written numbers",
+                name=name,
             )
 
 
@@ -178,7 +183,10 @@ def _open(path: Path, options: ReadOptions) -> Iterator[Mat73Source]:
     with h5py.File(path, "r") as file:
         if _NETCDF in file.attrs:
             raise FileError(
-                f"{path} is a NetCDF file: rename it with the ending .nc, or give format = 'netcdf'"
+                f"{path} is a NetCDF file. Rename it with the ending .nc, or specify "
+                "format = 'netcdf'",
+                name=str(path),
+                valid="'netcdf'",
             )
         yield Mat73Source(path, file)
 

@@ -71,7 +71,7 @@ class Mdf4Source:
             reasons = {c: _why_not(group.channels[c], group.channel_dependencies[c]) for c in every}
             names = {c: name for c, name in every.items() if not reasons[c]}
             of_group = (
-                "its group holds no records"
+                "its group contains no records"
                 if not length
                 else "its group has no time channel"
                 if master not in names
@@ -117,7 +117,8 @@ class Mdf4Source:
             numbers = instants if signal is None else signal.samples
             if numbers.ndim != 1 or numbers.dtype.kind not in "iufb":
                 raise FileError(
-                    f"{self._path}: channel {name!r} contains no numbers: do not select it"
+                    f"{self._path}: channel {name!r} does not contain numbers. Leave it out",
+                    name=name,
                 )
             channel = self._channel(group, index)
             if signal is not None and _has_codes(channel):
@@ -150,8 +151,9 @@ class Mdf4Source:
         if self._records_read != size:
             raise FileError(
                 f"{self._path} is damaged: group {group} declares {size} records from {begin} on, "
-                f"but {self._records_read} could be read: copy it again, or repair it with "
-                "the program that recorded it"
+                f"but only {self._records_read} could be read. Copy it again, or repair it with "
+                "the program that recorded it",
+                name=str(self._path),
             )
         return dict(zip(indices, signals, strict=True))
 
@@ -178,8 +180,9 @@ class Mdf4Source:
         if channel.channel_type not in (_VIRTUAL_MASTER, _VIRTUAL) and end > size:
             raise FileError(
                 f"{self._path} is damaged: the channel {quoted(channel.name)} reaches to byte "
-                f"{end} of records of {size} bytes: copy it again, or repair it with the program "
-                "that recorded it"
+                f"{end}, but records have {size} bytes. Copy it again, or repair it with the "
+                "program that recorded it",
+                name=channel.name,
             )
 
     def count_records(self) -> None:
@@ -207,11 +210,11 @@ def _why_not(channel: Any, parts: Any) -> str:
     if parts:
         return "it is an array or a structure"
     if channel.data_type not in _NUMBERS:
-        return "it holds text or bytes"
+        return "it contains text or bytes"
     if channel.channel_type not in (_VALUE, _MASTER, _VIRTUAL_MASTER, _VIRTUAL):
         return "it contains no samples itself"
     if _has_formula(channel.conversion):
-        return "a formula converts it, and bywire evaluates no formulas of files"
+        return "a formula converts it, and bywire does not evaluate formulas in files"
     return ""
 
 
@@ -325,12 +328,18 @@ def _require_mdf4(path: Path) -> None:
         head = stream.read(16)
     if head[:8] != b"MDF     ":
         raise FileError(
-            f"{path} was not finished: the recorder stopped before it wrote the number of "
-            "records; finalize it with the program that recorded it"
+            f"{path} is incomplete: the recorder stopped before it wrote the number of records. "
+            "Finalize it with the program that recorded it",
+            name=str(path),
         )
     if head[8:9] != b"4":
         version = head[8:16].decode("latin-1").strip("\0 ")
-        raise FileError(f"{path} is MDF {version}: convert it to MDF 4, for example with asammdf")
+        raise FileError(
+            f"{path} is MDF {version}. Convert it to MDF 4, for example with asammdf",
+            name=str(path),
+            value=str(version),
+            valid="MDF 4",
+        )
 
 
 def _write(dataset: xr.Dataset, path: Path, progress: Progress) -> None:

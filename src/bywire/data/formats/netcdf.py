@@ -74,8 +74,9 @@ def _require_whole(path: Path, file: Any) -> None:
         size = sum(math.prod(v.shape) * v.dtype.itemsize for v in file.variables.values())
         if size > path.stat().st_size:
             raise FileError(
-                f"{path} is damaged: it declares {size} bytes of numbers, but the file has "
-                f"{path.stat().st_size}: copy or export it again"
+                f"{path} is damaged: it declares {size} bytes of numbers, but the file has only "
+                f"{path.stat().st_size} bytes. Copy or export it again",
+                name=str(path),
             )
 
 

@@ -162,8 +162,8 @@ def _require_both_ways(sliding: Mapping[str, xr.Dataset], slowest: float) -> Non
     if short:
         said = ", ".join(f"{count} {way}" for way, count in counts.items())
         raise ParameterError(
-            f"too few samples slide {' and '.join(short)} ({said}; {_LEAST} each way are needed): "
-            "record motion to and fro (speed changes its sign), or lower "
+            f"too few samples slide {' and '.join(short)} ({said}, but at least {_LEAST} each way "
+            "are needed). Record motion in both directions, or reduce "
             f"{option('options')} slowest, which "
             f"excludes samples slower than {100 * slowest:g} % of a record's fastest speed",
             name="slowest",
@@ -179,7 +179,9 @@ def _require_braking(sliding: Mapping[str, xr.Dataset]) -> None:
     )
     along = float(F @ v / np.sqrt((F @ F) * (v @ v))) if F.any() else 0.0
     if along < 0.0:
-        raise wrong_sign("friction", "speed", f"cosine {along:.2f}: it would drive the motion")
+        raise wrong_sign(
+            "friction", "speed", f"cosine {along:.2f}, so friction would drive the motion"
+        )
 
 
 # --- The method
@@ -286,23 +288,23 @@ def identify(data: xr.Dataset, par: None, options: Options, effort: Effort) -> I
                 _misfit(whole, predicted),
                 limit=_MISFIT,
                 note="mean residual at a speed or a pressure, relative to the friction",
-                next_step="see in the curve where it occurs: at low speed, record slower "
-                "strokes; over pressure, give p as well; if it differs from record to record, "
-                "identify each record separately",
+                next_step="find where the residual occurs in the curve. At low speed, record "
+                "slower strokes. If it depends on pressure, also provide p. If it differs from "
+                "record to record, identify each record separately",
             ),
             Check(
                 "validation_over_training",
                 best.validation_error / best.training_error,
                 limit=1.5,
-                note="error on held-out data over the error on fitted data",
+                note="error on held-out data, relative to the error on fitted data",
                 next_step="measure more records, or the same speeds and pressures in each",
             ),
             _driving(best.estimate),
         ),
         curves=(_curve(records, whole, predicted),),
         notes=(
-            f"held out: {choice.held_out}; the simplest law within one standard error "
-            "of the best is chosen",
+            f"held out: {choice.held_out}. bywire chooses the simplest law within one standard "
+            "error of the best",
         ),
     )
 
@@ -317,7 +319,7 @@ def _driving(fit: Estimate) -> Check:
         "terms_that_drive",
         float(len(below)),
         limit=0.0,
-        note=said or "every part of the law has a sign that friction can have",
+        note=said or "the signs of all parts of the law are possible for friction",
         next_step="check the signs of friction and speed, and whether speeds and pressures "
         "vary enough to separate the parts of the law",
     )
@@ -359,7 +361,7 @@ def _curve(records: Mapping[str, xr.Dataset], whole: xr.Dataset, predicted: Arra
     attrs = {"units": whole["friction"].attrs.get("units", "1"), "long_name": "friction"}
     return Curve(
         "friction",
-        "Friction during sliding, one record after another: measured, and by the chosen law.",
+        "Measured friction during sliding, one record after another, and the chosen law.",
         xr.Dataset(
             {
                 "measured": ("time", whole["friction"].values, attrs),
@@ -402,7 +404,7 @@ def _known_values(par: None, options: Options) -> dict[str, float]:
 METHOD = Method(
     name="friction-model",
     assembly="",
-    summary=f"which of {len(LAWS)} friction laws a record supports, judged on held-out data",
+    summary=f"choice among {len(LAWS)} friction laws for a record, judged on held-out data",
     experiment="",
     signals={"friction": "", "speed": ""},
     options=Options,
@@ -424,7 +426,7 @@ METHOD = Method(
     optional={"pressure": "Pa"},
     truth=_known_values,
     further={
-        "F_c": ("", "Coulomb friction, or F_p forward and F_n backward"),
+        "F_c": ("", "Coulomb friction (or F_p forward and F_n backward)"),
         "f": ("", "friction over pressure"),
         "d": ("", "viscous friction"),
         "k": ("1", "breakaway over Coulomb friction"),

@@ -142,8 +142,8 @@ def _require_known(case: Case, question: Question) -> None:
     outputs, stimuli = signals_of(case.model.Output), signals_of(case.model.Stimulus)
     if not question.noise:
         raise ParameterError(
-            f"no output is measured: give {option('outputs')} SIGNAL, once for each of the "
-            f"model's outputs that the record has, for instance {', '.join(list(outputs)[:6])}",
+            f"there is no output. Add {option('outputs')} SIGNAL for each output of the model in "
+            f"the record, for instance {', '.join(list(outputs)[:6])}",
             name="outputs",
             valid=", ".join(outputs),
         )
@@ -161,8 +161,7 @@ def _require_known(case: Case, question: Question) -> None:
 
 METHOD = BenchMethod(
     name=_NAME,
-    summary="any parameters of any bench: its model, driven by measured inputs, against its "
-    "outputs",
+    summary="any parameters of any bench, from measured inputs and outputs",
     options=Options,
     defaults=_DEFAULTS,
     simulated=_SIMULATED,

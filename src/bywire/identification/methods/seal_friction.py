@@ -172,19 +172,21 @@ def _require_told(groups: Sequence[Group]) -> None:
     """
     if not groups:
         raise ParameterError(
-            "no stroke crosses the stretch x_low to x_high: move the piston to and fro through "
-            f"it, or set {option('options')} x_low and x_high to where it moves",
+            "no stroke covers the range x_low to x_high. Move the piston back and forth through "
+            f"this range, or set {option('options')} x_low and x_high to the piston's range",
             name="x_low",
         )
     if len({g.direction for g in groups}) < 2:
         raise ParameterError(
-            "F_0 and f need strokes both ways: friction alone changes sign", name="F_0"
+            "F_0 and f need strokes in both directions, because only friction changes its sign",
+            name="F_0",
         )
     levels = [g.p for g in groups]
     if max(levels) < _APART * min(levels) or len(groups) < 4:
         raise ParameterError(
             f"f cannot be separated from F_0: all strokes were made at {min(levels) / 1e5:.3g} to "
-            f"{max(levels) / 1e5:.3g} bar; give one record per pressure, at two pressures or more",
+            f"{max(levels) / 1e5:.3g} bar. Provide one record per pressure, at two or more "
+            "pressures",
             name="f",
         )
 
@@ -208,7 +210,7 @@ def _require_signs(A: float, friction: float) -> None:
     if A < 0.0:
         raise wrong_sign("F", "p", f"area {shown(float(f'{A:.4g}'), 'm**2')}")
     if friction < 0.0:
-        raise wrong_sign("F", "x", f"mean friction {friction:.3g} N: it would drive")
+        raise wrong_sign("F", "x", f"mean friction {friction:.3g} N, which would drive the motion")
 
 
 def _half_widths(groups: Sequence[Group]) -> tuple[Array, Array]:
@@ -245,8 +247,8 @@ def _drifting(groups: Sequence[Group], area: float) -> tuple[str, ...]:
         if line.pvalue < _LEVEL / len(groups):
             change = float(line.slope * np.ptp(time))
             texts.append(
-                f"the force drifts by {change:.2g} N over the {time.size} strokes {group.label}: "
-                "let it run in, or cut the record"
+                f"the force drifts by {change:.2g} N over the {time.size} strokes {group.label}. "
+                "Run the seal in first, or trim the record"
             )
     return tuple(texts)
 
@@ -282,8 +284,8 @@ def _misfits(groups: Sequence[Group], W: Array, F: Array) -> tuple[str, ...]:
         ratio = float(off @ np.linalg.solve(spread, off)) / count / variance
         if ratio > stats.f.isf(_LEVEL / len(groups), count, freedom):
             texts.append(
-                f"{label or 'the record'} is {float(np.abs(off).max()):.2g} N off the fit of all "
-                "other records: check its zeros, its pressure and its run-in"
+                f"{label or 'the record'} deviates by {float(np.abs(off).max()):.2g} N from the "
+                "fit to all other records. Check its zeros, its pressure and its run-in"
             )
     return tuple(texts)
 
@@ -310,7 +312,7 @@ def _friction_line(fit: Estimate, groups: Sequence[Group]) -> Curve:
     }
     return Curve(
         "friction",
-        "Friction over pressure with its 95 % band; points: each record, each direction.",
+        "Friction against pressure with its 95 % band; one point per record and direction.",
         over(("p", p, "Pa", "pressure"), columns, "N", "friction"),
         "p",
     )
@@ -330,7 +332,7 @@ def _sliding_force(
         pairs.append(_sliding(record, fit, stretch, slowest, cutoff))
     return Curve(
         "strokes",
-        "Force while the piston slides, one record after another: measured and modeled.",
+        "Measured and modeled force while the piston slides, one record after another.",
         _beside(pairs, after_one_another(times)),
         "time",
     )
@@ -349,7 +351,7 @@ def _force_over_travel(
     axis = {"x": ("x", x, {"units": "m", "long_name": "travel"})}
     return Curve(
         "loops",
-        "Force over travel while the piston slides: the height of a loop is twice the friction.",
+        "Force against travel while the piston slides; a loop's height is twice the friction.",
         _beside(pairs, axis, "x"),
         "x",
     )
@@ -478,7 +480,7 @@ def identify(data: xr.Dataset, par: None, options: Options, effort: Effort) -> I
                 "misfit_over_friction",
                 sigma / friction,
                 limit=_MISFIT,
-                note="residual of the mean forces about the line, over the mean friction",
+                note="residual of the mean forces about the line, relative to the mean friction",
                 next_step=_advice(),
             ),
             Check(
@@ -508,18 +510,18 @@ def identify(data: xr.Dataset, par: None, options: Options, effort: Effort) -> I
 
 def _unchecked() -> str:
     return (
-        f"units of pressure and force are not checked: {option('options', {'bore': '25mm'})} "
-        "compares the area with a known bore"
+        f"bywire cannot check the units of pressure and force. Use "
+        f"{option('options', {'bore': '25mm'})} to compare the area with a known bore"
     )
 
 
 def _advice() -> str:
     return (
-        "look at 'pressure_between_directions' and the curve of each record: if one record is "
-        "off, identify without it; if all forces are shifted, use "
-        f"{option('options', {'zero': 'free'})}; if friction depends on speed or bends over "
-        "pressure, run 'bywire identify friction-model' on friction, speed and pressure, which "
-        "compares such laws"
+        "check 'pressure_between_directions' and the curve of each record. If one record is off, "
+        "identify without it. If all forces are shifted, use "
+        f"{option('options', {'zero': 'free'})}. If friction depends on speed, or nonlinearly on "
+        "pressure, run 'bywire identify friction-model' on friction, speed and pressure to "
+        "compare such laws"
     )
 
 
@@ -533,8 +535,8 @@ def _bore_check(area: float, bore: float) -> tuple[Check, ...]:
             "area_off_bore",
             abs(area / known - 1.0),
             limit=_OFF_BORE,
-            note=f"{1e6 * area:.5g} mm^2 estimated, the bore has {1e6 * known:.5g} mm^2; "
-            "above the limit, a unit of pressure or force is wrong",
+            note=f"the estimate is {1e6 * area:.5g} mm^2, and the bore's area is "
+            f"{1e6 * known:.5g} mm^2. Above the limit, a unit of pressure or force is wrong",
             next_step=f"check both units in the file ({option('outputs')} 'p=COLUMN [bar]'), and "
             "the bore",
         ),
@@ -589,7 +591,7 @@ def known(par: None, options: Options) -> dict[str, float]:
 METHOD = Method(
     name="seal-friction",
     assembly="",
-    summary="friction of a sealed piston over pressure, from strokes both ways (2010, eq. 16)",
+    summary="friction of a sealed piston, from strokes in both directions (2010, eq. 16)",
     experiment="",
     signals={"F": "N", "x": "m", "p": "Pa"},
     options=Options,
