@@ -73,7 +73,7 @@ function cellsOf(computed, figure) {
   const { value, reason, open } = computed, met = figure.limit && isMet(computed, figure.limit);
   const outcome = open ? "undecided" : met ? "met" : "missed";
   const mark = { undecided: "?", met: "✓", missed: "✗" }[outcome];
-  const text = reason ? "–" : readable(shownOf(value, figure), figure.unit);
+  const text = reason ? "–" : readable(value, figure);
   return { value: element("td", { class: "number", title: reason }, text), outcome, mark, reason };
 }
 

@@ -45,7 +45,7 @@ from bywire.report.panels import Panel, Trace
 from bywire.report.stated_levels import stated_figure
 from bywire.report.subject import bench_changes, parameter_rows
 from bywire.report.terminal import change_texts
-from bywire.report.wording import amount, unit_text
+from bywire.report.wording import BY_SIZE, amount, unit_text
 from bywire.simulation.c_runtime import SCALAR
 
 if TYPE_CHECKING:
@@ -376,6 +376,10 @@ def _judged(made: Exported, result: Result, followed: Sequence[str]) -> dict[str
             "name": kpi.name,
             "unit": unit_text(display_unit(kpi.unit)),
             **_shown(kpi.unit),
+            "sizes": [
+                (least, convert(1.0, kpi.unit, unit), unit_text(unit))
+                for least, unit in BY_SIZE.get(kpi.unit, ())
+            ],
             "definition": kpi.definition,
             "text": bench.requirements.get(kpi.name, ""),
             "limit": limits.get(kpi.name),

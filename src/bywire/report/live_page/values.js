@@ -7,17 +7,19 @@ const siOf = (value, { factor, offset }) => (value - offset) / factor;
 /** Return a number with as many digits as a reader needs. */
 const digits = (value) => String(Number(value.toPrecision(6)));
 
-/** Return a key figure in four digits, times below 1 s in ms, as `wording.readable_unit` has it. */
-function readable(value, unit) {
-  const isShort = unit === "s" && Math.abs(value) < 1;
-  const written = String(Number((isShort ? value * 1e3 : value).toPrecision(4)));
-  return `${written} ${isShort ? "ms" : unit}`.trim();
+/** Return a number in four digits with its unit. */
+const withUnit = (value, unit) => `${Number(value.toPrecision(4))} ${unit}`.trim();
+
+/** Return a key figure [SI] in the unit for its size; `sizes`: least size, factor and unit of each. */
+function readable(value, { sizes, unit, factor, offset }) {
+  const fitting = value && sizes.findLast(([least]) => Math.abs(value) * (1 + 1e-6) >= least);
+  return fitting ? withUnit(value * fitting[1], fitting[2]) : withUnit(shownOf(value, { factor, offset }), unit);
 }
 
 /** Return a value at the pointer with its unit, or the name of a level. */
 function reading(value, unit, levels = []) {
   if (value === null || value === undefined || Number.isNaN(value)) return "–";
-  return levels.length ? levels[value] ?? String(value) : readable(value, unit);
+  return levels.length ? levels[value] ?? String(value) : withUnit(value, unit);
 }
 
 /** Return the ends of a slider [SI], and whether it goes by factors; null where it makes no sense. */
