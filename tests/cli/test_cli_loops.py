@@ -249,7 +249,7 @@ def test_a_stated_side_of_a_corner_is_taken(bywire):
     assert "plant/pressure_sensor.py:" in found["corners"][0]
     assert "below the kink of" in below.err
     assert not above.object["margins"]["has_loop"]
-    refused(bywire(*asked, "left"), "side = 'left': write 'above' or 'below'")
+    refused(bywire(*asked, "left"), "side = 'left' is not valid")
 
 
 @pytest.mark.usefixtures("drawn")

@@ -209,12 +209,20 @@ def test_the_same_seed_gives_the_same_gains() -> None:
     ("texts", "error", "match"),
     [
         (("bandwidth >= 10 Hz", "bandwidth <= 5 Hz"), ParameterError, "contradict"),
-        (("bandwidth >= 10 Hz", "bandwidth >= 5 Hz"), ParameterError, "twice"),
+        (
+            ("bandwidth >= 10 Hz", "bandwidth >= 5 Hz"),
+            ParameterError,
+            "two requirements on bandwidth",
+        ),
         (("bandwith >= 10 Hz",), UnknownNameError, "bandwidth"),
-        (("phase >= 60 deg", "phase_margin >= 50 deg"), ParameterError, "phase_margin is required"),
+        (
+            ("phase >= 60 deg", "phase_margin >= 50 deg"),
+            ParameterError,
+            "two requirements on phase_margin",
+        ),
         (("bandwidth >= 10 bar",), UnitError, "Hz"),
         (("bandwidth >= 10",), UnitError, "Hz"),
-        (("bandwidth 10 Hz",), ParameterError, "cannot be read"),
+        (("bandwidth 10 Hz",), ParameterError, "is not valid"),
         (("phase margin >= 200 deg",), ParameterError, "0 to 180"),
         (("sensitivity peak <= 0.5",), ParameterError, "above 1"),
         (("overshoot <= 15",), UnitError, "percent"),
@@ -252,7 +260,7 @@ def test_problems_that_are_refused() -> None:
         cases_of(loop, par, 200.0, {"wedge.mu_b": [0.3]})
     with pytest.raises(ParameterError, match=r"moment = 5000.*travel"):
         cases_of(loop, par, 200.0, {"moment": [200.0, 5000.0]})
-    with pytest.raises(ParameterError, match="less than 500 Hz"):
+    with pytest.raises(ParameterError, match="Require < 500 Hz"):
         designed("moment", ("bandwidth >= 600 Hz",))
     with pytest.raises(ParameterError, match="all tunable parameters"):
         design({}, read(["bandwidth >= 5 Hz"]), cases_of(loop, par, 200.0, {}), {})
