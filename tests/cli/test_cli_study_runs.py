@@ -105,7 +105,7 @@ def test_a_file_is_no_folder_of_a_study(bywire, study, tmp_path, monkeypatch, co
 def test_a_folder_that_cannot_be_written_has_no_option(bywire, tmp_path, command):
     (tmp_path / "file").touch()
     outcome = bywire("study", command, tmp_path / "file" / "folder")
-    refused(outcome, "cannot write to the output folder", "you may write there")
+    refused(outcome, "cannot write to the output folder", "you have write permission there")
     assert "--out" not in outcome.err
 
 

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 _POINTS = 6
 TwoAmplitudes = Annotated[
-    str, Ask("A small and a large amplitude, e.g. '0.001 rad, 1 rad'.", "Amplitudes")
+    str, Ask("Small and large amplitude, e.g. '0.001 rad, 1 rad'.", "Amplitudes")
 ]
 
 
@@ -50,16 +50,17 @@ def agreement(
     progress: "Progress | None" = None,
     side: Side = "",
 ) -> "LoopAgreement":
-    """Attribute the nonlinearity of a loop to its causes, one by one.
+    """Attribute a loop's nonlinearity to its causes, one by one.
 
     Parameters
     ----------
     loop, parameters, at, overrides
         See `bywire.margins`.
     frequencies
-        ``"1 Hz:150 Hz:20"``, or a list with commas. By default six over the loop's band.
+        Frequencies as ``"1 Hz:150 Hz:20"`` or separated by commas. Default: six over the loop's
+        band.
     amplitudes
-        A small and a large one, ``"0.001 rad, 1 rad"``. By default those that the loop declares.
+        Small and large amplitude, ``"0.001 rad, 1 rad"``. Default: those that the loop declares.
     progress
         Called with a label and the finished share, 0 to 1.
     side
@@ -68,8 +69,8 @@ def agreement(
     Returns
     -------
     LoopAgreement
-        Differences of the loop's responses by cause: frequencies in Hz, gains, phases in degree,
-        shares of the difference in percent.
+        Differences between the loop's responses by cause: frequencies in Hz, gains, phases in
+        degrees, shares of the difference in percent.
 
     Raises
     ------

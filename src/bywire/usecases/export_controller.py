@@ -1,4 +1,4 @@
-"""The ECU of a bench as readable C99."""
+"""Export of a bench's ECU as readable C99."""
 
 from typing import TYPE_CHECKING, Annotated
 
@@ -8,20 +8,21 @@ from bywire.usecases.declare import NOTHING, Ask, Command, use_case
 if TYPE_CHECKING:
     from bywire.api.exports import ControllerExport
 
-Precision = Annotated[str, Ask("Floating-point precision of the C: double, or single.")]
-Vectors = Annotated[int, Ask("Test vectors per task.")]
+Precision = Annotated[str, Ask("Floating-point precision of the C code: double or single.")]
+Vectors = Annotated[int, Ask("Number of test vectors per task.")]
 IsChecked = Annotated[
     bool,
     Ask(
-        "Run the C here and on emulated Cortex-M3, M4F and M7, in both precisions; exit status 1 "
-        "if a bit differs."
+        "Run the C code on this machine and on emulated Cortex-M3, M4F and M7, in both "
+        "precisions. Exits with status 1 if a bit differs."
     ),
 ]
-Bus = Annotated[bool, Ask("Also describe the ECU's memory for a CAN bus.")]
+Bus = Annotated[bool, Ask("Also write a description of the ECU's memory for a CAN bus (DBC).")]
 Prefix = Annotated[
     str,
     Ask(
-        "Prefix of files and symbols, so that several ECUs link into one program.",
+        "Prefix of file and symbol names. Different prefixes let several ECUs link into one "
+        "program.",
         shown_default="the model's name",
     ),
 ]
@@ -39,30 +40,31 @@ def export_controller(
     dbc: Bus = False,
     name: Prefix = "",
 ) -> "ControllerExport":
-    """Write the ECU as readable C99 with parameters, test vectors and a harness.
+    """Export the ECU as readable C99 with parameters, test vectors and a test harness.
 
     Parameters
     ----------
     bench
-        Bench, bench file, or name of an experiment. The ECU gets its parameters and options; of
-        several cases, those of the first. The export ignores faults of the bench.
+        Bench, bench file, or name of an experiment. The ECU uses the bench's parameters and
+        options, or those of the first case if there are several. The export ignores the bench's
+        faults.
     out
-        Folder, created if missing. The export replaces files of an earlier export in it.
+        Folder, created if missing. The export overwrites the files of an earlier export there.
     overrides
-        Changes of a bench file or experiment, as ``--set`` takes them.
+        Changes to a bench file or experiment, in the form of ``--set``.
     precision
         ``"double"``, bit-identical to Python, or ``"single"``.
     vectors
-        Test vectors per task.
-    check
-        Whether to compile the C in both precisions, run it on the vectors, compare it bit by bit,
-        and measure it. This happens on this machine and on Cortex-M3, M4F and M7, if
+        Number of test vectors per task.
+        check
+        Whether to compile the C code in both precisions, run it on the vectors, compare it bit for
+        bit, and measure it. bywire does this on this machine, and also on Cortex-M3, M4F and M7 if
         arm-none-eabi-gcc and qemu-system-arm are installed.
     dbc
-        Whether to describe the memory as signals of a CAN bus, with C that fills the messages.
+        Whether to describe the memory as signals of a CAN bus, with C code that fills the messages.
     name
-        Prefix of files and symbols, a C identifier; the model's name by default. ECUs with
-        different names link into one program.
+        Prefix of file and symbol names, a C identifier. Default: the model's name. ECUs with
+        different prefixes link into one program.
 
     Returns
     -------
@@ -74,7 +76,7 @@ def export_controller(
     ParameterError
         If the name is not a valid C identifier.
     ModelError
-        If an operation cannot be translated, with its file and line.
+        If bywire cannot translate an operation, with its file and line.
     FileError
         If the folder is not writable.
     CompilerError

@@ -1,4 +1,4 @@
-"""A bench's model as a functional mock-up unit."""
+"""Export of a bench's model as a functional mock-up unit."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated
@@ -12,13 +12,14 @@ if TYPE_CHECKING:
     from bywire.core.typing import Progress
 
 Part = Annotated[
-    str, Ask("Part: brake, plant or ecu.", shown_default="brake; plant for model-exchange")
+    str,
+    Ask("Part to export: brake, plant or ecu.", shown_default="brake, or plant for model-exchange"),
 ]
-UnitKind = Annotated[str, Ask("Kind: co-simulation, or model-exchange of the plant.")]
+UnitKind = Annotated[str, Ask("Kind of unit: co-simulation, or model-exchange (plant only).")]
 Version = Annotated[int, Ask("FMI version: 2 or 3.")]
 Targets = Annotated[
     Sequence[str],
-    Ask("Target platform, e.g. linux64 or win64; may be repeated.", name="target"),
+    Ask("Target platform, e.g. linux64 or win64. Repeatable.", name="target"),
 ]
 
 
@@ -35,43 +36,44 @@ def export_fmu(
     targets: Targets = (),
     progress: "Progress | None" = None,
 ) -> "ExportedFmu":
-    """Write a functional mock-up unit for co-simulation or model exchange.
+    """Export a functional mock-up unit (FMU) for co-simulation or model exchange.
 
     Parameters
     ----------
     bench
         A `Bench`, the path of a bench file, or the name of an experiment.
     out
-        Folder for the file ``NAME_PART.fmu``; an existing file is replaced.
+        Folder for the file ``NAME_PART.fmu``. An existing file is overwritten.
     overrides
-        Changes of a bench file or experiment, as ``--set`` takes them.
+        Changes to a bench file or experiment, in the form of ``--set``.
     part
-        ``"brake"``: everything; ``"plant"``: its inputs are the ECU's outputs, its outputs are the
-        ECU's readings; ``"ecu"``: the reverse. By default the brake; for model exchange the plant.
+        ``"brake"`` exports everything. ``"plant"`` has the ECU's outputs as inputs and the ECU's
+        readings as outputs. ``"ecu"`` is the reverse. Default: the brake, or the plant for model
+        exchange.
     kind
-        ``"co-simulation"``: the unit steps by itself, as the bench does; ``"model-exchange"``: the
-        plant for a client's solver, with derivatives, event indicators and modes.
+        ``"co-simulation"`` is a unit with the bench's own solver. ``"model-exchange"`` is the plant
+        for a client's solver, with derivatives, event indicators and modes.
     fmi
-        FMI version: 2 for 2.0, 3 for 3.0 (tasks are clocks, tables are arrays).
+        FMI version: 2 for 2.0, or 3 for 3.0, in which tasks are clocks and tables are arrays.
     case
-        Run of the experiment to export; optional if there is only one.
+        Run of the experiment to export. Optional if there is only one.
     targets
         Platforms of the binaries: ``linux64``, ``win64``, ``darwin64``, ``aarch64-linux``,
-        ``aarch64-darwin``; by default the platform of this machine.
+        ``aarch64-darwin``. Default: the platform of this machine.
     progress
         Called with a label and the finished share, 0 to 1.
 
     Returns
     -------
     ExportedFmu
-        The file and its contents; all values in it are SI.
+        The file and its contents. All values in it are in SI units.
 
     Raises
     ------
     InputError
         If the bench cannot be exported, or the file cannot be written.
     CompilerError
-        If a platform has no compiler here, or the compiler fails.
+        If this machine has no compiler for a platform, or the compiler fails.
     """
     from bywire.api.exports import ExportedFmu, export_folder
     from bywire.api.run import bench_of
@@ -87,8 +89,8 @@ def export_fmu(
         raise unknown_name("part", part, PARTS)
     if kind == "model-exchange" and part != "plant":
         raise ParameterError(
-            f"part = {part!r}: model exchange supports only the plant, because the ECU runs in "
-            "ticks; export the ECU separately, for co-simulation",
+            f"part = {part!r} is not valid: for model exchange it must be 'plant', because the ECU "
+            "runs in ticks. Export the ECU separately for co-simulation",
             name="part",
             value=repr(part),
             valid="plant",

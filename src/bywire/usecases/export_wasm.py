@@ -1,4 +1,4 @@
-"""A bench's run as WebAssembly."""
+"""Export of a bench's run as WebAssembly."""
 
 from typing import TYPE_CHECKING
 
@@ -17,24 +17,24 @@ def export_wasm(
     *,
     case: NeededCase = "",
 ) -> "ExportedWasm":
-    """Write a run as WebAssembly with a loader: parameters in, recording out.
+    """Export a run as a WebAssembly function from parameters to a recording, with a loader.
 
     Parameters
     ----------
     bench
         A `Bench`, the path of a bench file, or the name of an experiment.
     out
-        Folder of the files; existing files are replaced.
+        Folder for the files. Existing files are overwritten.
     overrides
-        Changes of a bench file or experiment, as ``--set`` takes them.
+        Changes to a bench file or experiment, in the form of ``--set``.
     case
-        Run of the experiment to export; optional if there is only one.
+        Run of the experiment to export. Optional if there is only one.
 
     Returns
     -------
     ExportedWasm
-        The files: ``NAME.wasm``, ``NAME.json`` (parameters, signals, stimulus, all SI), and the
-        loader ``bywire.mjs`` with its types.
+        The files: ``NAME.wasm``, ``NAME.json`` (parameters, signals and stimulus in SI units), and
+        the loader ``bywire.mjs`` with its types.
 
     Raises
     ------

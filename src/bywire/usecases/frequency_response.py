@@ -1,4 +1,4 @@
-"""A closed loop's response by amplitude: friction, limits and sampling included."""
+"""Closed-loop response by amplitude, including friction, limits and sampling."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any
@@ -26,13 +26,13 @@ Amplitudes = Annotated[str, Ask("Amplitudes, e.g. '0.5 rad, 1 rad'.", "Amplitude
 Excitation = Annotated[
     str,
     Ask(
-        "sine (one frequency at a time), multisine, or chirp.",
+        "Excitation: sine (one frequency at a time), multisine or chirp.",
         "Excitation",
         words=_EXCITATIONS,
     ),
 ]
 BandwidthRange = Annotated[
-    str, Ask("Range of a parameter for bandwidths, e.g. motor.R_m=0.2ohm:0.6ohm:5.", "Range")
+    str, Ask("Range over which to compute bandwidths, e.g. motor.R_m=0.2ohm:0.6ohm:5.", "Range")
 ]
 
 
@@ -72,32 +72,33 @@ def frequency_response(
     estimate_error: ErrorEstimate = True,
     side: Side = "",
 ) -> "FrequencyResponse":
-    """Measure a closed loop's response by amplitude: friction, limits and sampling included.
+    """Measure a closed loop's response by amplitude, including friction, limits and sampling.
 
     Parameters
     ----------
     loop, parameters, at, overrides
         See `bywire.margins`.
     frequencies
-        ``"1 Hz:150 Hz:20"``, or a list with commas. By default twenty over the loop's band.
+        Frequencies as ``"1 Hz:150 Hz:20"`` or separated by commas. Default: twenty over the loop's
+        band.
     amplitudes
-        Amplitudes with their unit and commas. By default those that the loop declares.
+        Amplitudes with units, separated by commas. Default: those that the loop declares.
     excitation
         ``"sine"`` (one frequency at a time), ``"multisine"``, or ``"chirp"``.
     over
-        Range of a parameter for bandwidths, ``"NAME=LOW:HIGH:COUNT"``.
+        Range of a parameter over which to compute bandwidths, ``"NAME=LOW:HIGH:COUNT"``.
     progress
         Called with a label and the finished share, 0 to 1.
     estimate_error
-        Whether to repeat the measurement in half steps. Gain, phase and bandwidths then come with
-        their numerical error (``NAME_step_error`` in ``data``).
+        Whether to repeat the measurement in half steps. ``data`` then contains the numerical error
+        of gain, phase and bandwidths (``NAME_step_error``).
     side
         Side of the linear models; see `bywire.margins`.
 
     Returns
     -------
     FrequencyResponse
-        Gain and phase [degree] by frequency [Hz] and amplitude [SI], with bandwidths in Hz.
+        Gain and phase [degrees] by frequency [Hz] and amplitude [SI], with bandwidths in Hz.
 
     Raises
     ------

@@ -11,25 +11,23 @@ if TYPE_CHECKING:
     from bywire.api.loop_case import LoopCase
 
 LoopOrPlant = Annotated[
-    str, Ask("Loop or plant, see 'bywire list'.", "Loop", name="loop", known=("loops", "plants"))
+    str, Ask("Loop or plant (see 'bywire list').", "Loop", name="loop", known=("loops", "plants"))
 ]
 LocusRange = Annotated[
-    str, Ask("Root locus over a range, e.g. motor.R_m=0.1ohm:1ohm:71.", "Root locus")
+    str, Ask("Range of a root locus, e.g. motor.R_m=0.1ohm:1ohm:71.", "Root locus")
 ]
-Reduce = Annotated[
-    str, Ask("Reduce the model to an order, e.g. 4, or a band, e.g. '150 Hz'.", "Reduce")
-]
+Reduce = Annotated[str, Ask("Order (e.g. 4) or band (e.g. '150 Hz') of a reduced model.", "Reduce")]
 FrictionKind = Annotated[
     str,
     Ask(
-        "Dry friction of a plant: removed (as in loops), sliding, or stuck.",
+        "Dry friction of a plant: removed (as in loops), sliding or stuck.",
         "Dry friction",
         words=("removed", "sliding", "stuck"),
     ),
 ]
-Speed = Annotated[str, Ask("Motor speed for sliding, e.g. '5 rad/s'.", "Speed")]
+Speed = Annotated[str, Ask("Motor speed for sliding friction, e.g. '5 rad/s'.", "Speed")]
 Dither = Annotated[
-    bool, Ask("Also linearize about the motion under dither, with friction.", "Under dither")
+    bool, Ask("Also linearize about the loop's motion under dither, with friction.", "Under dither")
 ]
 
 
@@ -85,18 +83,18 @@ def linearize(
     dither: Dither = False,
     side: Side = "",
 ) -> "LinearizedLoop | LinearizedPlant | PlantLocus":
-    """Derive the exact linear model of a closed loop, with its sampling, or of a plant.
+    """Derive the exact linear model of a sampled closed loop or of a plant.
 
     Parameters
     ----------
     name
         Name of a loop or of a plant.
     parameters
-        Parameter set; the main one of its brake by default.
+        Parameter set. Default: the main one of the loop's or plant's brake.
     at
-        Operating point with its unit, for instance ``"20 bar"``. By default the loop's nominal one.
+        Operating point with its unit, for instance ``"20 bar"``. Default: the loop's nominal point.
     overrides
-        Other parameters by dotted name: SI numbers, or texts with units.
+        Changes of parameters by dotted name, as SI numbers or texts with units.
     locus
         Range of the root locus, ``"NAME=LOW:HIGH:COUNT"``.
     reduce
@@ -104,14 +102,14 @@ def linearize(
     friction, speed
         For a plant: ``"removed"``, ``"sliding"`` or ``"stuck"``, and the motor speed for sliding.
     dither
-        For a loop: whether to linearize also about its motion under dither, with friction.
+        For a loop: whether to also linearize about its motion under dither, with friction.
     side
         See `bywire.margins`.
 
     Returns
     -------
     LinearizedLoop, LinearizedPlant or PlantLocus
-        The linear model in SI units, with its poles in 1/s; over a range only the poles.
+        The linear model in SI units, with its poles in 1/s. Over a range, only the poles.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Margins and bandwidth of a sampled loop, at a point or over a range."""
+"""Margins and bandwidth of a sampled loop at an operating point or over a range."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any
@@ -32,30 +32,30 @@ def margins(
     *,
     side: Side = "",
 ) -> "Margins":
-    """Compute margins and bandwidth of a sampled loop, and the worst case over a range.
+    """Compute a sampled loop's margins and bandwidth, and the worst case over a range.
 
     Parameters
     ----------
     loop
         Name of the loop.
     parameters
-        Parameter set; the main one of the loop's brake by default.
+        Parameter set. Default: the main one of the loop's brake.
     at
-        Operating point with its unit, for instance ``"20 bar"``. By default the loop's nominal one.
+        Operating point with its unit, for instance ``"20 bar"``. Default: the loop's nominal point.
     overrides
-        Other parameters by dotted name: SI numbers, or texts with units.
+        Changes of parameters by dotted name, as SI numbers or texts with units.
     over
-        Range, for instance ``"motor.R_m=0.2 ohm:0.6 ohm:9"``, or ``"at=5 bar:35 bar:7"``.
+        Range, for instance ``"motor.R_m=0.2 ohm:0.6 ohm:9"`` or ``"at=5 bar:35 bar:7"``.
     side
-        Side of a corner to take if the operating point lies on one: ``"above"``, ``"below"``, or
-        for single operations ``"FILE:LINE=above"``, with commas. Without it, a point on a corner
-        is rejected if the linear models of both sides differ.
+        Side of a kink to use if the operating point lies on one: ``"above"``, ``"below"``, or
+        ``"FILE:LINE=above"`` for single operations, separated by commas. Without a side, bywire
+        rejects such a point if the linear models of both sides differ.
 
     Returns
     -------
     Margins
-        Gain margins as factors, phase margin in degree, crossover and bandwidth in Hz, delay margin
-        in s: at the operating point, or at each value of the range, with the worst case.
+        Gain margins as factors, phase margin in degrees, crossover and bandwidth in Hz, delay
+        margin in s, at the operating point or at each value of the range, with the worst case.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""A bench as one page that anyone can open."""
+"""Export of a bench as one page that anyone can open."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,11 +11,11 @@ from bywire.usecases.declare import NOTHING, Ask, Command, Form, use_case
 if TYPE_CHECKING:
     from bywire.api.exports import BenchPage
 
-PageFile = Annotated[str | Path, Ask("File of the page (.html).", is_flag=True)]
+PageFile = Annotated[str | Path, Ask("HTML file to write (.html).", is_flag=True)]
 Sliders = Annotated[
     Sequence[str],
     Ask(
-        "Parameter at the top of the page; may be repeated.",
+        "Parameter to show at the top of the page. Repeatable.",
         completes="parameters",
     ),
 ]
@@ -35,21 +35,21 @@ def page(
     vary: Sliders = (),
     case: NeededCase = "",
 ) -> "BenchPage":
-    """Write a bench as one interactive HTML file: move parameters, and the curves follow.
+    """Write a bench as one interactive HTML file that updates its curves as you move parameters.
 
     Parameters
     ----------
     bench
         A `Bench`, the path of a bench file, or the name of an experiment.
     out
-        File of the page (.html); an existing file is replaced.
+        File of the page (.html). An existing file is overwritten.
     overrides
-        Changes of a bench file or experiment, as ``--set`` takes them.
+        Changes to a bench file or experiment, in the form of ``--set``.
     vary
-        Parameters at the top of the page. By default those that the bench changes, otherwise
-        those that its brake declares (`bywire.authoring.Sliders`).
+        Parameters at the top of the page. Default: those that the bench changes, otherwise those
+        that its brake declares (`bywire.authoring.Sliders`).
     case
-        Run of the experiment that the page computes; optional if there is only one.
+        Run of the experiment that the page computes. Optional if there is only one.
 
     Returns
     -------
@@ -87,7 +87,7 @@ def page(
             raise unknown_name("parameter", name, used)
         if name not in used:
             raise ParameterError(
-                f"{name} has no effect in this bench: leave it out of vary", name=name
+                f"{name} has no effect in this bench. Remove it from vary", name=name
             )
     result = run(bench)
     panels = shown_panels(result.recordings[made.case.label])

@@ -1,4 +1,4 @@
-"""Continuation of a study: interrupted, killed, or with more cases."""
+"""Continuation of a study that was interrupted or killed, or that needs more cases."""
 
 from typing import TYPE_CHECKING
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     Command("study resume", without=("cases",), **STUDY_FOLDER),
     Command(
         "study extend",
-        "Add cases to a study, from the same sequence of points.",
+        "Add cases to a study, continuing its sequence of points.",
         required={"cases": "Total number of cases."},
         **STUDY_FOLDER,
     ),
@@ -42,15 +42,15 @@ def resume_study(
     folder
         Folder of the study.
     cases
-        Number of cases, in place of the number so far. A larger number extends the study by points
-        of the same sequence, a smaller one drops cases not yet computed.
+        Number of cases, which replaces the present one. A larger number extends the study with
+        points of the same sequence. A smaller number drops cases that are not yet computed.
     workers, cluster, engine, progress
         See `run_study`.
 
     Returns
     -------
     StudyRun
-        See `run_study`; values in SI units.
+        See `run_study`. Values are in SI units.
 
     Raises
     ------
@@ -59,7 +59,7 @@ def resume_study(
     RunError
         If workers are lost.
     KeyboardInterrupt
-        If interrupted; finished chunks stay.
+        If interrupted. Finished chunks remain.
     """
     from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""A study: a bench run for many values of the varied quantities."""
+"""Study: a bench run for many values of varied quantities."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -16,7 +16,7 @@ StudyFile = Annotated[
 ]
 FolderOfStudy = Annotated[
     str | Path | None,
-    Ask("Folder of the study; by default named like the file.", is_folder=True),
+    Ask("Folder of the study. Default: the study file's name.", is_folder=True),
 ]
 
 
@@ -67,46 +67,46 @@ def run_study(
     engine: EngineName = "auto",
     progress: "Progress | None" = None,
 ) -> "StudyRun":
-    """Run a bench for many values of varied quantities: probabilities, spread, main influences.
+    """Run a bench for many values of varied quantities to find probabilities and influences.
 
-    Results in the study's folder are not computed again. The same call therefore continues a study
-    that was interrupted or killed.
+    bywire does not recompute results that are in the study's folder. The same call therefore
+    continues a study that was interrupted or killed.
 
     Parameters
     ----------
     study
-        Study file; see ``docs/studies.md``.
+        Study file (see ``docs/studies.md``).
     out
-        Folder of the study; by default the file's name without its ending, in the current folder.
+        Folder of the study. Default: the file's name without its suffix, in the current folder.
     overrides
-        Changes of the bench, as texts with units; kept with the study.
+        Changes to the bench, as texts with units. They are saved with the study.
     cases
-        Number of cases, in place of the file's, up to 10 million. A number larger than so far
-        extends the study, a smaller one drops cases not yet computed. If the folder has more cases
-        than the file asks for, all are judged.
+        Number of cases, up to 10 million, which overrides the file's. A larger number than before
+        extends the study. A smaller number drops cases that are not yet computed. If the folder
+        contains more cases than the file requests, bywire judges all of them.
     workers
-        Processes; by default one per core, if the work justifies their start.
+        Number of processes. Default: one per core, if the work justifies starting them.
     cluster
         Address of a Dask scheduler that runs the cases.
     engine
-        Engine; ``auto`` takes the bench's engine, ``cuda`` a graphics processor.
+        Engine. ``auto`` uses the bench's engine, ``cuda`` a graphics processor.
     progress
         Called with a label and the finished share, 0 to 1.
 
     Returns
     -------
     StudyRun
-        Probabilities of the requirements with intervals, the spread of key figures in SI units,
-        the main influences, the worst cases.
+        Probabilities of meeting requirements, with intervals, the spread of key figures in SI
+        units, the main influences, and the worst cases.
 
     Raises
     ------
     InputError
         For an invalid study file, and a folder that contains another study.
     RunError
-        If the nominal bench fails, or workers are lost. A failed case only lacks a result.
+        If the nominal bench fails, or workers are lost. A case that fails only lacks a result.
     KeyboardInterrupt
-        If interrupted; finished chunks stay.
+        If interrupted. Finished chunks remain.
     """
     from bywire.api.study_run import completed, with_engine
     from bywire.studies.meant_study import require_study_file

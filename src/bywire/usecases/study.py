@@ -1,4 +1,4 @@
-"""Sizing study: designs of a brake compared at equal demands."""
+"""Sizing study: comparison of brake designs at equal demands."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from bywire.core.typing import Progress
 
 SizingName = Annotated[
-    str, Ask("Sizing study, see 'bywire list'.", "Sizing study", known=("studies",))
+    str, Ask("Sizing study (see 'bywire list studies').", "Sizing study", known=("studies",))
 ]
 SizingChanges = Annotated[
     Mapping[str, Any],
@@ -45,17 +45,22 @@ def _require_sizing(name: str, **others: Any) -> None:
     file = meant_study(Path(name))
     if file is not None:
         raise UnknownNameError(
-            f"unknown sizing study {name!r}: to run the study file {file}, type 'bywire study run "
-            f"{file}'"
+            f"unknown sizing study {name!r}. To run the study file {file}, type 'bywire study run "
+            f"{file}'",
+            name="sizing study",
+            value=name,
+            valid=f"bywire study run {file}",
         )
     if loaded_files():
         raise STUDIES.unknown(name)  # explains how a user's brake declares a sizing study
     error = str(unknown_name("sizing study", name, STUDIES.all()))
     more = (
-        "; for one of your own brake add --system PATH, and to run a study file type 'bywire "
-        "study run FILE'"
+        ". To load your own brake, add --system PATH. To run a study file, type 'bywire study run "
+        "FILE'"
     )
-    raise UnknownNameError(error if error.endswith("?") else error + more)
+    raise UnknownNameError(
+        error if error.endswith("?") else error + more, name="sizing study", value=name
+    )
 
 
 @use_case(
@@ -71,17 +76,17 @@ def study(
     *,
     progress: "Progress | None" = None,
 ) -> "StudyResult":
-    """Compare designs of a brake at equal demands: the best, its limits and its cost.
+    """Compare brake designs at equal demands to find the best design, its limits and its cost.
 
     Parameters
     ----------
     name
         Name of the study.
     parameters
-        Parameter set; the main one of the study's brake by default.
+        Parameter set. Default: the main one of the study's brake.
     overrides
-        Changes: names with a dot are the brake's parameters, others the study's options; SI
-        numbers, or texts with units.
+        Changes as SI numbers or texts with units. Names with a dot are the brake's parameters, and
+        all others are the study's options.
     progress
         Called with a label and the finished share, 0 to 1.
 

@@ -1,4 +1,4 @@
-"""Progress and results of a study so far."""
+"""Progress and results so far of a study."""
 
 from typing import TYPE_CHECKING
 
@@ -12,15 +12,15 @@ if TYPE_CHECKING:
 @use_case(
     Command(
         "study report",
-        "Judge the results of a study so far by its file's requirements, and write its report.",
+        "Judge a study's results so far by the requirements in its file, and write the report.",
         **STUDY_FOLDER,
     ),
     Command("study status", before=require_study_folder, writes=""),
 )
 def study_report(folder: StudyFolder) -> "StudyRun":
-    """Show the progress of a study and its results so far, without writing anything.
+    """Show a study's progress and results so far without writing anything.
 
-    The requirements are those that are now in the study file.
+    bywire uses the requirements that are now in the study file.
 
     Parameters
     ----------
@@ -30,7 +30,7 @@ def study_report(folder: StudyFolder) -> "StudyRun":
     Returns
     -------
     StudyRun
-        See `run_study`; values in SI units.
+        See `run_study`. Values are in SI units.
 
     Raises
     ------

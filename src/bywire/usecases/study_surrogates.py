@@ -1,4 +1,4 @@
-"""Polynomial surrogates of key figures between the cases of a study."""
+"""Polynomial surrogates of key figures between a study's cases."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Annotated, Any
@@ -11,11 +11,11 @@ if TYPE_CHECKING:
 
 KeyFigures = Annotated[
     str | Sequence[str],
-    Ask("Key figure; by default those of requirements.", name="kpi", metavar="NAME"),
+    Ask("Key figure to estimate. Default: those with requirements.", name="kpi", metavar="NAME"),
 ]
 Values = Annotated[
     Mapping[str, Any],
-    Ask("Values at which to estimate, e.g. motor.R_m=0.4ohm.", metavar="KEY=VALUE"),
+    Ask("Value at which to estimate, e.g. motor.R_m=0.4ohm.", metavar="KEY=VALUE"),
 ]
 
 
@@ -25,30 +25,30 @@ def study_surrogates(
     kpis: KeyFigures = (),
     at: Values = NOTHING,
 ) -> "StudySurrogates":
-    """Estimate key figures between the cases of a study by polynomials, with their error.
+    """Estimate key figures between a study's cases with polynomials, including their error.
 
     Parameters
     ----------
     folder
         Folder of the study.
     kpis
-        Key figure, or several; by default those with a requirement, or all.
+        One or several key figures. Default: those with a requirement, otherwise all.
     at
-        Values of the varied quantities at which to estimate: SI numbers, texts with units, or
-        changes such as ``"+5 %"`` of the bench's value. The others are as in the bench.
+        Values of varied quantities at which to estimate, as SI numbers, texts with units, or
+        changes such as ``"+5 %"`` of the bench's value. All others have the bench's value.
 
     Returns
     -------
     StudySurrogates
-        Each surrogate with its error in the key figure's unit; ``.surrogates["overshoot"]`` is
-        called with values or arrays [SI].
+        Each surrogate with its error in the key figure's unit. ``.surrogates["overshoot"]`` is a
+        function of values or arrays [SI].
 
     Raises
     ------
     InputError
-        If the folder contains no study or too few cases, for unknown names, values outside the
-        range of the cases or between the values of a discrete quantity. Also for designs that do
-        not determine what lies between their points, and if structural choices vary.
+        If the folder contains no study or too few cases, a name is unknown, or a value is outside
+        the range of the cases or between the values of a discrete quantity. Also if the design does
+        not determine values between its points, or structural choices vary.
     """
     from bywire.api.study_run import kept_study
     from bywire.api.study_surrogate import StudySurrogates
@@ -80,5 +80,5 @@ def study_surrogates(
             refused[kpi] = str(error)
     if not surrogates:
         why = "; ".join(dict.fromkeys(refused.values()))
-        raise ParameterError(why or f"{folder}: no case is computed yet")
+        raise ParameterError(why or f"{folder}: no case is computed yet", name=str(folder))
     return StudySurrogates(report, surrogates, values, refused)
