@@ -82,7 +82,7 @@ def test_an_interrupt_says_where_it_goes_on(
     bywire.trust("seal-friction", 2, folder=tmp_path, processes=1)
     with monkeypatch.context() as stop:
         stop.setattr("bywire.identification.trust.experiments", stopped)
-        with pytest.raises(KeyboardInterrupt, match="experiments are in"):
+        with pytest.raises(KeyboardInterrupt, match="experiments are saved in"):
             bywire.trust("seal-friction", 4, folder=tmp_path)
     (tmp_path / "starts.jsonl").write_text("")
     method = replace(METHODS.find("seal-friction"), identify=stopped)

@@ -212,11 +212,11 @@ def test_what_was_killed_goes_on_with_the_same_bits(campaign, file, folder, monk
         ('"pressure.stuck" = ["0 bar"', '"pressure.stuck" = ["0 A"', "wrong unit"),
         ('signal = "p_pd"\nbelow', 'signal = "p_pads"\nbelow', "unknown signal of criterion"),
         ('below_share = "80 %"', 'beneath = "80 %"', "unknown key of ..criteria.. 'beneath'"),
-        ('below_share = "80 %"', 'above = "1 bar"\nbelow = "2 bar"', "give exactly one of"),
+        ('below_share = "80 %"', 'above = "1 bar"\nbelow = "2 bar"', "needs exactly one of"),
         ('name = "too much"', 'name = "loss"', "occurs twice"),
         ("battery = 1", "batery = 1", "unknown fault in .rates. 'batery'"),
         ('delay = "5 ms"', 'delay = "-5 ms"', "must be >= 0 s"),
-        ('"motor.R_m" = "+-10 %"', f'"adc.law" = {LAWS}', "only numbers vary"),
+        ('"motor.R_m" = "+-10 %"', f'"adc.law" = {LAWS}', "only numbers can vary"),
         (
             'bench = "hard-braking"',
             'bench = "hard-braking"\nresiduals = ["x"]',
@@ -229,12 +229,12 @@ def test_what_was_killed_goes_on_with_the_same_bits(campaign, file, folder, monk
         ),
         ("healthy = 8", "healthy = 1000000", "a whole number from 4 to 10000"),
         ('"0 bar", "50 bar"]', "20]", "wrong unit"),
-        ('["0 bar", "50 bar"]', "[]", "give a value, or use leave_out"),
-        ("[values]", '[values]\n"battery.lost" = 3', "battery.lost takes no value"),
+        ('["0 bar", "50 bar"]', "[]", "List a value, or use leave_out"),
+        ("[values]", '[values]\n"battery.lost" = 3', "battery.lost: this fault has no value"),
         ('above_healthy = "5 bar"', "above_healthy = 5", "wrong unit"),
         ('signal = "p_pd"\nbelow', 'signal = ["p_pd"]\nbelow', "unknown signal of criterion"),
-        ("present =", 'leave_out = ["*"]\npresent =', "leaves no fault"),
-        ('delay = "5 ms"', "value = 3", "bridge.open-phase takes no value"),
+        ("present =", 'leave_out = ["*"]\npresent =', "contains no faults"),
+        ('delay = "5 ms"', "value = 3", "bridge.open-phase has no value"),
         ("battery = 1", "battery = 1" + "0" * 400, "battery = a number of 300 digits or more"),
         ("battery = 1", "battery = 1e13", "a number from 0 to 1e12"),
         (SMALL, 'bench = "bandwidths"', "makes one run without faults, but 'bandwidths' makes"),
@@ -352,7 +352,7 @@ def test_an_interrupt_says_what_is_kept(campaign, file, folder):
         if share > 0:
             raise KeyboardInterrupt
 
-    with pytest.raises(KeyboardInterrupt, match="7 of 7 faults are kept: repeat the command"):
+    with pytest.raises(KeyboardInterrupt, match="7 of 7 faults are kept: Rerun the command"):
         bywire.run_faults(file, folder, progress=interrupt)
 
 

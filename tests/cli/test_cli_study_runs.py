@@ -64,7 +64,7 @@ def test_a_choice_has_no_polynomial(bywire, study, tmp_path):
     bywire("study", "run", study, "--out", tmp_path / "out")
     for at in ((), ("--at", "adc.law=ideal"), ("--at", "motor.R_m=+1%")):
         outcome = bywire("study", "surrogate", tmp_path / "out", *at)
-        refused(outcome, "adc.law: a choice has no polynomial", "a study for each of its values")
+        refused(outcome, "adc.law: cannot depend on a choice", "a study for each of its values")
 
 
 def test_an_unfinished_study_says_so(bywire, study, tmp_path):

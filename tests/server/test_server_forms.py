@@ -82,10 +82,20 @@ BAD = [
     ),
     ("size", {"name": "drive-trains"}, "name", "drive-train"),
     ("size", {"name": "drive-train", "parameters": "roberts"}, "parameters", "roberts2003"),
-    ("size", {"name": "drive-train", "parameters": "dardanelli2010"}, "parameters", "is for a"),
+    (
+        "size",
+        {"name": "drive-train", "parameters": "dardanelli2010"},
+        "parameters",
+        "Choose another parameter set",
+    ),
     ("size", {"name": "drive-train", "set": "t_9=1 s"}, "set", "unknown option"),
     ("margins", {"loop": "pressur"}, "loop", "pressure"),
-    ("margins", {**LOOP, "parameters": "roberts2003"}, "parameters", "is for a"),
+    (
+        "margins",
+        {**LOOP, "parameters": "roberts2003"},
+        "parameters",
+        "Choose another parameter set",
+    ),
     ("margins", {**LOOP, "at": "20 A"}, "at", "unit"),
     ("margins", {**LOOP, "set": "motor.R_m=-1 ohm"}, "set", "motor.R_m"),
     ("margins", {**LOOP, "over": "motor.R_m"}, "over", "LOW:HIGH:COUNT"),
@@ -102,7 +112,7 @@ BAD = [
     ("agreement", {**LOOP, "amplitudes": "2 bar, 1 bar"}, "amplitudes", "the small one first"),
     ("reproduce", {"source": "roberts203"}, "source", "roberts2003"),
     ("identify", {"method": "m"}, "method", "unknown"),
-    ("design", {**LOOP, "parameters": "roberts2003"}, "parameters", "is for a"),
+    ("design", {**LOOP, "parameters": "roberts2003"}, "parameters", "Choose another parameter set"),
 ]
 
 
