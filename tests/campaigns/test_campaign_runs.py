@@ -207,7 +207,7 @@ def test_what_was_killed_goes_on_with_the_same_bits(campaign, file, folder, monk
     [
         ("[campaign]", "[campain]", "unknown key of a campaign file 'campain'"),
         ('"motor.hot"', '"motor.hott"', "unknown fault of .campaign. only 'motor.hott'"),
-        ('onset = "0.4 s"', 'onset = "0.9 s"', "must be between"),
+        ('onset = "0.4 s"', 'onset = "0.9 s"', "must be in the range"),
         ("healthy = 8", "healthy = 2", "a whole number from 4"),
         ('"pressure.stuck" = ["0 bar"', '"pressure.stuck" = ["0 A"', "wrong unit"),
         ('signal = "p_pd"\nbelow', 'signal = "p_pads"\nbelow', "unknown signal of criterion"),
@@ -237,7 +237,7 @@ def test_what_was_killed_goes_on_with_the_same_bits(campaign, file, folder, monk
         ('delay = "5 ms"', "value = 3", "bridge.open-phase has no value"),
         ("battery = 1", "battery = 1" + "0" * 400, "battery = a number of 300 digits or more"),
         ("battery = 1", "battery = 1e13", "a number from 0 to 1e12"),
-        (SMALL, 'bench = "bandwidths"', "makes one run without faults, but 'bandwidths' makes"),
+        (SMALL, 'bench = "bandwidths"', "'bandwidths' has 7 runs"),
     ],
 )
 def test_what_does_not_fit_is_refused(tmp_path, right, wrong, message):
@@ -259,7 +259,7 @@ def test_a_campaign_that_does_not_fit_into_memory_is_refused(tmp_path):
     text = SMALL.replace("healthy = 8", "healthy = 1000").replace('"0.6 s"', '"600 s"')
     text = text.partition("[vary]")[0] + "[campaign]" + text.partition("[campaign]")[2]
     (tmp_path / "large.toml").write_text(text)
-    with pytest.raises(InputError, match=r"1000 runs of 6e\+05 rows of"):
+    with pytest.raises(InputError, match=r"1000 runs with 6e\+05 rows of"):
         read_campaign(tmp_path / "large.toml")
 
 
@@ -352,7 +352,7 @@ def test_an_interrupt_says_what_is_kept(campaign, file, folder):
         if share > 0:
             raise KeyboardInterrupt
 
-    with pytest.raises(KeyboardInterrupt, match="7 of 7 faults are kept: Rerun the command"):
+    with pytest.raises(KeyboardInterrupt, match="7 of 7 faults are saved. Rerun the command"):
         bywire.run_faults(file, folder, progress=interrupt)
 
 
@@ -398,7 +398,7 @@ def test_harm_done_by_the_reaction_is_counted_run_by_run(campaign):
     assert {k: counts for k, counts in harmed.items() if counts} == {0: {"loss": 2}, 4: {"loss": 1}}
     assert [each.is_relieved for each in faults] == [False] * 5 + [True]
     assert found.harm_of_reaction() == (
-        "the reaction, bridge.open-phase, makes things worse: it alone causes loss in 1 of 2 "
+        "the reaction, bridge.open-phase, is harmful: it alone causes loss in 1 of 2 "
         "harmless, seen faults; loss in 1 of 3 dangerous faults",
         "the reaction, bridge.open-phase, hastens loss in 1 of 3 dangerous faults",
     )
@@ -407,10 +407,10 @@ def test_harm_done_by_the_reaction_is_counted_run_by_run(campaign):
         "harmless"
     )
     shown = FaultCampaign(found)
-    assert str(shown).startswith("The reaction, bridge.open-phase, makes things worse: ")
+    assert str(shown).startswith("The reaction, bridge.open-phase, is harmful: ")
     assert next(iter(shown.as_object())) == "headline"
     banner = shown.document().banner
-    assert banner.text.startswith("The reaction, bridge.open-phase, makes things worse: ")
+    assert banner.text.startswith("The reaction, bridge.open-phase, is harmful: ")
     calm = FaultCampaign(CampaignFindings(plan, campaign.findings.healthy, faults[1:3]))
     assert not calm.warnings
     assert "headline" not in calm.as_object()

@@ -60,7 +60,7 @@ BAD = [
         "set",
         "unknown",
     ),
-    ("faults", {"campaign": ""}, "campaign", "missing"),
+    ("faults", {"campaign": ""}, "campaign", "is required"),
     ("faults", {"campaign": "motorcycl"}, "campaign", "motorcycle"),
     ("faults", {"campaign": "wrong.toml"}, "campaign", "motor.hot"),
     ("faults", {"campaign": "curve.toml"}, "campaign", "this is a bench, not"),
@@ -291,7 +291,7 @@ def test_what_is_asked_twice_is_computed_once(visit):
     assert first.status == 201
     again = visit.begin("faults", campaign="motorcycle")
     assert again.status == 409
-    assert "motorcycle is already being computed" in again.object["error"]
+    assert "already computing motorcycle" in again.object["error"]
     visit("POST", f"/api/jobs/{first.object['number']}/cancel", {})
     assert visit.ended(first.object["number"])["state"] == "canceled"
 
