@@ -239,6 +239,7 @@ def trust() -> int:
 def docs() -> int:
     """Make the site; whatever Sphinx warns of is an error."""
     os.environ.setdefault("OMP_NUM_THREADS", "1")
+    os.environ.setdefault("BYWIRE_CC_QUICK", "1")  # kernels of commands that pages show, each once
     return run(PYTHON, "-m", "sphinx", "-q", "-W", "-n", "-b", "html", "docs", "docs/_build")
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import bywire
-from bywire.core.brake import said_with_line
+from bywire.core.brake import error_with_line
 from bywire.core.errors import BywireError
 from bywire.simulation.compiler import find_compiler
 
@@ -55,7 +55,7 @@ def failed(name: str, error: Exception, unit: str = "1", goal: str = "") -> Resu
         reason = f"exit status {error.returncode}: {last}"
     else:
         is_ours = isinstance(error, BywireError)
-        reason = str(error) if is_ours else said_with_line(error, *_SOURCES)
+        reason = str(error) if is_ours else error_with_line(error, *_SOURCES)
     return Result(name, None, unit, goal, None, reason, is_failed=True)
 
 

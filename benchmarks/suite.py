@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 from benchmarks.declared import declared
 from benchmarks.result import Result, failed, machine
 from bywire.core.errors import CompilerError
-from bywire.core.interrupts import interrupt_heard
+from bywire.core.interrupts import interrupt_handled
 from bywire.core.registry import pick
 from bywire.report.answer import Answer
 from bywire.report.document import Document, Section, TableBlock
@@ -131,6 +131,6 @@ def measure(
             if progress is not None:
                 progress(f"benchmark: {label}", 1.0)
     except KeyboardInterrupt:
-        interrupt_heard()
+        interrupt_handled()
         return Benchmark(here, tuple(results), "interrupted")
     return Benchmark(here, tuple(results))

@@ -55,16 +55,20 @@ sphinx_gallery_conf = {
     "backreferences_dir": None,
 }
 
+smartquotes_action = "qe"  # -- is part of an option, not a dash
+
 html_theme = "pydata_sphinx_theme"
 html_title = "bywire"
 html_static_path = ["static"]
 html_css_files = ["site.css"]
+html_js_files = ["copy.js", "tables.js"]
 html_extra_path = ["_generated/extra"]
 (HERE / html_extra_path[0]).mkdir(parents=True, exist_ok=True)  # Sphinx checks for it early
 html_math_renderer = "mathml"
 html_show_sourcelink = False
 html_sidebars = {name: [] for name in ("index", "start", "papers", "_generated/live")}
 html_theme_options = {
+    "logo": {"text": f"bywire {release}"},
     "show_prev_next": False,
     "navigation_with_keys": True,
     "show_toc_level": 2,

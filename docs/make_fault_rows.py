@@ -20,14 +20,15 @@ TABLES: dict[str, tuple[Any, ...]] = {
 }
 HEAD = """# Faults: stated and computed figures
 
-The tables compare stated figures of faults with those that bywire computes. Stated figures come
-from prototypes of the same equations. Some are earlier results of bywire, and those rows show that
-nothing has changed. The tolerance is 10 %, 0.2 bar or 10 ms, whichever is larger. Disagreements
-remain in the table, with their reason below it. A dash means that no figure is stated.
+The tables compare stated figures for faults with figures that bywire computes. The stated figures
+come from prototypes with the same equations. Some are earlier bywire results, which show that these
+figures have not changed. The tolerance is 10 %, 0.2 bar or 10 ms, whichever is larger. If figures
+disagree, they remain in the table, and the reason is below it. A dash means that there is no stated
+figure.
 
-[faults.md](faults.md) describes the faults and how to inject them. It also has the figures for a
-wheel's lost encoder, for which none are stated. `python docs/make_fault_rows.py` computes this
-page, and `tests/examples/test_fault_rows.py` checks it.
+[faults.md](faults.md) describes the faults and how to inject them. It also contains the results for
+a wheel's lost encoder, for which there are no stated figures. `python docs/make_fault_rows.py`
+computes this page, and `tests/examples/test_fault_rows.py` checks it.
 """
 HEADING = ("fault", "figure", "stated", "computed", "unit", "agrees")
 

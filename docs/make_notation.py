@@ -1,6 +1,6 @@
 """Write the generated pages: ``python docs/make_notation.py``, after their contents changed.
 
-``notation.md`` has symbols, names, units and meanings of parameters and signals;
+``notation.md`` leads to symbols, names, units and meanings of parameters and signals;
 ``bench-reference.md`` has experiments with their options, stimuli and key figures. Everything
 comes from the code's own metadata, and a test compares.
 """
@@ -12,6 +12,7 @@ import math
 import pkgutil
 import typing
 from collections.abc import Iterable, Iterator, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -146,6 +147,11 @@ def models() -> Iterator[Any]:
     yield from ASSEMBLIES.all().values()
 
 
+def sets(model: Any) -> list[Any]:
+    """Return the parameter sets of a model."""
+    return [each for each in PARAMETER_SETS.all().values() if each.assembly == model.name]
+
+
 def element_tuples() -> Iterator[tuple[str, type]]:
     """Yield the signal tuples of all elements and control laws, with their element."""
     for package in (plant, control, elements, laws):
@@ -165,7 +171,12 @@ def merged(tuples: Iterable[tuple[str, Any]]) -> list[tuple[str, ...]]:
 
 
 def notation() -> str:
-    """Return the page of symbols."""
+    """Return the page that leads to the pages of symbols."""
+    rows = [
+        (f"[{model.name}](notation/{model.name}.md)", ", ".join(f"`{e.name}`" for e in sets(model)))
+        for model in models()
+    ]
+    rows += [("[elements and control laws](notation/elements.md)", "")]
     lines = [
         "# Notation",
         "",
@@ -177,20 +188,38 @@ def notation() -> str:
         "",
         "For signs, see [sign-conventions.md](sign-conventions.md).",
         "",
+        *table(("parameters and signals of", "parameter sets"), rows),
+        "```{toctree}",
+        ":hidden:",
+        "",
+        *(f"notation/{model.name}" for model in models()),
+        "notation/elements",
+        "```",
+        "",
     ]
-    for model in models():
-        known = [e for e in PARAMETER_SETS.all().values() if e.assembly == model.name]
-        if known:
-            sets = ", ".join(f"`{e.name}`" for e in known)
-            lines += [f"## Parameters of {model.name}", "", f"Parameter sets: {sets}.", ""]
-            titles = ("symbol", "name", "unit", "", "range or choices", "meaning")
-            lines += table(titles, parameter_rows(known[0].parameter_class))
-        lines += [f"## Signals of {model.name}", ""]
-        if not known:
-            lines += ["This is a rig; its parameters are those of the tested brake.", ""]
-        rows = merged(places_of(model).items())
-        lines += table(("symbol", "name", "unit", "meaning", "where"), rows)
-    lines += ["## Signals of elements and control laws", ""]
+    return "\n".join(lines)
+
+
+def notation_of_model(model: Any) -> str:
+    """Return the page of symbols of an assembly."""
+    lines = [f"# Notation of {model.name}", "", NOTE, ""]
+    known = sets(model)
+    if known:
+        names = ", ".join(f"`{e.name}`" for e in known)
+        lines += ["## Parameters", "", f"Parameter sets: {names}.", ""]
+        titles = ("symbol", "name", "unit", "", "range or choices", "meaning")
+        lines += table(titles, parameter_rows(known[0].parameter_class))
+    lines += ["## Signals", ""]
+    if not known:
+        lines += ["This is a rig; its parameters are those of the tested brake.", ""]
+    rows = merged(places_of(model).items())
+    lines += table(("symbol", "name", "unit", "meaning", "where"), rows)
+    return "\n".join(lines)
+
+
+def notation_of_elements() -> str:
+    """Return the page of symbols of elements and control laws."""
+    lines = ["# Notation of elements and control laws", "", NOTE, ""]
     lines += table(("symbol", "name", "unit", "meaning", "element"), merged(element_tuples()))
     return "\n".join(lines)
 
@@ -276,8 +305,14 @@ def bench_reference() -> str:
     return "\n".join(lines)
 
 
-PAGES = {"notation.md": notation, "bench-reference.md": bench_reference}
+PAGES = {
+    "notation.md": notation,
+    **{f"notation/{model.name}.md": partial(notation_of_model, model) for model in models()},
+    "notation/elements.md": notation_of_elements,
+    "bench-reference.md": bench_reference,
+}
 
 if __name__ == "__main__":
     for file, page in PAGES.items():
+        (HERE / file).parent.mkdir(exist_ok=True)
         (HERE / file).write_text(page(), encoding="utf-8")

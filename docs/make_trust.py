@@ -16,12 +16,12 @@ from bywire.core.scratch import require_finished
 DOCS = Path(__file__).parent
 HEAD = """# Trust in identification: known parameters recovered
 
-Each study simulates experiments with the sensors' noise, each with its own seed, and identifies
-the parameters from starts that are up to 30 % off. The mean of the estimates must lie within 3
-standard errors of the true value. The share of 95 % intervals that contain the true value must be
-compatible with 90 to 99 %. Rows that fail remain in the table and are explained below it. To make
-a study, use `bywire identify METHOD --study COUNT`. Every result with its seed is in
-[trust/](trust/).
+In each study, bywire simulates experiments with sensor noise, each with its own seed. It then
+identifies the parameters from starting points that are up to 30 % off. The mean of the estimates
+must lie within 3 standard errors of the true value. The share of 95 % intervals that contain the
+true value must be statistically consistent with 90 to 99 %. If a row fails, it remains in the
+table, and the reason is below it. To run such a study, use `bywire identify METHOD --study COUNT`.
+[trust/](trust/) contains every result with its seed.
 
 """
 HEADING = (

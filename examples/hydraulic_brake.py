@@ -1,7 +1,7 @@
-"""A hydraulic brake of your own in one file: motor, gear, rack, master cylinder, caliper.
+"""Your own hydraulic brake in one file: motor, gear, rack, master cylinder, caliper.
 
 All elements come from `bywire.plant`; only the brake itself is new. The tutorial
-"A hydraulic brake of your own" explains this file from top to bottom.
+"Your own hydraulic brake" explains this file from top to bottom.
 """
 
 from typing import Annotated, NamedTuple

@@ -8,7 +8,7 @@ from benchmarks.page_latency import page_latency
 from benchmarks.page_size import page_size
 from benchmarks.result import Result
 from benchmarks.suite import Part
-from bywire.usecases.page import page
+from bywire.usecases.export import page
 
 
 def _written(path: Path) -> tuple[int, int]:

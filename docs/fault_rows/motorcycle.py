@@ -31,20 +31,25 @@ CONDUCTANCE = "m**3/(s*Pa)"
 FROZEN = (1.7, 19.8, 36.9, 51.4, 51.4, 37.1, 16.6)
 AHEAD = 0.75e-3 / 20e-3
 PHASE = (
-    "the stated phases belong to a dither three quarters of an ECU sample ahead of ours, and the "
-    "final pressure differs by up to 13 bar from sample to sample. With the same lead, all seven "
-    "agree within 1.8 bar, and four of them within 0.1. The other three are still releasing, and "
-    "0.005 of duty corresponds to 1.8 bar"
+    "the stated phases are for a dither that is three quarters of an ECU "
+    "sample ahead, and the final pressure differs by up to 13 bar from sample"
+    " to sample. With the same lead, all seven pressures agree within 1.8 "
+    "bar, and four of them within 0.1 bar. In the other three cases, the "
+    "brake is still releasing, and a duty cycle of 0.005 corresponds to 1.8 "
+    "bar"
 )
 LATE = (
-    "with a delay of five ticks the current loop is unstable. Its phase crosses -180 degrees at "
-    "44 Hz, where its gain is 1.28. Without dither it oscillates by itself, at 41 Hz with 18 A. "
-    "The dither's 50 Hz are amplified 4.6 times to 13.5 A, beside 3.6 A of 41 Hz. So close to the "
-    "resonance, the gain is decisive: a tenth more or less of its integral part gives 12.1 or "
-    "8.1 A, and 17 % less gives 7 A. The definition of the stated figure is not known. Half the "
-    "range of ours is 17.3 A, its mean deviation 8.8 A, and it is 6.5 A above the healthy one"
+    "with a delay of five ticks, the current loop is unstable. Its phase "
+    "crosses -180 degrees at 44 Hz, where its gain is 1.28. Without dither, "
+    "it oscillates at 41 Hz with 18 A. It amplifies the 50 Hz dither 4.6 "
+    "times to 13.5 A, in addition to 3.6 A at 41 Hz. So close to the "
+    "resonance, the result depends strongly on the gain. With 10 % more or "
+    "less integral gain, it is 12.1 or 8.1 A, and with 17 % less, it is 7 A. "
+    "The definition of the stated figure is not known. In the computed "
+    "current, half the range is 17.3 A, the mean deviation is 8.8 A, and the "
+    "difference from the fault-free current is 6.5 A"
 )
-RIGID = "our line is rigid, like the paper's, so only the pads are compliant"
+RIGID = "bywire's line is rigid, as in the paper, so only the pads are compliant"
 
 
 def _seal() -> list[Row]:
@@ -143,21 +148,31 @@ def _motor_and_sensors() -> list[Row]:
         Row("motor.hot 2", "held pressure", 37.0, "bar", ends(one("motor.hot"))),
         Row(
             "motor.demagnetized 0.7",
-            "current, relative to the healthy one",
+            "current relative to the fault-free current",
             1.43,
             "1",
             current_ratio,
-            "the ECU does not know of the weak magnets, so its dither is weaker too. The piston "
-            "sticks all the time, and friction carries part of the current's load. With an ECU "
-            "that knows, the figure is 1.42",
+            "the ECU does not know that the magnets are weak, so its dither is also "
+            "weaker. The piston sticks permanently, and friction carries part of the "
+            "load. If the ECU knows the torque constant, the figure is 1.42",
         ),
         Row("current.stuck 0", "peak", 45.5, "bar", most(one("current.stuck", "0 A"))),
         Row("current.stuck 0", "time of the peak", 36.0, "ms", peak_time),
         Row(
-            "current.stuck 0", "pressure after that", 37.0, "bar", ends(one("current.stuck", "0 A"))
+            "current.stuck 0",
+            "pressure after the peak",
+            37.0,
+            "bar",
+            ends(one("current.stuck", "0 A")),
         ),
         Row("current.gain 0.5", "peak", 39.4, "bar", most(one("current.gain", 0.5))),
-        Row("current.gain 0.5", "pressure after that", 37.0, "bar", ends(one("current.gain", 0.5))),
+        Row(
+            "current.gain 0.5",
+            "pressure after the peak",
+            37.0,
+            "bar",
+            ends(one("current.gain", 0.5)),
+        ),
         *(
             Row(
                 f"pressure.offset {offset}",
@@ -219,9 +234,10 @@ def _controller() -> list[Row]:
             36.2,
             "bar",
             ends(one("ecu.dropped", 5), rows=1000),
-            "with every fifth tick alone, our controller treats differences over five sample times "
-            "as differences over one. Its derivative part grows fivefold, and demands of +-20 A "
-            "alternate",
+            "the ECU runs only every fifth tick, but bywire's controller treats "
+            "differences over five sample times as differences over one sample time. "
+            "Its derivative term is then five times as large, and the demand "
+            "alternates between +-20 A",
         ),
         Row("bridge.late 5", "peak", 38.5, "bar", most(one("bridge.late", 5))),
         Row(
@@ -238,7 +254,7 @@ def _controller() -> list[Row]:
             None,
             "A",
             late_with_less,
-            note="the current loop no longer oscillates by itself, see above",
+            note="without dither, the current loop no longer oscillates (see above)",
         ),
         Row(
             "ecu.frozen",
@@ -257,7 +273,7 @@ def _controller() -> list[Row]:
         ),
         Row(
             "ecu.frozen",
-            "largest deviation of the seven, dither 0.75 ms ahead",
+            "largest deviation of the seven phases, dither 0.75 ms ahead",
             None,
             "bar",
             lambda: max(
@@ -266,12 +282,12 @@ def _controller() -> list[Row]:
         ),
         Row(
             "p_set.lost",
-            "steady pressure: we hold the last demand",
+            "steady pressure, with the last demand held",
             37.0,
             "bar",
             ends(one("p_set.lost")),
         ),
-        Row("gear.jammed", "unchanged pressure", 37.0, "bar", ends(one("gear.jammed"))),
+        Row("gear.jammed", "pressure does not change", 37.0, "bar", ends(one("gear.jammed"))),
     ]
 
 
@@ -285,7 +301,7 @@ def _fluid() -> list[Row]:
         Row("fluid.air-in-line 1.28 ml", "current", 19.8, "A", ends(AIR, "i", 1.0, options=APPLY)),
         Row(
             "fluid.air-in-line 0.123 ml",
-            "pressure still reached",
+            "highest pressure",
             37.0,
             "bar",
             ends(one("fluid.air-in-line", "0.123 ml", FROM_START), options=APPLY),

@@ -163,21 +163,27 @@ WORN = ("power-off-hold", (), "heart.worn")
 WOUND = ("moment-ramp", (), "moment.stuck", 0.0)
 LOST = ("moment-ramp", (), "caliper.pad-lost")
 CONTROLLED = (
-    "28 is the ripple of Fig. 7 while the moment control holds 200 N m; with standing screws it is "
-    "21.0. The disc turns at 9.5 Hz, near the loop's crossover of 8 Hz. Without any friction, the "
-    "control lowers the 21.0 by 12 % to 18.4 N m. Shafts that stick at every reversal lag, which "
-    "adds ripple: 27.5 N m with lossless screws, 31.5 with our friction, 28.4 at 950 N m"
+    "28 is the ripple in Fig. 7 while the moment control holds 200 N m. With "
+    "stationary screws, it is 21.0. The disc turns at 9.5 Hz, near the loop's"
+    " crossover at 8 Hz. Without friction, the control reduces 21.0 by 12 % "
+    "to 18.4 N m. Shafts that stick at every reversal respond late, which "
+    "increases the ripple. It is 27.5 N m with lossless screws, 31.5 with "
+    "bywire's friction, and 28.4 at 950 N m"
 )
 FIVEFOLD = (
-    "140 is five times 28, but the contribution of sticking does not grow with the run-out. "
-    "Relative to standing screws, the ripple is 1.48 at 4 um, 1.19 at 8 um, 1.07 at 12 um and 0.98 "
-    "at 20 um"
+    "140 is five times 28, but the contribution of sticking does not increase"
+    " with the run-out. Relative to stationary screws, the ripple is 1.48 at "
+    "4 um, 1.19 at 8 um, 1.07 at 12 um and 0.98 at 20 um"
 )
-STANDING = "2 mu_B r_B K_cal times the peak-to-peak run-out, 21.0 N m and five times that"
+STANDING = (
+    "the formula is 2 mu_B r_B K_cal times the peak-to-peak run-out, which "
+    "gives 21.0 N m and five times this value"
+)
 CREEP = (
-    "0.1 mm is 0.863 rad of the motors, 7.19 ms at the 120 rad/s of the gap mode. If the ECU does "
-    "not know of the gap, all of it lies beyond the assumed contact, where the brake creeps at "
-    "10 rad/s: 86.3 ms"
+    "0.1 mm corresponds to 0.863 rad at the motors, which takes 7.19 ms at "
+    "the gap mode's 120 rad/s. If the ECU does not know that the gap has "
+    "grown, the additional gap lies beyond the assumed contact point. There, "
+    "the brake moves at only 10 rad/s, which takes 86.3 ms"
 )
 
 
@@ -187,7 +193,7 @@ def _motors() -> list[Row]:
         *(
             Row(
                 "power.stuck 1",
-                f"moment kept of 500 N m at mu_B {mu_B:g}",
+                f"remaining moment of 500 N m at mu_B {mu_B:g}",
                 kept,
                 "N m",
                 figure("moment_end", hold, (("wedge.mu_B", mu_B),)),
@@ -197,7 +203,7 @@ def _motors() -> list[Row]:
         Row("power.stuck 1", "drift", 0.0, "m", figure("drift", hold)),
         Row(
             "power.stuck 1",
-            "reaches the end stop without friction, at mu_B 0.45",
+            "reaches the end stop without friction at mu_B 0.45",
             1.0,
             "1",
             at_stop(hold, friction(0.45) + BARE),
@@ -223,7 +229,7 @@ def _motors() -> list[Row]:
         ),
         Row(
             "drive_1.stuck 0",
-            "reserve, minus its own bearing",
+            "reserve, minus the motor's own bearing friction",
             (0.0, 10.0),
             "%",
             lambda: 100.0 * (strongest(bearing=True) / (needed(0.2)() + back_driving()) - 1.0),
@@ -232,7 +238,7 @@ def _motors() -> list[Row]:
         *(
             Row(
                 f"drive_{k}.stuck 0",
-                "moment held of 950 N m at mu_B 0.2",
+                "moment achieved of 950 N m at mu_B 0.2",
                 None,
                 "N m",
                 held("M_B", "moment-ramp", friction(0.2), f"drive_{k}.stuck", 0.0, options=HIGH),
@@ -245,12 +251,13 @@ def _motors() -> list[Row]:
             (0.0, 40.0),
             "um",
             moved,
-            "26 um of it are free play. 27 um come from the spring of 24 N/um that pressed the "
-            "wedge on the jammed screw with 647 N and is released",
+            "26 um are free play. The other 27 um come from the spring of 24 N/um, "
+            "which pressed the wedge against the jammed screw with 647 N and then "
+            "relaxes",
         ),
         Row(
             "motor_1.shorted",
-            "moment held of 200 N m",
+            "moment achieved of 200 N m",
             None,
             "N m",
             held("M_B", "moment-ramp", (), "motor_1.shorted", options=LOW),
@@ -260,7 +267,7 @@ def _motors() -> list[Row]:
 
 def _sensors() -> list[Row]:
     return [
-        Row("encoder_1.offset", "force fight, in tens of N per um", (10.0, 99.0), "N/um", fight),
+        Row("encoder_1.offset", "force fight, tens of N per um", (10.0, 99.0), "N/um", fight),
         Row(
             "moment.offset 50 N m",
             "change of the moment",
@@ -284,14 +291,14 @@ def _mechanics() -> list[Row]:
     return [
         Row(
             "wedge.friction",
-            "force of the motors, 950 N m at mu_B 0.6",
+            "motor force, 950 N m at mu_B 0.6",
             -1495.0,
             "N",
             held("F_M", "moment-ramp", strong, options=HIGH),
         ),
         Row(
             "caliper.pad-lost",
-            "moment at any travel",
+            "largest moment at any travel",
             0.0,
             "N m",
             lambda: float(np.abs(rows_of("M_B", 0.0, *LOST, onset=FROM_START)).max()),
@@ -306,14 +313,14 @@ def _mechanics() -> list[Row]:
         ),
         Row(
             "heart.worn 5",
-            "the same for a healthy brake",
+            "the same for a fault-free brake",
             454.0,
             "N",
             figure("preload_end", "power-off-hold"),
         ),
         Row(
             "heart.worn 5",
-            "moment kept",
+            "remaining moment",
             482.0,
             "N m",
             figure("moment_end", *WORN, onset=FROM_START),
@@ -327,7 +334,7 @@ def _mechanics() -> list[Row]:
         ),
         Row(
             "wedge_friction.worn 5",
-            "moment kept of 500 N m without power",
+            "remaining moment of 500 N m without power",
             None,
             "N m",
             figure("moment_end", "power-off-hold", (), "wedge_friction.worn", onset=FROM_START),
@@ -349,7 +356,7 @@ def _mechanics() -> list[Row]:
         ),
         Row(
             "flywheel.run-out",
-            "ripple of the healthy brake, moment control",
+            "ripple of the fault-free brake, moment control",
             28.0,
             "N m",
             figure("hold_ripple", "moment-pulses"),
@@ -366,7 +373,7 @@ def _mechanics() -> list[Row]:
         *(
             Row(
                 f"flywheel.run-out{times}",
-                "ripple, standing screws without power",
+                "ripple, stationary screws without power",
                 None,
                 "N m",
                 ripple(fault),

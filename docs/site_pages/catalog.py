@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from typing import Any
 
 from bywire.analysis.loop import LOOPS, PLANTS
 from bywire.analysis.loop_figures import LOOP_FIGURES
@@ -35,11 +36,38 @@ class Topic:
         Heading, and the sentence below it.
     names
         Kind of thing, as `bywire.describe` calls it -> a function that returns all names.
+    are_apart
+        Each has a page of its own.
+    command
+        Returns the lines below the description of each, with a marked block.
     """
 
     title: str
     about: str
     names: dict[str, Callable[[], Iterable[str]]]
+    are_apart: bool = False
+    command: Callable[[dict[str, Any]], list[str]] | None = None
+
+
+_PRESSURE = "parameters=dardanelli2010 options.input=p_set"
+_SINE = f"{_PRESSURE} stimulus.kind=sine stimulus.mean=20bar stimulus.amplitude=5bar stimulus.f=2Hz"
+_SETTINGS = {  # of experiments that do not have a default for everything
+    "motor-open-loop": "stimulus.kind=step stimulus.start=0A stimulus.end=2A stimulus.t_step=0.1s",
+    "duty": "parameters=roberts2003 options.input=M_set motor_heat.law=lumped",
+    "open-loop": _SINE,
+    "tracking": _SINE,
+    "ramp": f"{_PRESSURE} options.end=30bar options.slope=10bar/s",
+    "release": f"{_PRESSURE} options.start=30bar",
+    "sine-sweep": f"{_PRESSURE} options.mean=20bar options.amplitude=1bar",
+    "step": f"{_PRESSURE} options.end=30bar",
+    "stribeck": "parameters=dardanelli2010 options.friction=omega",
+}
+
+
+def _experiment(thing: dict[str, Any]) -> list[str]:
+    name = thing["name"]
+    settings = "".join(f" --set {each}" for each in _SETTINGS.get(name, "").split())
+    return ["```sh run *", f"bywire run {name}{settings} --out results/{name}", "```", ""]
 
 
 TOPICS = {
@@ -52,6 +80,7 @@ TOPICS = {
         "Parameter sets",
         "Every value states its source: a paper, a derivation, a calibration or a choice.",
         {"parameter set": lambda: PARAMETER_SETS.all()},
+        are_apart=True,
     ),
     "experiments": Topic(
         "Experiments",
@@ -60,6 +89,8 @@ TOPICS = {
             "experiment": lambda: EXPERIMENTS.all(),
             "experiment of any brake": lambda: GENERIC_EXPERIMENTS.all(),
         },
+        are_apart=True,
+        command=_experiment,
     ),
     "stimuli": Topic(
         "Stimuli",
@@ -94,16 +125,32 @@ TOPICS = {
 }
 
 
-def page(name: str) -> str:
-    """Return the page of a topic."""
-    topic = TOPICS[name]
-    lines = [f"# {topic.title}", "", topic.about, ""]
-    for kind, names in topic.names.items():
-        for thing in names():
-            objects = [each for each in described(thing) if each["kind"] == kind]
-            sections = Description(thing, tuple(objects)).document().page
-            lines += section_lines(sections, 2)
-    return "\n".join(lines)
+def texts() -> Iterator[tuple[str, str]]:
+    """Yield file and text of the pages of all topics."""
+    for name, topic in TOPICS.items():
+        objects = [
+            described_as(kind, thing) for kind, names in topic.names.items() for thing in names()
+        ]
+        lines = [f"# {topic.title}", "", topic.about, ""]
+        if not topic.are_apart:
+            sections = (line for each in objects for line in _lines(each, 2))
+            yield f"{name}.md", "\n".join([*lines, *sections])
+            continue
+        for each in objects:
+            command = topic.command(each) if topic.command else []
+            yield f"{name}/{each['name']}.md", "\n".join([*_lines(each, 1), *command])
+        rows = ([f"[{plain(e['name'])}]({e['name']}.md)", plain(e["summary"])] for e in objects)
+        toctree = ["```{toctree}", ":hidden:", "", *(e["name"] for e in objects), "```", ""]
+        yield f"{name}/index.md", "\n".join([*lines, *table_lines(["name", ""], rows), *toctree])
+
+
+def described_as(kind: str, name: str) -> dict[str, Any]:
+    """Return the description of a name as a kind of thing."""
+    return next(each for each in described(name) if each["kind"] == kind)
+
+
+def _lines(thing: dict[str, Any], level: int) -> list[str]:
+    return section_lines(Description(thing["name"], (thing,)).document().page, level)
 
 
 def faults_page() -> str:

@@ -1,9 +1,11 @@
-"""Sphinx extension: generated pages, links that leave the folder, formulas, public names."""
+"""Sphinx extension: generated pages, results, links that leave the folder, formulas, names."""
 
 from __future__ import annotations
 
 import builtins
+import os
 import re
+from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -18,13 +20,15 @@ from sphinx.errors import ExtensionError
 from sphinx.util import logging
 from sphinx_gallery.scrapers import figure_rst
 
-from site_pages import pages, python_names
+from site_pages import built, gallery, pages, python_names, results, search
 
 HERE = Path(__file__).parents[1]
 GENERATED = HERE / "_generated"
 GALLERY = HERE.parent / "examples" / "gallery"
 FIGURES = GENERATED / "gallery-figures"
 _log = logging.getLogger(__name__)
+_shown: dict[str, list[results.Shown]] = {}  # page -> what its marked blocks show
+_pictures: dict[str, list[str]] = {}  # marker of a page -> thumbnails in its place
 
 # Links of pages in this folder that leave it in the repository -> the page that replaces them.
 _MOVED = {
@@ -34,27 +38,50 @@ _MOVED = {
     "../src/bywire/plant": "_generated/elements/index.rst",
     "trust/": "trust.md",
 }
-# A script, style sheet, picture or frame that a browser would load from another host.
-_ELSEWHERE = re.compile(
-    r"<(?:script|img|iframe|link(?![^>]*rel=\"(?:canonical|search|author)\"))[^>]*"
-    r"(?:src|href)=\"(?:https?:)?//[^\"]*",
-    re.IGNORECASE,
-)
 
 
 def setup(app: Sphinx) -> dict[str, Any]:
     """Connect everything."""
     app.connect("builder-inited", _make_pages, priority=100)  # before the gallery
+    app.connect("env-get-outdated", _pages_with_results)
+    app.connect("source-read", _show_results)
     app.connect("source-read", _follow_links)
     app.connect("autodoc-process-signature", _own_result)
     app.connect("missing-reference", _public_name)
-    app.connect("build-finished", _require_one_host)
+    app.connect("build-finished", _check_site)
     app.add_html_math_renderer("mathml", (_inline_math, None), (_displayed_math, None))
     return {"parallel_read_safe": True, "parallel_write_safe": True}
 
 
 def _make_pages(app: Sphinx) -> None:
-    pages.write(GENERATED, lambda what: _log.info("%s", what))
+    folder, sources = GENERATED / pages.RESULTS, pages.digest_of_sources()
+    with ThreadPoolExecutor(os.cpu_count()) as pool:  # of processes
+        texts = results.pages()
+        started = results.start(pool, texts, folder, sources)
+        pages.write(GENERATED, lambda what: _log.info("%s", what))
+        texts |= (generated := results.pages(GENERATED))
+        started |= results.start(pool, generated, folder, sources)
+        for page, shown in started.items():
+            try:
+                _shown[page] = shown.result()
+            except results.PageError as error:
+                raise ExtensionError(f"{page}: {error}") from None
+    place = f"_generated/{pages.RESULTS}"
+    _pictures[gallery.MARKER] = list(gallery.lines(texts, _shown, folder, place))
+    papers = gallery.paper_lines(GENERATED / "papers", "_generated/papers")
+    _pictures[gallery.PAPER_MARKER] = list(papers)
+
+
+def _pages_with_results(app: Sphinx, *changes: Any) -> list[str]:
+    return [*_shown, "gallery", "papers"]
+
+
+def _show_results(app: Sphinx, name: str, source: list[str]) -> None:
+    if name in _shown:
+        place = "../" * name.count("/") + f"_generated/{pages.RESULTS}/{name}"
+        source[0] = results.with_results(source[0], _shown[name], place)
+    for marker, lines in _pictures.items():
+        source[0] = source[0].replace(marker, "\n".join(lines))
 
 
 def _follow_links(app: Sphinx, name: str, source: list[str]) -> None:
@@ -140,9 +167,14 @@ def _displayed_math(writer: Any, node: nodes.Element) -> None:
     raise nodes.SkipNode
 
 
-def _require_one_host(app: Sphinx, error: Exception | None) -> None:
+def _check_site(app: Sphinx, error: Exception | None) -> None:
     if error is not None or app.builder.format != "html":
         return
-    for path in sorted(Path(app.outdir).rglob("*.html")):
-        if asked := _ELSEWHERE.search(path.read_text(encoding="utf-8")):
-            raise ExtensionError(f"{path.name} loads from another host: {asked.group()}")
+    folder = Path(app.outdir).resolve()
+    pictures = {page: sum(len(each.figures) for each in shown) for page, shown in _shown.items()}
+    faults = list(built.faults(folder, pictures))
+    index = (folder / "searchindex.js").read_text(encoding="utf-8")
+    missed = search.missed(index, app.builder.indexer.lang.stem)
+    faults += [f"the search for {words!r} does not find {page}" for words, page in missed.items()]
+    if faults:
+        raise ExtensionError("\n".join(faults))

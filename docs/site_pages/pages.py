@@ -15,22 +15,23 @@ from site_pages import (
     papers,
     python_names,
     repository_files,
+    results,
 )
 
 ROOT = Path(__file__).parents[2]
 STAMP = "made-of"
+RESULTS = "results"
 
 
 def texts() -> Iterator[tuple[str, str]]:
     """Yield file and text of the pages that need no computation."""
     yield "brakes.md", catalog.brakes_page()
-    for topic in catalog.TOPICS:
-        yield f"{topic}.md", catalog.page(topic)
+    yield from catalog.texts()
     yield "faults.md", catalog.faults_page()
     yield "loop-figures.md", catalog.loop_figures_page()
     yield "commands.md", commands.page()
     yield "python.rst", python_names.page()
-    yield "authoring.rst", python_names.authoring_page()
+    yield from python_names.authoring_pages()
     yield "errors.rst", python_names.errors_page()
     yield "elements/index.rst", elements.index()
     for inside in elements.modules().values():
@@ -44,13 +45,13 @@ def texts() -> Iterator[tuple[str, str]]:
 
 def write(folder: Path, said: Callable[[str], None]) -> None:
     """Write all pages, unless their sources are unchanged."""
-    digest = _digest()
+    digest = digest_of_sources(Path(__file__).parent, ROOT / "CHANGELOG.md")
     stamp = folder / STAMP
     if stamp.exists() and stamp.read_text() == digest:
         return
     if stamp.exists():
         stamp.unlink()
-    kept = {"gallery"}  # Sphinx-Gallery itself updates it
+    kept = {"gallery", RESULTS}  # they know themselves what has changed
     for path in folder.iterdir() if folder.exists() else ():
         if path.name not in kept:
             shutil.rmtree(path) if path.is_dir() else path.unlink()
@@ -70,13 +71,12 @@ def _write(path: Path, text: str) -> None:
     path.write_text(text, encoding="utf-8")
 
 
-def _digest() -> str:
-    """Return a digest of the sources of these pages."""
+def digest_of_sources(*more: Path) -> str:
+    """Return a digest of the sources that commands run, and of more files and folders."""
     digest = hashlib.sha256()
-    folders = (ROOT / "src", Path(__file__).parent, ROOT / "benches", ROOT / "studies")
-    inside = (p for folder in folders for p in folder.rglob("*") if p.suffix != ".pyc")
-    single = (ROOT / "CHANGELOG.md", ROOT / "examples" / "emb_caliper" / "README.md")
-    for path in sorted({*(p for p in inside if p.is_file()), *single}):
+    places = (*(ROOT / each for each in ("src", *results.FOLDERS)), *more)
+    inside = (p for place in places for p in (place, *place.rglob("*")) if p.suffix != ".pyc")
+    for path in sorted({p for p in inside if p.is_file()}):
         digest.update(path.relative_to(ROOT).as_posix().encode())
         digest.update(path.read_bytes())
     return digest.hexdigest()

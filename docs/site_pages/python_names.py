@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import importlib
 import inspect
 import re
+from collections.abc import Iterator
 from typing import Any, get_origin
 
 import bywire
 from bywire import authoring
+from bywire.core.lazy_names import LazyNames
 from bywire.core.quantities import Unit
+from bywire.core.signals import Signal
 from bywire.report.wording import unit_text
 
 
@@ -47,19 +51,46 @@ def page() -> str:
     return "\n".join(lines)
 
 
-def authoring_page() -> str:
-    """Return the page of the names for writing models, as reStructuredText."""
+def authoring_pages() -> Iterator[tuple[str, str]]:
+    """Yield file and text of the pages of names for writing models, a page per module."""
+    homes = LazyNames(authoring.__file__).homes
+    modules: dict[str, list[str]] = {}
+    for name in sorted(authoring.__all__, key=str.lower):
+        modules.setdefault(homes[name][0], []).append(name)
+    for module, names in sorted(modules.items()):
+        about = (inspect.getdoc(importlib.import_module(module)) or "").partition("\n\n")[0]
+        entries = [line for name in names for line in _authoring_entry(name)]
+        title = module.removeprefix("bywire.")
+        lines = [title, "=" * len(title), "", about, "", *entries]
+        yield f"authoring/{module}.rst", "\n".join(lines)
     title = "Names for writing models"
     lines = [title, "=" * len(title), "", inspect.getdoc(authoring) or "", ""]
-    both = public()
-    for name in sorted(authoring.__all__, key=str.lower):
-        thing = getattr(authoring, name)
-        if both.get(name) is thing:  # described there
-            lines += [f".. py:data:: bywire.authoring.{name}", ""]
-            lines += [f"   See :obj:`bywire.{name}`.", ""]
-        else:
-            lines += _entry("bywire.authoring", name, thing)
-    return "\n".join(lines)
+    lines += [".. list-table::", "   :header-rows: 1", ""]
+    rows = [["name", "meaning", "page"]]
+    for module, names in modules.items():
+        page = f":doc:`{module.removeprefix('bywire.')} <{module}>`"
+        rows += [[f":obj:`~bywire.authoring.{name}`", _summary(name), page] for name in names]
+    for row in [rows[0], *sorted(rows[1:], key=lambda row: row[0].lower())]:
+        # An empty cell is still a cell.
+        lines += [f"   {'  ' if k else '* '}- {cell}".rstrip() for k, cell in enumerate(row)]
+    lines += ["", ".. toctree::", "   :hidden:", "", *(f"   {m}" for m in sorted(modules)), ""]
+    yield "authoring/index.rst", "\n".join(lines)
+
+
+def _authoring_entry(name: str) -> list[str]:
+    thing = getattr(authoring, name)
+    if public().get(name) is not thing:
+        return _entry("bywire.authoring", name, thing)
+    return [f".. py:data:: bywire.authoring.{name}", "", f"   See :obj:`bywire.{name}`.", ""]
+
+
+def _summary(name: str) -> str:
+    """Return the first line about a name for writing models."""
+    thing = getattr(authoring, name)
+    if inspect.isfunction(thing) or inspect.isclass(thing) or inspect.ismodule(thing):
+        line = (inspect.getdoc(thing) or "").partition("\n\n")[0]
+        return re.sub(r"\s+", " ", line)
+    return _constant(thing)
 
 
 def errors_page() -> str:
@@ -86,17 +117,20 @@ def _entry(face: str, name: str, thing: Any) -> list[str]:
         return [f".. autofunction:: {face}.{name}", ""]
     if inspect.isclass(thing):
         return [f".. autoclass:: {face}.{name}", "   :members:", ""]
-    lines = [f".. py:data:: {face}.{name}", ""]
+    return [f".. py:data:: {face}.{name}", "", f"   {_constant(thing)}", ""]
+
+
+def _constant(thing: Any) -> str:
+    """Return a sentence about a name that is neither a function nor a class."""
     if inspect.ismodule(thing):
-        said = (inspect.getdoc(thing) or "").partition("\n\n")[0]
-        return [*lines, f"   Module: {said}", ""]
+        return f"Module: {(inspect.getdoc(thing) or '').partition(chr(10) * 2)[0]}"
     units = [note.symbol for note in getattr(thing, "__metadata__", ()) if isinstance(note, Unit)]
     if units:
-        return [*lines, f"   Quantity in {unit_text(units[0]) or '1'}.", ""]
-    return [*lines, f"   ``{_shown(thing)}``", ""]
-
-
-def _shown(thing: Any) -> str:
+        return f"Quantity in {unit_text(units[0]) or '1'}."
+    labels = [n for n in getattr(thing, "__metadata__", ()) if isinstance(n, Signal)]
+    if labels:
+        return f"Signal in {unit_text(labels[0].unit) or '1'}: {labels[0].label}."
     if not get_origin(thing):
-        return type(thing).__name__
-    return re.sub(r"\b(?:\w+\.)+(?=\w)", "", str(thing))  # without the modules
+        return f"``{type(thing).__name__}``"
+    name = re.sub(r"\b(?:\w+\.)+(?=\w)", "", str(thing))  # without the modules
+    return f"``{name}``"

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from bywire.brakes.motorcycle.methods import friction_ramp
-from bywire.brakes.motorcycle.paper import table3
+from bywire.brakes.motorcycle.paper import friction
 from bywire.brakes.motorcycle.paper.dardanelli2010 import PARTS, reproduce
 from bywire.reproduction.reproduction import Reproduction
 from undrawn import drawn_once, undrawn
@@ -105,12 +105,12 @@ COARSE = {"step": 1e-4, "longest": 2.0}
 def reproduction(request: pytest.FixtureRequest) -> Iterator[Reproduction]:
     method = friction_ramp.METHOD
     STAGES.clear()
-    table3._identified.cache_clear()
+    friction._identified.cache_clear()
     with pytest.MonkeyPatch.context() as patch:
         defaults = method.defaults.replace(request.param)
         patch.setattr(friction_ramp, "METHOD", replace(method, defaults=defaults))
         yield reproduce(lambda label, share: STAGES.append((label, share)))
-    table3._identified.cache_clear()
+    friction._identified.cache_clear()
 
 
 @pytest.fixture(scope="module")
@@ -259,7 +259,7 @@ def test_report_shows_every_figure_and_progress_every_part(
     assert results == reproduction.as_object()
     assert {p.name for p in paths if p.suffix == ".png"} == {f"{name}.png" for name in names}
     assert {p.suffix for p in paths} == {".png", ".nc", ".html", ".json"}
-    for title in ("In short", "Tolerances"):
+    for title in ("The paper contradicts itself: 31 of 68 judged statements", "Tolerances"):
         assert f"<h2>{title}</h2>" in html
     assert sorted(label for label, share in STAGES if share == 1.0) == sorted(PARTS)
 

@@ -145,10 +145,10 @@ def test_folder_results_and_benches_give_the_same(results, folders):
 
 
 def test_what_a_run_warned_of_is_said_of_its_folder_too(folders, tmp_path):
-    with pytest.warns(UserWarning, match="energy balance is open"):
+    with pytest.warns(UserWarning, match="energy balance is off"):
         coarse = bywire.run("hard-braking", {**QUICK, "pipeline.k_lf": "1e-15"})
     coarse.write(tmp_path / "coarse")
-    with pytest.warns(UserWarning, match="coarse: the energy balance is open"):
+    with pytest.warns(UserWarning, match="coarse: the energy balance is off"):
         found = bywire.compare(folders[0], tmp_path / "coarse")
     assert found.warnings == [f"coarse: {text}" for text in coarse.warnings]
 
@@ -222,13 +222,13 @@ def test_changes_of_what_was_run_before_are_refused(folders):
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (None, "not a finished result of bywire run"),
+        (None, "not a complete result of bywire run"),
         ("{", "cannot be read"),
         ("[]", "does not contain a JSON object"),
         ('{"status": "passed"}', "is damaged"),
         (
             '{"status": "passed", "bench": "x", "kpis": {}, "requirements": [], "files": []}',
-            "names no recording",
+            "does not list any recording",
         ),
         (
             '{"status": "passed", "bench": "x", "kpis": {}, "requirements": [], '
@@ -237,7 +237,7 @@ def test_changes_of_what_was_run_before_are_refused(folders):
         ),
         (
             '{"status": "interrupted", "bench": "x", "kpis": {}, "requirements": [], "files": []}',
-            "is not finished",
+            "is incomplete",
         ),
     ],
 )
@@ -285,5 +285,5 @@ def test_a_set_that_is_not_known_here_leaves_values_without_units(folders, tmp_p
 def test_a_folder_whose_result_was_not_written_to_its_end(folders, tmp_path):
     shutil.copytree(folders[0], tmp_path / "half")
     (tmp_path / "half" / UNFINISHED).write_text("")
-    with pytest.raises(FileError, match="half holds a result that is incomplete"):
+    with pytest.raises(FileError, match="half contains an incomplete result"):
         bywire.compare(tmp_path / "half", folders[1])

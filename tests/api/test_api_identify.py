@@ -119,5 +119,5 @@ def test_a_file_is_converted(tmp_path: Path) -> None:
     assert found.alignment.samples == found.recording.sizes["time"] == 25
     assert found.as_object()["files"] == [str(target)]
     assert found.tables()["Signals"]["signal"].to_list() == ["p"]
-    with pytest.raises(bywire.BywireError, match="also give the rate, as rate '1 kHz'"):
+    with pytest.raises(bywire.BywireError, match="Add a sample rate, for example rate '1 kHz'"):
         bywire.convert(source, tmp_path / "other.nc", method="average")

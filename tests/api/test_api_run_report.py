@@ -28,8 +28,8 @@ def test_what_was_changed_and_the_verdict_come_first_and_figures_before_tables()
     assert [row[0].text for row in required.rows] == ["overshoot"]
     assert [[cell.text for cell in row[:3]] for row in changed.rows] == [
         ["motor.R_m", "0.5 Ω", "0.35 Ω"],
-        ["options.duration", "0.04 s", "1.2 s"],
-        ["options.settle", "0.01 s", "1 s"],
+        ["options.duration", "40 ms", "1.2 s"],
+        ["options.settle", "10 ms", "1 s"],
     ]
 
 

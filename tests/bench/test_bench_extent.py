@@ -9,6 +9,7 @@ import pytest
 import bywire
 from bywire.bench import experiment
 from bywire.core.errors import StepError
+from raising import raises
 from run_once import run_once
 
 SET = "dardanelli2010"
@@ -51,7 +52,7 @@ def test_recording_intervals_that_the_step_does_not_divide(record):
     ("record", "text"),
     [
         ("1.21 s", r"1\.2 s cannot have rows every .*record more often"),
-        ("1e300 s", r"the recording interval of 1e[+]300 s, .*: take a shorter interval"),
+        ("1e300 s", r"the recording interval of 1e[+]300 s, .*: use a shorter interval"),
     ],
 )
 def test_recording_interval_longer_than_the_run(record, text):
@@ -85,12 +86,12 @@ def test_runs_that_one_memory_holds_alone_and_not_together(monkeypatch):
     bench = bywire.Bench("current-loop", "roberts2003", options={"duration": "4 ms"})
     kept = sum(each.nbytes for each in run_once(bench).recordings.values())
     monkeypatch.setattr(experiment, "_memory", lambda: 0.9 * kept)
-    with pytest.raises(StepError, match=r"9 runs of up to .* kept together, need about"):
+    with pytest.raises(StepError, match=r"9 runs of up to .* together need about"):
         run_once(bench)
     monkeypatch.setattr(experiment, "_memory", lambda: 1.5 * kept)
     result = bywire.run(bench)
     assert math.isnan(result.kpis[0].error)
-    assert any("kept together, need about" in text for text in result.warnings)
+    assert any("together need about" in text for text in result.warnings)
 
 
 def test_infinite_duration():
@@ -124,7 +125,7 @@ def test_inadmissible_step(value):
 
 
 def test_sample_times_that_would_make_it_settle_for_long():
-    with pytest.raises(StepError, match=r"would settle for 970\.471 s, .*multiples of each other"):
+    with raises(StepError, name="settle", value="970.471 s"):
         bywire.Bench(
             "moment-release",
             "roberts2003",

@@ -122,7 +122,7 @@ def test_breakaway_is_that_of_the_highest_pressure_in_any_order():
     assert found[0] == found[1]
 
 
-HALF = "the error estimate from half the step was abandoned: it took more than 1.5 times the work"
+HALF = "bywire abandoned the error estimate from half the step, which needed more than 1.5 times"
 
 
 def estimated(bench: bywire.Bench) -> list[Result]:

@@ -186,7 +186,7 @@ def test_tracking_of_what_is_held_lags_half_a_sample_at_most() -> None:
     }
     result = run_once(bench("tracking", {"output": "F"}, stimulus=stimulus))
     assert result.kpi("tracking_max").value < 10.0 * 2.0 * math.pi * 5.0 * 1.1e-3
-    with pytest.raises(ParameterError, match=r"options.output: x is in m, and the set point F_set"):
+    with raises(ParameterError, name="options.output", value="x", valid="an output in N"):
         bench("tracking", {"output": "x"}, stimulus=stimulus)
 
 
@@ -211,14 +211,9 @@ def test_further_stimuli_act_beside() -> None:
             UnknownNameError,
             "stimulus of spring-axis in options.input 'F_sett': did you mean 'F_set'?",
         ),
-        ({"input": "noise_x"}, UnknownNameError, "known are F_set, load"),
+        ({"input": "noise_x"}, UnknownNameError, "valid names are F_set, load"),
         ({"output": "y"}, UnknownNameError, "recording of spring-axis in options.output 'y'"),
-        (
-            {"input": ""},
-            ParameterError,
-            "options.input is missing: name the stimulus of spring-axis"
-            " that experiment 'step' drives: F_set, load",
-        ),
+        ({"input": ""}, ParameterError, "options.input is missing"),
         ({"input": 3}, ParameterError, "a stimulus of spring-axis"),
         ({"end": "2 bar"}, UnitError, "end"),
         ({"endd": "2 N"}, UnknownNameError, "did you mean 'end'?"),
@@ -298,7 +293,7 @@ def test_an_earlier_name_means_one_experiment_or_is_refused(name, own, option, m
     assert generic.experiment == name
     assert set(generic.definition.kpis) != set(known.definition.kpis)
     monkeypatch.setattr("bywire.core.brake._loaded", {})  # whose only set would be taken
-    with pytest.raises(ParameterError, match=f"that of the motorcycle-brake is now called '{own}'"):
+    with pytest.raises(ParameterError, match=f"motorcycle-brake is now called '{own}'"):
         bywire.run(name)
 
 

@@ -14,7 +14,7 @@ from bywire.core.model import ASSEMBLIES
 from bywire.simulation.engine import prepare
 from bywire.simulation.stages import build_stages
 
-OFF = "fluid.V_air = 0.5 ml would have no effect because fluid.air = 'none': set fluid.air"
+OFF = r"fluid.V_air = 0.5 ml would have no effect because fluid.air = 'none'. Either set fluid.air"
 ON = {"fluid.V_air": 5e-8, "fluid.air": "caliper"}
 NAMES = sorted(PARAMETER_SETS.all())
 

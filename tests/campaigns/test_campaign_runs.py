@@ -161,7 +161,8 @@ def test_classes_coverage_and_reaction_follow_from_the_runs(campaign):
     assert {*tables} >= {"Faults", "Residuals", "Criteria"}
     frame = tables["Faults"]
     assert frame.attrs["units"] == {"within": "s", "seen within": "s"}
-    np.testing.assert_equal(frame["within"].to_numpy(), [e.tolerance for e in findings.faults])
+    tolerances = [e.tolerance for e in findings.faults]  # the table begins with the worst fault
+    np.testing.assert_equal(np.sort(frame["within"]), np.sort(tolerances))
     assert tables["Residuals"]["false alarms"].dtype.kind == "i"
     assert len(campaign.write(campaign.folder)) >= 3
 
@@ -352,7 +353,7 @@ def test_an_interrupt_says_what_is_kept(campaign, file, folder):
         if share > 0:
             raise KeyboardInterrupt
 
-    with pytest.raises(KeyboardInterrupt, match="7 of 7 faults are saved. Rerun the command"):
+    with pytest.raises(KeyboardInterrupt, match=r"7 of 7 faults are saved\. Rerun the command"):
         bywire.run_faults(file, folder, progress=interrupt)
 
 

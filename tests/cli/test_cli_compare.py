@@ -36,5 +36,5 @@ def test_what_was_run_in_a_folder_of_an_experiments_name(bywire, tmp_path, monke
 
 def test_what_cannot_be_compared(bywire, tmp_path):
     refused(bywire("compare", "hard-braking"), "at least two")
-    refused(bywire("compare", "hard-braking", tmp_path), "not a finished result", "--out")
+    refused(bywire("compare", "hard-braking", tmp_path), "not a complete result", "--out")
     refused(bywire("compare", "hard-braking", "hard-brakin"), "did you mean hard-braking?")

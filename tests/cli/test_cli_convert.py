@@ -52,7 +52,7 @@ def test_alignment_is_told(bywire, run, tmp_path, monkeypatch):
     np.testing.assert_allclose(there, 1e5 * 100.0 * (there["time"] + 0.002), rtol=1e-9, atol=1e-3)
     monkeypatch.setenv("COLUMNS", "200")
     text = bywire(*arguments, "--force", "--exclude", "nothing")
-    assert "1, longest 0.31 s at 0.488 s" in text.out
+    assert "1, longest 310 ms at 488 ms" in text.out
     assert "excluded: nothing" in text.out
     assert not np.isnan(read_measurement(out)["p_mc"]).any()
     no_half_files(tmp_path)

@@ -63,6 +63,7 @@ def test_requirements_from_a_file_and_a_bench_file_that_runs(bywire, tmp_path):
         "motor.R_m=0.4 ohm",
         "--out",
         tmp_path / "out",
+        "--verbose",
     )
     assert outcome.status in (0, 1)
     assert "nonlinear bench" in outcome.out
@@ -146,7 +147,7 @@ def test_the_bench_looks_at_the_worst_corner_too(bywire):
         "--amplitudes",
         "1 A",
     )
-    outcome = bywire(*arguments)
+    outcome = bywire(*arguments, "--verbose")
     assert outcome.status in (0, 1)
     assert "bandwidth, sine of 1 A at motor.R_m = 0." in outcome.out
     assert "(worst of 2 corners)" in outcome.out

@@ -61,5 +61,5 @@ def test_bad_input(bywire, arguments, texts):
 def test_a_dither_is_designed(bywire):
     outcome = bywire("study", "dither", *SMALL)
     assert outcome.status == 0
-    assert "least gain for all pressures together" in outcome.out
+    assert "lowest gain for all pressures together" in outcome.out
     assert "share of the time stuck at 20 bar" in outcome.out

@@ -57,7 +57,7 @@ def test_a_campaign_is_written_and_shown(bywire, tmp_path):
 def test_a_run_with_a_fault_says_so(bywire):
     outcome = bywire("run", "hard-braking", "--fault", "motor.hot=1.5@0.2 s", "--json")
     assert outcome.status == 0
-    assert outcome.object["remarks"][0].startswith("fault motor.hot = 1.5, from 0.2 s on")
+    assert outcome.object["remarks"][0].startswith("fault motor.hot = 1.5, from 200 ms on")
 
 
 def test_what_is_not_known_is_refused(bywire, tmp_path):

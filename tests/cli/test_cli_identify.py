@@ -74,8 +74,11 @@ def test_a_bench_file_says_what_failed_and_what_it_cannot_do(
 @pytest.mark.parametrize(
     ("given", "texts"),
     [
-        ("F_set", ("unknown stimulus 'F_set'", "did you mean 'v_set'", "Known are p_set, ")),
-        ("frequency=p_mc", ("unknown stimulus 'frequency': known are p_set, pedal_force, i_set",)),
+        ("F_set", ("unknown stimulus 'F_set'", "did you mean 'v_set'", "Valid names are p_set, ")),
+        (
+            "frequency=p_mc",
+            ("unknown stimulus 'frequency': valid names are p_set, pedal_force, i_set",),
+        ),
         ("p_set=", ("--input p_set=: write STIMULUS=SIGNAL", "p_set=p_ref")),
     ],
 )

@@ -148,7 +148,7 @@ def test_a_parameter_a_group_a_signal_and_a_key_figure(bywire: Bywire) -> None:
     assert figure["unit"] == "%"
     assert "hard-braking" in figure["experiments"].split(", ")
     distance = only(bywire("list", "stopping_distance", "--json"), "KPI")
-    assert distance["unit"] == "mm or m"  # as reports write it, by its size
+    assert distance["unit"] == "um, mm or m"  # as reports write it, by its size
     refused(bywire("list", "motor.R_n"), "unknown name 'motor.R_n'", "'motor.R_m'")
 
 
@@ -205,7 +205,7 @@ def test_a_word_that_nothing_mentions_gets_the_nearest_that_is(bywire: Bywire) -
 def test_a_stimulus_says_its_defaults(bywire: Bywire) -> None:
     (sine,) = bywire("list", "sine", "--json").object["found"]
     values = {row["name"]: row["value"] for row in sine["parameters"]}
-    assert (values["phase"], values["t_start"], values["f"]) == ("0 rad", "0 s", None)
+    assert (values["phase"], values["t_start"], values["f"]) == ("0 rad", "0 ms", None)
 
 
 def test_every_value_of_a_set_says_where_it_comes_from(bywire: Bywire) -> None:

@@ -74,7 +74,7 @@ def test_a_reduced_loop(bywire):
         (("wedge-plant", "--reduce", "1e9 Hz"), ("fastest corner",)),
         (("wedge-plant", "--at", "30 A"), ("current = 30 A", "drive.i_max = 20 A")),
         (("motorcycle-plant", "--at", "1000 A"), ("current = 1000 A", "end stop")),
-        (("wedge-plant", "--friction", "stuck", "--reduce", "2"), ("nothing to reduce",)),
+        (("wedge-plant", "--friction", "stuck", "--reduce", "2"), ("cannot be reduced",)),
         (("moment", "--reduce", "600 Hz"), ("500 Hz",)),
         (("moment", "--friction", "stuck"), ("--friction", "wedge-plant")),
         (("wedge-plant", "--friction", "slidng"), ("did you mean 'sliding'",)),

@@ -66,7 +66,7 @@ def test_failed_run_is_3(bywire, bench):
         (["run", "a", "--sett", "b"], "--set"),
         (["run", "a", "--set"], "requires an argument"),
         (["lst"], "Did you mean 'list'?"),
-        (["list", "--yaml"], "no such option: --yaml: see 'bywire list -h'"),
+        (["list", "--yaml"], "no such option: --yaml. For help, type 'bywire list -h'"),
         (["reproduce"], "missing argument"),
     ],
 )
@@ -82,7 +82,7 @@ def test_a_defect_is_3_and_never_a_verdict(bywire, bench, monkeypatch):
     status, out, err = bywire("run", bench(), "--json")
     assert (status, out) == (3, "")
     assert "seeded" in err
-    assert "please report it" in err
+    assert "Please report it" in err
 
 
 @pytest.mark.parametrize("flag", ["--help", "-h", "--version"])

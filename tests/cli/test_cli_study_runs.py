@@ -8,7 +8,7 @@ import pytest
 from command_line import BRAKING, QUICK, no_half_files, refused
 
 from bywire.core.errors import FileError
-from bywire.usecases.study_report import study_report
+from bywire.usecases.study import study_report
 from emulated_driver import EmulatedDriver, emulated
 
 STUDY = 'bench = "bench.toml"\n[vary]\n"motor.R_m" = "+-5 %"\n[design]\ncases = 64\n'
@@ -144,7 +144,7 @@ def test_the_name_of_a_study_file_is_no_sizing_study(
 
 def test_a_study_that_is_nothing_says_what_is_wanted(bywire, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    texts = "unknown sizing study 'foo': known are actuator-sizing", "'bywire study run FILE'"
+    texts = "unknown sizing study 'foo': valid names are actuator-sizing", "'bywire study run FILE'"
     refused(bywire("study", "foo"), *texts)
     refused(bywire("study", "drive-trian"), "did you mean 'drive-train'?")
     for name in ("foo", "foo.toml", "foo/bar.toml"):

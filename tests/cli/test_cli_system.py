@@ -13,6 +13,7 @@ from bywire.core import brake as registry
 from bywire.core.errors import ParameterError, UnknownNameError
 from bywire.server.place import Place
 from bywire.server.task import tasks
+from raising import raises
 from systems.loading import SPRING_AXIS, forgotten, loaded
 
 Bywire = Callable[..., Outcome]
@@ -144,7 +145,7 @@ def test_what_it_does_not_declare_is_said(bywire: Bywire) -> None:
 def test_an_experiment_of_any_brake_takes_the_only_parameter_set(
     bywire: Bywire, tmp_path: Path
 ) -> None:
-    refused(bywire("run", "step"), "is for any brake: name its parameter set", "dardanelli2010")
+    refused(bywire("run", "step"), "is for any brake. Specify a parameter set", "dardanelli2010")
     plain = ("--set", "options.input=F_set", "--set", "options.output=x")
     done = bywire("run", "step", *plain, *SYSTEM, "--json")
     assert done.status == 0, done.err
@@ -171,7 +172,7 @@ def test_python_and_forms_take_the_only_parameter_set(tmp_path: Path) -> None:
         changes = "\n".join(f"options.{name}={value}" for name, value in options.items())
         asked = tasks()["run"].read({"bench": "step", "set": changes}, Place(tmp_path))
         assert asked["bench"] == "step"
-    with pytest.raises(ParameterError, match="is for any brake: name its parameter set"):
+    with raises(ParameterError, name="parameters", valid="dardanelli2010"):
         Bench("step")
     with pytest.raises(UnknownNameError, match="unknown experiment 'stepp': did you mean 'step'"):
         Bench("stepp")
@@ -231,7 +232,9 @@ def test_its_own_experiment_runs_by_its_name(bywire: Bywire, tmp_path: Path) -> 
 def test_its_own_names_come_first(bywire: Bywire) -> None:
     assert next(iter(bywire("list", "--json", *SYSTEM).object["brakes"])) == "spring-axis"
     caliper = ("--system", ROOT / "examples" / "emb_caliper")
-    refused(bywire("margins", "xyzzy", *caliper), "unknown loop 'xyzzy': known are clamp-force")
+    refused(
+        bywire("margins", "xyzzy", *caliper), "unknown loop 'xyzzy': valid names are clamp-force"
+    )
 
 
 def test_a_set_for_an_assembly_that_does_not_exist_is_said(bywire: Bywire, tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ from command_line import refused
 
 def test_ramp_downward_gets_one_clear_line(bywire):
     outcome = bywire("run", "moment-ramp", "--set", "options.M_low=300 N*m")
-    refused(outcome, "M_low = 300 N*m must not be above M_high = 200 N*m")
+    refused(outcome, "M_low = 300 N*m must be <= M_high = 200 N*m")
 
 
 @pytest.mark.parametrize("change", ["options.t_hold=0.4ms", "simulation.record=0.6s"])

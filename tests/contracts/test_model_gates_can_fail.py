@@ -131,7 +131,7 @@ def test_a_linear_model_that_is_the_mean_of_two_sides_is_found(
     with seeded(tmp_path, "seeded-mean", MISTAKES["kink where it rests"]) as subject:
         found = examine(OF_A_MODEL["linear model on corners"], subject, subject.place())
     assert not found.holds, found.text
-    assert re.search(r"\w+\.py:\d+ on its corner", found.text)
+    assert re.search(r"\w+\.py:\d+ at its kink", found.text)
 
 
 def test_every_gate_lets_the_right_brake_pass(tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ from bywire.core.brake import BrakeWarning, brakes, load_system
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.errors import FileError, InputError, ModelError, UnknownNameError
 from bywire.core.model import ASSEMBLIES
+from raising import raises
 from systems.loading import SPRING_AXIS, forgotten
 
 HEAD = "from bywire.core.brake import Brake\n"
@@ -122,11 +123,16 @@ def test_a_package_keeps_each_kind_in_its_own_module(write: Write) -> None:
             "json.py",
             declared("json"),
             ModelError,
-            ["there is a module 'json' already", "give it another name"],
+            ["the module name 'json' is used already"],
         ),
-        ("numpy.py", declared("numpy"), ModelError, ["there is a module 'numpy' already"]),
-        ("my-brake.py", declared("my-brake"), ModelError, ["must be one that Python can import"]),
-        ("brake.txt", declared("txt"), FileError, ["does not declare a brake: give a Python file"]),
+        ("numpy.py", declared("numpy"), ModelError, ["the module name 'numpy' is used already"]),
+        (
+            "my-brake.py",
+            declared("my-brake"),
+            ModelError,
+            ["a name that Python can import"],
+        ),
+        ("brake.txt", declared("txt"), FileError, ["does not declare a brake: use a Python file"]),
         (
             "half_typed.py",
             f"{HEAD}from typing import NamedTuple\nfrom bywire.core.signals import "
@@ -155,7 +161,7 @@ def test_a_package_keeps_each_kind_in_its_own_module(write: Write) -> None:
             "    t_hold: Duration\n    t_rest: Duration\n\n\nOPTIONS = Options()\n",
             ModelError,
             [
-                "valueless.py, line 11: t_hold, t_rest: give a value here, or a default in the "
+                "valueless.py, line 11: t_hold, t_rest: set a value here, or a default in the "
                 "class Options",
             ],
         ),
@@ -173,7 +179,7 @@ def test_what_is_wrong_with_a_file_is_said_with_its_line(
 
 
 def test_what_is_not_there_is_said() -> None:
-    with pytest.raises(FileError, match=r"nowhere\.py does not declare a brake"):
+    with raises(FileError, name="nowhere.py", valid="BRAKE = bywire.Brake(...)"):
         load_system("nowhere.py")
 
 
@@ -185,7 +191,7 @@ def test_a_file_beside_a_script_or_notebook_loads(
     assert load_system(path).name == "beside"
     other = write("below/beside_two.py", declared("beside-two"))
     write("beside_two.py", declared("beside-two"))
-    with pytest.raises(ModelError, match=r"a module 'beside_two' already \(.*beside_two\.py\)"):
+    with raises(ModelError, name=str(other), value="beside_two"):
         load_system(other)
 
 
@@ -194,7 +200,7 @@ def test_the_folder_of_a_project_is_its_package(write: Write) -> None:
     project = package.parents[1]
     assert load_system(project) is load_system(package)
     write("project/src/another/__init__.py", declared("another"))
-    with pytest.raises(FileError, match="does not declare a brake: give a Python file"):
+    with raises(FileError, name=str(project), valid="BRAKE = bywire.Brake(...)"):
         load_system(project)
 
 
@@ -221,7 +227,7 @@ def test_a_file_that_was_mended_loads(write: Write) -> None:
             'T = CitedSet("s", "b", "", "", ParameterSet, {})',
             PARAMETER_SETS,
             r"twice.py, line 7: the parameter set 's' is declared in .*twice.py, line 6 already: "
-            "give this one another name",
+            "rename it",
         ),
         (
             "same_test",
@@ -258,10 +264,8 @@ def test_what_a_brake_does_not_declare_is_said_with_how_it_is_declared() -> None
     load_system(SPRING_AXIS)
     with pytest.raises(UnknownNameError) as caught:
         LOOPS.find("travel")
-    assert "the brake 'spring-axis' declares no loop: that takes a Loop in a module or folder " in (
-        str(caught.value)
-    )
-    assert "docs/modeling.md" in str(caught.value)
+    for words in ("the brake 'spring-axis' declares no loop", "declare a Loop", "docs/modeling.md"):
+        assert words in str(caught.value)
 
 
 @pytest.fixture

@@ -42,7 +42,7 @@ def test_a_flag_is_an_argument_in_a_program(
 
 def test_an_argument_has_one_flag() -> None:
     use_cases()
-    with pytest.raises(ValueError, match="'overrides' has the flag --set already, not --change"):
+    with pytest.raises(ValueError, match="'overrides' already has the flag --set, not --change"):
         name_flag("overrides", "--change")
 
 

@@ -9,7 +9,7 @@ import weakref
 
 import pytest
 
-from bywire.core.interrupts import interrupt_heard, interrupts_deferred, interrupts_noted
+from bywire.core.interrupts import interrupt_handled, interrupts_deferred, interrupts_noted
 
 
 @pytest.fixture(autouse=True)
@@ -148,7 +148,7 @@ def test_an_interrupt_that_is_heard_does_not_come_again():
         try:
             signal.raise_signal(signal.SIGINT)
         except KeyboardInterrupt:
-            interrupt_heard()
+            interrupt_handled()
         time.sleep(0.5)
         assert was_interrupted()
     time.sleep(0.3)
@@ -159,4 +159,4 @@ def test_the_user_may_press_twice():
         for _ in range(2):
             with pytest.raises(KeyboardInterrupt):
                 signal.raise_signal(signal.SIGINT)
-            interrupt_heard()
+            interrupt_handled()

@@ -135,5 +135,5 @@ def test_a_folder_that_stays_empty_goes_with_the_parents_that_were_made(tmp_path
     assert [path.name for path in (tmp_path / "kept" / "a").iterdir()] == ["result"]
     with made_folder(tmp_path / "kept"):  # was there
         pass
-    with pytest.raises(OSError, match="cannot hold a null character"), made_folder(Path("a\0b")):
+    with pytest.raises(OSError, match="cannot contain a null character"), made_folder(Path("a\0b")):
         pass

@@ -9,8 +9,8 @@ import pytest
 
 LINES = """
 import warnings
-from bywire.core.callers import heard_warnings
-with heard_warnings() as heard:
+from bywire.core.callers import collected_warnings
+with collected_warnings() as heard:
     for _ in range(2):
         warnings.warn("the step is coarse")
     warnings.warn("use reshape", DeprecationWarning)

@@ -11,6 +11,7 @@ from pydantic import Field
 from bywire.core.errors import InputError, ParameterError, UnitError, UnknownNameError
 from bywire.core.quantities import Unit
 from bywire.core.section import Hint, Name, Names, Section, Table
+from raising import raises
 
 
 class Inner(Section):
@@ -59,7 +60,7 @@ def test_a_file_is_read_into_si() -> None:
 @pytest.mark.parametrize(
     ("content", "kind", "message"),
     [
-        ({"cuont": 1}, UnknownNameError, "unknown key of a file 'cuont': did you mean 'count'? Kn"),
+        ({"cuont": 1}, UnknownNameError, "unknown key of a file 'cuont': did you mean 'count'? Va"),
         ({"name": "  "}, ParameterError, "name = '  ' must be a text"),
         ({"name": 3}, ParameterError, "name = 3 must be a text"),
         ({"kind": "grdi"}, UnknownNameError, "unknown kind 'grdi': did you mean 'grid'?"),
@@ -102,5 +103,5 @@ def test_what_does_not_fit_is_refused(
 
 
 def test_what_is_missing_is_named() -> None:
-    with pytest.raises(ParameterError, match=r"^name is missing: give it a value$"):
+    with raises(ParameterError, name="name"):
         Whole.read({}, "a file")

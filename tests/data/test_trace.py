@@ -90,7 +90,7 @@ def test_refused_files(tmp_path, content, text):
         ("pedal", r"'pedal': it has no unit: write it after the title, as 'pedal \[mm\]'"),
         ("pedal [N]", "'N' has the wrong unit, it cannot be converted to m"),
         ("pedal [furlongs per beat]", "the unit 'furlongs' in .* is not known"),
-        ("pedal [9**9**9**9]", "is not written like a unit"),
+        ("pedal [9**9**9**9]", "does not have the form of a unit"),
     ],
 )
 def test_refused_units(tmp_path, title, text):

@@ -6,6 +6,7 @@ import re
 import shlex
 import sys
 from collections.abc import Iterator
+from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,7 @@ ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
 sys.path.insert(0, str(DOCS))
 
-from site_pages import commands, markdown, pages, papers  # noqa: E402  beside what they describe
+from site_pages import built, commands, markdown, pages, papers, search  # noqa: E402  beside what they describe
 
 WRITTEN = [
     page
@@ -39,58 +40,56 @@ def made() -> dict[str, str]:
 def test_every_public_name_and_command_is_described(made: dict[str, str]) -> None:
     for name in bywire.__all__:
         assert re.search(rf":: bywire\.{name}$", made["python.rst"], re.M), name
+    models = "".join(text for name, text in made.items() if name.startswith("authoring/"))
     for name in authoring.__all__:
-        assert re.search(rf":: bywire\.authoring\.{name}$", made["authoring.rst"], re.M), name
+        assert re.search(rf":: bywire\.authoring\.{name}$", models, re.M), name
     for words in commands.commands():
         assert f"## {words}\n" in made["commands.md"], words
 
 
 def test_every_parameter_and_key_figure_is_described(made: dict[str, str]) -> None:
-    notation = (DOCS / "notation.md").read_text(encoding="utf-8")
+    notation = "".join(page.read_text("utf-8") for page in (DOCS / "notation").glob("*.md"))
+    sets = "".join(text for name, text in made.items() if name.startswith("parameter-sets/"))
     for cited in PARAMETER_SETS.all().values():
         for name in leaf_fields(cited.parameter_class):
             assert f"`{name}`" in notation, name
-            assert markdown.plain(name) in made["parameter-sets.md"], name
+            assert markdown.plain(name) in sets, name
     for name in definitions():
         assert f"KPI {markdown.plain(name)}" in made["key-figures.md"], name
 
 
-def led_to() -> set[str]:
+def led_to(texts: dict[str, str]) -> set[str]:
     """Return all pages that a table of contents names, without their ending."""
+    blocks = re.compile(
+        r"^```\{toctree\}\n(.*?)```|^\.\. toctree::\n((?:   [^\n]*\n|\n)+)", re.S | re.M
+    )
     known: set[str] = set()
-    for page in WRITTEN:
-        for block in re.findall(r"```\{toctree\}\n(.*?)```", page.read_text(), re.S):
-            for line in block.splitlines():
-                if line and not line.startswith(":"):
-                    target = (page.parent / line).resolve().relative_to(DOCS).as_posix()
-                    known |= set(_matching(target))
+    for page, text in texts.items():
+        for line in "\n".join("".join(each) for each in blocks.findall(text)).splitlines():
+            if (entry := line.strip()) and not entry.startswith(":"):
+                entry = re.sub(r".*<(.*)>", r"\1", entry)
+                target = ((DOCS / page).parent / entry).resolve().relative_to(DOCS).as_posix()
+                known |= {name for name in texts if fnmatch(name, target)} or {target}
     return known
 
 
-def _matching(target: str) -> Iterator[str]:
-    if "*" not in target:
-        yield target
-    elif target == "_generated/papers/*":
-        yield from (f"_generated/papers/{source}" for source in papers.sources())
-    else:
-        for path in DOCS.glob(f"{target}.md"):
-            yield path.relative_to(DOCS).with_suffix("").as_posix()
-
-
 def test_every_page_is_led_to_and_is_there(made: dict[str, str]) -> None:
-    written = {page.relative_to(DOCS).with_suffix("").as_posix() for page in WRITTEN}
-    generated = {f"_generated/{Path(name).with_suffix('').as_posix()}" for name in made}
-    generated |= {f"_generated/papers/{source}" for source in papers.sources()}
-    elements = {name for name in generated if name.startswith("_generated/elements/bywire")}
-    there = (written | generated) - elements | {"_generated/gallery/index"}
-    assert led_to() ^ there == {"index"}
-    for name in elements:
-        assert name.removeprefix("_generated/elements/") in made["elements/index.rst"]
+    texts = {
+        page.relative_to(DOCS).with_suffix("").as_posix(): page.read_text("utf-8")
+        for page in WRITTEN
+    }
+    texts |= {f"_generated/{name.rpartition('.')[0]}": text for name, text in made.items()}
+    texts |= {f"_generated/papers/{source}": "" for source in papers.sources()}
+    texts |= {"_generated/gallery/index": ""}
+    assert led_to(texts) ^ texts.keys() == {"index"}
+    assert led_to({**texts, "new": ""}) ^ texts.keys() == {"index"}  # one that nothing leads to
 
 
 def blocks(page: Path, language: str) -> list[str]:
     """Return the code blocks of a page in a language."""
-    return re.findall(rf"```{language}\n(.*?)```", page.read_text(encoding="utf-8"), re.S)
+    return re.findall(
+        rf"```{language}(?: run[^\n]*)?\n(.*?)```", page.read_text(encoding="utf-8"), re.S
+    )
 
 
 def command_lines(page: Path) -> Iterator[list[str]]:
@@ -137,3 +136,33 @@ def test_messages_of_the_page_of_troubleshooting_are_in_the_product() -> None:
 
 def test_letters_that_mean_something_in_markdown_are_escaped() -> None:
     assert markdown.plain("a_b *c* |d| <e>") == r"a\_b \*c\* \|d\| \<e\>"
+
+
+def test_a_search_that_does_not_find_its_page_is_told() -> None:
+    terms = '"terms":{"instal":[0,1],"window":1},"titleterms":{"maco":0}'
+    index = f'Search.setIndex({{"docnames":["a","b"],{terms}}})'
+    stem = {"windows": "window", "install": "instal", "macos": "maco"}.get
+    queries = {"install windows": "b", "install": "a", "install macos": "a"}
+    assert search.missed(index, stem, queries) == {}
+    assert search.missed(index, stem, {"install windows": "a", "windows cat": "b"}) == {
+        "install windows": "a",
+        "windows cat": "b",
+    }
+
+
+def test_faults_of_a_built_site_are_told(tmp_path: Path) -> None:
+    (tmp_path / "b.html").write_text('<h1 id="there">B</h1>')
+    (tmp_path / "_modules").mkdir()
+    (tmp_path / "_modules" / "m.html").write_text('<a href="gone.html">m</a>')
+    links = '<a href="b.html#there">b</a> <a href="https://a.b/c">out</a> <img src="b.html?x=1">'
+    page = tmp_path / "a.html"
+    page.write_text(links)
+    assert list(built.faults(tmp_path, {"a": 1})) == []
+    page.write_text(f'{links} <a href="b.html#gone"></a> <a href="c.html"></a>')
+    assert list(built.faults(tmp_path, {"a": 2})) == [
+        "a does not show its 2 figures",
+        "a has a dead link: b.html#gone",
+        "a has a dead link: c.html",
+    ]
+    page.write_text('<script src="https://a.b/c.js"></script>')
+    assert "loads from another host" in next(built.faults(tmp_path, {}))

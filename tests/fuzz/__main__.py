@@ -32,7 +32,7 @@ if __package__ in (None, ""):
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from bywire.data import limited_source
-from bywire.usecases.run_study import run_study
+from bywire.usecases.study import run_study
 from fuzz import failing, inputs, kills, layouts, options, plans, sound, study_kills
 from fuzz.judge import Verdict, judged, judged_alone
 

@@ -294,4 +294,4 @@ def test_a_replay_whose_energy_balance_is_open_says_so(ramp: xr.Dataset) -> None
         stimulus={"kind": "step", "start": 0, "end": 0, "t_step": 0},
     )
     replayed = replay(bench, ramp[["i", "p_mc"]], {"i_set": "i"})
-    assert any("energy balance is open" in note for note in replayed.notes)
+    assert any("energy balance is off" in note for note in replayed.notes)

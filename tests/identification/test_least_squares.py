@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from bywire.core.errors import ParameterError
 from bywire.identification.confidence import autocorrelation, is_white, uncertainty
+from bywire.identification.estimate import Part
 from bywire.identification.least_squares import Problem, estimate, solve
 from bywire.identification.unknown import Unknown
 from raising import raises
@@ -79,6 +80,17 @@ def test_linear_covariance_equals_the_closed_form() -> None:
     found = uncertainty(J, r)
     assert not found.colored
     np.testing.assert_allclose(found.covariance, wanted, rtol=1e-10)
+
+
+def test_single_statements_have_no_order() -> None:
+    """The same residuals, as a record and as statements: only a record has neighbors."""
+    record = decay(colored(1))
+    statements = replace(record, parts=tuple(Part(f"s{k}", "", 1) for k in range(T.size)))
+    found, single = estimate(record), estimate(statements)
+    assert found.colored
+    assert not single.colored
+    assert single.freedom == T.size - 2
+    assert (np.diff(single.intervals()) < 0.6 * np.diff(found.intervals())).all()
 
 
 def test_whiteness() -> None:

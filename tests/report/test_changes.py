@@ -49,10 +49,10 @@ def test_settings_of_the_run_stimulus_and_assembly_are_changes():
         seed=7,
     )
     assert found["motor.R_m"] == ("0.4 Ω", "0.35 Ω")
-    assert found["options.duration"] == ("0.1 s", "1 s")
+    assert found["options.duration"] == ("100 ms", "1 s")
     assert found["stimulus.kind"] == ("step", "the experiment's own")
-    assert found["simulation.step"] == ("1e-05 s", "2e-05 s")
-    assert found["simulation.record"] == ("0.002 s", "the experiment's own")
+    assert found["simulation.step"] == ("0.01 ms", "0.02 ms")
+    assert found["simulation.record"] == ("2 ms", "the experiment's own")
     assert found["simulation.seed"] == ("7", "0")
     assert changed("hard-braking", "dardanelli2010") == {}
 

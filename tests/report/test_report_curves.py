@@ -25,6 +25,10 @@ def legend_of(axes: Axes) -> list[str]:
     return [] if legend is None else [text.get_text() for text in legend.get_texts()]
 
 
+def places(axes: Axes) -> list[np.ndarray]:
+    return [np.asarray(line.get_xdata(), dtype=float) for line in axes.lines]
+
+
 def heights(axes: Axes) -> list[np.ndarray]:
     return [np.asarray(line.get_ydata(), dtype=float) for line in axes.lines]
 
@@ -41,7 +45,7 @@ def test_loop_divides_at_the_top_of_the_demand() -> None:
         coords={"time": time},
     )
     drawn = hysteresis_loop({"ramp": ramp}, *LOOP).axes[0]
-    applying, releasing = [v for v in heights(drawn) if len(v)]
+    applying, releasing = [v for v in places(drawn) if len(v)]
     assert applying[0] == pytest.approx(0.1)
     assert applying[-1] == releasing[0] == pytest.approx(5.1)
     with pytest.raises(ParameterError, match="at least one"):
@@ -60,7 +64,7 @@ def test_loop_of_a_dithered_current_is_its_average() -> None:
         coords={"time": time},
     )
     drawn = hysteresis_loop({"dithered": ramp}, *LOOP, average=0.02).axes[0]
-    raw, applying, releasing, _ = heights(drawn)
+    raw, applying, releasing, _ = places(drawn)
     assert raw.max() > 5.5
     assert max(applying.max(), releasing.max()) < 5.05
     assert "ripple around the average over 20 ms" in legend_of(drawn)

@@ -62,7 +62,7 @@ def test_key_figures_are_shown_with_unit_limit_and_result() -> None:
 def test_limits_are_left_out_where_there_are_none() -> None:
     table = kpi_table([KpiRow("rise_time", 0.0423817, "s", "10 to 90 %")])
     assert [column.heading for column in table.columns] == ["name", "value", "definition"]
-    assert texts(table) == [["rise_time", "0.04238 s", "10 to 90 %"]]
+    assert texts(table) == [["rise_time", "42.38 ms", "10 to 90 %"]]
 
 
 def test_statements_without_value_or_verdict_show_a_dash() -> None:
@@ -162,7 +162,7 @@ def test_a_quantity_is_stated_once_for_table_json_and_frame() -> None:
     rows = [Run("a", 0.25, (1.0, 2.0)), Run("", math.nan, (3.0,))]
     table = record_table(rows, quantities)
     texts = [[cell.text for cell in row] for row in table.rows]
-    assert texts == [["a", "0.25 s", "2 s at most"], ["-", "not defined", "3 s at most"]]
+    assert texts == [["a", "250 ms", "2 s at most"], ["-", "not defined", "3 s at most"]]
     assert record_data(rows[0], quantities) == {
         "run": "a",
         "delay": 0.25,

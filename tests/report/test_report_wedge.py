@@ -75,7 +75,7 @@ def energies(**changes: float) -> xr.Dataset:
 def test_panels_are_stacked_as_in_the_paper() -> None:
     drawn = panels(time_traces(recording(BRAKING)))
     assert list(drawn) == ["moment", "motor speed", "current", "power", "force", "mode"]
-    assert "on the software rate limit" in legend(drawn["motor speed"])
+    assert "at the software rate limit" in legend(drawn["motor speed"])
     assert "shafts and wedge stuck" in legend(drawn["moment"])
 
 

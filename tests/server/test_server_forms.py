@@ -71,7 +71,7 @@ BAD = [
     ("life", {"life": "two-wheeler-pads", "check": "1"}, "check", "it must be 0 or >="),
     ("life", {"life": "wedge-pads", "set": "wear.x=1"}, "set", "unknown"),
     ("compare", {"runs": "curve.toml"}, "runs", "at least two"),
-    ("compare", {"runs": "curve.toml\naside"}, "runs", "not a finished result"),
+    ("compare", {"runs": "curve.toml\naside"}, "runs", "not a complete result"),
     ("compare", {"runs": "curve.toml\nseal-stribek"}, "runs", "seal-stribeck"),
     ("compare", {"runs": "curve.toml\nseal-stribeck", "set": "motor.x=1"}, "set", "motor.x"),
     (

@@ -148,7 +148,7 @@ def test_a_study_tells_now_and_then_what_there_is(monkeypatch, tmp_path):
         return []
 
     monkeypatch.setattr("bywire.api.study_run.kept_study", lambda _: Report())
-    monkeypatch.setattr("bywire.usecases.study_report.study_report", lambda _: Report())
+    monkeypatch.setattr("bywire.usecases.study.study_report", lambda _: Report())
     monkeypatch.setattr(study_so_far, "so_far", estimate)
     monkeypatch.setattr(study_so_far, "tell", lambda **said: told.append(said))
     monkeypatch.setattr(study_so_far.time, "monotonic", lambda: clock[0])

@@ -37,14 +37,14 @@ def test_one_that_is_not_there_is_refused(wanted, driver, monkeypatch):
 @pytest.mark.parametrize(
     ("started", "count", "said"),
     [
-        (RuntimeError("no library"), 1, "the driver's library is not there"),
+        (RuntimeError("no library"), 1, "the driver's library is missing"),
         (Status.CUDA_ERROR_NO_DEVICE, 1, "CUDA_ERROR_NO_DEVICE"),
         (Status.CUDA_SUCCESS, 0, "no NVIDIA graphics processor: check that nvidia-smi lists one"),
     ],
 )
 def test_a_machine_without_one_is_told(started, count, said, driver):
     driver.started, driver.count = started, count
-    with pytest.raises(DeviceError, match=f"{said}.*or take engine = 'auto'"):
+    with pytest.raises(DeviceError, match=f"{said}.*or use engine = 'auto'"):
         find_device()
 
 

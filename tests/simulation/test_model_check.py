@@ -9,6 +9,7 @@ import pytest
 
 from bywire.core.errors import ModelError
 from bywire.simulation.program import check_model
+from raising import raises
 from systems.nonlinear_drive import PARAMETERS, NonlinearDrive, State
 from systems.three_contacts import heart
 
@@ -55,20 +56,20 @@ class GroupWithoutGap(NonlinearDrive):
 
 
 @pytest.mark.parametrize(
-    ("model", "words"),
+    ("model", "fields"),
     [
-        (IfOnAValue, "core.ops.where instead of if"),
-        (MathOnASymbol, "core.ops"),
-        (TooFewRows, "balance returns 2 values: it must return 3"),
-        (NoMass, "mass returns 0 values: it must return 3"),
-        (NoTask, "tasks returns none"),
-        (Misspelled, "frictions names 'omga'"),
-        (BareBounds, "bounds returns 2 values: it must return 1"),
-        (GroupWithoutGap, "must match"),
+        (IfOnAValue, {"name": "balance"}),
+        (MathOnASymbol, {"name": "balance"}),
+        (TooFewRows, {"name": "balance", "value": "2", "valid": "3"}),
+        (NoMass, {"name": "mass", "value": "0", "valid": "3"}),
+        (NoTask, {"name": "tasks", "valid": "at least one task"}),
+        (Misspelled, {"name": "state", "value": "omga", "valid": "omega"}),
+        (BareBounds, {"name": "bounds", "value": "2", "valid": "1"}),
+        (GroupWithoutGap, {"name": "gap", "valid": "[1]"}),
     ],
 )
-def test_mistake_is_named(model: type[NonlinearDrive], words: str) -> None:
-    with pytest.raises(ModelError, match=words) as caught:
+def test_mistake_is_named(model: type[NonlinearDrive], fields: dict[str, str]) -> None:
+    with raises(ModelError, **fields) as caught:
         check_model(model(), PARAMETERS)
     assert model.name in str(caught.value)
 

@@ -169,7 +169,7 @@ def test_an_experiment_needs_no_bench_file(tmp_path):
         ),
         (
             '[vary]\n"motor.R_m" = "+-5 %"\n[simulatoin]\nstep = "10 us"',
-            ["'simulatoin': known are name, bench, vary"],
+            ["'simulatoin': valid names are name, bench, vary"],
         ),
         (
             '[vary]\n"motor.R_m" = "+-5 %"\n[[correlation]]\nof = ["motor.R_m", "motor.K_e"]\n'
@@ -302,7 +302,7 @@ def test_a_share_of_a_whole_number_may_be_whole(study):
     [
         ('"options.source" = { values = ["current", "voltage"] }', "A cannot be converted to V"),
         ('"options.source" = { values = ["current", "current-loop"] }', "(share_sat_current, "),
-        ('"options.add_holding" = { values = [true, 1] }', "known are false, true"),
+        ('"options.add_holding" = { values = [true, 1] }', "valid names are false, true"),
     ],
 )
 def test_an_option_that_makes_it_another_experiment_does_not_vary(study, text, said):

@@ -197,7 +197,7 @@ def test_results_in_python(study, tmp_path):
     assert "peak_current" in str(result)
     with undrawn():
         assert "probability" in result._repr_html_()
-    with pytest.raises(UnknownNameError, match="known are peak_current"):
+    with pytest.raises(UnknownNameError, match="valid names are peak_current"):
         result.worst("overshoot")
 
 

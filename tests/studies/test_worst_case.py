@@ -75,7 +75,7 @@ def test_a_study_finds_the_worst_bench(study, tmp_path):
     assert found.cases["peak_current"].max() >= ends.cases["peak_current"].max() - 1e-3
     assert found.status == ends.status
     assert found.worst("peak_current").seed == found.plan.bench.seed
-    assert any("is not a proof" in note for note in found.notes)
+    assert any("does not prove" in note for note in found.notes)
     (shown,) = found.tables()["Requirements"]["worst found"]
     assert shown == found.cases["peak_current"].max()  # and no share of what it went through
 

@@ -39,7 +39,7 @@ def test_the_filter_is_no_faster_than_the_sampling_and_the_set_point_is_not_diff
     assert default.gains.keys() == {"ecu.pressure.k_d", "ecu.pressure.tau_d"}
     assert default.gains["ecu.pressure.tau_d"] >= default.case.par.ecu.T_s
     assert default.case.par.ecu.pressure.c == 0.0
-    assert "limited for an ECU: ecu.pressure.tau_d >= 0.001 s, ecu.pressure.c = 0" in str(default)
+    assert "limited for an ECU: ecu.pressure.tau_d >= 1 ms, ecu.pressure.c = 0" in str(default)
     assert default.as_object()["kept_for_the_ecu"] == {
         "ecu.pressure.tau_d": [1e-3, 1e-2],
         "ecu.pressure.c": [0.0, 0.0],

@@ -11,8 +11,8 @@ import xarray as xr
 
 import bywire
 from bywire.brakes.motorcycle.studies import actuator_sizing
-from bywire.brakes.wedge.sizing import Demand, answer, closing_speed, redesigned
 from bywire.brakes.wedge.studies import drive_train
+from bywire.brakes.wedge.studies.drive_train import Demand, answer, closing_speed, redesigned
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.errors import ParameterError
 from bywire.core.model import ASSEMBLIES

@@ -433,8 +433,8 @@ def reduce(
     high, n = _band(full, band), len(acting)
     if not acting:
         raise ParameterError(
-            f"{full.name}: no input reaches an output, for instance because of stiction: there is "
-            "nothing to reduce",
+            f"{full.name}: no input reaches an output, for instance because of stiction, so "
+            "it cannot be reduced",
             name=full.name,
         )
     lasts = lasting(full)

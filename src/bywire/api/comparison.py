@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 import numpy as np
 import xarray as xr
@@ -35,6 +35,7 @@ from bywire.core.typing import Progress
 from bywire.core.units import difference_unit
 from bywire.report.answer import Answer
 from bywire.report.document import (
+    Banner,
     Block,
     Change,
     Document,
@@ -49,7 +50,7 @@ from bywire.report.document import (
 from bywire.report.subject import bench_changes
 from bywire.report.tables import Cell, Column, Table, measured_cell, value_text
 from bywire.report.terminal import change_texts
-from bywire.report.wording import clean, duration, measured_amount
+from bywire.report.wording import amount, beside_limit, clean, measured_amount
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -264,6 +265,19 @@ class Compared:
         return any(value != first for value in others)
 
     @property
+    def largest(self) -> float:
+        """Largest magnitude of a key figure, which determines the unit of all its values."""
+        known = (abs(v) for v in self.values if v is not None and math.isfinite(v))
+        return max(known, default=0.0)
+
+    @property
+    def ratio(self) -> float:
+        """Spread of a key figure relative to its smallest magnitude; 0 if one is zero or none."""
+        known = [v for v in self.values if v is not None and math.isfinite(v)]
+        least = min(map(abs, known), default=0.0)
+        return (max(known) - min(known)) / least if least and len(known) > 1 else 0.0
+
+    @property
     def is_distinct(self) -> bool:
         """Whether a key figure differs by more than its errors, assumed independent."""
         values = [math.nan if value is None else value for value in self.values]
@@ -318,7 +332,7 @@ def _kpi_table(labels: Sequence[str], rows: Sequence[Compared]) -> Table:
             (
                 Cell(clean(each.name)),
                 *(
-                    measured_cell(v, each.unit, e)
+                    measured_cell(v, each.unit, e, like=each.largest)
                     for v, e in zip(each.values, each.errors, strict=True)
                 ),
                 _change(each),
@@ -340,12 +354,17 @@ def _verdict_table(runs: Sequence[ComparedRun]) -> Table:
             if verdict is None:
                 cells.append(Cell("-"))
                 continue
-            shown = measured_amount(verdict.value, verdict.unit, verdict.error)
+            value, error, unit = beside_limit(verdict.value, verdict.error, verdict.unit, limit)
+            shown = measured_amount(value, unit, error)
             text = f"{shown} {verdict.outcome}"
             cells.append(Cell(text, "good" if verdict.met else "bad", verdict.outcome))
         rows.append((Cell(clean(name)), Cell(clean(limit)), *cells))
     columns = (Column("requirement"), Column("limit", numeric=True))
     return Table((*columns, *(Column(each.label, numeric=True) for each in runs)), tuple(rows))
+
+
+def _not_met(run: ComparedRun) -> list[Verdict]:
+    return [verdict for verdict in run.verdicts if verdict.outcome != "met"]
 
 
 def _change(row: Compared) -> Cell:
@@ -359,10 +378,11 @@ def _change(row: Compared) -> Cell:
     if not row.is_distinct:
         return Cell("not distinct", value=change)
     error = row.errors[low] + row.errors[high]
-    written = measured_amount(change, difference_unit(row.unit), error, 3)
+    of = difference_unit(row.unit)
+    written = measured_amount(change, of, error, 3, like=row.largest if of == row.unit else None)
     is_share = is_pair and first and row.unit not in ("%", "K")
-    share = f" ({100 * change / abs(first):+.3g} %)" if is_share else ""
     sign = "+" if is_pair and change > 0 else ""
+    share = f" ({sign}{amount(100 * change / abs(first), '%', 3)})" if is_share else ""
     return Cell(f"{sign}{written}{share}", value=change)
 
 
@@ -446,20 +466,46 @@ class Comparison(Answer):
         sources = [f"{each.label}: {each.source}" for each in self.runs]
         changed = self._changed()
         changes = [Listing(changed, "Also changed:")] if changed else []
+        conclusion = self._conclusion()
         return Document(
             "Comparison of " + ", ".join(each.label for each in self.runs),
             f"{len(self.runs)} runs, with values in the order of the command",
             sections=lambda: [
-                Section("Differing settings", [Listing(sources), *settings, *changes]),
                 *([Section("Requirements", verdicts)] if verdicts else []),
+                Section("Differing settings", [Listing(sources), *settings, *changes]),
                 Section("Curves", self._curves()),
                 *([Section("Differences", apart)] if (apart := self._differences()) else []),
                 Section("Key figures", figures),
             ],
-            brief=spaced([*settings, *changes, *figures, *verdicts]),
+            brief=spaced([f"{conclusion}.", *verdicts, *settings, *figures, *changes]),
             data=self._data(),
+            banner=Banner(conclusion, self._overall()),
             record="compare.json",
         )
+
+    def _conclusion(self) -> str:
+        """Return who meets the requirements, the worst run first, and what differs most."""
+        parts = []
+        judged = [each for each in self.runs if each.verdicts]
+        for each in sorted(judged, key=lambda run: -len(_not_met(run))):
+            open_ = [f"{v.kpi} {v.outcome}" for v in _not_met(each)]
+            met = f"{len(each.verdicts) - len(open_)} of {len(each.verdicts)} requirements"
+            missed = f" ({', '.join(open_)})" if open_ else ""
+            parts.append(f"{each.label} meets {met}{missed}")
+        distinct = [each for each in self.figures if each.differs and each.is_distinct]
+        count = f"{len(distinct)} of {len(self.figures)} key figures differ"
+        most = max(distinct, key=lambda each: each.ratio, default=None)
+        if most is not None and math.isfinite(most.ratio) and most.ratio > 0.0:
+            pairs = zip(most.values, most.errors, strict=True)
+            values = (measured_amount(v, most.unit, e, like=most.largest) for v, e in pairs)
+            count += f", {most.name} the most ({', '.join(values)})"
+        return "; ".join([*parts, count])
+
+    def _overall(self) -> Literal["good", "bad", "open", "none"]:
+        outcomes = {v.outcome for each in self.runs for v in each.verdicts}
+        if "missed" in outcomes:
+            return "bad"
+        return "none" if not outcomes else "open" if "undecided" in outcomes else "good"
 
     def _changed(self) -> list[str]:
         """Return the changes of the runs, except settings that differ between the runs."""
@@ -510,7 +556,7 @@ class Comparison(Answer):
 
     def _spans(self) -> list[str]:
         spans = {
-            each.label: tuple(f"{duration(float(t))}" for t in recordings["time"].values[[0, -1]])
+            each.label: tuple(amount(float(t), "s") for t in recordings["time"].values[[0, -1]])
             for group in self._groups.values()
             for each, recordings in zip(self.runs, group, strict=True)
         }

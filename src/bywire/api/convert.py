@@ -15,6 +15,7 @@ from bywire.core.errors import not_valid
 from bywire.report.answer import Answer
 from bywire.report.document import Document, Section, TableBlock
 from bywire.report.tables import Cell, Table, text_table
+from bywire.report.wording import amount
 
 if TYPE_CHECKING:
     from bywire.data.channel_quality import AlignedChannel, AlignmentReport, Stretch
@@ -192,8 +193,8 @@ def _channel_table(report: AlignmentReport) -> Table:
 
 def _row(channel: AlignedChannel) -> tuple[str | Cell, ...]:
     quality = channel.quality
-    jitter = f"{1e3 * quality.jitter:.3g} ms" if quality.jitter * quality.rate > _ROUNDING else "-"
-    delay = f"{1e3 * channel.delay:.4g} ms" if channel.delay else "-"
+    jitter = amount(quality.jitter, "s", 3) if quality.jitter * quality.rate > _ROUNDING else "-"
+    delay = amount(channel.delay, "s") if channel.delay else "-"
     return (
         channel.name,
         Cell(f"{quality.rate:.6g} Hz", value=quality.rate, unit="Hz"),
@@ -208,4 +209,5 @@ def _in_short(stretches: tuple[Stretch, ...]) -> str:
     if not stretches:
         return "-"
     longest = max(stretches, key=lambda stretch: stretch.length)
-    return f"{len(stretches)}, longest {longest.length:.3g} s at {longest.start:.4g} s"
+    length, start = amount(longest.length, "s", 3), amount(longest.start, "s")
+    return f"{len(stretches)}, longest {length} at {start}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -33,11 +34,13 @@ from bywire.report.document import (
     Attachment,
     Banner,
     Block,
+    Details,
     Document,
     FigureBlock,
     Listing,
     Paragraph,
     Section,
+    TableBlock,
 )
 from bywire.report.tables import Cell, text_table
 from bywire.studies.plan import CHUNK, StudyPlan
@@ -473,13 +476,36 @@ class DesignAnswer(Answer):
                 Section("Figures", self._figures()),
                 self.case.subject.provenance("Parameters before the design."),
             ],
-            brief=design_parts.brief_blocks(parts),
+            brief=self._brief(parts, verdict),
             data={**self.data(), "kept_for_the_ecu": {k: list(v) for k, v in self.limits.items()}},
             banner=Banner(verdict, "good" if self.holds else "bad"),
             attachments=[Attachment(f"{loop.name}-design.toml", self._write_bench)],
             remarks=self._remarks(),
             changes=self.case.subject.changes,
         )
+
+    def _brief(self, parts: Sequence[Part], verdict: str) -> list[str | Block]:
+        """Return verdict, requirements and gains; the rest is for ``--verbose``."""
+        table = design_parts.requirement_table(self.requirements, self.worst, self.tried)
+        first = self.first_parts(parts)
+        rest = [part for part in parts if not any(part is each for each in first)]
+        point = f"loop {self.case.loop.name} of {self.case.name} at {self.points}: {verdict}"
+        return [
+            point,
+            "",
+            TableBlock(table),
+            "",
+            *design_parts.as_brief(first),
+            Details("", design_parts.as_blocks(rest)),
+        ]
+
+    @abstractmethod
+    def worst(self, figure: str) -> float:
+        """Return the worst value of a figure on the linear model; NaN for none."""
+
+    def first_parts(self, parts: Sequence[Part]) -> list[Part]:
+        """Return the gains, their limits, and what requirements that exclude each other reach."""
+        return [part for part in parts if design_parts.is_brief(part)]
 
     def _remarks(self) -> list[str]:
         if self.status == "infeasible":
@@ -591,6 +617,17 @@ class LoopDesign(DesignAnswer):
         parts = design_parts.as_parts(self.case, self.requirements, self.designed, self.tried)
         return parts if self.probability is None else [*parts, *self.probability.parts()]
 
+    def worst(self, figure: str) -> float:
+        """Return the worst value of a figure on the linear model."""
+        return self.designed.worst[figure][0]
+
+    def first_parts(self, parts: Sequence[Part]) -> list[Part]:
+        """Return also the probabilities over drawn models."""
+        first = super().first_parts(parts)
+        count = 0 if self.probability is None else len(self.probability.parts())
+        end = len(parts) - len(design_parts.limit_lines(self.case, self.limits))
+        return [*first, *parts[end - count : end]]
+
     def data(self) -> dict[str, Any]:
         """Return all results as plain data."""
         data = design_parts.as_object(self.case, self.requirements, self.designed, self.tried)
@@ -608,6 +645,10 @@ class LoopScheduleDesign(DesignAnswer):
     def linear(self) -> ScheduleDesign:
         """The design on the linear model."""
         return self.designed
+
+    def worst(self, figure: str) -> float:
+        """Return the value of a figure at the worst point on the linear model."""
+        return float(self.designed.worst.figures.get(figure, math.nan))
 
     @property
     def points(self) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from bywire.analysis.loop_figures import LOOP_FIGURES
@@ -13,7 +13,7 @@ from bywire.core.callers import option
 from bywire.core.parameters import leaf_fields
 from bywire.core.units import shown
 from bywire.report.document import Block, Flat, Listing, TableBlock
-from bywire.report.tables import Cell, Table, amount_cell, text_table
+from bywire.report.tables import OUTCOMES, Cell, Table, amount_cell, text_table
 from bywire.report.wording import amount
 from bywire.synthesis.bench_figures import BenchFigures
 from bywire.synthesis.outcome import Across, Design, ScheduleDesign
@@ -122,7 +122,10 @@ def _figure_rows(
     def cell(figures: BenchFigures | None, k: int, name: str) -> Cell:
         if figures is None or not figures.small:
             return Cell("-")
-        return amount_cell(getattr(figures.small[k], name), LOOP_FIGURES[name].unit, 3)
+        value, unit = getattr(figures.small[k], name), LOOP_FIGURES[name].unit
+        if name == "crossover" and math.isinf(value):
+            return Cell("none", value=value, unit=unit)
+        return amount_cell(value, unit, 3)
 
     sizes = next(
         ([s.amplitude for s in figures.small] for figures in columns if figures and figures.small),
@@ -343,9 +346,7 @@ def limit_lines(case: LoopCase, limits: Mapping[str, tuple[float, float]]) -> li
         else f"{name} >= {_gain_text(case, name, low)}"
         for name, (low, high) in limits.items()
     ]
-    return [
-        f"limited for an ECU: {', '.join(texts)} ({option('free_derivative')} removes the limit)"
-    ]
+    return [f"{_LIMITED}: {', '.join(texts)} ({option('free_derivative')} removes the limit)"]
 
 
 def _unit_of(case: LoopCase, name: str) -> str:
@@ -358,17 +359,45 @@ def _gain_text(case: LoopCase, name: str, value: float) -> str:
     return amount(value, _unit_of(case, name))
 
 
-def brief_blocks(parts: Sequence[Part]) -> list[str | Block]:
-    """Return the parts for a terminal, without loop figures that have no limit."""
-    blocks: list[str | Block] = []
-    for part in parts:
-        if isinstance(part, str):
-            blocks.append(part)
-            continue
-        is_limited = part.columns[-1].heading == "limit"
-        limited = sum(bool(row[-1].text) for row in part.rows) if is_limited else 0
-        blocks.append(TableBlock(part, most=limited))
-    return blocks
+def requirement_table(
+    requirements: Sequence[Limit], worst: Callable[[str], float], tried: Verification | None
+) -> Table:
+    """Return one row per requirement, and per figure enforced as well, with the verdict first.
+
+    ``worst(figure)``: worst value on the linear model, which decides if the bench was skipped.
+    """
+    every = [*requirements, *(() if tried is None else tried.kept)]
+    rows = []
+    for each in every:
+        text, value = str(each), worst(each.figure) if each.figure in LOOP_FIGURES else math.nan
+        linear = "-" if math.isnan(value) else figure_cell(each.figure, value)
+        if tried is None:
+            is_met, room, where = bool(each.is_met(value)), "-", "on the linear model"
+        else:
+            is_met = tried.final.slacks[text] >= 0.0
+            room = f"{100.0 * tried.final.room(text):+.1f} %"
+            where = judged_on(tried.final, text)
+        verdict = OUTCOMES["met" if is_met else "missed"]
+        rows.append([verdict, text, linear, room, where])
+    heading = ["verdict", "requirement", "linear model, worst", "margin to the limit", "judged"]
+    return text_table(heading, rows)
+
+
+def is_brief(part: Part) -> bool:
+    """Return whether a terminal shows a part without ``--verbose``: gains, limits, conflicts."""
+    if isinstance(part, str):
+        return ": at best " in part or part.startswith(_LIMITED)
+    return part.columns[0].heading in _GAINS
+
+
+_LIMITED = "limited for an ECU"
+_GAINS = ("gain", "linear design", "retuned on the bench")
+"""first headings of tables of gains: of one point, and of regions"""
+
+
+def as_brief(parts: Sequence[Part]) -> list[str | Block]:
+    """Return parts for a terminal."""
+    return [part if isinstance(part, str) else TableBlock(part) for part in parts]
 
 
 def as_blocks(parts: Sequence[Part]) -> list[Flat]:

@@ -64,8 +64,8 @@ def response_warnings(
     ----------
     response
         Response of the loop.
-        variants
-    Cases of the response.
+    variants
+        Cases of the response.
     unit
         SI unit of the amplitudes.
     tolerance

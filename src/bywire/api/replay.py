@@ -10,6 +10,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+import numpy as np
 import xarray as xr
 
 from bywire.bench import bench_file
@@ -19,6 +20,7 @@ from bywire.core.callers import option
 from bywire.core.errors import ParameterError
 from bywire.core.model import Model
 from bywire.core.signals import signals_of
+from bywire.core.units import difference_unit
 from bywire.data.named_columns import NamedColumns
 from bywire.identification.bench_replay import Replayed
 from bywire.identification.replay_fit import (
@@ -43,7 +45,7 @@ from bywire.report.document import (
 )
 from bywire.report.subject import Subject
 from bywire.report.tables import Cell, Column, Table, measured_cell
-from bywire.report.wording import amount, clean, duration
+from bywire.report.wording import amount, clean
 
 _SHOWN = ("nrmse", "vaf", "max_error", "bias", "lag")
 
@@ -112,7 +114,7 @@ class Replay(Answer):
                     *(f"{note[:1].upper()}{note[1:]}." for note in self.notes),
                 ),
             ],
-            brief=spaced([head, table, *self._tracked_texts()]),
+            brief=spaced([f"{self._verdict()}.", head, table, *self._tracked_texts()]),
             data=self._data(),
             banner=self._banner(),
             attachments=[Attachment("replay.nc", self._write_signals)],
@@ -166,15 +168,48 @@ class Replay(Answer):
                 )
                 yield f"{each.relation.parameter} tracked: at first {first}, at last {last}"
 
-    def _banner(self) -> Banner | None:
-        if not any(fit.verdicts for fit in self.fits):
-            return None
+    def _banner(self) -> Banner:
+        is_judged = any(fit.verdicts for fit in self.fits)
+        return Banner(self._verdict(), ("good" if self.holds else "bad") if is_judged else "none")
+
+    def _verdict(self) -> str:
+        """Return the verdict in words, with the largest difference and its time."""
         outcomes = [v.outcome for fit in self.fits for v in fit.verdicts]
+        if not outcomes:
+            worst = self._worst(self.fits)
+            return f"No tolerance is set{worst and f'; the largest difference: {worst}'}"
+        if self.holds:
+            return (
+                "The model reproduces the record within the tolerance"
+                if len(outcomes) == 1
+                else f"The model reproduces the record within all {len(outcomes)} tolerances"
+            )
         counted = ((outcomes.count(word), word) for word in ("missed", "undecided"))
         open_ = " and ".join(f"{count} {word}" for count, word in counted if count)
-        if not open_:
-            return Banner("All tolerances are met.", "good")
-        return Banner(f"Of {len(outcomes)} tolerances, {open_}.", "bad")
+        failing = [fit for fit in self.fits if any(v.outcome != "met" for v in fit.verdicts)]
+        worst = self._worst(failing)
+        reproduces = "does not reproduce" if "missed" in outcomes else "may not reproduce"
+        return (
+            f"The model {reproduces} the record: {open_} of {len(outcomes)} tolerances"
+            f"{worst and f'; worst: {worst}'}"
+        )
+
+    def _worst(self, fits: Iterable[SegmentFit]) -> str:
+        """Return the largest difference relative to its signal's range, as text with its time."""
+        places = []
+        for fit in fits:
+            pair = self.replayed.outputs[fit.signal]
+            time = pair["time"].values
+            within = (time >= fit.segment.start) & (time <= fit.segment.stop)
+            off = np.abs((pair["modeled"] - pair["measured"]).values[within])
+            if not np.isfinite(off).any():
+                continue
+            k = int(np.nanargmax(off))
+            reach = float(np.ptp(pair["measured"].dropna("time").values)) or 1.0
+            unit = difference_unit(str(pair["measured"].attrs.get("units", "1")))
+            size = f"{fit.signal} differs by {amount(float(off[k]), unit, 3)}"
+            places.append((off[k] / reach, f"{size} at t = {amount(float(time[within][k]), 's')}"))
+        return max(places)[1] if places else ""
 
     def _data(self) -> dict[str, Any]:
         return {
@@ -252,7 +287,7 @@ def _fit_table(fits: Sequence[SegmentFit]) -> Table:
 
 def _figure(kpi: Kpi) -> Cell:
     if kpi.unit == "s" and math.isfinite(kpi.value) and not kpi.bound > 0.0:
-        return Cell(duration(kpi.value), value=kpi.value, unit=kpi.unit)
+        return Cell(amount(kpi.value, "s", 3), value=kpi.value, unit=kpi.unit)
     return measured_cell(kpi.value, kpi.unit, kpi.bound, 3)
 
 

@@ -24,6 +24,7 @@ from bywire.bench.requirements import Verdict
 from bywire.bench.result_folder import kpi_record, verdict_record
 from bywire.bench.running import Result
 from bywire.bench.stated import stated_figures
+from bywire.core.arguments import require_kinds
 from bywire.core.errors import ParameterError
 from bywire.core.typing import Progress
 from bywire.report.animation.scene import SCENES
@@ -44,7 +45,7 @@ from bywire.report.document import (
 from bywire.report.stated_levels import stated_figure
 from bywire.report.subject import bench_changes
 from bywire.report.tables import KpiRow, kpi_table
-from bywire.report.wording import amount, measured_amount
+from bywire.report.wording import amount, beside_limit, error_text, measured_amount
 
 if TYPE_CHECKING:
     from bywire.report.bench_figures import Shown
@@ -152,6 +153,47 @@ class BenchResult(Result, Answer):
             )
             for kpi in self.kpis
         ]
+
+    def interact(self, *parameters: str, figure: str = "") -> Any:
+        """Return sliders for a notebook; each change runs the bench again and redraws it.
+
+        Key figures are shown without their numerical errors, which would need further runs.
+
+        Parameters
+        ----------
+        *parameters
+            Parameters by dotted name, such as ``"motor.R_m"``. A slider ranges from a quarter to
+            four times a positive value, within the parameter's valid range.
+        figure
+            Name of the figure, see `plot`; the first one by default.
+
+        Returns
+        -------
+        ipywidgets.VBox
+            Sliders, figure and key figures, which a notebook shows.
+
+        Raises
+        ------
+        FileError
+            If ipywidgets is not installed (extra ``notebook``).
+        UnknownNameError
+            For an unknown parameter or figure.
+        ParameterError
+            Without parameters, or if a parameter has no range around its value.
+        """
+        from bywire.api.notebook import sliders
+
+        require_kinds(BenchResult.interact, (self, *parameters), {"figure": figure})
+        if not parameters:
+            raise ParameterError(
+                "interact needs at least one parameter, such as 'motor.R_m'", name="parameters"
+            )
+
+        def run(changes: Mapping[str, float]) -> BenchResult:
+            changed = self.bench.with_overrides(changes)
+            return run_once(changed, None, "auto", estimate_error=False, animated=False)
+
+        return sliders(self, self.bench.par, parameters, figure, run)
 
     def ledgers(self) -> dict[str, Ledger]:
         """Return the energy balances of every run from time zero on, by label."""
@@ -321,11 +363,11 @@ def faulty(bench: Bench, faults: Sequence[str]) -> Bench:
 def _remark(verdict: Verdict) -> str:
     """Return a remark on a requirement that is missed or undecided."""
     limit = f", limit {verdict.limit}"
+    value, error, unit = beside_limit(verdict.value, verdict.error, verdict.unit, verdict.limit)
     if not verdict.is_decided and math.isfinite(verdict.error):
-        written = measured_amount(verdict.value, verdict.unit, verdict.error)
         return (
-            f"requirement undecided: {verdict.kpi} is {written}, numerical error "
-            f"{amount(verdict.error, verdict.unit, 2)}{limit}. Use a smaller step"
+            f"requirement undecided: {verdict.kpi} is {measured_amount(value, unit, error)}, "
+            f"numerical error {error_text(value, unit, error)}{limit}. Use a smaller step"
         )
     if not verdict.is_decided and not math.isinf(verdict.error):
         return f"requirement undecided: {verdict.kpi} is not defined{limit} ({verdict.note})"
@@ -334,6 +376,6 @@ def _remark(verdict: Verdict) -> str:
             f"requirement undecided: {verdict.kpi} is defined either for the step or for half the "
             f"step, but not for both{limit}. Use a smaller step"
         )
-    return f"requirement not met: {verdict.kpi} is {amount(verdict.value, verdict.unit)}{limit}" + (
+    return f"requirement not met: {verdict.kpi} is {amount(value, unit)}{limit}" + (
         f" ({verdict.note})" if verdict.note else ""
     )

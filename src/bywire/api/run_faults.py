@@ -14,10 +14,9 @@ import numpy as np
 from bywire.api.run_sections import varied_texts
 from bywire.campaigns.residual import NEVER
 from bywire.campaigns.running import CampaignFindings, FaultFinding
-from bywire.core.quantities import display_unit
 from bywire.core.signals import signals_of
 from bywire.core.typing import Array
-from bywire.core.units import difference_unit, display_factor
+from bywire.core.units import difference_unit
 from bywire.report.answer import Answer
 from bywire.report.document import (
     Banner,
@@ -25,6 +24,7 @@ from bywire.report.document import (
     Document,
     FigureBlock,
     Listing,
+    Paragraph,
     Section,
     TableBlock,
 )
@@ -111,6 +111,7 @@ _SHORT = ("fault", "class", "severity", "violates", "within", "seen within", "wi
 _RANK = ("undetected", "too late", "covered", "latent", "harmless, seen")
 """classes of faults, the most dangerous first"""
 _MOST = 12
+_NOTHING = 1e-4  # share of the largest deviation, below which a deviation is not worth a number
 
 
 @dataclass(frozen=True, repr=False)
@@ -164,7 +165,7 @@ class FaultCampaign(Answer):
             notes.append("nothing varies, so thresholds come from a single healthy run. Add [vary]")
         if plan.reaction is not None:
             notes.append(
-                f"the reaction, {plan.reaction.failing.name} {_milliseconds(plan.reaction.delay)} "
+                f"the reaction, {plan.reaction.failing.name} {amount(plan.reaction.delay, 's', 3)} "
                 "after detection, is simulated for each fault that permits it"
             )
             notes.append(findings.benefit_of_reaction())
@@ -177,13 +178,18 @@ class FaultCampaign(Answer):
         table = TableBlock(self._table())
         residuals = TableBlock(self._residual_table())
         uncovered = sum(f.kind in _RANK[:2] for f in findings.faults)
-        kinds = ", ".join(f"{n} {kind}" for kind, n in findings.kinds().most_common())
+        counts = findings.kinds()
+        order = sorted(counts, key=lambda kind: _RANK.index(kind) if kind in _RANK else len(_RANK))
+        kinds = ", ".join(f"{counts[kind]} {kind}" for kind in order)
+        first = f"{len(plan.faults)} faults: {kinds}"
         known = Listing([kinds, *varied_texts(plan.varied), *self.notes])
         return Document(
             f"Faults: {plan.name}",
             f"{len(plan.faults)} faults, {plan.total} runs of {subject.line}",
             sections=lambda: [
-                Section("Faults", [table]),
+                Section(
+                    "Faults", [Paragraph(f"{first}. The most dangerous are listed first."), table]
+                ),
                 Section("Notes", [known]),
                 Section("Figures", self._figures()),
                 Section("Residuals", [residuals]),
@@ -191,8 +197,9 @@ class FaultCampaign(Answer):
                 subject.provenance("" if self.folder is None else f"Outcomes: {self.folder}."),
             ],
             brief=[
+                f"{first}{self._worst_fault()}",
+                "",
                 TableBlock(self._worst_first(), most=max(_MOST, uncovered)),
-                f"{len(plan.faults)} faults: {kinds}",
                 Details("", [table, residuals, known]),
             ],
             data=self._data(),
@@ -232,7 +239,7 @@ class FaultCampaign(Answer):
                 "tolerated_for",
                 "within",
                 "s",
-                lambda f: _milliseconds(f.tolerance),
+                lambda f: _time(f.tolerance),
             ),
             Quantity(lambda f: f.violated.tolist(), "violated_after"),
             Quantity(
@@ -256,16 +263,27 @@ class FaultCampaign(Answer):
 
     def _table(self) -> Table:
         columns = [self._quantities[name] for name in _COLUMNS if name in self._quantities]
-        return record_table(self.findings.faults, columns)
+        return record_table(self._ranked, columns)
 
-    def _worst_first(self) -> Table:
-        """Return the table for a terminal, with the most dangerous faults first."""
-        ranked = sorted(
+    @cached_property
+    def _ranked(self) -> list[FaultFinding]:
+        """The faults, the most dangerous first."""
+        return sorted(
             self.findings.faults,
             key=lambda f: (_RANK.index(f.kind), f.tolerance if f.dangerous else math.inf),
         )
+
+    def _worst_fault(self) -> str:
+        """Return the most dangerous fault that no monitor detects in time; empty for none."""
+        worst = self._ranked[0] if self._ranked else None
+        if worst is None or worst.kind not in _RANK[:2]:
+            return ""
+        return f"; the worst: {_name(worst)}, {worst.kind}, {_violated(worst)}"
+
+    def _worst_first(self) -> Table:
+        """Return the table for a terminal."""
         columns = [self._quantities[name] for name in _SHORT if name in self._quantities]
-        return record_table(ranked, columns)
+        return record_table(self._ranked, columns)
 
     def _off_healthy(self, each: FaultFinding) -> str:
         signals = signals_of(self.findings.plan.case(0).model.Output)
@@ -288,7 +306,7 @@ class FaultCampaign(Answer):
                     "never checked" if limit <= NEVER else amount_cell(limit, residual.unit, 3),
                     Cell(str(alarms), value=alarms, unit="1"),
                     Cell(f"{seen} of {dangerous}", value=seen, unit="1"),
-                    Cell(_milliseconds(delay), value=delay, unit="s"),
+                    Cell(amount(delay, "s", 3), value=delay, unit="s"),
                 ]
             )
         heads = ["residual", "compares", "threshold", "false alarms", "sees", "median delay"]
@@ -431,15 +449,16 @@ def _at_threshold() -> int:
 
 def _range(low: Array, high: Array, unit: str) -> str:
     """Return the range of deviations over all runs."""
-    scale, shown = display_factor(unit), display_unit(difference_unit(unit))
-    text = f"{scale * low.min():.3g} to {scale * high.max():.3g}"
-    return text if unit == "1" else f"{text} {shown}"
+    lowest, highest = float(low.min()), float(high.max())
+    largest = max(abs(lowest), abs(highest))
+    of = difference_unit(unit)
+    ends = [each if abs(each) > _NOTHING * largest else 0.0 for each in (lowest, highest)]
+    first, last = (amount(each, of, 3, like=largest) for each in ends)
+    return f"{first.split()[0]} to {last}"
 
 
-def _milliseconds(time: float) -> str:
-    if math.isnan(time):
-        return "-"
-    return f"{time:.3g} s" if time >= 1.0 else f"{1e3 * time:.3g} ms"
+def _time(time: float) -> str:
+    return "-" if math.isnan(time) else amount(time, "s", 3)
 
 
 def _latest(times: Array) -> float:
@@ -452,5 +471,5 @@ def _worst(times: Array) -> str:
     never = int(np.isnan(times).sum())
     if never == times.size:
         return "never"
-    text = _milliseconds(_latest(times))
+    text = _time(_latest(times))
     return f"{text}, {never} never" if never else text

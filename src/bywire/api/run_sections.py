@@ -29,7 +29,7 @@ from bywire.report.tables import (
     parameter_table,
     text_table,
 )
-from bywire.report.wording import amount, clean
+from bywire.report.wording import amount, clean, part_text
 from bywire.studies.plan import StudiedBench, StudyPlan, Varied
 
 _MOST = {"share_stuck": 0.5, "share_sat_current": 0.1, "share_sat_duty": 0.1}
@@ -205,8 +205,9 @@ def energy_table(books: Ledger) -> Table:
 
     def row(side: str, label: str, energy: float) -> tuple[str | Cell, ...]:
         share = 100.0 * energy / total if total > 0 else math.nan
-        text = f"{share:.3g} %" if total > 0 else "-"
-        return side, label, amount_cell(energy, "J"), Cell(text, value=share, unit="%")
+        text = part_text(share, "%", 100.0) if total > 0 else "-"
+        size = part_text(energy, "J", total)
+        return side, label, Cell(size, value=energy, unit="J"), Cell(text, value=share, unit="%")
 
     rows = [row("from", posting.label, posting.energy) for posting in books.sources]
     rows += [row("to", posting.label, posting.energy) for posting in books.sinks]

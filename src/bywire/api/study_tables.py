@@ -478,7 +478,7 @@ def search_notes(findings: Findings) -> list[str]:
         for demand, each in zip(plan.judged_demands, findings.searches, strict=False)
         if each.state == "budget spent"
     ]
-    notes = [f"{plan.design}: a search is not a proof. It may have missed worse cases"]
+    notes = [f"{plan.design}: a search does not prove that there are no worse cases"]
     if spent:
         notes.append(
             f"{', '.join(spent)}: the budget of {plan.cases} cases was spent before the search "

@@ -61,7 +61,7 @@ class ThingKind(NamedTuple):
     line
         Function that returns a thing's line in the index.
     listed
-        Things that the index lists; by default all.
+        Things that the index lists; default: all.
     meaning
         Function that returns the searched text; None if they are not searched.
     has_assembly

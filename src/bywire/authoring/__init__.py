@@ -1,4 +1,4 @@
-"""What a brake of one's own is written with: one place to import from, two levels deep.
+"""Names for writing your own brake: one place to import from, two levels deep.
 
 Models, experiments, loops, methods, studies and sources of a user's package or file take their
 names from here, wherever those stand inside bywire; elements come from ``bywire.plant`` and

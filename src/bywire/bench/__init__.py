@@ -1,1 +1,1 @@
-"""Virtual tests: an assembly, its ECU, a stimulus and sensors make an experiment that is judged."""
+"""Virtual tests: an experiment runs an assembly with ECU, stimulus and sensors, and judges it."""

@@ -46,12 +46,12 @@ from bywire.core.values import parsed
 from bywire.simulation.engine import engine_names, structure_of
 from bywire.simulation.run import Run
 
-_SHARE = 1e-3  # of a value: step by which it is moved to find out whether it has an effect
+_SHARE = 1e-3  # of a value: change that tests whether the value has an effect
 
 
 @dataclass(frozen=True)
 class Bench:
-    """A virtual test, complete.
+    """Complete virtual test.
 
     Parameters
     ----------
@@ -59,16 +59,16 @@ class Bench:
         Name of the experiment.
     parameters
         Name of a parameter set of the catalog. If empty, the main set of the experiment's brake;
-        an experiment of any brake then takes the only set of the brakes loaded by path.
+        an experiment for any brake then uses the only set of the brakes loaded by path.
     overrides, options
         Changed parameters and options of the experiment, by dotted name: SI numbers, or texts
         with units such as ``"0.35 ohm"``. Durations below may also be such texts. A percentage
         changes a parameter relatively, ``{"seal.T_pr": "+50%"}``, and a pattern several,
         ``{"seal.*": "-10%"}``.
     stimulus
-        ``{"kind": ..., **parameters}`` for experiments that take a stimulus; a table may come
-        from a file, see `bywire.bench.stimulus.with_nodes`. Experiments of any brake also take
-        such a mapping under the name of each further signal of the model's Stimulus.
+        ``{"kind": ..., **parameters}`` for experiments with a stimulus of your choice; a table may
+        come from a file (see `bywire.bench.stimulus.with_nodes`). Experiments for any brake also
+        accept such a mapping under the name of each additional signal of the model's Stimulus.
     step
         Substep [s].
     record
@@ -76,25 +76,25 @@ class Bench:
     seed
         Seed of the sensors' noise.
     requirements
-        KPI name -> limit, such as ``{"overshoot": "<= 15 %"}``.
+        Limit by KPI name, such as ``{"overshoot": "<= 15 %"}``.
     name
         Name in reports.
     faults
-        Faults and their times: tables like those of ``[[faults]]`` in a bench file, see
-        ``docs/faults.md``.
+        Faults and their times: tables like those of ``[[faults]]`` in a bench file (see
+        ``docs/faults.md``).
     assembly
-        Tested model of the parameters' brake, where an experiment of any brake leaves the choice;
-        if empty, that of the parameter set.
+        Tested model of the parameters' brake, for experiments that leave the choice; if empty, the
+        model of the parameter set.
     engine
-        Engine of its runs: ``auto``, ``compiled``, ``virtual-machine``, a graphics processor,
-        ``cuda``, or the compiled C of the ECU in the loop, ``sil`` (double precision) or
+        Engine of the runs: ``auto``, ``compiled``, ``virtual-machine``, ``cuda`` (a graphics
+        processor), or the compiled C of the ECU in the loop, ``sil`` (double precision) or
         ``sil-single``.
 
     Raises
     ------
     InputError
-        At construction, for names, values, files and steps that are not valid. Errors of the
-        simulation itself, and too little memory, are raised by the run.
+        At construction, for names, values, files and steps that are not valid. The run itself
+        raises errors of the simulation, and the error for too little memory.
     """
 
     experiment: str
@@ -116,7 +116,7 @@ class Bench:
             if not isinstance(getattr(self, key), str):
                 raise not_valid(key, quoted(getattr(self, key)), "a text")
         for key in ("overrides", "options", "stimulus", "requirements"):
-            object.__setattr__(self, key, dict(getattr(self, key)))  # a copy of its own
+            object.__setattr__(self, key, dict(getattr(self, key)))  # a copy
         object.__setattr__(self, "faults", tuple(checked_sections(self.faults)))
         object.__setattr__(self, "step", checked_step(self.step))
         object.__setattr__(self, "record", checked_interval(self.record))
@@ -143,7 +143,7 @@ class Bench:
             )
         self._check_stimulus(chosen)
         self._check_names()
-        _ = self.limits  # read now, so that requirements that cannot be judged are rejected
+        _ = self.limits  # rejects requirements that cannot be judged
         if chosen.preview is None:
             self._require_effects(written, self.cases(), chosen.cases)
         else:
@@ -154,12 +154,12 @@ class Bench:
         return {name: self.__dict__[name] for name in type(self).__dataclass_fields__}
 
     def _check_stimulus(self, chosen: Experiment) -> None:
-        """Reject a stimulus that the experiment does not take."""
+        """Reject a stimulus that the experiment does not accept."""
         further = [name for name, each in self.stimulus.items() if isinstance(each, Mapping)]
         if len(further) < len(self.stimulus) and chosen.driven_unit is None:
             raise ParameterError(
-                f"experiment {chosen.name!r} has its own stimulus: remove [stimulus], or "
-                "use experiment 'open-loop'",
+                f"experiment {chosen.name!r} has its own stimulus. Remove [stimulus], or use "
+                "experiment 'open-loop'",
                 name="stimulus",
             )
         known = {} if chosen.beside is None else chosen.beside(self.chosen_options)
@@ -168,7 +168,7 @@ class Bench:
                 raise unknown_name(f"stimulus beside {chosen.name}", name, known)
 
     def _require_effects(self, names: Sequence[str], cases: Sequence[Case], make: Cases) -> None:
-        """Reject parameters that a choice switches off: they would be listed without any effect.
+        """Reject changed parameters that a choice switches off, as they would have no effect.
 
         ``names``: names without patterns; a pattern may match parameters that have no effect.
         """
@@ -194,12 +194,12 @@ class Bench:
         return not are_alike(cases, made)
 
     def require_effect(self, name: str) -> None:
-        """Reject a parameter that is to vary although a choice switches it off.
+        """Reject a parameter to vary if a choice switches it off.
 
         Raises
         ------
         ParameterError
-            With the choice that switches it on.
+            With the choice that switches the parameter on.
         """
         if name not in self.par.leaves():
             return
@@ -220,7 +220,7 @@ class Bench:
 
     @cached_property
     def limits(self) -> Mapping[str, Limit]:
-        """Limits of the requirements, by KPI name."""
+        """Limits from the requirements, by KPI name."""
         return read_limits(self.requirements, self.definition.kpis_with(self.chosen_options))
 
     @cached_property
@@ -250,9 +250,9 @@ class Bench:
             now = shown(each.now, unit)
             then = shown(each.formula, unit) if math.isfinite(each.formula) else "no finite value"
             texts.append(
-                f"{each.name} = {now} is derived ({each.where}) from {', '.join(each.changed)}, "
-                f"which was changed: its formula now gives {then}; set it too, or leave it on "
-                "purpose"
+                f"{each.name} = {now} does not match {', '.join(each.changed)}, which you changed: "
+                f"its formula ({each.where}) now gives {then}. Change {each.name} too, or accept "
+                "the mismatch"
             )
         return texts
 
@@ -280,7 +280,7 @@ class Bench:
     def summary(self, varied: Collection[str] = ()) -> str:
         """Return the experiment's summary with the options of this bench.
 
-        ``varied``: names of quantities that take several values, also ``options.NAME``.
+        ``varied``: names of quantities that have several values, including ``options.NAME``.
         """
         _, own = split_options(dict.fromkeys(varied))
         return self.definition.summary_with(self.chosen_options, own)
@@ -301,7 +301,7 @@ class Bench:
         return with_faults(cases, self.faults) if self.faults else cases
 
     def _made(self, make: Cases) -> tuple[Case, ...]:
-        """Return the cases, or reject overrides without effect and steps that do not divide."""
+        """Return the cases; reject overrides without effect and steps that do not divide."""
         cases = self.cases_with(self.par, self.chosen_options, make)
         for case in cases:
             _check_driven(case, self.definition)
@@ -310,8 +310,8 @@ class Bench:
             wanted, given = self.par.value(name), [case.par.value(name) for case in cases]
             if given and all(value != wanted for value in given):
                 raise ParameterError(
-                    f"{name} = {wanted!r} would have no effect: experiment "
-                    f"{self.experiment!r} sets it to {given[0]!r}; leave it out",
+                    f"{name} = {wanted!r} would have no effect because experiment "
+                    f"{self.experiment!r} sets it to {given[0]!r}. Leave {name} out",
                     name=name,
                     value=repr(wanted),
                     valid=repr(given[0]),
@@ -374,7 +374,7 @@ class Bench:
 
     @cached_property
     def _shared(self) -> dict[str, Any]:
-        """What this bench shares with the benches that `varied` returns."""
+        """Properties that this bench shares with the benches that `varied` returns."""
         lasting = ("definition", "system", "chosen_stimuli")
         return {**self.__getstate__(), **{name: getattr(self, name) for name in lasting}}
 
@@ -394,7 +394,7 @@ class Bench:
 
     @property
     def _previewed(self) -> tuple[Case, ...]:
-        """Runs for checks, without the runs that would have to be computed first."""
+        """Runs for checks, without computing the runs on which they depend."""
         preview = self.definition.preview
         return self.cases() if preview is None else self._made(preview)
 
@@ -413,7 +413,7 @@ def _check_driven(case: Case, experiment: Experiment) -> None:
             )
 
 
-# --- Parameters without effect: those that a structural choice switches off
+# --- Parameters without effect because a structural choice switches them off
 
 _TIMES = 101  # number of times at which stimuli are compared
 _KNOWN: dict[tuple[object, ...], frozenset[str] | None] = {}
@@ -444,9 +444,9 @@ class Switch:
 def switches_of(name: str, cases: Sequence[Case]) -> list[Switch]:
     """Return the choices that switch a parameter off in all runs of an experiment.
 
-    The equations decide: whether those of any run read the parameter, and whether they would with
-    another value of a choice in the parameter's group or in a group above it. If the equations
-    cannot be traced, the list is empty.
+    A choice switches the parameter off if the equations of no run read it, but would read it with
+    another value of that choice. The choices are those in the parameter's group and in the groups
+    above it. If the equations cannot be traced, the list is empty.
 
     Parameters
     ----------
@@ -484,7 +484,7 @@ def refuse_without_effect(
     off = " and ".join(f"{each.name} = {each.value!r}" for each in switches)
     on = ", or ".join(each.hint for each in switches)
     raise ParameterError(
-        f"{name} = {text} would have no effect because {off}: {on} too, or leave {name} out",
+        f"{name} = {text} would have no effect because {off}. Either {on} too, or leave {name} out",
         name=name,
         value=text,
     )
@@ -524,7 +524,10 @@ def _is_read_with(name: str, model: Model, par: ParameterSet, choice: str, value
 
 
 def _is_read(name: str, model: Model, par: ParameterSet, unless_known: bool = True) -> bool:
-    """Return whether equations read a parameter; ``unless_known``: where they cannot be traced."""
+    """Return whether equations read a parameter.
+
+    ``unless_known``: result for equations that cannot be traced.
+    """
     read = parameters_read(model, par)
     if read is None:
         return unless_known
@@ -534,7 +537,7 @@ def _is_read(name: str, model: Model, par: ParameterSet, unless_known: bool = Tr
 def parameters_read(model: Model, par: ParameterSet) -> frozenset[str] | None:
     """Return the names of the numbers that a model's equations and controllers read.
 
-    Tables have one name per node, ``name.0``. None where the equations cannot be traced.
+    Tables have one name per node, ``name.0``. None if the equations cannot be traced.
     """
     key = structure_of(model, par)
     if key not in _KNOWN:
@@ -562,7 +565,7 @@ def _traced(model: Any, par: ParameterSet) -> frozenset[str]:
     zeros = _Zeros()
     mass, balance = model.mass(xe, here), model.balance(x, xe, m, here, contact)
     results: tuple[Any, ...] = (
-        # A state without any force stays at rest, whatever its mass.
+        # A state without any force stays at rest, so its mass has no effect.
         tuple(
             each
             for each, force, name in zip(mass, balance, model.State._fields, strict=True)
@@ -581,7 +584,7 @@ def _traced(model: Any, par: ParameterSet) -> frozenset[str]:
 
 
 class _Zeros:
-    """Numbers that are zero whatever their inputs; kernels leave these out, too."""
+    """Numbers that are zero for any input; kernels also leave these out."""
 
     def __init__(self) -> None:
         self._known: dict[int, tuple[bool, Any]] = {}  # kept alive: ids stay unique

@@ -1,4 +1,4 @@
-"""Bench files: TOML read as a `Bench`, and written; nothing in them is executed."""
+"""Read and write a `Bench` as a bench file in TOML; nothing in a bench file is executed."""
 
 from __future__ import annotations
 
@@ -114,7 +114,7 @@ def _text(name: str, value: Any, symbol: str) -> str:
         return str(value).lower()
     if isinstance(value, Sequence):
         return f"[{', '.join(_text(name, node, symbol) for node in value)}]"
-    number = value if isinstance(value, int) else float(value)  # all digits: the same run
+    number = value if isinstance(value, int) else float(value)  # all digits, for the same run
     return json.dumps(f"{number} {symbol}") if symbol != "1" else f"{number}"
 
 
@@ -159,7 +159,7 @@ class BenchFile(Section):
 _FAULTS = "faults"
 SECTIONS = ("options", "stimulus", "set", "simulation", "requirements")
 """sections of a bench file, without ``[[faults]]``"""
-_TOO_LARGE = "; measured traces go into a file of their own (options.trace)"
+_TOO_LARGE = ". Put measured traces into a separate file (options.trace)"
 
 
 @checked
@@ -183,7 +183,7 @@ def load(path: str | Path) -> Bench:
     FileError
         When the file cannot be read or is not valid TOML.
     InputError
-        For anything in it that is not valid, with the file's name in front.
+        For any content that is not valid, with the file's name in front.
     """
     return read(path, {})
 
@@ -268,8 +268,8 @@ def flattened(tree: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
         ).items():
             if each in flat:
                 raise ParameterError(
-                    f'{each} has two values, by {each} and by "{each}" in quotation marks: leave '
-                    "one of them out",
+                    f'{each} has two values, one for {each} and one for "{each}" in quotation '
+                    "marks. Remove one of them",
                     name=each,
                 )
             flat[each] = leaf
@@ -321,11 +321,13 @@ def _changed(content: Mapping[str, Any], changes: Mapping[str, str]) -> dict[str
         elif near and key:
             raise unknown_name("section", section, SECTIONS)
         elif name in SECTIONS:
-            raise ParameterError(f"{name} is a section: write {name}.NAME=VALUE", name=name)
+            raise ParameterError(
+                f"{name} is a section. Write {name}.NAME=VALUE", name=name, valid=f"{name}.NAME"
+            )
         elif section == _FAULTS:
             raise ParameterError(
-                f"faults are put in by {option('faults')} NAME=VALUE@ONSET, not by "
-                f"{option('overrides')}",
+                f"{option('overrides')} cannot add a fault. Use {option('faults')} "
+                "NAME=VALUE@ONSET",
                 name=name,
             )
         elif name in BenchFile.model_fields:
@@ -360,9 +362,9 @@ def content_of_experiment(file: Path, changes: Mapping[str, str]) -> dict[str, s
     Raises
     ------
     ParameterError
-        For an experiment of any brake, if ``changes`` do not name a parameter set.
+        For an experiment for any brake, if ``changes`` do not specify a parameter set.
     UnknownNameError
-        For a bare name of neither an experiment nor a file.
+        For a bare name that is neither an experiment nor a file.
     """
     name = str(file)
     if not file.exists() and _NAME.fullmatch(name) and not names_experiment(name):
@@ -377,8 +379,8 @@ def content_of_experiment(file: Path, changes: Mapping[str, str]) -> dict[str, s
 def meant_by(file: Path) -> str:
     """Return advice on a bench file that does not exist.
 
-    It names the most similar bench file of the same folder, or experiment. A file of the same name
-    in a folder of benches takes precedence.
+    The advice is the most similar bench file in the same folder, or the most similar experiment. A
+    file of the same name in a folder of benches takes precedence.
     """
     folders = (file.parent / _FOLDER, file.parent / ".." / _FOLDER)
     there = first_there(folder / file.name for folder in folders)
@@ -387,7 +389,7 @@ def meant_by(file: Path) -> str:
     near = max(_near(file), default=None)
     if near is not None:
         return f"did you mean {near[1]}?"
-    return "check the path, or name an experiment of 'bywire list'"
+    return "check the path, or specify an experiment (see 'bywire list')"
 
 
 def _near(file: Path) -> Iterator[tuple[float, str]]:

@@ -37,7 +37,7 @@ def settled(base: ParameterSet, changes: Mapping[str, Any]) -> dict[str, Any]:
     UnknownNameError
         When a pattern matches nothing.
     ParameterError
-        When a percentage is given for a choice, for zero, or for a temperature.
+        For a percentage of a choice, of zero, or of a temperature.
     """
     if not any(is_relative(name, value) for name, value in changes.items()):
         return dict(changes)
@@ -53,10 +53,11 @@ def settled(base: ParameterSet, changes: Mapping[str, Any]) -> dict[str, Any]:
             names = [name for name in names if name in leaves and any(_nodes(values[name]))]
             if not names:
                 raise ParameterError(
-                    f"{pattern} = {quoted(changes[pattern])}: the pattern matches no quantity that "
-                    "is not zero: give a value",
+                    f"{pattern} = {quoted(changes[pattern])} changes nothing: every quantity that "
+                    "matches the pattern is 0. Specify a value with its unit",
                     name=pattern,
                     value=str(changes[pattern]),
+                    valid="a value with its unit",
                 )
         spread |= dict.fromkeys(names, changes[pattern])
     spread |= {name: value for name, value in changes.items() if not _PATTERN.search(name)}
@@ -100,8 +101,8 @@ def refuse_share_of_temperature(name: str, text: str, symbol: str) -> None:
     """
     if difference_unit(symbol) != symbol:
         raise ParameterError(
-            f"{name} = {quoted(text)}: a percentage of a temperature is ambiguous, as degC and K "
-            "have different zeros: give a temperature, or a width in K",
+            f"{name} = {quoted(text)} is ambiguous because degC and K have different zeros. "
+            "Specify a temperature, or a width in K",
             name=name,
             value=text,
             valid="a temperature, or a width in K",
@@ -111,17 +112,20 @@ def refuse_share_of_temperature(name: str, text: str, symbol: str) -> None:
 def _scaled(name: str, text: str, share: float, value: Any, is_quantity: bool) -> Any:
     if not is_quantity:
         raise ParameterError(
-            f"{name} = {quoted(text)}: a choice, now {value}, cannot change by a percentage: name "
-            "another choice",
+            f"{name} = {quoted(text)} is not valid: {name} is a choice (now {value}), which cannot "
+            "change by a percentage. Specify another choice",
             name=name,
             value=text,
+            valid="another choice",
         )
     nodes = [*_nodes(value)]
     if not any(nodes):
         raise ParameterError(
-            f"{name} = {quoted(text)}: a percentage of 0 changes nothing: give a value",
+            f"{name} = {quoted(text)} changes nothing because {name} is 0. Specify a value with "
+            "its unit",
             name=name,
             value=text,
+            valid="a value with its unit",
         )
     scaled = tuple(Written((1.0 + share) * node, text) for node in nodes)
     return scaled if isinstance(value, tuple) else scaled[0]

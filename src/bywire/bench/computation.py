@@ -1,4 +1,4 @@
-"""Digests of what a bench computes, by which kept studies are recognized."""
+"""Digests of a bench's computation, from which saved studies are recognized."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ _ROOMS = (
 def computation(
     bench: Bench, choices: Iterable[Mapping[str, Any]] = (), beside: Iterable[Any] = ()
 ) -> dict[str, Any]:
-    """Digests of the equations of a bench, and of its runs and key figures.
+    """Digests of a bench's equations, runs and key figures.
 
-    Names of files, comments, docstrings and the place of a definition do not matter.
+    File names, comments, docstrings and the location of a definition do not matter.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ def computation(
     choices
         Parameters and options by dotted name that cases change.
     beside
-        Further functions that judge its runs, and objects that contain such functions.
+        Additional functions that judge its runs, and objects that contain such functions.
     """
     return {
         "equations": sorted({each for b in (bench, *_chosen(bench, choices)) for each in _of(b)}),
@@ -57,9 +57,9 @@ def functions_digest(roots: Iterable[Any], *rooms: str, with_equations: bool = F
     roots
         Functions, and objects that contain functions.
     rooms
-        Further packages whose definitions count by their text.
+        Additional packages whose source text counts.
     with_equations
-        Whether the equations of models count, too.
+        Whether the equations of models also count.
     """
     reached = (*_ROOMS, *rooms, *(brake.module for brake in brakes().values()))
     return definitions_digest(roots, reached, _family, with_equations)
@@ -69,7 +69,7 @@ def _chosen(bench: Bench, choices: Iterable[Mapping[str, Any]]) -> Iterator[Benc
     for each in choices:
         try:
             yield bench.varied(*split_options(each))
-        except InputError:  # a choice that needs another one: its case raises the error
+        except InputError:  # a choice that needs another one, whose case raises the error
             continue
 
 
@@ -90,7 +90,7 @@ def _functions(bench: Bench) -> Iterator[Any]:
 
 
 def _family(text: str) -> Iterator[Any]:
-    """Yield what a family of key figures computes, if a text is the name of a family."""
+    """Yield the functions of a family of key figures, if a text is the name of a family."""
     family = FAMILIES.guess(text) if text.isidentifier() and text.islower() else None
     if isinstance(family, Family):
         yield family.setting_class

@@ -31,8 +31,8 @@ class Posting:
     name, label
         Variable, and its label.
     energy
-        Energy in J, signed: a source that takes energy back and a loss below zero are negative.
-        For the rows of several runs an array of shape (runs,), like everything derived from it.
+        Energy in J, signed: negative for a source that absorbs energy, and for a loss that returns
+        energy. For rows of several runs an array of shape (runs,), as are all derived values.
     """
 
     name: str
@@ -55,7 +55,7 @@ class Ledger:
 
     @property
     def closing_error(self) -> float:
-        """Energy of the sources minus energy of the sinks [J]: the error of the balance."""
+        """Energy of the sources minus energy of the sinks [J], which is the balance's error."""
         given = sum(posting.energy for posting in self.sources)
         return given - sum(posting.energy for posting in self.sinks)
 
@@ -85,7 +85,7 @@ class Delivery:
     Parameters
     ----------
     name, label, book
-        Variable, its label, and its balance, empty for the actuator's own.
+        Variable, its label, and its balance, empty for the actuator's own balance.
     energy
         Largest returned energy in J, >= 0. For the rows of several runs an array of shape (runs,).
     turnover
@@ -103,7 +103,7 @@ def deliveries(recording: xr.Dataset, among: Collection[str] | None = None) -> l
     """Return the energy that every loss of a recording returned, in all balances.
 
     Work, ``W_...``, is not a loss and may have either sign. Recordings of both ends alone determine
-    the total. ``among``: names of the losses to check; all by default.
+    the total. ``among``: names of the losses to check (default: all).
     """
     roles = _roles(recording, _energies(recording))
     losses = {
@@ -121,7 +121,7 @@ def deliveries(recording: xr.Dataset, among: Collection[str] | None = None) -> l
     returned = []
     for name, role in losses.items():
         values = recording.variables[name].values
-        # A loss that may return energy for a while counts at the end only.
+        # A loss that may return energy temporarily counts at the end only.
         fallen = -values[..., -1:] if role.returns else np.maximum.accumulate(values, -1) - values
         most = _plain(np.max(fallen, axis=-1))
         returned.append(
@@ -133,9 +133,9 @@ def deliveries(recording: xr.Dataset, among: Collection[str] | None = None) -> l
 def actuator_ledger(recording: xr.Dataset, is_split: bool = True) -> Ledger:
     """Return the energy balance of an actuator or rig, between the ends of a recording.
 
-    ``recording``: recording with energies [J]. If all energies are in further balances, as those of
-    a vehicle without actuators are, it is the first of them. ``is_split``: whether to split sinks
-    into moving and holding where declared, which takes all rows.
+    ``recording``: recording with energies [J]. If there is no such balance, for instance for a
+    vehicle without actuators, the result is the first of the other balances. ``is_split``: whether
+    to split sinks into moving and holding where declared, which needs all rows.
     """
     return _ledger(recording, _main_book(recording), is_split)
 
@@ -144,9 +144,9 @@ def further_ledgers(recording: xr.Dataset) -> dict[str, Ledger]:
     """Return the energy balances beyond the actuator's own, by name.
 
     A balance in which a source replaces one of the actuator's sources includes the actuator's
-    energies, too. The additional energy of that source goes to a sink: for a braked disc, the heat
-    of the pads. Other balances are separate. Balances without any energy, because their part is
-    switched off, are left out.
+    energies. The additional energy of that source flows to a sink, for a braked disc the heat of
+    the pads. Other balances are separate. A balance without any energy, whose part is switched off,
+    is left out.
     """
     main = _main_book(recording)
     names = [name for name in _books(recording) if name not in ("", main)]
@@ -180,8 +180,8 @@ def ledger(recording: xr.Dataset, sources: Mapping[str, str], sinks: Mapping[str
     recording
         Recording with energies [J]; the difference between end and start of each counts.
     sources, sinks
-        Label by variable. Variables that the recording does not have are left out, and sinks whose
-        parts, moving and holding, are both named.
+        Label by variable. Variables that the recording does not contain are left out. So are sinks
+        whose parts, moving and holding, are both listed.
     """
     changes = _changes(recording) | _split(recording)
     given, taken = (
@@ -222,7 +222,7 @@ def _ledger(recording: xr.Dataset, book: str, is_split: bool = True) -> Ledger:
 
 
 def _roles(recording: xr.Dataset, names: Collection[str]) -> dict[str, Role]:
-    """Return the role of every energy: as declared, else as its name implies."""
+    """Return the role of every energy: the declared role, else the role that its name implies."""
     declared = {name: _role_of(recording.variables[name]) for name in names}
     roles = {name: role for name, role in declared.items() if role is not None}
     if "E_source" in names and not any(role.side == "source" for role in roles.values()):
@@ -259,14 +259,14 @@ def _changes(recording: xr.Dataset) -> dict[str, float]:
 def _energies(recording: xr.Dataset) -> list[str]:
     """Return the names of all energies."""
     named = (str(key) for key in recording.data_vars if str(key).startswith(("E_", "W_")))
-    # Variables, as arrays with coordinates would cost more than all balances.
+    # Variables, because arrays with coordinates would cost more than all balances.
     return [name for name in named if recording.variables[name].ndim == 1]
 
 
 def _split(recording: xr.Dataset) -> dict[str, float]:
     """Return the energies of sinks that are split into moving and holding [J].
 
-    Holding is the increase of an energy at standstill, taken as even within each recorded
+    Holding is the increase of an energy at standstill, assumed to be even within each recording
     interval.
     """
     every = {str(key): _role_of(recording.variables[key]) for key in recording.data_vars}
@@ -284,16 +284,16 @@ def _split(recording: xr.Dataset) -> dict[str, float]:
 
 
 _OPEN = 1e-5  # of the turnover: largest closing error, and largest energy that a loss may return
-_NOTHING = 1e-9  # J: rounding of the stored energy while nothing moves
+_NOTHING = 1e-9  # J: rounding error of the stored energy while nothing moves
 
 
 def energy_doubts(recording: xr.Dataset, runs: Sequence[Run] = ()) -> list[str]:
     """Return warnings on impossible energies in a recording.
 
-    These are an energy balance whose closing error is larger than the step can explain, and a loss
-    that delivers energy. The scheme closes the balance to a few parts in 1e8, the remainder of
-    nonlinear elements, and a loss grows in every substep. Both fail where extreme parameters make
-    numbers cancel, or where an element's equations leave their range.
+    One warning concerns an energy balance whose closing error is larger than the step can explain,
+    the other a loss that delivers energy. The scheme closes the balance to a few parts in 1e8,
+    except for nonlinear elements, and a loss grows in every substep. Both fail if extreme
+    parameters make numbers cancel, or if an element's equations leave their range.
 
     ``runs``: the run of the recording, if known.
     """
@@ -314,8 +314,8 @@ def energy_doubts_of_cases(
         for k in np.flatnonzero(is_wrong).tolist():
             doubts[k].append(
                 f"the loss {each.label!r}{where} ({each.name}) delivers {energies[k]:.3g} J of a "
-                f"turnover of {totals[k]:.3g} J, which is impossible: do not trust this run, take "
-                "a smaller step, and look for an extreme parameter"
+                f"turnover of {totals[k]:.3g} J, which is impossible. Do not trust this run. Use "
+                "a smaller step, and check for an extreme parameter"
             )
     if _are_surely_closed(recording):
         return doubts
@@ -324,8 +324,9 @@ def energy_doubts_of_cases(
     for k, (left, total) in enumerate(zip(error.tolist(), turned.tolist(), strict=True)):
         if abs(left) > _OPEN * total + _NOTHING:
             doubts[k].append(
-                f"the energy balance is open by {abs(left):.3g} J of a turnover of {total:.3g} J: "
-                "do not trust this run, take a smaller step, and look for an extreme parameter"
+                f"the energy balance is off by {abs(left):.3g} J of a turnover of "
+                f"{total:.3g} J. Do not trust this run. Use a smaller step, and check for an "
+                "extreme parameter"
             )
     return doubts
 
@@ -333,8 +334,8 @@ def energy_doubts_of_cases(
 def _losses(runs: Sequence[Run]) -> Collection[str] | None:
     """Return the losses that must grow in every substep; None for all.
 
-    The loss of a contact includes the energy of a change of its parameters, see
-    `bywire.simulation.advance`.
+    A contact's loss includes the energy of a change in its parameters (see
+    `bywire.simulation.advance`).
     """
     return runs[0].model.Flow._fields if any(run.changes for run in runs) else None
 
@@ -356,7 +357,7 @@ def _are_surely_closed(recording: xr.Dataset) -> bool:
     books = actuator_ledger(recording, is_split=False)
     if not (books.sources and books.sinks):
         return True
-    # Splitting a sink cannot reduce the turnover: if the whole is far from the bound, so are parts.
+    # Splitting a sink cannot reduce the turnover, so a check without splits is sufficient.
     return bool(np.all(2.0 * np.abs(books.closing_error) <= _OPEN * books.turnover + _NOTHING))
 
 
@@ -372,7 +373,7 @@ def energy_signals(run: Run) -> tuple[str, ...]:
 def energy_residual(recording: xr.Dataset) -> xr.DataArray:
     """Return the energy input minus losses minus the change of stored energy [J].
 
-    It is zero except for the numerical error. It covers the actuator's own balance only.
+    The residual is zero except for the numerical error. It covers the actuator's own balance only.
     """
     losses = sum(
         values

@@ -1,4 +1,4 @@
-"""Many benches of one experiment, side by side where they differ in numbers alone."""
+"""Many benches of one experiment, run side by side if they differ in numbers alone."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class BenchEnsemble:
     Parameters
     ----------
     variations
-        Parameter, or ``options.NAME``, by name -> its value [SI] in each case, shape (cases,).
+        Value [SI] in each case, shape (cases,), by the name of the parameter or ``options.NAME``.
     results
         Result of each case, judged by the bench's requirements.
     """
@@ -141,15 +141,15 @@ def simulate_ensemble(
         `bywire.simulation.ensemble.simulate_ensemble`. Or a bench: every case then has the initial
         values that the experiment computes from its parameters, with key figures and verdicts.
     variations
-        Dotted name of a parameter, or ``options.NAME`` of a bench -> its value [SI] in each case,
-        shape (cases,). Other parameters keep their values.
+        Values [SI] in each case, shape (cases,), by the dotted name of a parameter or by
+        ``options.NAME`` of a bench. Other parameters keep their values.
     signals
         Outputs of a run to record. A bench records all signals that its key figures need.
     threads
-        Threads to use, >= 1; all cores by default.
+        Number of threads, >= 1 (default: all cores).
     engine
-        ``auto``, the engine of the bench or lanes of this machine's processor; ``compiled``;
-        ``virtual-machine``; or ``cuda``, a graphics processor (``docs/studies.md``).
+        ``auto`` (the bench's engine, or lanes on this machine's processor), ``compiled``,
+        ``virtual-machine``, or ``cuda`` (a graphics processor, see ``docs/studies.md``).
 
     Returns
     -------
@@ -168,11 +168,14 @@ def simulate_ensemble(
     if isinstance(run, Run):
         if signals is None:
             raise ParameterError(
-                "signals are missing: name the outputs of the run to record", name="signals"
+                "signals is missing. Specify the outputs of the run to record", name="signals"
             )
         return ensemble.simulate_ensemble(run, variations, signals, threads, engine)
     if signals is not None:
-        raise ParameterError("a bench records all signals: leave signals out", name="signals")
+        raise ParameterError(
+            "signals is not valid for a bench, which records all signals. Leave signals out",
+            name="signals",
+        )
     arrays = {name: np.atleast_1d(np.asarray(v, dtype=float)) for name, v in variations.items()}
     lengths = {name: array.size for name, array in arrays.items()}
     if not arrays or len(set(lengths.values())) != 1 or 0 in lengths.values():
@@ -194,7 +197,7 @@ def varied_leaf(bench: Bench, name: str) -> Leaf:
     Raises
     ------
     UnknownNameError
-        With the most similar names of the bench.
+        With the most similar names in the bench.
     """
     return _varied_leaf(type(bench.par), type(bench.chosen_options), name)
 
@@ -241,7 +244,7 @@ def changed(bench: Bench, values: Mapping[str, float | str], seed: int | None = 
     Raises
     ------
     InputError
-        When a name is unknown, or a value out of range or in contradiction to another; the message
+        When a name is unknown, or a value is out of range or contradicts another value. The message
         lists the values.
     """
     names = _names_within(type(bench.par), type(bench.chosen_options), tuple(values))
@@ -277,13 +280,13 @@ def run_benches(
     benches
         Benches of one experiment.
     progress
-        Called with a run's label and the finished share, 0 to 1.
+        Called with a run's label and the completed share, 0 to 1.
     engine
         ``auto``, ``compiled``, ``cuda``, or ``virtual-machine``, which has no lanes.
     threads
-        Threads to use, >= 1; all cores by default.
+        Number of threads, >= 1 (default: all cores).
     estimate_error
-        Whether to repeat all runs in other steps; see `bywire.bench.running.run`.
+        Whether to repeat all runs with other steps (see `bywire.bench.running.run`).
 
     Raises
     ------
@@ -307,7 +310,7 @@ def run_benches(
                 each[factor] = further
             continue
         for bench, each, failed, most in zip(benches, others, failures, limits, strict=True):
-            try:  # a single case may prevent a joint run
+            try:  # a single case may rule out a joint run
                 other = replace(bench, step=factor * bench.step)
                 (each[factor],) = _recordings([other], progress, engine, threads, limits=[most])
             except NO_ESTIMATE as error:
@@ -390,8 +393,8 @@ def rounds(
 ) -> Iterator[Round]:
     """Yield the first run of all benches, the second one, and so on.
 
-    Runs that fit into lanes are a `RunGroup`, which records only rows that a recording keeps. Other
-    runs, and all runs without a compiler, are computed one after the other.
+    Runs that fit into lanes form a `RunGroup`, which records only rows that a recording keeps.
+    Other runs, and all runs without a compiler, are computed one after the other.
 
     Parameters
     ----------
@@ -402,7 +405,7 @@ def rounds(
     signals
         ``signals(run)``: outputs to record of runs side by side; None for all.
     limits
-        For each bench the largest work of its runs, by label; unlimited by default.
+        Largest work of each bench's runs, by label (default: unlimited).
 
     Raises
     ------
@@ -490,7 +493,7 @@ def key_figures_of(benches: Sequence[Bench], threads: int | None = None) -> KeyF
     benches
         Benches of one experiment and the same choices.
     threads
-        Threads to use, >= 1; all cores by default.
+        Number of threads, >= 1 (default: all cores).
 
     Raises
     ------
@@ -550,9 +553,9 @@ def needed(wanted: set[str], run: Run) -> Wanted | None:
 
 
 def _books(made: Round, group: RunGroup, rows: Rows, threads: int | None) -> list[list[str]]:
-    """Return the warnings of every run on impossible energies.
+    """Return every run's warnings on impossible energies.
 
-    For most runs the two ends exclude such warnings. Otherwise all rows are computed.
+    For most runs the two ends rule out such warnings. Otherwise all rows are computed.
     """
     if group.end_names:
         if are_surely_sound(cast(xr.Dataset, ends_of_group(group)), made.runs):

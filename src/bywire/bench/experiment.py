@@ -36,8 +36,8 @@ _POOL = 4  # least number of words of a seed before those of its child
 def put_noise(samples: NDArray[np.float64], seed: Sequence[int], child: int) -> None:
     """Fill samples with standard normal noise, shape (samples,).
 
-    The samples equal those of ``SeedSequence(seed, spawn_key=(child,))``. Passing the words of the
-    seed directly takes a third of the time.
+    The samples equal those of ``SeedSequence(seed, spawn_key=(child,))``. Passing the seed's words
+    directly takes a third of the time.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ def _words(number: int) -> Iterator[int]:
 
 
 class Summary(str):
-    """Summary of an experiment, with the template from which it was made.
+    """Experiment's summary, with its template.
 
     Parameters
     ----------
@@ -146,7 +146,7 @@ def _value_text(value: Any, symbol: str, unit: str) -> str:
 # --- Experiments
 
 Recordings = Mapping[str, xr.Dataset]
-_LENGTHENED = 100.0  # longest settling until all sample times coincide, over the run's length
+_LENGTHENED = 100.0  # longest settling until all sample times coincide, relative to the run
 
 
 @dataclass(frozen=True)
@@ -169,13 +169,13 @@ class Case:
     settle
         Time before zero in which the run settles [s], for instance into a periodic orbit.
     keep
-        How much of the settling time the recording keeps [s].
+        Part of the settling time that the recording keeps [s].
     record
         Recording interval [s].
     start
-        ``start(par) -> (state, memory)``: the same initial values for other parameters of this
-        structure, written with ``core.ops`` alone, so that exported models also begin at rest
-        with changed parameters; None where these are not known.
+        ``start(par) -> (state, memory)``: initial values for other parameters of this structure.
+        It uses ``core.ops`` alone, so that exported models also begin at rest with changed
+        parameters. None if there is no such function.
     """
 
     label: str
@@ -191,7 +191,7 @@ class Case:
     start: Callable[[Any], tuple[Any, Any]] | None = None
 
     def aligned(self, step: float, interval: float | None = None) -> Case:
-        """Return the case with a settling time after which all ticks and a row fall on zero.
+        """Return the case with a settling time after which all ticks and a row coincide at zero.
 
         The settling time is rounded up to a common multiple of the sample times and the recording
         interval. An event at zero then falls on a tick and on a recorded row.
@@ -207,7 +207,7 @@ class Case:
         ------
         StepError
             When the step does not divide a sample time or the recording interval, or the common
-            multiple is out of all proportion to the run.
+            multiple is much longer than the run.
         """
         record = self.record if interval is None else interval
         periods = tuple((task.name, task.period) for task in self.model.tasks(self.par))
@@ -216,7 +216,7 @@ class Case:
         return self if is_aligned else replace(self, settle=settle, record=record)
 
 
-@lru_cache(maxsize=256)  # the cases of a study ask for the same one
+@lru_cache(maxsize=256)  # the cases of a study share it
 def _settling(
     settle: float,
     duration: float,
@@ -224,14 +224,14 @@ def _settling(
     step: float,
     record: float,
 ) -> float:
-    """Return a settling time after which all ticks and a row fall on zero; see `Case.aligned`."""
+    """Return a settling time after which all ticks and a row coincide at zero (`Case.aligned`)."""
     schedule = plan(settle + duration, step, dict(periods), record)
     common = math.lcm(schedule.record_frames, *schedule.task_frames) * schedule.frame
     settled = float(f"{math.ceil(settle / common - 1e-9) * common:.12g}")
     if settled > _LENGTHENED * (settle + duration):
         raise StepError(
-            f"a run of {settle + duration:g} s would settle for {settled:g} s, until all sample "
-            "times and recording intervals coincide: choose shorter sample times that are "
+            f"a run of {settle + duration:g} s would need to settle for {settled:g} s, until all "
+            "sample times and recording intervals coincide. Choose shorter sample times that are "
             f"multiples of each other ({', '.join(f'{name} {T:g} s' for name, T in periods)})",
             name="settle",
             value=f"{settled:g} s",
@@ -271,22 +271,20 @@ class Experiment:
     assembly
         Name of the tested assembly.
     summary
-        One line for listings and below the titles of reports. Names of options in braces, with a
-        unit after a colon where useful, become their values: ``"stop from {v_0:km/h}"``, see
-        `summary_with`.
+        One line for listings and below the titles of reports. `summary_with` replaces names of
+        options in braces by their values, in the unit after a colon: ``"stop from {v_0:km/h}"``.
     options
         Class of its options, each with unit and range.
     defaults
         Options as in the source.
     cases
-        ``cases(par, options, stimulus)``: the runs it consists of; none for a static
-        characteristic. ``stimulus`` is the `Stimulus` of the bench file, or None; of an
-        experiment with ``beside`` it is all of them by the names of their signals, that of the
-        plain section under an empty name.
+        ``cases(par, options, stimulus)``: the runs of the experiment; none for a static
+        characteristic. ``stimulus`` is the bench file's `Stimulus`, or None. For an experiment with
+        ``beside``, it maps names of signals to stimuli; the plain section has an empty name.
     judge
-        ``judge(recordings, options)``: its KPIs.
+        ``judge(recordings, options)``: the experiment's KPIs.
     kpis
-        Unit of each KPI by name, so that requirements are checked before anything runs.
+        Unit of each KPI by name, to check requirements before any run.
     figures
         Kinds of figures that show the experiment, by their names in the report layer.
     finish
@@ -294,32 +292,32 @@ class Experiment:
     step
         ``step(options)``: setting of the step response, for KPIs and figures.
     loop, followed, sweep
-        The same for a hysteresis loop, a signal that follows another, and sines.
+        Corresponding settings of a hysteresis loop, a signal that follows another, and sines.
     static
-        ``static(par, options)``: recordings of a static characteristic, without any run.
+        ``static(par, options)``: recordings of a static characteristic, which needs no run.
     driven_unit
         ``driven_unit(options)``: SI unit of the signal that a ``[stimulus]`` section drives; None
-        where the experiment has its own stimulus.
+        if the experiment has its own stimulus.
     beside
         ``beside(options)``: SI unit of every stimulus that a section ``[stimulus.NAME]`` may
-        drive, by its name; such an experiment records its stimuli. None where the experiment
-        drives all signals itself.
+        drive, by its name; such an experiment records its stimuli. None if the experiment itself
+        drives all signals.
     following
         ``following(par)``: defaults of options that depend on the parameters.
     preview
-        ``cases`` with any start, for checks alone, where ``cases`` has to compute runs first.
+        ``cases`` with any start, for checks, if ``cases`` itself has to compute runs first.
     without
         ``without(options)``: key figures that the options leave out.
     begins_at
         Recorded signal by the option that sets its initial value, for replays.
     compared
-        Label of the ordinate by signal, where traces of several runs are overlaid.
+        Label of the ordinate by signal, for overlaid traces of several runs.
     named
-        ``named(options)``: unit of every key figure by name, where a table among the options
-        determines the key figures; ``kpis`` then holds those of the defaults.
+        ``named(options)``: unit of every key figure by name, if a table among the options
+        determines the key figures; ``kpis`` then contains the units for the default options.
     formerly
-        Earlier name, which an experiment of any brake has now. Bench files with that name still
-        work where their options distinguish the two.
+        Earlier name, which now belongs to an experiment for any brake. Bench files with that name
+        still work if their options distinguish the two experiments.
     """
 
     name: str
@@ -423,12 +421,12 @@ def changes_of(case: Case, zero: float) -> tuple[Change, ...]:
 
 
 def fixed(**levels: float) -> Callable[[NDArray[np.float64]], Mapping[str, NDArray[np.float64]]]:
-    """Return a stimulus that holds constant levels [SI]."""
+    """Return a stimulus with constant levels [SI]."""
     return lambda t: {name: np.full(t.shape, value) for name, value in levels.items()}
 
 
 EXPERIMENTS = Kind("experiment", ("experiments",), instances(Experiment))
-"""every experiment of a single brake; `GENERIC_EXPERIMENTS` are those of any brake"""
+"""every experiment for a single brake; `GENERIC_EXPERIMENTS` contains those for any brake"""
 
 
 # --- Steps, seeds and memory, checked before a run
@@ -436,7 +434,7 @@ EXPERIMENTS = Kind("experiment", ("experiments",), instances(Experiment))
 SHORTEST_STEP = 1e-9
 """shortest substep [s]: below it, a single tick of an ECU would take seconds to compute"""
 LARGEST_SEED = 2**63 - 1
-"""largest seed that a recording's file can hold"""
+"""largest seed that a recording's file can store"""
 
 _COPIES = 3  # of the recorded rows in memory, while they become a dataset and a file
 _GIGA = 1e9
@@ -470,7 +468,7 @@ def check_seed(value: Any) -> None:
 
 
 def check_extent(case: Case, run: Run) -> None:
-    """Reject a run that records nothing, or more than the memory of this machine holds.
+    """Reject a run that records nothing, or more than fits into this machine's memory.
 
     ``case``: the run as the experiment describes it; ``run``: the same run for the engine.
 
@@ -481,8 +479,8 @@ def check_extent(case: Case, run: Run) -> None:
     """
     if not run.record <= case.duration:
         raise StepError(
-            f"a recording of {case.duration:g} s cannot have rows every {run.record:g} s: "
-            "run longer, or record more often (simulation.record)",
+            f"a recording of {case.duration:g} s cannot have rows every {run.record:g} s. "
+            "Lengthen the run, or record more often (simulation.record)",
             name="simulation.record",
             value=f"{run.record:g} s",
             valid=f"<= {case.duration:g} s",
@@ -491,7 +489,7 @@ def check_extent(case: Case, run: Run) -> None:
 
 
 def check_recordings(runs: Sequence[Run], held: float) -> None:
-    """Reject runs that are kept in memory together and need more than this machine has.
+    """Reject runs that together need more memory than this machine has.
 
     ``held``: bytes of other recordings in memory.
 
@@ -506,9 +504,9 @@ def check_recordings(runs: Sequence[Run], held: float) -> None:
         longest = max(runs, key=lambda run: run.schedule().rows)
         raise StepError(
             f"{len(runs)} runs of up to {longest.duration:g} s, recorded every "
-            f"{longest.record:g} s and kept together, need about {needed / _GIGA:.3g} GB of "
-            f"memory, but this machine has {memory / _GIGA:.3g} GB: run shorter, or record less "
-            "often (simulation.record)",
+            f"{longest.record:g} s, together need about {needed / _GIGA:.3g} GB of memory, but "
+            f"this machine has {memory / _GIGA:.3g} GB. Shorten the runs, or record less often "
+            "(simulation.record)",
             name="simulation.record",
             value=f"{longest.record:g} s",
         )
@@ -527,12 +525,12 @@ def check_memory(run: Run, signals: int) -> None:
     schedule = run.schedule()
     numbers = schedule.rows * signals * _COPIES
     numbers += schedule.stimulus_rows * len(run.model.Stimulus._fields)
-    needed, memory = 8 * numbers, _memory()  # integers: a float cannot hold every size
+    needed, memory = 8 * numbers, _memory()  # integers, as a float cannot represent every size
     if needed > memory:
         raise StepError(
             f"a run of {run.duration:g} s, recorded every {run.record:g} s, needs about "
             f"{Decimal(needed) / 10**9:.3g} GB of memory, but this machine has "
-            f"{memory / _GIGA:.3g} GB: run shorter, or record less often (simulation.record)",
+            f"{memory / _GIGA:.3g} GB. Shorten the run, or record less often (simulation.record)",
             name="simulation.record",
             value=f"{run.record:g} s",
         )

@@ -1,7 +1,7 @@
-"""Experiments of any brake, defined by the names of its signals.
+"""Experiments for any brake, defined by the names of its signals.
 
-A `GenericExperiment` is bound to a model. Its levels then have the units of the signals that its
-options name; everything else is as for an `Experiment` of one brake.
+A `GenericExperiment` is bound to a model. Its levels then have the units of the signals in its
+options. The result is an `Experiment`, like those for one brake.
 """
 
 from __future__ import annotations
@@ -91,7 +91,7 @@ class TestedModel:
         Parameters
         ----------
         course
-            ``course(options, stimuli)``: function that returns the input [SI] at times [s].
+            ``course(options, stimuli)``: function of times [s] that returns the input [SI].
         judged
             Families of key figures with ``setting(options)``; effort and occupation follow them.
         figures
@@ -101,7 +101,7 @@ class TestedModel:
         resolved
             SI units of the placeholders of the families, except ``level``, the output's unit.
         more
-            Further fields of the `Experiment`.
+            Additional fields of the `Experiment`.
         """
         stimuli = _known(self.model, "stimulus")
         others = {name: signal.unit for name, signal in stimuli.items() if name != self.input}
@@ -166,20 +166,20 @@ class GenericExperiment:
     Parameters
     ----------
     name
-        Name in bench files and on the command line. No experiment of a brake may have it.
+        Name in bench files and on the command line, different from all experiments of a brake.
     summary
         One line for listings.
     options
-        Class of its options; the unit ``input`` is that of the signal that the option ``input``
-        names, and so on.
+        Class of its options. The unit ``input`` stands for the unit of the signal in the option
+        ``input``, and likewise for other options.
     signals
-        Kind of signal by the option that names it: a ``stimulus``, a ``recording``, one of both
-        (``input or recording``), a ``friction`` or a ``state``. The default of ``input or
-        recording`` and ``state`` is the signal of the first option.
+        Kind of signal by option: a ``stimulus``, a ``recording``, either of them (``input or
+        recording``), a ``friction`` or a ``state``. The default of ``input or recording`` and
+        ``state`` is the signal of the first option.
     defaults
         Default options; a level is a multiple of its signal's nominal magnitude.
     build
-        ``build(tested)``: the experiment of a model. Its cases get the stimuli by name.
+        ``build(tested)``: the experiment for a model. Its cases receive the stimuli by name.
     """
 
     name: str
@@ -200,9 +200,9 @@ class GenericExperiment:
         Raises
         ------
         UnknownNameError
-            When an option names a signal that the model does not have.
+            When an option is a signal that the model does not have.
         ParameterError
-            When an option that has to name a signal is missing.
+            When an option without a default signal is missing.
         """
         known: dict[str, tuple[str, Signal]] = {}
         for key, place in self.signals.items():
@@ -214,8 +214,8 @@ class GenericExperiment:
         for key, info in options.model_fields.items():
             if info.is_required() and key not in defaults:
                 raise ModelError(
-                    f"the experiment {self.name!r} declares no default of its option {key!r}: add "
-                    "one to its defaults, or give the field of its class one",
+                    f"the experiment {self.name!r} declares no default for its option {key!r}. Add "
+                    "one to its defaults, or to the field of its class",
                     name=key,
                 )
         units = {key: signal.unit for key, (_, signal) in known.items()}
@@ -236,7 +236,7 @@ class GenericExperiment:
 GENERIC_EXPERIMENTS = Kind(
     "experiment", ("generic_experiments",), instances(GenericExperiment), "bywire.bench.experiments"
 )
-"""every experiment of any brake"""
+"""every experiment for any brake"""
 
 
 @cache
@@ -250,7 +250,7 @@ def with_units(
     template
         Class of options in which the names of options stand for units.
     places
-        Option that names a signal; SI unit and nominal magnitude of that signal.
+        Option for a signal; SI unit and nominal magnitude of that signal.
     """
     fields: dict[str, Any] = {}
     for name, info in template.model_fields.items():
@@ -282,7 +282,7 @@ def _signal(
     wanted: Any,
     chosen: Mapping[str, tuple[str, Signal]],
 ) -> tuple[str, Signal]:
-    """Return the signal that an option names, or the default signal."""
+    """Return the signal in an option, or the default signal."""
     known = _known(model, place)
     if wanted is not None and not isinstance(wanted, str):
         raise not_valid(f"options.{option}", quoted(wanted), f"a {place} of {model.name}")
@@ -294,7 +294,7 @@ def _signal(
         return next(iter(chosen.values()))
     if not known:
         raise ParameterError(
-            f"experiment {experiment!r} needs a {place}: {model.name} has none",
+            f"experiment {experiment!r} needs a {place}, but {model.name} has none",
             name=f"options.{option}",
         )
     if place == "recording":
@@ -305,7 +305,7 @@ def _signal(
         name = next(iter(known))
     else:
         raise ParameterError(
-            f"options.{option} is missing: name the {place} of {model.name} that experiment "
+            f"options.{option} is missing. Specify the {place} of {model.name} that experiment "
             f"{experiment!r} drives: {', '.join(known)}",
             name=f"options.{option}",
             valid=", ".join(known),
@@ -314,7 +314,7 @@ def _signal(
 
 
 def _known(model: Model, place: str) -> dict[str, Signal]:
-    """Return the signals of a model that an option may name."""
+    """Return the signals of a model that are valid in an option."""
     states = signals_of(model.State)
     stimuli, outputs = signals_of(model.Stimulus), signals_of(model.Output)
     driven = {name: stimuli[name] for name in without_noise(stimuli)}
@@ -351,7 +351,7 @@ def at_rest(model: Model, par: Any) -> tuple[Any, Any]:
     return start
 
 
-# --- Experiments by name, of a brake or of any
+# --- Experiments by name, for one brake or for any
 
 
 def experiment_of(
@@ -366,15 +366,15 @@ def experiment_of(
     parameters
         Name of the parameter set.
     assembly
-        Model of the set's brake; if empty, that of the set.
+        Model of the set's brake; if empty, the set's model.
     options
-        The user's options, which may name signals.
+        The user's options, which may be names of signals.
 
     Raises
     ------
     InputError
-        When there is no such experiment, when its options name signals that the model does not
-        have, and when an earlier name of a brake's experiment is ambiguous.
+        When there is no such experiment, when the model does not have a signal in its options, and
+        when an earlier name of a brake's experiment is ambiguous.
     """
     cited = PARAMETER_SETS.find(parameters)
     system = assembly or cited.assembly
@@ -407,12 +407,12 @@ def former_names(name: str) -> dict[str, str]:
 def _former(
     name: str, brake: str, system: str, options: Mapping[str, Any], generic: GenericExperiment
 ) -> Experiment | None:
-    """Return a brake's experiment that formerly had this name, if the options are its options.
+    """Return a brake's experiment that formerly had this name, if the options fit it.
 
     Raises
     ------
     ParameterError
-        When the options are those of neither.
+        When the options fit both experiments.
     """
     each = (e for e in EXPERIMENTS.of(brake).values() if e.formerly == name)
     former = next((e for e in each if e.assembly == system), None)
@@ -426,8 +426,8 @@ def _former(
         return former
     example = next(iter(generic.signals))
     raise ParameterError(
-        f"experiment {name!r} is for any brake, and that of the {system} is now called "
-        f"{former.name!r}: write {former.name}, or name the signal for {name}, for instance "
+        f"experiment {name!r} is for any brake, and the experiment of the {system} is now called "
+        f"{former.name!r}. Write {former.name}, or specify the signal for {name}, for instance "
         f"{option('overrides', {f'options.{example}': 'NAME'})}",
         name="experiment",
         value=name,
@@ -438,15 +438,15 @@ def _former(
 def usual_set(name: str) -> str:
     """Return the default parameter set of an experiment.
 
-    It is the main set of the experiment's brake. An experiment of any brake takes the only set of
-    the brakes loaded by path.
+    It is the main set of the experiment's brake. For an experiment for any brake, it is the only
+    set of the brakes loaded by path.
 
     Raises
     ------
     UnknownNameError
         When the experiment is unknown.
     ParameterError
-        For an experiment of any brake if there are several sets.
+        For an experiment for any brake if there are several sets.
     """
     definition, sets = EXPERIMENTS.get(name), sets_of_loaded()
     if len(sets) == 1 and name in GENERIC_EXPERIMENTS.all():
@@ -457,11 +457,11 @@ def usual_set(name: str) -> str:
         raise EXPERIMENTS.unknown(name, GENERIC_EXPERIMENTS)
     known = ", ".join(sets or PARAMETER_SETS.all())
     former = "".join(
-        f"; that of the {assembly} is now called {now!r}"
+        f". The experiment of the {assembly} is now called {now!r}"
         for now, assembly in former_names(name).items()
     )
     raise ParameterError(
-        f"experiment {name!r} is for any brake: name its parameter set with "
+        f"experiment {name!r} is for any brake. Specify a parameter set with "
         f"{option('overrides', {'parameters': 'NAME'})} ({known}){former}",
         name="parameters",
         valid=known,

@@ -36,8 +36,9 @@ def record(
 ) -> xr.Dataset:
     """Return the recording of a run.
 
-    ``settle``: time of the run [s] before the recording's zero; ``keep``: part of it that is kept,
-    at negative times; ``notes``: further attributes, for instance the experiment's name.
+    ``settle``: time of the run [s] before the recording's zero; ``keep``: part of it that the
+    recording includes, at negative times; ``notes``: additional attributes, such as the
+    experiment's name.
 
     Returns
     -------
@@ -46,7 +47,7 @@ def record(
     """
     rows = rows_of(run, trajectory, settle, keep)
     variables = {n: ("time", row.values, dict(row.attrs)) for n, row in rows.data_vars.items()}
-    # As an index of pandas: for an array, xarray would import pint to check its type.
+    # A pandas index: for an array, xarray would import pint to check its type.
     axis = pd.Index(rows["time"].values, name="time")
     recording = xr.Dataset(variables, coords={"time": ("time", axis, {"units": "s"})})
     recording["time"].attrs["long_name"] = "time"
@@ -84,7 +85,7 @@ def rows_of(
     time = trajectory.time - settle
     begin = int(np.searchsorted(time, -keep - 1e-9))
     attributes = _attributes_of(run.model.Output)
-    # A copy: each signal is contiguous, and the settling is not kept in memory.
+    # A copy makes each signal contiguous, and frees the memory of the settling.
     kept = dict(zip(trajectory.names, trajectory.values[begin:].T.copy(), strict=True))
     signals = {name: kept[name] for name in attributes if name in kept}
     return Rows(
@@ -106,7 +107,7 @@ def rows_of_group(group: RunGroup, settle: float) -> Rows:
 
 
 def ends_of_group(group: RunGroup) -> Rows:
-    """Return the first and last rows of several runs, with the signals of these rows alone."""
+    """Return the first and last rows of several runs, with all signals that are recorded there."""
     values = {name: each[:, [0, -1]] for name, each in zip(group.names, group.values, strict=True)}
     values |= zip(group.end_names, group.ends, strict=True)
     attributes = _attributes_of(group.runs[0].model.Output)
@@ -127,7 +128,7 @@ def _attributes(signal: Signal) -> dict[str, str]:
 
 
 def _separable(texts: Iterable[str]) -> list[str]:
-    """Return warnings without the ``"; "`` that joins them in a recording's attribute."""
+    """Return warnings with ``"; "`` replaced, which joins them in a recording's attribute."""
     return [text.replace("; ", ", ") for text in texts]
 
 
@@ -145,8 +146,8 @@ def watch_cases(
 ) -> list[list[str]]:
     """Return the warnings of `watch` for each of several runs of one structure and plan.
 
-    ``rows``: rows of all runs; ``unsettled``: substeps of each that hit the cap of the contacts;
-    ``books``: `energy_doubts` of each.
+    ``rows``: rows of all runs; ``unsettled``: number of substeps of each run that hit the contact
+    iteration's cap; ``books``: `energy_doubts` of each run.
     """
     solver = map(solver_doubts, doubts_of(runs), unsettled)
     model, pars = runs[0].model, [run.par for run in runs]
@@ -159,11 +160,11 @@ def watch_cases(
 
 
 def solver_doubts(doubt: str, unsettled: int) -> list[str]:
-    """Return warnings of a run's solver; ``unsettled``: substeps that hit the contacts' cap."""
+    """Return a solver's warnings; ``unsettled``: substeps that hit the contact iteration's cap."""
     doubts = [doubt] if doubt else []
     if unsettled:
         doubts.append(
-            f"{unsettled} substeps hit the cap of the contact iteration: take a smaller step"
+            f"{unsettled} substeps hit the cap of the contact iteration. Use a smaller step"
         )
     return doubts
 
@@ -180,15 +181,15 @@ def energy_doubts_of(run: Run, trajectory: Trajectory) -> list[str]:
 
 # --- Rows in place of a recording, for many runs without plots
 # Building a Dataset of thirty signals takes longer than simulating them. Key figures, warnings and
-# energy balances need only signals, windows of time, sums and products of signals, and their
-# extremes and means. For any other operation in a brake's code, the Dataset, or the DataArray of a
-# signal, is built on demand.
+# energy balances need only signals, time windows, sums and products of signals, and their extremes
+# and means. Any other operation in a brake's code builds the Dataset, or a signal's DataArray, on
+# demand.
 
 TIME = "time"
 
 
 class Row(NDArrayOperatorsMixin):
-    """Signal of `Rows`, or their time.
+    """Signal of `Rows`, or the time.
 
     Parameters
     ----------
@@ -251,7 +252,7 @@ class Row(NDArrayOperatorsMixin):
         return getattr(self._array, how)(*asked, **given) if np.isnan(value) else value
 
     def sel(self, *asked: Any, **given: Any) -> Any:
-        """Return the rows in a window of time, ``time=slice(begin, end)``, like a DataArray."""
+        """Return the rows in a time window, ``time=slice(begin, end)``, like a DataArray."""
         window = _window(self._time, asked, given)
         if window is None:
             return self._array.sel(*asked, **given)
@@ -279,7 +280,7 @@ class Row(NDArrayOperatorsMixin):
 
 
 def _window(time: Array, asked: tuple[Any, ...], given: Mapping[str, Any]) -> slice | None:
-    """Return the slice of rows for a window of time as in `sel`; None for other arguments."""
+    """Return the slice of rows for a time window as in `sel`; None for other arguments."""
     wanted = given.get(TIME)
     if asked or len(given) != 1 or not isinstance(wanted, slice) or wanted.step is not None:
         return None
@@ -291,8 +292,8 @@ def _window(time: Array, asked: tuple[Any, ...], given: Mapping[str, Any]) -> sl
 class Rows:
     """Recorded rows of a run, or of several runs side by side.
 
-    Rows of several runs serve families of key figures and energy balances only; use `case` for
-    others.
+    Only families of key figures and energy balances accept rows of several runs. Use `case` for
+    anything else.
 
     Parameters
     ----------
@@ -354,7 +355,7 @@ class Rows:
         return rows
 
     def sel(self, *asked: Any, **given: Any) -> Any:
-        """Return the rows in a window of time, ``time=slice(begin, end)``, like a Dataset."""
+        """Return the rows in a time window, ``time=slice(begin, end)``, like a Dataset."""
         window = _window(self._values[TIME], asked, given)
         return self.dataset.sel(*asked, **given) if window is None else self._within(window)
 
@@ -397,7 +398,7 @@ class Rows:
     def with_signals(
         self, signals: Mapping[str, Array], attributes: Mapping[str, Mapping[str, Any]]
     ) -> Rows:
-        """Return the rows with further signals; see `Rows` for both."""
+        """Return the rows with additional signals; parameters as in `Rows`."""
         every = {name: self._values[name] for name in self._signals}
         return Rows(self._values[TIME], {**every, **signals}, {**self._attributes, **attributes})
 
@@ -430,7 +431,7 @@ class Rows:
     def __getitem__(self, name: Any) -> Any:
         if not isinstance(name, str):
             return self.dataset[name]
-        # No cache: rows and their signals would form a cycle, which delays freeing their memory.
+        # No cache: a cycle of rows and their signals would delay freeing their memory.
         return Row(self, name, self._values[name], self._attributes[name])
 
     def __getattr__(self, name: str) -> Any:

@@ -1,4 +1,4 @@
-"""Limits of figures, as text such as ``"<= 15 %"``, and verdicts on them."""
+"""Limits of figures, from texts such as ``"<= 15 %"``, and verdicts on them."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Limit:
     text
         The user's text, for instance ``"<= 15 %"``.
     probability
-        Least probability of meeting the limit; None if every case has to meet it.
+        Required probability of meeting the limit; None if every case has to meet it.
     of_magnitude
         Whether the limit bounds the figure's magnitude.
     """
@@ -65,11 +65,11 @@ class Limit:
         return self.compare in ("<=", "<")
 
     def is_met(self, values: Any) -> NDArray[np.bool_]:
-        """Return whether each value meets the limit; undefined values do not."""
+        """Return whether each value meets the limit; an undefined value does not."""
         return np.asarray(COMPARE[self.compare](self._bounded(values), self.bound))
 
     def is_near(self, values: Any, error: float) -> NDArray[np.bool_]:
-        """Return whether each value is within its error of the bound."""
+        """Return whether each value is closer to the bound than its error."""
         return np.asarray(np.abs(self._bounded(values) - self.bound) <= error)
 
     def _bounded(self, values: Any) -> Any:
@@ -93,7 +93,8 @@ class Verdict(EqualWhereUndefined):
     error
         Numerical error of the value, in its unit; NaN where it was not estimated.
     is_decided
-        Whether the recording determines the value, and its distance to the limit exceeds its error.
+        Whether the recording determines the value, and the value's distance to the limit exceeds
+        its error.
     """
 
     required: Limit
@@ -127,15 +128,15 @@ class Verdict(EqualWhereUndefined):
 def judge(limits: Iterable[Limit], kpis: Iterable[Kpi]) -> tuple[Verdict, ...]:
     """Compare KPIs with their limits.
 
-    A verdict is undecided if the KPI is within its error of the limit, or if the recording leaves
-    the KPI open. A KPI without an error estimate is taken as exact.
+    A verdict is undecided if the KPI is closer to the limit than its error, or if the recording
+    does not determine the KPI. A KPI without an error estimate counts as exact.
     """
     by_name = {kpi.name: kpi for kpi in kpis}
     return tuple(verdict_of(limit, by_name[limit.figure]) for limit in limits)
 
 
 def verdict_of(limit: Limit, kpi: Kpi) -> Verdict:
-    """Return the verdict on a KPI by its limit; see `judge`."""
+    """Return the verdict on a KPI with its limit (see `judge`)."""
     is_close = bool(limit.is_near(kpi.value, kpi.bound)) or math.isinf(kpi.bound)
     is_decided = not (is_close or kpi.is_open)
     met = is_decided and bool(limit.is_met(kpi.value))
@@ -169,11 +170,11 @@ def read_limits(requirements: Mapping[str, Any], units: Mapping[str, str]) -> di
     Raises
     ------
     UnknownNameError
-        When a requirement names an unknown KPI.
+        When a requirement is for an unknown KPI.
     ParameterError
         When a limit cannot be read.
     UnitError
-        When a limit's unit has another dimension than the KPI.
+        When a limit's unit does not have the dimension of the KPI.
     """
     for name in requirements:
         if name not in units:
@@ -191,7 +192,7 @@ def read_limit(figure: str, text: Any, unit: str, what: str = "requirement") -> 
     ParameterError
         When the text is not a limit.
     UnitError
-        When its unit has another dimension than the figure.
+        When its unit does not have the dimension of the figure.
     """
     example = "<= 15 %" if unit == "%" else f"<= {units.example(unit)}"
     before, compare, bound = parted(text) if isinstance(text, str) else ("", None, "")

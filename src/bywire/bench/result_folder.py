@@ -1,4 +1,4 @@
-"""Folder of ``bywire run --out``, read back: recordings, key figures, verdicts."""
+"""Read the folder that ``bywire run --out`` wrote: recordings, key figures, verdicts."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from bywire.core.scratch import require_finished
 from bywire.data.netcdf import read_recording
 
 RECORD = "result.json"
-"""file of a result folder that describes its content"""
+"""file in a result folder that describes the folder's content"""
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class FolderResult:
     warnings
         Warnings of the run.
     changes
-        Changes by name: the value, the original value, and where that came from.
+        Changes by name: the value, the original value, and the original value's source.
     """
 
     name: str
@@ -62,14 +62,15 @@ def read_result(folder: Path) -> FolderResult:
     Raises
     ------
     FileError
-        When it is not a result folder, is not finished, or a file is damaged or missing.
+        When the folder is not a result folder or is incomplete, or a file is damaged or missing.
     """
     record = record_of(folder)
     try:
         status = str(record["status"])
         if status == "interrupted":
             raise FileError(
-                f"{folder} is not finished: its run was interrupted; {_again()}", name=str(folder)
+                f"{folder} is incomplete because its run was interrupted. {_again()}",
+                name=str(folder),
             )
         kpis = tuple(_kpi(name, each) for name, each in record["kpis"].items())
         verdicts = tuple(_verdict(each) for each in record["requirements"])
@@ -83,13 +84,14 @@ def read_result(folder: Path) -> FolderResult:
         }
     except (AttributeError, InputError, KeyError, TypeError, ValueError) as error:
         raise FileError(
-            f"{folder / RECORD} is damaged ({type(error).__name__}: {error}); {_again()}",
+            f"{folder / RECORD} is damaged ({type(error).__name__}: {error}). {_again()}",
             name=str(folder / RECORD),
         ) from None
     recordings = {path.stem: _recording(path) for path in files if path.suffix == ".nc"}
     if not recordings:
         raise FileError(
-            f"{folder / RECORD} names no recording; {_again()}", name=str(folder / RECORD)
+            f"{folder / RECORD} does not list any recording. {_again()}",
+            name=str(folder / RECORD),
         )
     return FolderResult(name, recordings, kpis, verdicts, status, warned, changes)
 
@@ -126,24 +128,24 @@ def record_of(folder: Path) -> dict[str, Any]:
     Raises
     ------
     FileError
-        When it is not a result folder, is not finished, or its record is damaged.
+        When the folder is not a result folder or is incomplete, or its record is damaged.
     """
     path = folder / RECORD
     if not folder.is_dir():
-        raise FileError(f"{folder} is not a folder: check the path", name=str(folder))
+        raise FileError(f"{folder} is not a folder. Check the path", name=str(folder))
     require_finished(folder)
     if not path.is_file():
         raise FileError(
-            f"{folder} is not a finished result of bywire run: {RECORD} is missing; {_again()}",
+            f"{folder} is not a complete result of bywire run: {RECORD} is missing. {_again()}",
             name=str(folder),
         )
     try:
         record = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
-        raise FileError(f"{path} cannot be read ({error}); {_again()}", name=str(path)) from None
+        raise FileError(f"{path} cannot be read ({error}). {_again()}", name=str(path)) from None
     if not isinstance(record, dict):
         raise FileError(
-            f"{path} is damaged: it does not contain a JSON object; {_again()}", name=str(path)
+            f"{path} is damaged: it does not contain a JSON object. {_again()}", name=str(path)
         )
     return record
 
@@ -151,7 +153,7 @@ def record_of(folder: Path) -> dict[str, Any]:
 def _recording(path: Path) -> xr.Dataset:
     if not path.is_file():
         raise FileError(
-            f"{path.parent} is damaged: {path.name} is missing; {_again()}", name=str(path)
+            f"{path.parent} is damaged: {path.name} is missing. {_again()}", name=str(path)
         )
     return read_recording(path)
 
@@ -190,4 +192,4 @@ def _number(value: Any) -> float:
 
 
 def _again() -> str:
-    return f"run the bench again with {option('out')}, or name another folder"
+    return f"Run the bench again with {option('out')}, or specify another folder"

@@ -1,4 +1,4 @@
-"""Benches run: recordings, key figures and verdicts."""
+"""Run a bench: recordings, key figures and verdicts."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from bywire.bench.step_error import (
 )
 from bywire.bench.stimulus import Stimulus
 from bywire.core.errors import ParameterError, unknown_name
-from bywire.core.interrupts import interrupt_heard, interrupts_deferred
+from bywire.core.interrupts import interrupt_handled, interrupts_deferred
 from bywire.core.signals import signals_of
 from bywire.simulation.engine import prepare
 from bywire.simulation.run import Run, Trajectory, simulate
@@ -46,7 +46,7 @@ class Result:
         ``done`` (no requirements), ``passed``, ``failed`` (a requirement was not met),
         ``undecided`` (a figure is within its numerical error of its limit) or ``interrupted``.
     unestimated
-        Reason why a requested error estimate is missing; empty otherwise.
+        Reason why a requested error estimate is missing; empty if it is not missing.
     """
 
     bench: Bench
@@ -62,7 +62,9 @@ class Result:
         if len(self.recordings) != 1:
             labels = ", ".join(self.recordings)
             raise ParameterError(
-                f"this experiment made several recordings: take one of {labels}", valid=labels
+                f"this experiment made several recordings. Choose one of them: {labels}",
+                name="recording",
+                valid=labels,
             )
         return next(iter(self.recordings.values()))
 
@@ -102,22 +104,23 @@ def run(
     engine: str = "auto",
     estimate_error: bool = False,
 ) -> Result:
-    """Make all runs of a bench, and judge them.
+    """Run all cases of a bench, and judge them.
 
     Parameters
     ----------
     bench
         Bench to run; `bywire.load` reads a bench file.
     progress
-        Called with the run's label and its finished share, 0 to 1.
+        Called with the run's label and its completed share, 0 to 1.
     engine
-        As in `Bench`; ``auto`` is the engine of the bench.
+        As in `Bench`; ``auto`` uses the bench's engine.
     estimate_error
         Whether to repeat all runs with half the step, a slightly shorter step, and double the step
-        where it divides the sample times. Key figures and recorded signals then have an estimate
-        of their numerical error. A figure within its error of a limit is undecided. The repeated
-        runs take 3.6 times as many substeps as the run. Steps in which a run fails are left out.
-        If none remains, or one takes five times the work of the run, the result has a warning.
+        if that divides the sample times. Key figures and recorded signals then have an estimate of
+        their numerical error. A figure that is closer to a limit than its error is undecided. The
+        repeated runs need 3.6 times as many substeps as the run. Steps with which a run fails are
+        left out. The result has a warning if no step remains, or if a run takes five times the
+        work of the original run.
 
     Raises
     ------
@@ -144,8 +147,8 @@ def run(
                 others[factor] = made
             except NO_ESTIMATE as error:
                 failures[factor] = error
-    except KeyboardInterrupt:  # also outside the engine, which keeps its recordings
-        interrupt_heard()
+    except KeyboardInterrupt:  # outside the engine, which handles interrupts itself
+        interrupt_handled()
         kpis = judged(bench, recordings).kpis if is_complete else ()
         return Result(bench, recordings, kpis, (), "interrupted")
     result = judged(bench, recordings, others)
@@ -163,10 +166,10 @@ def _make_runs(
     compared: Mapping[str, float] | None = None,
     held: float = 0.0,
 ) -> None:
-    """Add all recordings of a bench, each as soon as it is finished, and the work of its runs.
+    """Add all recordings of a bench, each as soon as it is complete, and the work of its runs.
 
-    ``compared``: work of the runs in the bench's own step, which limits that of these runs;
-    ``held``: bytes of the recordings that are in memory already.
+    ``compared``: work of the runs with the bench's own step, which limits the work of these runs;
+    ``held``: bytes of the recordings that are already in memory.
     """
     engine = bench.engine if engine == "auto" else engine
     recordings |= static_recordings(bench)
@@ -208,7 +211,7 @@ def run_of(bench: Bench, case: Case, number: int) -> Run:
     Raises
     ------
     StepError
-        When it records nothing, or more than the memory of this machine holds.
+        When the run records nothing, or more than fits into this machine's memory.
     """
     computed = as_run(case, bench.step, seed=(bench.seed, number))
     check_extent(case, computed)
@@ -237,7 +240,7 @@ def _with_faults(recording: xr.Dataset, bench: Bench) -> xr.Dataset:
     """Return a recording with the number of active faults."""
     time = recording["time"].values
     there = sum((fault.course.is_there(time) for fault in bench.injections), np.zeros(time.size))
-    attributes = {"units": "1", "long_name": "faults that are there"}
+    attributes = {"units": "1", "long_name": "number of active faults"}
     return recording.assign({"faults": ("time", there, attributes)})
 
 
@@ -276,8 +279,8 @@ def judged(
     Parameters
     ----------
     others
-        The same runs in other steps, by the ratio of their step to the bench's. Figures and
-        signals then have an error.
+        The same runs with other steps, by the ratio of their step to the bench's. Figures and
+        signals then have a numerical error.
     """
 
     def figures(made: Mapping[str, xr.Dataset]) -> tuple[Kpi, ...]:
@@ -314,7 +317,7 @@ def _with_inputs(recording: xr.Dataset, case: Case) -> xr.Dataset:
 
 
 def inputs_recorded(rows: Rows, cases: Sequence[Case], wanted: Collection[str]) -> Rows:
-    """Return the rows of several runs with those requested stimuli that they lack."""
+    """Return the rows of several runs, and add requested stimuli that are missing."""
     each = [case.stimulus(rows["time"].values) for case in cases]
     lacking = [name for name in each[0] if name in wanted and name not in rows]
     given = {name: np.array([stimuli[name] for stimuli in each]) for name in lacking}

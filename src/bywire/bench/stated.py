@@ -1,4 +1,4 @@
-"""Statements of a source on an experiment: levels and ranges of signals, and key figures."""
+"""Statements of a source about an experiment: levels and ranges of signals, and key figures."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from bywire.core.registry import Kind, instances
 @checked
 @dataclass(frozen=True)
 class StatedLevel:
-    """Level of a signal that a source states, in its text or by the end of a figure's axis.
+    """Level of a signal that a source states in its text, or as the end of a figure's axis.
 
     Parameters
     ----------
@@ -30,9 +30,10 @@ class StatedLevel:
     label
         Short text for a legend.
     where
-        Place in the source, and how the value was read; the reason for a tolerance of our own.
+        Place in the source, and how the value was read; the reason for a tolerance that the source
+        does not state.
     options
-        Names of options that must have their default values for the statement to hold.
+        Names of options that must have their default values, or the statement does not apply.
     tolerance
         Tolerance of the statement in the signal's SI unit; 0 if none is stated.
     """
@@ -143,12 +144,12 @@ STATED_FIGURES = Kind(
 
 
 def stated_for(bench: Bench) -> list[StatedLevel | StatedRange]:
-    """Return the statements on a bench's signals that hold for its options."""
+    """Return the statements about a bench's signals that apply to its options."""
     return _holding(bench, STATED.beside(type(bench.par)).values())
 
 
 def stated_figures(bench: Bench) -> dict[str, StatedFigure]:
-    """Return the statements on a bench's key figures that hold for its options, by figure."""
+    """Return the statements about a bench's key figures that apply to its options, by figure."""
     statements = STATED_FIGURES.beside(type(bench.par)).values()
     return {each.figure: each for each in _holding(bench, statements)}
 

@@ -1,14 +1,14 @@
-"""Numerical error of a run from its step, estimated from the same run in other steps.
+"""Numerical error due to the step, estimated from the same run with other steps.
 
 The scheme is of second order: a figure with step h has an error of c h^2. It differs from the
 figure with step f h by c h^2 |1 - f^2|. Half and double steps show whether a figure converges in
-this way: both differences then have the same sign, and one is four times the other. Each then gives
-an estimate of the error, and the larger one counts.
+this way: both differences then have the same sign, and one is four times the other. Each difference
+then gives an estimate of the error, and the larger estimate counts.
 
 If friction, contacts or chaos dominate, the differences show no order, and any of them may be small
-by chance. The figures of all steps are then samples of one distribution, and their spread measures
-the error. A further step close to the bench's own makes a small spread by chance less likely. The
-error is a scale: 95 % of the true errors are within three times it.
+by chance. The figures with all steps are then samples of one distribution, and their spread
+measures the error. An additional step close to the bench's own makes a spread that is small by
+chance less likely. The error is then a scale: 95 % of the true errors are below three times it.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ from bywire.simulation.run import Run
 OTHER_STEPS = (0.5, 2.0)
 """ratios of other steps to the run's step, which show the order"""
 MOST_WORK = 5.0
-"""ratio to the work of the run at which a run in another step is abandoned"""
+"""work relative to the original run, above which a run with another step is abandoned"""
 NO_ESTIMATE = (StepError, RunError)
-"""errors that runs in other steps may raise: no divisor of a sample time, or too coarse"""
+"""errors of runs with other steps: the step does not divide a sample time, or is too coarse"""
 ROUNDING = 1e-11
-"""rounding error of many steps, relative to the largest value of a signal"""
+"""accumulated rounding error, relative to the largest value of a signal"""
 _STEPS = {0.5: "half the step", 2.0: "twice the step"}
 _ORDER, _OFF = 2.0, 0.3  # order of the scheme, and largest deviation of an observed order
 SPREAD = {3: 1.72, 4: 1.29}
@@ -53,27 +53,29 @@ def of_difference(factor: float, order: int = 2) -> float:
 
 
 def unestimated(failures: Mapping[float, Exception]) -> str:
-    """Return the warning that no other step could run, with the reason for each ratio."""
-    reasons = "; ".join(f"{factor:g} of the step: {e}" for factor, e in failures.items())
+    """Return the warning that the bench runs with no other step, and why for each ratio."""
+    reasons = ", ".join(f"{_share(factor)}: {error}" for factor, error in failures.items())
     return (
-        "the numerical error of the figures is unknown: the bench runs in neither half nor double "
-        f"steps ({reasons})"
+        "the numerical error of the figures is unknown because the bench runs neither with half "
+        f"the step nor with twice the step ({reasons})"
     )
 
 
 def abandoned(failures: Mapping[float, Exception]) -> str:
-    """Return the note that runs in other steps were abandoned; empty if none was."""
+    """Return the note on runs with other steps that were abandoned; empty if there are none."""
     steps = [
-        _STEPS.get(factor, f"{factor:.3g} of the step")
-        for factor, error in failures.items()
-        if isinstance(error, WorkLimitError)
+        _share(factor) for factor, error in failures.items() if isinstance(error, WorkLimitError)
     ]
     if not steps:
         return ""
     return (
-        f"the error estimate from {' and '.join(steps)} was abandoned: it took more than "
+        f"bywire abandoned the error estimate from {' and '.join(steps)}, which needed more than "
         f"{MOST_WORK:g} times the work of the run itself"
     )
+
+
+def _share(factor: float) -> str:
+    return _STEPS.get(factor, f"{factor:.3g} of the step")
 
 
 def are_distinct(values: Sequence[float], errors: Sequence[float]) -> bool:
@@ -106,15 +108,15 @@ def with_step_errors(
     kpis
         Figures of the runs.
     others
-        The same figures in other steps, by the ratio of the steps.
+        The same figures with other steps, by the ratio of the steps.
     recordings
-        Recordings of the runs. They give the rounding error of figures that are small differences
-        of large values, and the error of times that were read at a row.
+        Recordings of the runs. They determine the rounding error of figures that are small
+        differences of large values, and the error of times that were read at a row.
 
     Returns
     -------
     tuple of Kpi
-        Figures with ``error`` in their unit; infinite where a step leaves a figure undefined.
+        Figures with ``error`` in their unit, infinite if a figure is undefined with another step.
     """
     intervals = _intervals(recordings)
     rounding = {unit: ROUNDING * peak for unit, peak in _peaks(recordings).items()}
@@ -133,8 +135,8 @@ def with_step_errors(
 def steps_of(runs: Iterable[Run]) -> tuple[float, ...]:
     """Return the ratios of other steps to that of some runs: `OTHER_STEPS`, and one close to 1.
 
-    The latter has one substep more in the longest interval that divides all sample times. There is
-    none if that interval has a single substep.
+    The latter has one more substep in the longest interval that divides all sample times. It is
+    left out if that interval has a single substep.
     """
     count = math.gcd(*(run.schedule().substeps for run in runs))
     return (*OTHER_STEPS, count / (count + 1)) if count > 1 else OTHER_STEPS
@@ -146,15 +148,15 @@ def note_step_errors(
     """Write the numerical error of each recorded signal into its attributes.
 
     The attributes ``step_error_rms`` and ``step_error_max`` [the signal's unit] cover all rows of
-    the recording. A signal that jumps, such as a duty cycle, may have a large error in a single
-    row, because the jump falls into another one, and be correct on average.
+    the recording. A signal that jumps, such as a duty cycle, may be correct on average although a
+    single row has a large error, because the jump falls into another row.
 
     Parameters
     ----------
     recordings
         Recordings by label; the attributes of their signals are set.
     others
-        The same recordings in other steps, by the ratio of the steps; ratios close to 1 are not
+        The same recordings with other steps, by the ratio of the steps. Ratios close to 1 are not
         used.
     """
     for label, recording in recordings.items():
@@ -174,8 +176,8 @@ def note_step_errors(
 def _estimate(value: float, others: Mapping[float, float], rounding: float) -> tuple[float, bool]:
     """Return the error of a figure, and whether it converges.
 
-    ``others``: the figure in other steps, by the ratio of the steps; ``rounding``: largest
-    difference that is rounding only.
+    ``others``: the figure with other steps, by the ratio of the steps; ``rounding``: largest
+    difference that rounding alone explains.
     """
     apart = {factor: _apart(value, other) for factor, other in others.items()}
     if any(not math.isfinite(each) for each in apart.values()):
@@ -219,7 +221,7 @@ def _intervals(recordings: Mapping[str, xr.Dataset]) -> set[float]:
 
 
 def _reading(time: float, intervals: Iterable[float]) -> float:
-    """Return the error of a time that was read at a row [s]: the interval, or zero for others."""
+    """Return the error of a time [s]: the interval if it was read at a row, else zero."""
     if not math.isfinite(time) or abs(time) < _SAME:  # the start of the run is exact
         return 0.0
     at_rows = (each for each in intervals if abs(math.remainder(time, each)) < _SAME)

@@ -1,9 +1,9 @@
 """Stimuli: their quantities, their kinds by name, and their sections in a bench.
 
 A stimulus may drive a current, a voltage, a pressure or a force. Its levels therefore have the unit
-``level``, which `create` replaces by the unit of the driven signal. Every file of ``stimuli/`` is
-a kind: ``Parameters`` and a function ``sample(t, par)``, which returns the driven signal [level] at
-times [s] of any shape.
+``level``, which `create` replaces by the unit of the driven signal. Every file in ``stimuli/``
+defines a kind by ``Parameters`` and a function ``sample(t, par)``. The function returns the driven
+signal [level] at times [s] of any shape.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from bywire.core.values import nodes, number
 Level = Annotated[float, Unit("level"), Field(allow_inf_nan=False)]
 Amplitude = Annotated[float, Unit("level"), Field(ge=0, allow_inf_nan=False)]
 
-TOLERANCE = 1e-9  # s: the rounding errors of ticks at k * T are far smaller
+TOLERANCE = 1e-9  # s: far above the rounding errors of ticks at k * T
 
 
 def reached(t: NDArray[np.float64], instant: float) -> NDArray[np.bool_]:
@@ -98,7 +98,7 @@ STIMULI = Kind("stimulus", ("stimuli",), _declared, "bywire.bench.stimuli")
 
 
 def create(kind: str, values: Mapping[str, Value], level_unit: str) -> Stimulus:
-    """Build a stimulus from numbers (SI) and texts with units.
+    """Build a stimulus from SI numbers and texts with units.
 
     Parameters
     ----------
@@ -158,9 +158,9 @@ def required_stimulus(stimulus: Stimulus | None, experiment: str) -> Stimulus:
     """
     if stimulus is None:
         raise ParameterError(
-            f"{experiment} needs a [stimulus] section: kind = step, ramp, sine, chirp, multisine "
-            "or table, with its parameters; without a file "
-            f"{option('overrides', {'stimulus.kind': 'step'})} and so on",
+            f"{experiment} needs a [stimulus] section with a kind (step, ramp, sine, chirp, "
+            "multisine or table) and its parameters. Without a bench file, use "
+            f"{option('overrides', {'stimulus.kind': 'step'})} and likewise for its parameters",
             name="stimulus",
         )
     return stimulus
@@ -169,7 +169,7 @@ def required_stimulus(stimulus: Stimulus | None, experiment: str) -> Stimulus:
 # --- Sections of a bench
 
 _FILE = ("format", "rate", "start", "decimal", "skip_lines")
-_CLOCK = {"time": "column", "time_unit": "unit"}  # flat, as a table would be another stimulus
+_CLOCK = {"time": "column", "time_unit": "unit"}  # flat, because a table is another stimulus
 _SIGNAL = ("column", "unit", "scale", "sign", "offset", "delay")
 _NAME = "stimulus"
 _SHOWN = 12
@@ -181,10 +181,10 @@ def with_nodes(values: Mapping[str, Any], level_unit: str) -> dict[str, Any]:
     Parameters
     ----------
     values
-        Parameters of the stimulus. ``file``: path of the file; ``column``: name of the column,
-        needed if there are several others than time; ``unit``, ``scale``, ``sign``, ``offset``,
-        ``delay``, ``rate``, ``start``, ``format``, ``decimal`` and ``skip_lines`` as in a mapping,
-        and ``time`` and ``time_unit`` for the column of times, if the file does not name them;
+        Parameters of the stimulus. ``file``: path of the file. ``column``: name of the column,
+        required if there is more than one in addition to time. ``unit``, ``scale``, ``sign``,
+        ``offset``, ``delay``, ``rate``, ``start``, ``format``, ``decimal`` and ``skip_lines`` are
+        the same as in a mapping, as are ``time`` and ``time_unit`` for the time column.
         ``max_gap``: longest gap that is bridged. Time starts at the first row; ``between`` is
         ``"linear"`` by default.
     level_unit
@@ -193,7 +193,7 @@ def with_nodes(values: Mapping[str, Any], level_unit: str) -> dict[str, Any]:
     Raises
     ------
     InputError
-        When the file cannot be used, or ``times`` or ``values`` are given as well.
+        When the file cannot be used, or ``times`` or ``values`` are also present.
     """
     if "file" not in values:
         return dict(values)
@@ -204,7 +204,9 @@ def with_nodes(values: Mapping[str, Any], level_unit: str) -> dict[str, Any]:
     rest = {key: value for key, value in values.items() if key not in keys}
     if "times" in rest or "values" in rest:
         raise ParameterError(
-            "stimulus 'table': give either file, or times and values", name="stimulus.file"
+            "stimulus 'table' has both a file and times or values. Specify either file, or times "
+            "and values",
+            name="stimulus.file",
         )
     path = values["file"]
     if not isinstance(path, str):
@@ -218,7 +220,7 @@ def with_nodes(values: Mapping[str, Any], level_unit: str) -> dict[str, Any]:
         if len(names) != 1:
             more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
             raise FileError(
-                f"{path} has several columns in addition to time: name one of them with column "
+                f"{path} has several columns in addition to time. Choose one with the key column "
                 f"({', '.join(names[:_SHOWN])}{more})",
                 name="stimulus.column",
                 valid=", ".join(names),

@@ -19,7 +19,7 @@ from bywire.cli.output import INTERRUPTED, message, result
 from bywire.cli.show import JsonFlag, show
 from bywire.cli.use_case_commands import command_of
 from bywire.core.errors import InputError, ParameterError
-from bywire.core.interrupts import interrupt_heard
+from bywire.core.interrupts import interrupt_handled
 from bywire.server.address import PORT
 from bywire.usecases import use_cases
 
@@ -106,7 +106,7 @@ def serve_command(
     try:
         serve(subject or "", port=port, folder=folder or "", say=say)
     except KeyboardInterrupt:  # typer would exit without a message
-        interrupt_heard()
+        interrupt_handled()
         message("interrupted")
         raise typer.Exit(INTERRUPTED) from None
 

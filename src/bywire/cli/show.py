@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from bywire.cli import output
-from bywire.core.callers import heard_warnings
+from bywire.core.callers import collected_warnings
 from bywire.core.errors import BywireError, FileError
-from bywire.core.interrupts import interrupt_heard
+from bywire.core.interrupts import interrupt_handled
 from bywire.core.scratch import made_folder
 
 if TYPE_CHECKING:
@@ -164,7 +164,7 @@ def show(
         load_matplotlib()
     files: list[Path] = []
     trouble: BywireError | None = None
-    with heard_warnings() as caught:
+    with collected_warnings() as caught:
         try:
             with nullcontext() if out is None else output_folder(out, advice):
                 with progress_bar() as progress:
@@ -176,7 +176,7 @@ def show(
                     except BywireError as error:
                         trouble = error
         except KeyboardInterrupt as stop:  # typer would exit without a message
-            interrupt_heard()
+            interrupt_handled()
             for text in (*stop.args, "interrupted"):
                 output.message(str(text))
             raise typer.Exit(output.INTERRUPTED) from None

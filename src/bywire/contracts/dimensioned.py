@@ -15,12 +15,12 @@ PURE = ("exp", "log", "sin", "cos", "arctan", "floor", "power")  # functions of 
 
 
 class Dimensioned:
-    """Number with a unit; zero is compatible with every unit, any other plain number is pure.
+    """Number with a unit; zero fits every unit, and every other plain number is pure.
 
-    A plain NaN is an unknown value. It is also compatible with every unit, as are its results.
+    A plain NaN is an unknown value. It also fits every unit, and so do results computed from it.
     """
 
-    __array_ufunc__ = None  # NumPy's scalars pass operations on to this class
+    __array_ufunc__ = None  # NumPy's scalars leave operations to this class
 
     def __init__(self, value: float, unit: str = "1") -> None:
         self.value, self.powers = si_value(value, unit), base_powers(unit, BASE)
@@ -137,7 +137,9 @@ def _parts(value: Any) -> tuple[float, tuple[float, ...]]:
 def _pure(value: Any) -> float:
     number, powers = _parts(value)
     if any(powers):
-        raise DimensionError(f"{value!r} is not a pure number")
+        raise DimensionError(
+            f"{value!r} is not a pure number", value=repr(value), valid="a pure number"
+        )
     return float(number)
 
 
@@ -148,7 +150,7 @@ def _combined(operation: Callable[[Any, Any], Any], left: Any, right: Any) -> An
     if _is_unknown(left) or _is_unknown(right):
         return float("nan")
     if _is_nothing(left) or (operation is operator.mul and _is_nothing(right)):
-        return 0.0  # zero is compatible with every unit, also as a factor
+        return 0.0  # zero fits every unit, even as a factor
     (x, of_left), (y, of_right) = _parts(left), _parts(right)
     sign = 1.0 if operation is operator.mul else -1.0
     powers = tuple(a + sign * b for a, b in zip(of_left, of_right, strict=True))
@@ -164,10 +166,11 @@ def _is_unknown(value: Any) -> bool:
 
 
 def _alike(left: Any, right: Any) -> tuple[float, float, tuple[float, ...]]:
-    """Return two numbers and their common dimension; zero and NaN take the other's."""
+    """Return two numbers and their common dimension; zero and NaN have the other's."""
     (x, powers), (y, others) = _parts(left), _parts(right)
     if _is_nothing(left) or _is_unknown(left):
         return x, y, others
     if powers != others and not (_is_nothing(right) or _is_unknown(right)):
-        raise DimensionError(f"{left!r} and {right!r} have different dimensions")
+        text = f"{left!r} and {right!r} have different dimensions"
+        raise DimensionError(text, value=repr(left), valid=repr(right))
     return x, y, powers

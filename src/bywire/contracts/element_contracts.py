@@ -41,20 +41,20 @@ from bywire.core.errors import ParameterError
 from bywire.core.parameters import Leaf, ParameterSet, leaf_fields
 from bywire.core.typing import Array
 
-NODES = 4  # of every table
+NODES = 4  # number of nodes of every table
 ATTEMPTS = 2000
 _SHOWN = 24  # values in a message
 MANY = 64
-"""largest number of combinations of choices of which all are tried"""
+"""largest number of combinations of choices for which all are tried"""
 
 Arguments = dict[str, Any]
 Choices = dict[str, Any]
 
 
 def combinations(annotations: Mapping[str, Any]) -> Iterator[Choices]:
-    """Yield combinations of structural choices, ``par.law`` and the like, of some arguments.
+    """Yield combinations of the arguments' structural choices, such as ``par.law``.
 
-    These are all combinations if they are few. Otherwise, every choice is combined with the first
+    A small number of combinations is complete. Otherwise, every choice is combined with the first
     and with the last of all other choices.
 
     Raises
@@ -132,7 +132,9 @@ class Sampler:
             except ParameterError as error:
                 refusal = error
         raise ParameterError(
-            f"{cls.__module__}: no sample of {chosen} is valid: {refusal}", name=cls.__module__
+            f"{cls.__module__}: no sample of {chosen} is valid: {refusal}",
+            name=cls.__module__,
+            value=str(chosen),
         )
 
     def _leaf(self, cls: type[ParameterSet], name: str, number: Number) -> Any:
@@ -265,7 +267,7 @@ Class = type[ParameterSet]
 
 
 def samples(cls: Class) -> Iterator[ParameterSet]:
-    """Yield a sample of a class for every combination of its choices."""
+    """Yield a sample of a class for each combination of its choices."""
     for choices in combinations({"par": cls}):
         yield Sampler({"par": cls}, choices).sample()["par"]
 
@@ -314,7 +316,7 @@ def _says_both(leaf: Leaf, value: float) -> tuple[str, ...]:
 
 
 def refuses_outside(
-    par: ParameterSet, name: str, wanted: Callable[[Leaf, float], tuple[str, ...]]
+    par: ParameterSet, name: str, expected: Callable[[Leaf, float], tuple[str, ...]]
 ) -> Iterator[Evidence]:
     """Check that a set rejects the values just outside the range of a number.
 
@@ -322,8 +324,8 @@ def refuses_outside(
     ----------
     name
         Dotted name of the number, or of a table of them.
-    wanted
-        ``wanted(leaf, value)``: texts that the message must contain.
+    expected
+        ``expected(leaf, value)``: texts that the message must contain.
     """
     leaf = leaf_fields(type(par))[name]
     place = _declared_at(type(par), name)
@@ -336,9 +338,11 @@ def refuses_outside(
                 text += ": write allow_inf_nan=False in its Field"
             yield Evidence(False, text, place=place)
             continue
-        lacking = [part for part in wanted(leaf, value) if part not in message]
-        said = f"{lacking[0]!r} is missing in {message!r}" if lacking else f"{name} keeps its range"
-        yield Evidence(not lacking, said, place=place)
+        lacking = [part for part in expected(leaf, value) if part not in message]
+        text = f"{name} keeps its range"
+        if lacking:
+            text = f"{lacking[0]!r} is missing in {message!r}"
+        yield Evidence(not lacking, text, place=place)
 
 
 def outside(leaf: Leaf) -> Iterator[float]:
@@ -351,7 +355,7 @@ def outside(leaf: Leaf) -> Iterator[float]:
 
 
 def refusal(par: ParameterSet, name: str, value: Any) -> str | None:
-    """Return the message with which a set rejects a value; None if it accepts the value."""
+    """Return a set's message for a value that it rejects, or None if it accepts the value."""
     try:
         par.replace({name: value})
     except ParameterError as error:
@@ -385,7 +389,7 @@ PREFIX = 1e-12
 
 
 def with_units(sampler: Sampler) -> Arguments:
-    """Return a sample whose numbers carry their units."""
+    """Return a sample whose numbers have units."""
     sample = sampler.sample()
     values = {k: Dimensioned(v, sampler.known(k).unit) for k, v in flattened(sample).items()}
     return carrying(sample, values)
@@ -403,7 +407,7 @@ def has_annotated_units(function: Function) -> Iterator[Evidence]:
 
 
 def is_in_SI(function: Function) -> Iterator[Evidence]:
-    """Check that all units are SI, because no code applies the factor of a prefix."""
+    """Check that all units are SI, since no code applies a prefix's factor."""
     arguments, returns = signature_of(function)
     for argument, annotation in (*arguments.items(), ("result", returns)):
         for name, number in numbers(argument, annotation).items():
@@ -421,7 +425,8 @@ def has_agreeing_back_ends(function: Function) -> Iterator[Evidence]:
         arrays = evaluate(function, structure, samples)
         column, results = traced(function, structure)
         symbols = ca.Function("f", [column], [results])(samples).full()
-        # A difference of large terms is as accurate as these: the row's largest value is scale.
+        # A difference of large terms is only as accurate as these terms, so the row's largest value
+        # is the scale.
         scale = np.abs(floats).max(axis=1, keepdims=True)
         for name, other in (("arrays", arrays), ("symbols", symbols)):
             apart = np.abs(other - floats)
@@ -479,7 +484,7 @@ def _slopes(function: Function, structure: Arguments, matrix: Array, steps: Arra
 
 
 def _relative(off: Array, scale: Array) -> float:
-    """Return the largest relative difference; infinite if values differ that are all zero."""
+    """Return the largest relative difference; infinite if the scale is zero but values differ."""
     wide = np.broadcast_to(scale, off.shape)
     with np.errstate(divide="ignore", invalid="ignore"):
         share = np.where(off == 0.0, 0.0, off / wide)
@@ -493,7 +498,7 @@ def _relative(off: Array, scale: Array) -> float:
 # type another function of the element returns (the contact forces) is computed by that function.
 
 BALANCE = 1e-9
-"""of the powers; the series for the fluid's flow energy has an error of about 1e-10"""
+"""share of the powers; the series for the fluid's flow energy has an error of about 1e-10"""
 ENERGETIC = ("energy", "power_in", "power_loss", "mass", "balance", "input_rate")
 
 
@@ -548,7 +553,7 @@ def keeps_energy(module: ModuleType) -> Iterator[Evidence]:
             yield Evidence(False, text, place=place)
             return
         off, scale = np.abs(powers.sum(axis=0)), np.abs(powers).sum(axis=0)
-        if not scale.any():  # choices may switch it off
+        if not scale.any():  # choices may switch the element off
             continue
         is_alive = True
         shares = off / np.where(scale > 0, scale, 1.0)
@@ -558,7 +563,7 @@ def keeps_energy(module: ModuleType) -> Iterator[Evidence]:
         text = f"d(energy)/dt is off by {share:.1e} of the powers{where}"
         yield measured(share, BALANCE, text, place)
     if not is_alive:
-        yield Evidence(False, "no power ever flows", place=place)
+        yield Evidence(False, "all powers are zero", place=place)
 
 
 def loses_what_it_says(module: ModuleType) -> Iterator[Evidence]:
@@ -584,7 +589,7 @@ def loses_what_it_says(module: ModuleType) -> Iterator[Evidence]:
 
 
 def _consistent(module: ModuleType, known: dict[str, Any], sample: Arguments) -> Arguments:
-    """Return the arguments, with those replaced that the element has a law for."""
+    """Return the arguments; the element's own laws replace those that they determine."""
     computed: Arguments = {}
     for law in (f for k, f in functions(module).items() if k not in ENERGETIC):
         takes, gives = signature_of(law)
@@ -631,7 +636,7 @@ OF_A_CLASS: dict[str, Contract] = {
 
 
 def demands_on(element: Element) -> Demands:
-    """Yield every contract that an element has to keep."""
+    """Yield every contract of an element."""
     functions = element.functions
     for name, function in functions.items():
         for contract, test in OF_A_FUNCTION.items():

@@ -1,4 +1,4 @@
-"""Elements and control laws, and the meaning of their functions according to the annotations."""
+"""Elements and control laws, and the meaning of their annotated functions."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from bywire.core.signals import signal_in
 
 @dataclass(frozen=True)
 class Number:
-    """Description of one number among the arguments or results of a function."""
+    """Description of one number among a function's arguments or results."""
 
     unit: str
     nominal: float
@@ -44,7 +44,7 @@ class Element:
 
     @property
     def summary(self) -> str:
-        """First line of the docstring of its file."""
+        """First line of its file's docstring."""
         return (self.module.__doc__ or "").strip().partition("\n")[0]
 
     @property
@@ -60,9 +60,9 @@ def _declared(module: ModuleType) -> Iterator[Element]:
 
 
 ELEMENTS = Kind("element", ("elements",), _declared, "bywire.plant")
-"""every physical element: the general ones, and those of the brakes"""
+"""every physical element: general elements, and the brakes' elements"""
 LAWS = Kind("control law", ("laws",), _declared, "bywire.control")
-"""every control law: the general ones, and those of the brakes"""
+"""every control law: general laws, and the brakes' laws"""
 
 
 def every_element() -> dict[str, Element]:
@@ -71,7 +71,7 @@ def every_element() -> dict[str, Element]:
 
 
 def elements_by_name() -> dict[str, Element]:
-    """Return all elements and control laws by each valid name; the last part may suffice."""
+    """Return all elements and control laws by every valid name, including unique last parts."""
     every = every_element()
     ends = [name.rpartition(".")[2] for name in every]
     short = {name.rpartition(".")[2]: element for name, element in every.items()}
@@ -79,7 +79,7 @@ def elements_by_name() -> dict[str, Element]:
 
 
 def elements_of(brake: Brake) -> dict[str, Element]:
-    """Return the elements and laws of a brake's package, and those that its modules import."""
+    """Return the elements and laws in a brake's package, and those that its modules import."""
     ASSEMBLIES.of(brake.module)  # loads its models and the modules that they use
     known = every_element()
     bring = {**ELEMENTS.of(brake.module), **LAWS.of(brake.module)}

@@ -15,7 +15,7 @@ from typing import Any, Literal
 
 
 class NotCheckedError(Exception):
-    """Contract that cannot be checked; the text contains the reason."""
+    """Reason why a contract cannot be checked."""
 
 
 @dataclass(frozen=True)
@@ -36,13 +36,13 @@ class Evidence:
     Parameters
     ----------
     holds
-        Whether the contract is kept.
+        Whether the subject fulfills the contract.
     text
         Text of the finding, with its choices or signal.
     figure, limit
         Measure and its limit; None if the contract has none.
     place
-        Line to inspect, if it is not that of the subject.
+        Line to inspect, if it differs from the subject's.
     is_error
         Whether an error prevented the check.
     """
@@ -56,19 +56,19 @@ class Evidence:
 
 
 def measured(figure: float, limit: float, text: str, place: Place | None = None) -> Evidence:
-    """Return evidence that holds if a figure is at most its limit; NaN never is."""
+    """Return evidence that holds if a figure is at most its limit; NaN never holds."""
     return Evidence(bool(figure <= limit), text, float(figure), limit, place)
 
 
 def worst(evidence: Iterable[Evidence]) -> Evidence:
-    """Return the first evidence that does not hold, else the evidence nearest to its limit."""
+    """Return the first evidence that does not hold, otherwise the evidence nearest its limit."""
     nearest: Evidence | None = None
     for each in evidence:
         if not each.holds:
             return each
         if nearest is None or _share(each) > _share(nearest):
             nearest = each
-    return nearest or Evidence(True, "there is nothing to check")
+    return nearest or Evidence(True, "nothing to check")
 
 
 def _share(evidence: Evidence) -> float:
@@ -82,12 +82,12 @@ Contract = Callable[[Any], Evidence | Iterator[Evidence]]
 
 
 def examine(contract: Contract, subject: Any, place: Place | None = None) -> Evidence:
-    """Return the evidence on a contract; an error in the subject's equations breaks it.
+    """Return the evidence on a contract; an error in the subject's equations breaks the contract.
 
     Parameters
     ----------
     place
-        Place of the subject, if it is not that of its own code.
+        Place of the subject, if it differs from its code's place.
 
     Raises
     ------
@@ -99,7 +99,7 @@ def examine(contract: Contract, subject: Any, place: Place | None = None) -> Evi
         return evidence if isinstance(evidence, Evidence) else worst(evidence)
     except NotCheckedError:
         raise
-    except Exception as error:  # any error of a user's equations
+    except Exception as error:  # any error in a user's equations
         text = " ".join(str(error).split())
         at = place or place_of(subject)
         said = f"{type(error).__name__}: {text}"
@@ -124,15 +124,15 @@ def _source(subject: Any) -> tuple[list[str], int]:
 
 
 def field_place(cls: type[Any], name: str) -> Place:
-    """Return the line on which a class declares a field, else that of the class."""
+    """Return the line on which a class declares a field, otherwise the class's line."""
     at = place_of(cls)
     declaring: Any = cls
     try:
         lines, first = _source(declaring)
     except (OSError, TypeError):
         return at
-    wanted = re.compile(rf"\s+{re.escape(name)}\s*:")
-    places = (Place(at.file, first + k) for k, line in enumerate(lines) if wanted.match(line))
+    declaration = re.compile(rf"\s+{re.escape(name)}\s*:")
+    places = (Place(at.file, first + k) for k, line in enumerate(lines) if declaration.match(line))
     return next(places, at)
 
 
@@ -220,7 +220,7 @@ class Demand:
 def one_by_cause(findings: Iterable[Finding]) -> Iterator[Finding]:
     """Yield findings in order; report each error once, and mark other contracts as not checked.
 
-    A renamed parameter, for instance, prevents the check of every contract of a model at one line.
+    For instance, a renamed parameter prevents all checks of a model at the same line.
     """
     seen: dict[tuple[str, Place], Finding] = {}
     for each in findings:

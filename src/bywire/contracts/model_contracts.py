@@ -43,11 +43,11 @@ SLOW_SHARES = (1.0, 0.1, 1e-2, 1e-3, 1e-4)
 INSIDE = 0.9
 """share of a friction's bounds: a force within it is held at the start"""
 SLOW = (1e-4, 1e-3, 1e-2)
-"""of a usual speed: at so low a speed, smooth forces hardly act"""
+"""share of a usual speed at which smooth forces are negligible"""
 HIDDEN = 0.1
-"""of the force at the usual speed: largest excess over a force proportional to speed"""
+"""largest excess over a force proportional to speed, relative to the force at the usual speed"""
 GROWN = 0.3
-"""the same for the bounds of a dry friction, up to a tenth of the usual speed"""
+"""the same limit for a dry friction's bounds, up to a tenth of the usual speed"""
 
 
 def rests_exactly(trial: Trial) -> Iterator[Evidence]:
@@ -60,7 +60,7 @@ def rests_exactly(trial: Trial) -> Iterator[Evidence]:
     holds = _holds_at_start(trial)
     waiting = {name for name, share in holds.items() if share < INSIDE}
     if not waiting:
-        raise NotCheckedError(f"at {start.known} nothing is held by dry friction")
+        raise NotCheckedError(f"at {start.known} dry friction does not hold any velocity")
     for amount in SLOW_SHARES:
         run = states(simulate(trial.drive.run(amount)), names)
         for name in sorted(waiting):
@@ -68,7 +68,7 @@ def rests_exactly(trial: Trial) -> Iterator[Evidence]:
                 waiting.discard(name)
                 text = f"{name} is exactly zero at {amount:g} of the controllers' moves"
                 yield Evidence(True, text, place=place)
-    for name in sorted(waiting):  # other loads may move it later, such as a disc's run-out
+    for name in sorted(waiting):  # other loads, such as a disc's run-out, may move it later
         first = float(run[1, names.index(name)])
         text = (
             f"{name} is {first:.2g} after one sample time at {SLOW_SHARES[-1]:g} of the "
@@ -94,7 +94,7 @@ def _holds_at_start(trial: Trial) -> dict[str, float]:
 
 
 def hides_no_friction(trial: Trial) -> Iterator[Evidence]:
-    """Check whether the balance of a velocity jumps at its reversal, as with hidden friction."""
+    """Check that a velocity's balance does not jump at its reversal, as with hidden friction."""
     state = signals_of(trial.model.State)
     speeds = [n for n, s in state.items() if s.unit in ("rad/s", "m/s")]
     if not speeds:
@@ -110,7 +110,7 @@ def hides_no_friction(trial: Trial) -> Iterator[Evidence]:
         sooner = max(share - r for share, r in zip(shares, SLOW, strict=True))
         text = f"the smooth force against {name} comes {sooner:.2g} sooner than with its speed"
         if sooner > HIDDEN:
-            text += ": declare this friction in frictions and bounds, and it will not creep"
+            text += ": declare this friction in frictions and bounds to prevent creep"
         yield measured(sooner, HIDDEN, text, place)
 
 
@@ -128,19 +128,19 @@ def _contain_zero(trial: Trial) -> Iterator[Evidence]:
 
 
 def _same_at_rest(trial: Trial, name: str) -> Evidence:
-    """Check that the bounds of a friction do not vanish at rest and appear with speed."""
+    """Check that a friction's bounds at rest are as wide as at low speed."""
     nominal = signals_of(trial.model.State)[name].nominal
     rest, far = (_bounds_at(trial, name, r * nominal) for r in (0.0, 1.0))
     slow = {r: _bounds_at(trial, name, r * nominal) for r in (*SLOW, 0.1)}
     sooner = max((width - rest) / far - r if far else 0.0 for r, width in slow.items())
     text = f"the bounds of {name} grow by {sooner:.2g} more than with its speed"
     if sooner > GROWN:
-        text += ": so it creeps; a friction must hold as much at rest"
+        text += ", so the body creeps: a friction must have the same bounds at rest"
     return measured(sooner, GROWN, text, trial.place("bounds", "friction"))
 
 
 def _bounds_at(trial: Trial, name: str, speed: float) -> float:
-    """Return the width between the bounds of a friction at a speed of its own velocity."""
+    """Return the width between a friction's bounds at a speed of its own velocity."""
     start, model = trial.start, trial.model
     x = start.state._replace(**{name: speed})
     contact = _forces(trial, SX(ca.DM(list(x))))
@@ -169,7 +169,7 @@ def _forces(trial: Trial, column: Any) -> tuple[float, ...]:
 # --- Contracts of a model and of its parameter sets: units, runs, energies, sensitivities
 
 OFF = 0.37
-"""distance from the start at which to evaluate equations, of usual magnitudes: away from zeros"""
+"""distance from the start at which to evaluate equations, in usual magnitudes, to avoid zeros"""
 
 
 def has_its_units(trial: Trial) -> Iterator[Evidence]:
@@ -211,7 +211,7 @@ def has_its_units(trial: Trial) -> Iterator[Evidence]:
 
 
 def with_units(par: ParameterSet) -> ParameterSet:
-    """Return a parameter set whose numbers carry their units."""
+    """Return a parameter set whose numbers have units."""
     known = leaf_fields(type(par))
     values = {}
     for name, value in par.leaves().items():
@@ -259,7 +259,7 @@ def _fits(what: str, value: Any, unit: str, trial: Trial, *members: str) -> Evid
 # --- Energy balance: the energy input of a run equals losses plus stored energy
 
 RESIDUAL = 1e-6
-"""of the energy turnover: largest residual after subtracting the numerical error"""
+"""largest residual after subtracting the numerical error, relative to the energy turnover"""
 ENERGY_SHARES = (LARGE, 0.05)
 
 
@@ -313,8 +313,9 @@ SLOPE = 1e-3
 def has_its_derivatives(trial: Trial) -> Iterator[Evidence]:
     """Check that derivatives of the states by the parameters equal differences of runs.
 
-    The runs have no dry friction and no controllers that round. Instants of breakaway and reversals
-    depend on a parameter: exact derivatives include this within a few percent, differences do not.
+    The runs have no dry friction and no controllers that round. Instants of breakaway and reversal
+    depend on a parameter. Exact derivatives include this effect within a few percent; differences
+    do not.
     """
     if find_compiler() is None:
         raise NotCheckedError("there is no C compiler: install the extra bywire[compiler]")
@@ -324,7 +325,7 @@ def has_its_derivatives(trial: Trial) -> Iterator[Evidence]:
     if not chosen:
         raise NotCheckedError(f"from {trial.start.known} no parameter moves any state")
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of converters; these runs are those of the plant alone
+        warnings.simplefilter("ignore")  # from converters; these runs contain only the plant
         exact = simulate_with_sensitivities(run, tuple(chosen), names)
     at = run.par.leaves()
     ahead = {name: [at[name]] * 2 * len(chosen) for name in chosen}
@@ -394,29 +395,29 @@ SMOOTH_SHARES = (1.0, 0.3, 0.1)
 SHARES = (1.0, 0.5, 0.25, 0.12, 0.06, 0.03)
 """shares of the controllers' moves: if stick-slip shifts instants, the errors of one run scatter"""
 SCATTER = 0.2
-"""least standard error of the order of one run: a few errors may be on a line by chance"""
+"""lower bound for a run's standard error of the order: few errors may fit a line by chance"""
 ROUNDING = 1e-12
-"""of a state's largest or usual magnitude: smaller differences are not errors of the step"""
+"""share of a state's largest or usual magnitude: smaller differences are not due to the step"""
 AGREEMENT = 1e-9
-"""largest difference between engines, relative to the largest value of a signal in the run, which
-counts as at least a thousandth of the usual one"""
+"""largest difference between engines, relative to a signal's largest value in the run, which counts
+as at least a thousandth of the usual magnitude"""
 _VIRTUAL = 0.02  # length [s] of the run that is repeated without a compiler
 
 
 def is_of_second_order(trial: Trial) -> Iterator[Evidence]:
     """Check that every state of the plant converges with the square of the substep.
 
-    This holds without and with dry friction, as a substep is cut where a velocity reverses.
+    This holds without and with dry friction, since a substep is cut where a velocity reverses.
     """
     orders = list(_orders(trial, False, ORDER))
     if not orders:
-        raise NotCheckedError(f"from {trial.start.known} no state moves enough for a check")
+        raise NotCheckedError(f"from {trial.start.known} no state moves enough for the check")
     yield from orders
     if trial.model.frictions:
         yield from _orders(trial, True, ORDER)
 
 
-def _orders(trial: Trial, frictions: bool, wanted: float) -> Iterator[Evidence]:
+def _orders(trial: Trial, frictions: bool, expected: float) -> Iterator[Evidence]:
     """Yield the evidence for every state that moves enough for a check."""
     start = trial.start
     steps = [start.step / 2**k for k in range(HALVINGS + 1)]
@@ -439,16 +440,16 @@ def _orders(trial: Trial, frictions: bool, wanted: float) -> Iterator[Evidence]:
             how = "with" if frictions else "without"
             text = (
                 f"{name} converges with order {order:.2f} +- {doubt:.2f} in the substep {how} dry "
-                f"friction, but it must be {wanted:g}"
+                f"friction, but it must be {expected:g}"
             )
             place = trial.place("balance", "wire")
-            yield measured(max(wanted - order - doubt, 0.0), SHORTFALL, text, place)
+            yield measured(max(expected - order - doubt, 0.0), SHORTFALL, text, place)
 
 
 def _observed(errors: Array) -> tuple[float, float]:
     """Return the order with which errors fall, and twice its standard error.
 
-    It is the mean over the runs, weighted by how closely their errors are on a line.
+    The order is a mean over the runs, weighted by how well their errors fit a line.
 
     Parameters
     ----------
@@ -515,10 +516,10 @@ OF_A_SET: dict[str, Contract] = {
 
 
 def has_faults_of_what_is_there(trial: Trial) -> Iterator[Evidence]:
-    """Check that the failure modes of a model name known signals, tasks and parameters."""
+    """Check that a model's failure modes refer to known signals, tasks and parameters."""
     start = trial.start
     modes = modes_of(start.model, start.par)
-    yield Evidence(True, f"{len(modes)} failure modes name known things")
+    yield Evidence(True, f"{len(modes)} failure modes refer to known signals, tasks and parameters")
     for mode in modes.values():
         if mode.changes is not None and not mode.lacks(start.par):
             for name in mode.changes(start.par, mode.value):
@@ -552,7 +553,7 @@ def demands_on_set(name: str, par: ParameterSet) -> Demands:
 
 
 OF_ITS_NUMBERS = ("exact rest", "hidden friction", "energy of a run")
-"""the model contracts that depend on the numbers of a parameter set"""
+"""model contracts that depend on a parameter set's numbers"""
 
 
 def demands_on_model(name: str, trial: Trial, of_numbers: bool = False) -> Demands:

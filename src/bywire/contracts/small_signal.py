@@ -1,4 +1,4 @@
-"""Contract of a model's linearization: it describes small motions of the plant."""
+"""Contract of a model's linearization, which must describe small motions of the plant."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ AT_REST = 1e-3
 def is_its_linear_model(trial: Trial) -> Iterator[Evidence]:
     """Check that the linear model of the plant predicts its response to small motions.
 
-    Loops of the model must not be on a corner at their usual operating point.
+    The model's loops must not be at a kink at their usual operating point.
 
     If the start is an equilibrium of the smooth equations, the check removes dry friction.
     Otherwise it holds all velocities with friction at zero.
@@ -62,12 +62,12 @@ def is_its_linear_model(trial: Trial) -> Iterator[Evidence]:
         runs = [states(simulate(trial.drive.run(s, step, not removed)), names) for s in SMALL]
     except SolverError as error:
         raise NotCheckedError(f"the small run from {start.known} fails: {error}") from error
-    wanted = _response(linear, trial.drive.rows[: len(base)], period)
+    expected = _response(linear, trial.drive.rows[: len(base)], period)
     deviations = [(run - base) / share for run, share in zip(runs, SMALL, strict=True)]
     nominal = [abs(s.nominal) for s in signals_of(trial.model.State).values()]
     moving = 0
     for k, name in enumerate(names):
-        exact, size = wanted[:, k], float(np.abs(wanted[:, k]).max())
+        exact, size = expected[:, k], float(np.abs(expected[:, k]).max())
         floor = 1e-11 * max(float(np.abs(base[:, k]).max()), nominal[k]) / SMALL[-1]
         size = max(size, float(np.abs(deviations[-1][:, k]).max()))
         if size <= floor / MISMATCH:
@@ -82,7 +82,7 @@ def is_its_linear_model(trial: Trial) -> Iterator[Evidence]:
 
 
 def _require_loops_off_corners(trial: Trial) -> None:
-    """Reject loops of the model whose usual operating point is on a corner."""
+    """Reject the model's loops whose usual operating point is at a kink."""
     for loop in LOOPS.all().values():
         if loop.assembly == trial.model.name:
             try:
@@ -137,20 +137,20 @@ def _response(linear: LinearModel, inputs: Array, period: float) -> Array:
 
 
 MOST = 40
-"""largest number of operations of a model to put on their corners, one per place in the source"""
+"""largest number of a model's operations to put at their kinks, one per place in the source"""
 ONE_SIDED = 1e-3
-"""largest deviation of a linear model from differences on its side, of the largest effect"""
+"""largest deviation of a linear model from one-sided differences, relative to the largest effect"""
 ROUNDING = 1e-14
-"""of rates: largest error of their differences"""
+"""largest error of the differences of rates"""
 _NEWTON = 8
 
 
 def is_linear_beside_its_corners(trial: Trial) -> Iterator[Evidence]:
-    """Check that linear models are valid or rejected when operations are on their corners.
+    """Check that linear models are valid or rejected when operations are at their kinks.
 
-    The check moves the plant's operating point to the corner of each limit, selection and absolute
-    value in its equations. A model that is returned there must hold on both sides. If it is
-    rejected, the models of the two sides must match the equations next to the corner.
+    The check moves the plant's operating point to the kink of each limit, selection and absolute
+    value in its equations. A linear model at a kink must be valid on both sides. If bywire rejects
+    it, the models of the two sides must match the equations next to the kink.
     """
     start = trial.start
     try:
@@ -168,13 +168,13 @@ def is_linear_beside_its_corners(trial: Trial) -> Iterator[Evidence]:
             count += 1
             yield _beside(trial, corner, free, place)
     if not count:
-        raise NotCheckedError(f"no operation of the plant has a corner near {start.known}")
+        raise NotCheckedError(f"no operation of the plant has a kink near {start.known}")
 
 
 def _driven(
     at: SmoothPoint, free: NDArray[np.bool_], usual: Array, order: int
 ) -> SmoothPoint | None:
-    """Return the nearest point at which an operation is on its corner; None if none is found."""
+    """Return the nearest point at which an operation is at its kink, or None."""
     for _ in range(_NEWTON):
         kink = _kink(kinks_at(at, free, usual, outputs=False, ticks=False), order)
         if kink is None or not np.isfinite(kink.excess):
@@ -189,7 +189,7 @@ def _driven(
 
 
 def _with_its_contacts(at: SmoothPoint) -> SmoothPoint | None:
-    """Return a point with its closed contacts; None if one just touches, or at a limit."""
+    """Return a point with its closed contacts; None if one just touches or is at a limit."""
     model = at.model
     state = cast(NamedTuple, cast(Any, model.State)(*at.state.tolist()))
     memory = cast(NamedTuple, cast(Any, model.Memory)(*at.memory.tolist()))
@@ -206,7 +206,7 @@ def _kink(kinks: list[Kink], order: int) -> Kink | None:
 
 
 def _beside(trial: Trial, at: SmoothPoint, free: NDArray[np.bool_], place: str) -> Evidence:
-    """Return whether the linear models at a corner match the equations next to it."""
+    """Return whether the linear models at a kink match the equations next to it."""
     model = trial.model
     n, m = at.state.size, at.memory.size
     state = cast(NamedTuple, cast(Any, model.State)(*at.state.tolist()))
@@ -228,12 +228,12 @@ def _beside(trial: Trial, at: SmoothPoint, free: NDArray[np.bool_], place: str) 
     for away in (by, -by):
         once, twice = (at.moved(share * away).plant()[4][:, 0] for share in (0.5, 1.0))
         if not (np.isfinite(once).all() and np.isfinite(twice).all()):
-            return Evidence(True, f"{place} is on its corner, near which a value is not finite")
-        wanted, step = twice - once, 0.5 * away[: n + m]
+            return Evidence(True, f"{place} is at its kink, near which a value is not finite")
+        expected, step = twice - once, 0.5 * away[: n + m]
         size = np.maximum(np.abs(sides[0]), np.abs(sides[-1])) @ np.abs(step)
         rounding = ROUNDING * (np.abs(once) + np.abs(twice))
-        # A slope that takes more than a second to change a signal by its magnitude is negligible.
+        # A slope that needs more than a second to change a signal by its magnitude is negligible.
         size = np.maximum(size, rounding / ONE_SIDED + REACH * magnitudes(at)[:n])
-        most = max(most, min(float(np.max(np.abs(J @ step - wanted) / size)) for J in sides))
-    text = f"with {place} on its corner the linear model {how} is off by {most:.1e}"
+        most = max(most, min(float(np.max(np.abs(J @ step - expected) / size)) for J in sides))
+    text = f"with {place} at its kink, the linear model {how} is off by {most:.1e}"
     return measured(most, ONE_SIDED, text, trial.place("balance", "wire"))

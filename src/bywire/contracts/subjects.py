@@ -31,14 +31,14 @@ def demands_on(name: str | None, figures: Collection[str]) -> Iterator[Demand]:
     ----------
     name
         Name of a brake, a model, an experiment, an element, a control law or a parameter set;
-        everything installed by default.
+        default: everything installed.
     figures
         Names of the figures that experiments may use.
 
     Raises
     ------
     UnknownNameError
-        When the name is unknown; the message lists the nearest names.
+        When the name is unknown, with the nearest names.
     """
     if name is None:
         yield from _on_elements(every_element().values())
@@ -60,7 +60,7 @@ def demands_on(name: str | None, figures: Collection[str]) -> Iterator[Demand]:
 def _element(name: str) -> Element:
     """Return an element by its dotted name, or by the last part if it is unique.
 
-    Hyphens count as underscores, as names of modules have no hyphens.
+    Hyphens count as underscores, since module names have no hyphens.
     """
     known, module = every_element(), name.replace("-", "_")
     ends = [full for full in known if full.rpartition(".")[2] == module]
@@ -91,7 +91,7 @@ def _on_set(entry: CitedSet) -> Iterator[Demand]:
 
 
 def _on_model(model: Any) -> Iterator[Demand]:
-    """Yield the contracts of a model: all with its first parameter set, then those of numbers."""
+    """Yield a model's contracts: all with its first parameter set, then those on numbers."""
     entries = [e for e in PARAMETER_SETS.all().values() if e.assembly == model.name]
     for k, entry in enumerate(entries):
         subject = f"{model.name} ({entry.name})"
@@ -118,7 +118,7 @@ _SAMPLES = 201
 
 @dataclass(frozen=True)
 class Rehearsal:
-    """Experiment with its defaults, and recordings of brakes that never move.
+    """Experiment with its defaults, and recordings of brakes at rest.
 
     Parameters
     ----------
@@ -147,7 +147,7 @@ class Rehearsal:
 
     @cached_property
     def cases(self) -> tuple[Case, ...]:
-        """Its runs, with zero stimuli in place of those of a bench file."""
+        """The experiment's runs, with zero stimuli in place of a bench file's."""
         experiment, options = self.experiment, self.experiment.defaults
         stimulus: Any = None
         if experiment.driven_unit is not None:
@@ -158,7 +158,7 @@ class Rehearsal:
         return (experiment.preview or experiment.cases)(self.par, options, stimulus)
 
     def recordings(self) -> Mapping[str, xr.Dataset]:
-        """Return recordings of brakes at rest, zero everywhere."""
+        """Return recordings of brakes at rest, with zeros everywhere."""
         experiment, options = self.experiment, self.experiment.defaults
         recordings = {} if experiment.static is None else experiment.static(self.par, options)
         for case in self.cases:
@@ -190,7 +190,7 @@ def has_its_assembly(rehearsal: Rehearsal) -> Evidence:
 
 
 def has_its_figures(rehearsal: Rehearsal) -> Evidence:
-    """Check that every figure named by the experiment is declared."""
+    """Check that every figure that the experiment lists is declared."""
     return _named("figure", rehearsal.experiment.figures, rehearsal.figures)
 
 
@@ -202,7 +202,7 @@ def drives_stimuli(rehearsal: Rehearsal) -> Iterator[Evidence]:
 
 
 def judges_what_is_recorded(rehearsal: Rehearsal) -> Evidence:
-    """Check that the computed key figures are the declared ones.
+    """Check that the computed key figures match the declared ones.
 
     Raises
     ------
@@ -213,13 +213,13 @@ def judges_what_is_recorded(rehearsal: Rehearsal) -> Evidence:
     try:
         given = {kpi.name: kpi.unit for kpi in experiment.judge(rehearsal.recordings(), options)}
     except (KeyError, AttributeError, UnknownNameError, ModelError):
-        raise  # it names something missing, or a key figure that cannot be translated to C
+        raise  # a name is missing, or a key figure cannot be translated to C
     except Exception as error:
         raise NotCheckedError(f"no recorded signal moves: {error}") from error
     declared = experiment.kpis_with(options)
     missing = [name for name in declared if name not in given]
     if missing:
-        return Evidence(False, f"it never computes the declared key figures {', '.join(missing)}")
+        return Evidence(False, f"it does not compute the declared key figures {', '.join(missing)}")
     other = [name for name, unit in given.items() if declared.get(name) != unit]
     if other:
         texts = [f"{name} in {given[name]}" for name in other]

@@ -1,4 +1,4 @@
-"""Trial of one model with one parameter set: start of its runs, and their shared results."""
+"""Trial of a model with a parameter set: start of its runs, and their shared results."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from bywire.simulation.run import Run, Trajectory, simulate
 STEP = 20e-6
 """substep [s] of the runs, or the next smaller one that divides the sample times"""
 ACTIVE = 0.2
-"""time [s] of the single wave that excites a run; the stimulus then returns to its first value"""
+"""duration [s] of the single wave that excites a run, after which the stimulus is constant"""
 DURATION = 0.3
 
 
@@ -74,7 +74,7 @@ class Start:
         share
             Amplitude, relative to the signal's usual magnitude.
         record
-            Recording interval [s]; the fastest sample time by default.
+            Recording interval [s]. Default: the fastest sample time.
         """
         base = np.array([float(value) for value in self.stimulus])
         signals = signals_of(type(self.stimulus))
@@ -100,11 +100,11 @@ class Start:
 
 
 def start_of(model: Model, par: ParameterSet) -> Start:
-    """Return the start of the runs of a model with some parameters.
+    """Return the start of a model's runs with some parameters.
 
-    It is the operating point of one of the model's loops, or the start of one of its experiments,
-    with the same choices if there is one; else the model's rest. A rest is often at an end stop,
-    where contacts just touch and little can be checked.
+    The start is an operating point of a loop of the model, or the start of an experiment, with the
+    same choices if possible. Otherwise it is the model's rest, which is often at an end stop, where
+    contacts just touch and few contracts can be checked.
     """
     known = list(_points(model, par)) or list(_cases(model, par))
     same = [each for each in known if each.par.choices() == par.choices()]
@@ -144,7 +144,7 @@ def _points(model: Model, par: ParameterSet) -> Iterator[Start]:
         if loop.assembly == model.name:
             try:
                 point = loop.point(par, loop.at.default)
-            except InputError:  # a loop of other choices
+            except InputError:  # a loop for other choices
                 continue
             if type(point.model) is type(model):
                 yield Start(
@@ -164,7 +164,11 @@ def _cases(model: Model, par: ParameterSet, module: str = "") -> Iterator[Start]
             continue
         try:
             cases = (experiment.preview or experiment.cases)(par, experiment.defaults, None)
-        except (InputError, AttributeError, TypeError):  # it needs other parameters, or a stimulus
+        except (
+            InputError,
+            AttributeError,
+            TypeError,
+        ):  # an experiment that needs other parameters, or a stimulus
             continue
         for case in cases:
             if type(case.model) is type(model):
@@ -270,7 +274,7 @@ class Drive:
     start
         Start of that run.
     rows
-        Difference of the memory from that of the start, at every sample time; shape (samples,
+        Difference of the memory from its value at the start, at every sample time, shape (samples,
         memories).
     """
 
@@ -285,7 +289,7 @@ class Drive:
         share
             Prescribed share of the memory's changes.
         step
-            Substep [s]; that of the start by default.
+            Substep [s]. Default: the start's.
         frictions
             Whether to include dry friction.
         """
@@ -310,7 +314,7 @@ class Drive:
 
 
 def drive_of(start: Start, share: float) -> Drive:
-    """Return the memory that the controllers write in a run from a start, see `Start.run`."""
+    """Return the memory that the controllers write in a run from a start; see `Start.run`."""
     run = start.run(share)
     probe = Run(
         Probe(start.model, held=False),
@@ -398,7 +402,7 @@ class Trial:
     def large_run(self, frictions: bool) -> Run:
         """Return a large run from the start, with states and memory recorded.
 
-        If a controller rounds, it is a run of the plant alone: the last digit of a signal may
+        If a controller rounds, the run contains only the plant: the last digit of a signal may
         change a code, and there are no derivatives.
         """
         if self.rounds:
@@ -407,7 +411,7 @@ class Trial:
         return replace(self.start.run(LARGE), model=probe)
 
     def place(self, *members: str) -> Place:
-        """Return the place of the first of some members of the model, else of its class."""
+        """Return the place of the model's first member among some names, otherwise of its class."""
         for member in members:
             function = vars(self.kind).get(member)
             if inspect.isfunction(function):
@@ -416,13 +420,13 @@ class Trial:
 
 
 def constants(run: Run) -> Iterator[tuple[str, float]]:
-    """Yield the numbers of a run that may vary within an ensemble: no tables or sample times."""
+    """Yield a run's numbers that may vary within an ensemble, without tables and sample times."""
     periods = [task.period for task in run.model.tasks(run.par)]
     for name, value in run.par.flat().items():
         if name in run.par.leaves():
             try:
                 moved = run.par.replace({name: float(np.nextafter(value, np.inf))})
-            except ParameterError:  # at the end of its range
+            except ParameterError:  # the number is at the end of its range
                 continue
             if [task.period for task in run.model.tasks(moved)] == periods:
                 yield name, float(value)

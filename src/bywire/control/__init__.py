@@ -1,1 +1,1 @@
-"""Control laws, one per file: sampled, pure, written against the values the ECU believes."""
+"""Control laws, one per file: sampled, pure, and based on the values that the ECU assumes."""

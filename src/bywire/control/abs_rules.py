@@ -15,8 +15,8 @@ from bywire.core.signals import Pressure, Signal
 BUILD, DUMP, HOLD, STEPPED = 0.0, 1.0, 2.0, 3.0
 PHASES = ("build", "dump", "hold", "stepped")
 """names of the phases 0 to 3"""
-_FAR = 0.5  # share of the pressure that remains if a wheel slips far in spite of a dump
-_LEAST = 0.05  # share of the pressure; from less, steps would build it up too slowly
+_FAR = 0.5  # share of the pressure that remains if a wheel slips far despite a dump
+_LEAST = 0.05  # smallest share of the pressure: from lower ones, steps would be too slow
 
 SampleTime = Annotated[float, Signal("s", "sample time", 1e-3), Gt(0)]
 Flag = Annotated[float, Signal("1", "flag")]
@@ -25,7 +25,7 @@ Speed = Annotated[float, Unit("m/s", 5.0), Field(gt=0, allow_inf_nan=False)]
 
 
 class Parameters(ParameterSet):
-    """Thresholds, times, and pressures relative to the last one that the road held.
+    """Thresholds, times, and pressures relative to the last pressure that the road could hold.
 
     Thresholds act on the slip ahead, which the wheel's deceleration predicts for ``t_lead``. A
     threshold is thus a line in the plane of slip and deceleration: a wheel that slows down quickly
@@ -33,7 +33,7 @@ class Parameters(ParameterSet):
     """
 
     slip_keep: Fraction
-    """slip ahead above which the first build-up is halted"""
+    """slip ahead above which the first build-up stops"""
     slip_dump: Fraction
     """slip ahead above which pressure is reduced"""
     slip_back: Fraction
@@ -41,21 +41,21 @@ class Parameters(ParameterSet):
     t_lead: TimeConstant
     """prediction time of the slip ahead"""
     a_hold: Annotated[float, Unit("m/s**2", 10.0), Field(ge=0, allow_inf_nan=False)]
-    """least recovery rate of a wheel, relative to constant slip, or pressure falls further"""
+    """recovery rate of a wheel, relative to constant slip, below which pressure falls further"""
     t_hold: Duration
-    """least time for which pressure is held"""
+    """shortest time for which pressure is held"""
     t_most: Duration
     """time after which pressure is built up again in any case"""
     dump: Annotated[float, Unit("1/s", 100.0), Field(gt=0, allow_inf_nan=False)]
     """rate at which pressure is reduced, relative to the pressure"""
     depth: Fraction
-    """pressure at the end of a dump, relative to the last one that the road held"""
+    """pressure at the end of a dump, relative to the last pressure that the road could hold"""
     back: Factor
-    """pressure at which the stepped build-up begins, relative to the same"""
+    """pressure at which the stepped build-up begins, relative to the same pressure"""
     t_step: Duration
     """time between two steps"""
     step: Fraction
-    """first step, relative to the same"""
+    """first step, relative to the same pressure"""
     growth: Factor
     """ratio of a step to the previous one: build-up accelerates while the wheel does not lock"""
     tau_a: TimeConstant
@@ -65,11 +65,11 @@ class Parameters(ParameterSet):
     v_off: Speed
     """speed below which the wheel may lock"""
     v_fall: Speed
-    """speed below which thresholds fall with speed, as far as sensors can follow"""
+    """speed below which thresholds fall with speed, because sensors lag"""
 
 
 class State(NamedTuple):
-    """Phase and when it began, demand, pressures, the next step, and the filtered deceleration."""
+    """Phase and its start, demand, pressures, the next step, and the filtered deceleration."""
 
     phase: Annotated[float, Signal("1", "phase of anti-lock control", 3.0)]
     since: Annotated[float, Signal("s", "time since the last phase or step began", 0.1)]
@@ -81,7 +81,7 @@ class State(NamedTuple):
 
 
 class Input(NamedTuple):
-    """State of wheel and vehicle, the demand now and a sample ago, and the last output."""
+    """State of wheel and vehicle, the demand of this and the last sample, and the last output."""
 
     v: Annotated[float, Signal("m/s", "vehicle speed", 20.0), Ge(0)]
     a: Annotated[float, Signal("m/s**2", "measured deceleration of the vehicle", 10.0)]
@@ -167,8 +167,9 @@ def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, O
     p_hat = x.p_hat + T / (par.tau_p + T) * (u.p_ref - x.p_hat)
     phase = ops.where(u.p_before <= 0, BUILD, next_phase(x.phase, seen(x, u, slowing, par)))
     begun = ops.where(ops.fabs(phase - x.phase) > 0.5, 1.0, 0.0)
-    # The road limit is estimated again when a dump begins or the first bite ends. If a dump was not
-    # sufficient, the estimate was wrong or the road has changed: it holds at most what remained.
+    # The law estimates the road's limit again when a dump begins or the first bite ends. If a dump
+    # was not sufficient, the estimate was wrong or the road has changed. The road then holds at
+    # most the remaining pressure.
     held = balanced(p_hat, slowing, u)
     far = ops.where(u.slip > par.slip_dump, _FAR, par.depth)
     again = ops.where(ops.fabs(x.phase - HOLD) < 0.5, ops.fmin(held, far * x.p_held), held)

@@ -54,8 +54,8 @@ def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, O
     .. math:: D = k_p (i_{ref} - i) + I, \quad
         I_{k+1} = I_k + T (k_i (i_{ref} - i) + (D_{sat} - D) / T_t)
 
-    D_sat is D within the smaller of the two limits, the ECU's own and the power stage's: the
-    integral part follows the realized duty cycle, not the demanded one.
+    D_sat is D within the smaller of the ECU's and the power stage's limit. The integral part
+    follows the realized duty cycle, not the demanded one.
     """
     error = u.i_ref - u.i_meas
     unlimited = par.k_p * error + x.integral

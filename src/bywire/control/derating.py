@@ -11,7 +11,7 @@ from annotated_types import Ge, Gt
 from pydantic import Field, model_validator
 
 from bywire.core import ops
-from bywire.core.parameters import ParameterSet
+from bywire.core.parameters import ParameterSet, RuleError
 from bywire.core.quantities import (
     HeatCapacity,
     HeatConductance,
@@ -29,7 +29,7 @@ Rise = Annotated[float, Signal("delta_degC", "rise above the air, estimated by t
 
 
 class Parameters(ParameterSet):
-    """Thermal model of the ECU, and the current limit that follows from it.
+    """The ECU's thermal model, and the resulting current limit.
 
     ``law``: ``"current"`` lowers the limit; ``"off"`` keeps it constant and computes nothing.
     """
@@ -49,7 +49,7 @@ class Parameters(ParameterSet):
     G_ha_hat: HeatConductance
     """conductance from housing to the air assumed by the ECU"""
     T_ref_hat: Temperature
-    """temperature at which R_hat holds"""
+    """temperature at which R_hat is valid"""
     T_a_hat: Temperature
     """temperature of the air assumed by the ECU"""
     T_derate: Temperature
@@ -57,14 +57,16 @@ class Parameters(ParameterSet):
     T_limit: Temperature
     """temperature at which the limit has fallen to i_least"""
     i_least: LeastCurrent
-    """least limit at any temperature"""
+    """lowest limit at any temperature"""
 
     @model_validator(mode="after")
     def _falls(self) -> Parameters:
         if not self.T_derate < self.T_limit:
-            raise ValueError(
-                f"T_derate = {shown(self.T_derate, 'K')} must be < T_limit = "
-                f"{shown(self.T_limit, 'K')}: between them the limit falls"
+            raise RuleError(
+                "T_derate",
+                shown(self.T_derate, "K"),
+                f"< T_limit = {shown(self.T_limit, 'K')}",
+                "the current limit falls between these temperatures",
             )
         return self
 

@@ -1,4 +1,4 @@
-"""Dither against stick-slip: a periodic current that overcomes the believed breakaway torque."""
+"""Dither against stick-slip: a periodic current that overcomes the assumed breakaway torque."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ class Parameters(ParameterSet):
     """Shape of the dither."""
 
     waveform: Literal["off", "sine", "square", "triangle"]
-    """waveform; the paper's sine has the least harmonic distortion"""
+    """waveform; the paper's sine has the lowest harmonic distortion"""
     f_dit: Frequency
     """frequency: above the pressure loop's band, inside the current loop's"""
     gain: Gain
-    """amplitude over the believed breakaway current"""
+    """amplitude over the assumed breakaway current"""
 
 
 class Believed(ParameterSet):
@@ -87,8 +87,8 @@ def output(
 ) -> tuple[State, Output]:
     r"""Advance the dither by one sample.
 
-    A phase that differs from the end of a period or half period by rounding only counts as that
-    end. A square wave then has equally many samples above and below zero.
+    A phase that differs from the end of a period or half period only by rounding counts as that
+    end. A square wave then has the same number of samples above and below zero.
 
     .. math:: i_{dit}(t) = A_{dit} \sin(2 \pi f_{dit} t), \quad A_{dit} = i_{brkf}
 

@@ -8,7 +8,7 @@ from pydantic import model_validator
 
 from bywire.control import pressure_pid
 from bywire.core import ops
-from bywire.core.parameters import ParameterSet
+from bywire.core.parameters import ParameterSet, RuleError
 from bywire.core.quantities import (
     CurrentPerPressure,
     CurrentPerPressureTime,
@@ -19,7 +19,7 @@ from bywire.core.signals import Signal
 
 
 class Gains(ParameterSet):
-    """Gains of one pressure region; filter and set-point weights are the PID's own everywhere."""
+    """Gains of a pressure region; filter and set-point weights are the PID's in all regions."""
 
     k_p: CurrentPerPressure
     """proportional gain in this region"""
@@ -30,26 +30,27 @@ class Gains(ParameterSet):
 
 
 class Parameters(ParameterSet):
-    """Regions of pressure; the gains of the medium region are those of the PID itself."""
+    """Regions of pressure; the medium region uses the PID's own gains."""
 
     law: Literal["off", "regions"]
     """whether the gains depend on the pressure"""
     p_1: Pressure
-    """border of low and medium pressure"""
+    """boundary between low and medium pressure"""
     p_2: Pressure
-    """border of medium and high pressure"""
+    """boundary between medium and high pressure"""
     p_blend: Pressure
-    """width of the blend around each border"""
+    """width of the blend around each boundary"""
     low: Gains
     high: Gains
 
     @model_validator(mode="after")
     def _blends_are_apart(self) -> Parameters:
         if not self.p_1 + self.p_blend <= self.p_2:
-            raise ValueError(
-                f"p_1 = {self.p_1:g} Pa and p_2 = {self.p_2:g} Pa must be at least p_blend = "
-                f"{self.p_blend:g} Pa apart, or the blends overlap: move a border, or "
-                "take a narrower blend"
+            raise RuleError(
+                "p_1",
+                f"{self.p_1:g} Pa",
+                f"<= p_2 - p_blend = {self.p_2 - self.p_blend:g} Pa",
+                "otherwise the blends overlap. Move a boundary, or use a narrower blend",
             )
         return self
 

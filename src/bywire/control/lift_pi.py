@@ -16,10 +16,10 @@ SampleTime = Annotated[float, Signal("s", "sample time", 1e-3), Gt(0)]
 
 
 class Parameters(ParameterSet):
-    """It acts before the wheel lifts: a lifted wheel would need an impractically low demand."""
+    """Gains of a law that acts before the wheel lifts; a lifted wheel needs a very low demand."""
 
     a_lim: Annotated[float, Unit("m/s**2", 10.0), Field(gt=0, allow_inf_nan=False)]
-    """limit of the deceleration; that of the flat body is g l_f/h"""
+    """limit of the deceleration; for a rigid body on a level road, g l_f/h"""
     k_p: Annotated[float, Unit("Pa*s**2/m", 1e5), Field(ge=0, allow_inf_nan=False)]
     """proportional gain"""
     T_i: Duration

@@ -18,8 +18,8 @@ SampleTime = Annotated[float, Signal("s", "sample time", 1e-3), Gt(0)]
 class Parameters(ParameterSet):
     """Filter between pressure and current controller, next to eq. (20) in the signal chain.
 
-    ``place`` says where the dither joins: ``"after-dither"`` filters demand and dither together
-    (the paper's wording), ``"before-dither"`` the demand alone.
+    ``place`` determines where the dither is added: ``"after-dither"`` filters demand plus dither
+    (the paper's wording), ``"before-dither"`` only the demand.
     """
 
     f_c: Frequency
@@ -27,7 +27,7 @@ class Parameters(ParameterSet):
     zeta: Factor
     """damping ratio; 1/sqrt(2) puts -3 dB at the cut-off"""
     place: Literal["after-dither", "before-dither"]
-    """whether the filter acts on demand and dither, or on the demand alone"""
+    """whether the filter acts on demand plus dither, or only on the demand"""
 
 
 class State(NamedTuple):
@@ -53,7 +53,7 @@ def output(
 
     .. math:: \frac{\omega_c^2}{s^2 + 2 \zeta \omega_c s + \omega_c^2}
 
-    by the trapezoidal rule with the cut-off prewarped, so that it stays at f_c; valid for
+    by the trapezoidal rule with a prewarped cut-off frequency, which keeps it at f_c; valid for
     f_c T < 0.5.
     """
     angle = math.pi * par.f_c * T

@@ -17,9 +17,9 @@ SampleTime = Annotated[float, Signal("s", "sample time", 1e-3), Gt(0)]
 class Parameters(ParameterSet):
     """Shares of slip and deceleration, and the deceleration that corresponds to the slip set point.
 
-    ``alpha`` 1 is slip alone, 0 deceleration alone. In between, the controller demands less slip if
-    the road holds more. Deceleration contains the rate of the slip, times speed over gravity:
-    it needs separate gains, but fixed ones suffice at every speed.
+    With ``alpha`` = 1 only slip counts, with 0 only deceleration. In between, the controller
+    demands less slip on a road with more adhesion. Deceleration contains the slip rate, times speed
+    over gravity. It needs separate gains, but fixed gains suffice at every speed.
     """
 
     alpha: Weight

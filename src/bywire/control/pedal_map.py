@@ -8,7 +8,7 @@ from typing import Annotated
 from pydantic import model_validator
 
 from bywire.core import ops
-from bywire.core.parameters import ParameterSet
+from bywire.core.parameters import ParameterSet, RuleError
 from bywire.core.quantities import Nodes, Unit
 from bywire.core.signals import Signal
 
@@ -25,11 +25,10 @@ class Parameters(ParameterSet):
     def _is_a_map(self) -> Parameters:
         V, p = self.V_nodes, self.p_nodes
         if len(V) != len(p) or len(V) < 2:
-            raise ValueError(
-                f"pedal_map needs V_nodes and p_nodes of one length >= 2, got {len(V)} and {len(p)}"
-            )
+            valid = f"of the same length as p_nodes, {len(p)} nodes, and at least 2"
+            raise RuleError("V_nodes", f"{len(V)} nodes", valid)
         if any(a >= b for a, b in pairwise(V)):
-            raise ValueError(f"pedal_map.V_nodes must increase, got {V}")
+            raise RuleError("V_nodes", str(V), "a table that increases")
         return self
 
 

@@ -18,7 +18,7 @@ SampleTime = Annotated[float, Signal("s", "sample time", 2e-4), Gt(0)]
 class Parameters(ParameterSet):
     """Second-order position loop, without integral part.
 
-    The brake uses a high bandwidth (60 Hz); a low one (12 Hz) stays within the current limit.
+    The brake uses a high bandwidth (60 Hz); a low bandwidth (12 Hz) stays within the current limit.
     """
 
     f_n: Frequency
@@ -26,9 +26,9 @@ class Parameters(ParameterSet):
     zeta: Factor
     """damping ratio"""
     c: Weight
-    """share of the reference's speed that is not damped; 0 damps the whole speed"""
+    """share of the reference's speed that is exempt from damping; 0 damps the whole speed"""
     f_speed: Frequency
-    """corner of the filter of the encoder's differences"""
+    """corner frequency of the filter for the encoder's differences"""
     i_max: Current
     """limit of the current demand's magnitude"""
     J_hat: Inertia
@@ -65,7 +65,7 @@ def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, O
         i = \frac{J}{K_T} \left(\omega_n^2 (\theta_{ref} - \theta)
         + 2 \zeta \omega_n (c\, \omega_{ref} - \hat\omega)\right)
 
-    with the speed from differences of the encoder after a first-order filter.
+    with the speed from the encoder's differences after a first-order filter.
 
     References
     ----------

@@ -36,7 +36,7 @@ class Parameters(ParameterSet):
     b: Weight
     """set-point weight of the proportional part"""
     c: Weight
-    """set-point weight of the derivative part; 0 acts on the measurement alone"""
+    """set-point weight of the derivative part; with 0 it acts only on the measurement"""
     T_t: Duration
     """tracking time of the anti-wind-up"""
     i_max: Current
@@ -71,7 +71,7 @@ def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, O
         D_k = \frac{\tau_d D_{k-1} + k_d (d_k - d_{k-1})}{\tau_d + T}, \quad d = c r - p
 
     The integral follows the difference between the limited and the unlimited demand with the time
-    constant T_t, so that it cannot wind up.
+    constant T_t, so it cannot wind up.
     """
     signal = par.c * u.p_ref - u.p_meas
     slope = (par.tau_d * x.slope + par.k_d * (signal - x.last)) / (par.tau_d + T)
@@ -99,13 +99,13 @@ def transferred(
 
     .. math:: I \leftarrow I + (k_p^{old} - k_p) (b r - p)
 
-    The demand at this input then equals that of the old gains. Integral and derivative part are
-    currents, which new k_i and k_d do not change.
+    The demand at this input then equals the demand with the old gains. Integral and derivative part
+    are currents, which new k_i and k_d do not change.
 
     Notes
     -----
     With a pressure-dependent k_p, the demand contains the integral of k_p over the error. At an
-    equilibrium, the loop's linear model is exactly that with the gains frozen there.
+    equilibrium, the loop's linear model equals that of fixed gains at the equilibrium's pressure.
 
     References
     ----------

@@ -36,7 +36,7 @@ class Parameters(ParameterSet):
     eager: Gain
     """additional integral gain without slip, as a factor; it falls to zero at the set slip"""
     v_off: Annotated[float, Unit("m/s", 2.0), Field(gt=0, allow_inf_nan=False)]
-    """least speed to which slip is relative: below it, control fades out and the wheel may lock"""
+    """lowest reference speed of slip: below it, control fades out and the wheel may lock"""
     v_fall: Annotated[float, Unit("m/s", 5.0), Field(gt=0, allow_inf_nan=False)]
     """speed below which the slip set point falls with speed, because sensors lag"""
     v_fixed: Annotated[float, Unit("m/s", 15.0), Field(gt=0, allow_inf_nan=False)]
@@ -112,8 +112,8 @@ def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, O
     unlimited = K_p * error + x.integral
     p = ops.clip(unlimited, 0.0, ops.fmax(u.p_most, 0.0))
     short = ops.fmax(error, 0.0) / ops.fmax(u.slip_set, _NO_SLIP)
-    # While a demand builds up, slip control is not the cause of missing pressure. Below v_fall the
-    # edges of the wheel are so late that slip seems too small: no faster integral then.
+    # While a demand builds up, slip control is not the cause of missing pressure. Below v_fall, the
+    # sensor's edges arrive so late that slip seems too small, so the integral must not be faster.
     calm = ops.where(u.p_most < u.p_rider, 1.0, ops.where(u.v < par.v_fall, 1.0, 0.0))
     haste = 1.0 + par.eager * (1.0 - calm) * short
     growth = K_p / par.T_i * haste * error + (p - unlimited) / par.T_t

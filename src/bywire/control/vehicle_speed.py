@@ -1,4 +1,4 @@
-"""Speed of the vehicle from its wheels while they slip."""
+"""Vehicle speed from the wheels while they slip."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Parameters(ParameterSet):
     tau: Duration
     """time constant with which the reference returns to a reliable wheel"""
     v_still: Annotated[float, Unit("m/s", 1.0), Field(gt=0, allow_inf_nan=False)]
-    """speed below which every wheel is reliable; otherwise an error would remain at standstill"""
+    """speed below which every wheel counts as reliable, which removes errors at standstill"""
 
 
 class State(NamedTuple):

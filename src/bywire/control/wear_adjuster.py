@@ -1,6 +1,6 @@
-"""Adjuster of a brake's clearance: it measures the travel of the pads, and turns by whole teeth.
+"""Adjuster of a brake's clearance, which measures the pads' travel and turns by whole teeth.
 
-It acts only while the brake is parked. Its faults are parameters of the turning. Teeth are
+It acts only while the brake is parked. Its faults are parameters that affect the turning. Teeth are
 positive if they reduce the clearance.
 """
 
@@ -17,7 +17,7 @@ from bywire.core.signals import Signal
 
 WAITS, APPLIED, TURNS = 0.0, 1.0, 2.0
 
-_WHOLE = 1e-9  # of a tooth: rounding error of a whole tooth
+_WHOLE = 1e-9  # share of a tooth: rounding error of a whole tooth
 Flag = Annotated[float, Signal("1", "flag")]
 Teeth = Annotated[float, Signal("1", "teeth")]
 
@@ -34,21 +34,21 @@ class Parameters(ParameterSet):
     """
 
     gap_nominal: Length
-    """clearance that it restores"""
+    """clearance that the adjuster restores"""
     band: Length
-    """excess of the clearance that it tolerates"""
+    """tolerated excess of the clearance"""
     gap_min: Length
-    """clearance of the cold brake below which it never turns; a hot disc reduces it"""
+    """clearance of the cold brake below which the adjuster never turns; a hot disc reduces it"""
     tooth: Length
     """clearance removed by a tooth"""
     applications: Annotated[float, Unit("1", 3.0), Field(ge=1, allow_inf_nan=False)]
-    """number of consecutive applications with the same deviation before it turns"""
+    """number of consecutive applications with the same deviation before the adjuster turns"""
     growth: Annotated[float, Unit("m/K", 3e-7), Field(ge=0, allow_inf_nan=False)]
     """clearance lost per kelvin of the disc"""
     T_cold: Annotated[float, Unit("K", 300.0), Field(gt=0, allow_inf_nan=False)]
     """temperature of a cold disc"""
     ways: Literal["closing", "both"]
-    """directions in which it turns"""
+    """directions in which the adjuster turns"""
     fault: Literal["none", "stuck", "one-way", "slips", "over-adjusts", "blind-to-heat"]
     """fault"""
 
@@ -91,8 +91,8 @@ def cold_gap(u: Input, par: Parameters) -> Annotated[float, Signal("m", "clearan
 def due(gap: Annotated[float, Signal("m", "clearance when cold", 2e-4)], par: Parameters) -> Teeth:
     """Return the teeth that restore a clearance, not below the nominal or the least clearance.
 
-    Below the least clearance, it is the smallest sufficient number if the direction is allowed,
-    else zero.
+    Below the least clearance, the result is the smallest sufficient number if the direction is
+    allowed, otherwise zero.
     """
     spare = gap - ops.fmax(par.gap_nominal, par.gap_min)
     closing = ops.fmax(ops.floor(spare / par.tooth + _WHOLE), 0.0)
@@ -107,7 +107,7 @@ def turned(teeth: Teeth, before: Teeth, par: Parameters) -> Teeth:
         return 0.0 * teeth
     if par.fault == "one-way":
         return ops.fmax(teeth, 0.0)
-    if par.fault == "slips":  # of all intended teeth, the odd ones hold
+    if par.fault == "slips":  # only the odd ones of the intended teeth have an effect
         return ops.floor(0.5 * (before + teeth + 1.0)) - ops.floor(0.5 * (before + 1.0))
     if par.fault == "over-adjusts":
         return teeth + ops.where(teeth > 0, 1.0, 0.0)
@@ -117,8 +117,8 @@ def turned(teeth: Teeth, before: Teeth, par: Parameters) -> Teeth:
 def output(x: State, u: Input, par: Parameters) -> tuple[State, Output]:
     """Advance the adjuster by one sample.
 
-    An application is one in which the pads touched the disc. It counts once, when the brake is
-    parked after it without a demand.
+    An application counts if the pads have touched the disc. It counts once, when the brake is
+    parked without a demand afterward.
     """
     rests = ops.where(u.parked > 0.5, ops.where(u.wanted > 0.5, 0.0, 1.0), 0.0)
     finished = rests * x.applied

@@ -46,7 +46,7 @@ class Input(NamedTuple):
 
 
 def output(x: State, u: Input, T: SampleTime, par: Parameters) -> State:
-    """Advance the measurement by one sample; the speed is that of the state."""
+    """Advance the measurement by one sample; the state contains the speed."""
     turned = u.angle - x.angle
     if par.law == "difference":
         return State(u.angle, u.age, turned / T)

@@ -1,4 +1,4 @@
-"""Argument checks of public functions against their annotations, with one clear error each."""
+"""Argument checks of public functions against their annotations, with one clear error."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _LINES.maxstring = _LINES.maxother = 60  # characters of a value in a message
 
 
 def checked(function: F) -> F:
-    """Make a function, or a data class, reject arguments whose type its signature does not allow.
+    """Make a function or data class reject arguments whose type its signature does not allow.
 
     Examples
     --------
@@ -41,11 +41,11 @@ def checked(function: F) -> F:
         return function
 
     @wraps(function)
-    def asked(*args: Any, **kwargs: Any) -> Any:
+    def checking(*args: Any, **kwargs: Any) -> Any:
         require_kinds(function, args, kwargs)
         return function(*args, **kwargs)
 
-    return asked  # type: ignore[return-value]
+    return checking  # type: ignore[return-value]
 
 
 def require_kinds(
@@ -81,8 +81,9 @@ def require_kinds(
         kinds = expected.get(name)
         if kinds and not any(fits(value) for _, fits in kinds):
             valid = " or ".join(dict.fromkeys(text for text, _ in kinds if text))
-            shown = _LINES.repr(value)  # as Python writes it, not as a file does
-            raise ParameterError(f"{name} = {shown} must be {valid}")
+            shown = _LINES.repr(value)  # in Python's notation, not in TOML's
+            text = f"{name} = {shown} must be {valid}"
+            raise ParameterError(text, name=name, value=shown, valid=valid)
 
 
 def whole_number(name: str, value: object, least: int, most: int) -> int:
@@ -100,7 +101,7 @@ def whole_number(name: str, value: object, least: int, most: int) -> int:
     Raises
     ------
     ParameterError
-        When the value is not a whole number of the range.
+        When the value is not a whole number within the range.
     """
     if not _is_whole(value) or not least <= operator.index(value) <= most:  # type: ignore[arg-type]
         raise ParameterError(
@@ -117,7 +118,7 @@ _Kind = tuple[str, Callable[[Any], bool]]
 
 @cache
 def _signature(function: Callable[..., Any]) -> tuple[list[str], dict[str, list[_Kind]]]:
-    """Return the names of positional arguments, and the kinds of each that can be checked."""
+    """Return the names of positional arguments, and each argument's checkable kinds."""
     parameters = inspect.signature(function).parameters
     positional = [
         p.name
@@ -138,7 +139,7 @@ def _signature(function: Callable[..., Any]) -> tuple[list[str], dict[str, list[
 
 
 def _parts(annotation: str) -> list[str]:
-    """Split an annotation at the bars that are outside of brackets.
+    """Split an annotation at the bars outside brackets.
 
     Examples
     --------
@@ -156,7 +157,7 @@ def _parts(annotation: str) -> list[str]:
 
 
 def _kind(part: str, known: Mapping[str, Any]) -> _Kind | None:
-    """Return the words and the test for a part of an annotation; None where any value is valid.
+    """Return the description and the test for a part of an annotation; None if any value is valid.
 
     Parameters
     ----------
@@ -169,7 +170,7 @@ def _kind(part: str, known: Mapping[str, Any]) -> _Kind | None:
     if name in _KINDS:
         return _KINDS[name]
     meant = known.get(name)
-    if meant is None:  # its module loads that library when it is called
+    if meant is None:  # the module imports that library only when the function is called
         meant = getattr(sys.modules.get("bywire"), name, None)
     if meant is None and name.startswith("xr."):
         meant = getattr(import_module("xarray"), name[3:], None)
@@ -192,7 +193,7 @@ def _is_whole(value: object) -> bool:
 
 
 def _is_truth_value(value: object) -> bool:
-    numpy = sys.modules.get("numpy")  # unless it is loaded, no value is of its type
+    numpy = sys.modules.get("numpy")  # no value has NumPy's type unless NumPy is loaded
     return isinstance(value, bool if numpy is None else (bool, numpy.bool_))
 
 

@@ -1,10 +1,10 @@
 """Models made of parts and wires, whose equations follow from their elements.
 
-An assembly names its elements and assigns their inputs, once and in the order of the physics.
-States, masses, balances, contacts, stored energies, plain losses and recorded signals follow from
-the elements. Connections are causal on purpose: acausal ones need index reduction, and
-that does not fit the diagonal mass form of ``core.model``. Models of that form can be written
-without assemblies.
+An assembly declares its elements and assigns each input once, in the order of the physics. States,
+masses, balances, contacts, stored energies, plain losses and recorded signals follow from the
+elements. Connections are causal on purpose: acausal connections need index reduction, which does
+not fit the diagonal mass form of ``core.model``. Models in that form can also be written without
+assemblies.
 """
 
 from __future__ import annotations
@@ -25,18 +25,18 @@ from bywire.core.wires import Instant, Integral, Port, Shown, Wire, Wired, insta
 AnyPart = Part[Any, Any, Any, Any]
 
 _STORED = Signal("J", "stored energy", role=Role("sink", "stored", returns="any"))
-"""what every assembly can record as ``E_stored``"""
+"""signal that every assembly can record as ``E_stored``"""
 ParT = TypeVar("ParT")
 MemoryT = TypeVar("MemoryT")
 
 _NAN = float("nan")
 
 
-# --- An assembly at an instant: the values that its equations read, and the wiring of subassemblies
+# --- Assembly at an instant: values that its equations read, and wiring of subassemblies
 
 
 class Evaluated(Generic[ParT, MemoryT]):
-    """An assembly as it is evaluated at an instant, alone or within another one."""
+    """An assembly evaluated at an instant, on its own or within another assembly."""
 
     shared: ClassVar[tuple[str, ...]]
     subs: ClassVar[dict[str, Sub[Any]]]
@@ -54,7 +54,7 @@ class Evaluated(Generic[ParT, MemoryT]):
 
     @property
     def xe(self) -> Any:
-        """State, value-only."""
+        """State as a value only."""
         return instant_of(self, "xe").xe
 
     @property
@@ -69,7 +69,7 @@ class Evaluated(Generic[ParT, MemoryT]):
 
     @property
     def reaction(self) -> tuple[float, ...]:
-        """Forces of its own frictions, then of its limits; in ``power`` and ``record``."""
+        """Forces of the assembly's frictions, then of its limits; in ``power`` and ``record``."""
         every = instant_of(self, "reaction").reaction
         return tuple(every[k] for k in self.reaction_places[""]) if every and self.subs else every
 
@@ -96,9 +96,9 @@ class Evaluated(Generic[ParT, MemoryT]):
         Parameters
         ----------
         contact
-            Contact forces; unknown by default.
+            Contact forces. Default: unknown.
         more
-            Further fields of `Instant`: ``xe`` where it is not the state, for instance.
+            Other fields of `Instant`, such as ``xe`` if it differs from the state.
         """
         here = vars(self).get("_instant")
         if here is not None and here.is_held:
@@ -109,11 +109,12 @@ class Evaluated(Generic[ParT, MemoryT]):
         return w
 
     def _as_held(self, here: Instant, state: Any) -> Self:
-        """Return itself at the instant where its holder is evaluated, wired."""
+        """Return the wired assembly at its holder's instant."""
         if state is not here.x:
             raise ModelError(
                 f"{type(self).__name__} is evaluated at a state other than its holder's: within an "
-                "assembly its equations hold at that instant alone"
+                "assembly its equations are valid only at that instant",
+                name=type(self).__name__,
             )
         here.settle()
         return self
@@ -121,7 +122,7 @@ class Evaluated(Generic[ParT, MemoryT]):
     def held_at(
         self, x: Any, memory: Any, par: Any, contact: tuple[float, ...] | None, **more: Any
     ) -> Self:
-        """Return the assembly at its holder's instant; it is wired when it is first read."""
+        """Return the assembly at its holder's instant; the first read wires it."""
         w = self._unwired(x, memory, par, contact, is_held=True, **more)
 
         def wire() -> None:
@@ -138,7 +139,7 @@ class Evaluated(Generic[ParT, MemoryT]):
         left = iter(contact) if contact is not None else repeat(_NAN)
         for part in _contacts(type(self)):
             count = sum(part.group_sizes(par))
-            unknown = (_NAN,) * len(part.element.Forces._fields)  # where a choice leaves them out
+            unknown = (_NAN,) * len(part.element.Forces._fields)  # if a choice omits them
             each[part.name] = tuple(islice(left, count)) or unknown
         for name, sub in self.subs.items():
             count = contact_count(sub.assembly, sub.parameters(par))
@@ -152,7 +153,7 @@ class Evaluated(Generic[ParT, MemoryT]):
 
 @cache
 def _at_an_instant(cls: type[Any]) -> type[Any]:
-    """Return the object for an assembly at an instant; only its wires can be set."""
+    """Return the class of an assembly at an instant, which allows setting only wires."""
     kinds = (Part, Wire, Integral, Shown, Sub)
     every = {k: v for base in cls.__mro__ for k, v in vars(base).items()}
     known = frozenset(name for name, value in every.items() if isinstance(value, kinds))
@@ -160,7 +161,7 @@ def _at_an_instant(cls: type[Any]) -> type[Any]:
     def refuse(self: Any, name: str) -> Any:
         there = known | {n for n, v in vars(Evaluated).items() if isinstance(v, property)}
         error = unknown_name("part or wire", name, there)
-        raise ModelError(f"{cls.__name__}: {line()} names an {error}")
+        raise error.at(f"{cls.__name__}: {line().rstrip(',')}", ModelError)
 
     def assign(self: Any, name: str, value: Any) -> None:
         if name not in known:
@@ -174,7 +175,7 @@ def _at_an_instant(cls: type[Any]) -> type[Any]:
 
 
 def _settled(w: Any) -> None:
-    """Wire subassemblies that were not read yet, and set unset ports to their defaults."""
+    """Wire subassemblies that nothing has read yet, and set unset ports to their defaults."""
     cls: Any = type(w)
     for name in cls.subs:
         instant_of(getattr(w, name), name).settle()
@@ -191,9 +192,9 @@ class Assembly(Evaluated[ParT, MemoryT], Watching, Generic[ParT, MemoryT]):
     """A model made of parts; see ``docs/modeling.md``.
 
     A subclass declares `Part`, `Wire`, `Integral`, `Shown` and `Sub` objects, ``Memory``,
-    ``Stimulus`` and ``records``, and defines ``wire``, ``tasks``, and where needed
-    ``friction``, ``power`` and ``record``. Where a mode replaces an equation it overrides ``mass``
-    or ``balance``.
+    ``Stimulus`` and ``records``. It defines ``wire``, ``tasks`` and, if needed, ``friction``,
+    ``power`` and ``record``. If a mode replaces an equation, it overrides ``mass`` or
+    ``balance``.
     """
 
     State: ClassVar[Any]
@@ -202,28 +203,30 @@ class Assembly(Evaluated[ParT, MemoryT], Watching, Generic[ParT, MemoryT]):
     Memory: ClassVar[Any]
     Stimulus: ClassVar[Any]
     records: ClassVar[tuple[str, ...]] = ()
-    """names of the recorded signals, in order; all by default"""
+    """names of the recorded signals, in order; default: all"""
     shared: ClassVar[tuple[str, ...]] = ()
-    """groups of parameters that several elements take by name, such as a fluid"""
+    """parameter groups that elements receive as arguments by name, such as a fluid"""
     parts: ClassVar[dict[str, AnyPart]]
     subs: ClassVar[dict[str, Sub[Any]]]
-    """the assemblies within"""
+    """subassemblies"""
     ports: ClassVar[tuple[Port, ...]]
-    """wires that the holder of this assembly sets"""
+    """wires that this assembly's holder sets"""
     reaction_places: ClassVar[dict[str, tuple[int, ...]]]
-    """places of each subassembly's reactions; its own are under an empty name"""
+    """places of each subassembly's reactions; the assembly's own places have an empty name"""
 
     def __init_subclass__(cls, *, at_an_instant: bool = False, **options: Any) -> None:
         """Derive signals and equations from the parts."""
         super().__init_subclass__(**options)
         holds = any(isinstance(each, Sub) for base in cls.__mro__ for each in vars(base).values())
-        if not at_an_instant and (isinstance(cls.Memory, type) or holds):  # else more is to come
+        if not at_an_instant and (
+            isinstance(cls.Memory, type) or holds
+        ):  # otherwise it is an abstract base class
             _gather(cls)
 
     # Defined by a subclass.
 
     def friction(self, w: Self) -> tuple[Bounds, ...]:
-        """Return (low, high) of each friction, as ``bounds`` of the protocol."""
+        """Return (low, high) of each friction, like the protocol's ``bounds``."""
         return ()
 
     def power(self, w: Self) -> Mapping[str, float]:
@@ -231,13 +234,13 @@ class Assembly(Evaluated[ParT, MemoryT], Watching, Generic[ParT, MemoryT]):
         return {}
 
     def record(self, w: Self) -> Mapping[str, float]:
-        """Return recorded signals that no part defines, or that replace those of a part."""
+        """Return recorded signals that no part defines, or that replace a part's signals."""
         return {}
 
     # Derived from the parts.
 
     def mass(self, xe: Any, par: ParT) -> Any:
-        """Return the factor of each state's derivative."""
+        """Return the factors of the states' derivatives."""
         w = self.at(xe, self._nothing(), par)
         rows: list[float] = []
         for part in _stores(type(self)):
@@ -292,7 +295,7 @@ class Assembly(Evaluated[ParT, MemoryT], Watching, Generic[ParT, MemoryT]):
         return tuple(groups)
 
     def gap(self, x: Any, xe: Any, par: ParT) -> tuple[tuple[float, ...], ...]:
-        """Return the damped overlaps, group by group."""
+        """Return the damped overlaps by group."""
         w = self.at(x, self._nothing(), par, xe=xe)
         groups: list[tuple[float, ...]] = []
         for part in _contacts(type(self)):
@@ -308,7 +311,7 @@ class Assembly(Evaluated[ParT, MemoryT], Watching, Generic[ParT, MemoryT]):
 
     @property
     def usually_open(self) -> tuple[bool, ...]:
-        """Per contact group, whether it rarely touches."""
+        """Whether each contact group rarely touches."""
         own = tuple(
             part.rarely
             for part in _contacts(type(self))
@@ -372,7 +375,7 @@ class Assembly(Evaluated[ParT, MemoryT], Watching, Generic[ParT, MemoryT]):
         return _filled(self, "record", self.Output, values)
 
     def stored(self, w: Self) -> Any:
-        """Return the energy that the parts store at an instant [J], without that of contacts."""
+        """Return the parts' stored energy at an instant [J], without contacts."""
         sums: list[Any] = []
         for wanted in (False, True):
             values = [
@@ -400,12 +403,12 @@ class Assembly(Evaluated[ParT, MemoryT], Watching, Generic[ParT, MemoryT]):
     def state(cls, **parts: NamedTuple) -> Any:
         """Return a State from the states of parts and subassemblies, by their names.
 
-        Missing ones are zero.
+        Missing states are zero.
 
         Raises
         ------
         ModelError
-            When there is no such part, or the state is another element's.
+            When there is no such part, or the state belongs to another element.
         """
         given = (0.0, *chain.from_iterable(parts.values()))
         kinds = tuple((name, type(each)) for name, each in parts.items())
@@ -413,26 +416,26 @@ class Assembly(Evaluated[ParT, MemoryT], Watching, Generic[ParT, MemoryT]):
 
     @classmethod
     def memory(cls, own: NamedTuple | None = None, **subs: NamedTuple) -> Any:
-        """Return a Memory from its own fields and the memories of subassemblies.
+        """Return a Memory from the assembly's own fields and the memories of subassemblies.
 
-        Missing ones are zero.
+        Missing fields are zero.
 
         Raises
         ------
         ModelError
-            When no such assembly is within.
+            When there is no such subassembly.
         """
         values = {} if own is None else own._asdict()
         for name, given in subs.items():
             if name not in cls.subs:
-                raise ModelError(f"{cls.__name__}: {unknown_name('assembly', name, cls.subs)}")
+                raise unknown_name("assembly", name, cls.subs).at(cls.__name__, ModelError)
             values |= cls.subs[name].outside("Memory", given)
         return zeros(cls.Memory)._replace(**values)
 
     @classmethod
-    @cache  # studies begin thousands of runs a second
+    @cache  # studies start thousands of runs per second
     def _sources(cls, kinds: tuple[tuple[str, type], ...]) -> tuple[int, ...]:
-        """Return the index of each State entry in the sequence of zero and the parts' states."""
+        """Return each State entry's index in the sequence of zero and the parts' states."""
         sources, place = [0] * len(cls.State._fields), 0
         for name, kind in kinds:
             for there in cls._places(name, kind):
@@ -446,23 +449,31 @@ class Assembly(Evaluated[ParT, MemoryT], Watching, Generic[ParT, MemoryT]):
         if name in cls.subs:
             sub = cls.subs[name]
             if not issubclass(kind, sub.assembly.State):
-                raise ModelError(f"{sub.where}: {kind.__name__} is not a state of {sub.label}")
+                raise ModelError(
+                    f"{sub.where}: {kind.__name__} is not a state of {sub.label}",
+                    name=sub.where,
+                    value=kind.__name__,
+                )
             return tuple(fields.index(each) for each in sub.signals("State"))
         part = cls.parts.get(name)
         if part is None:
             there = {**cls.parts, **cls.subs}
-            raise ModelError(f"{cls.__name__}: {unknown_name('part', name, there)}")
+            raise unknown_name("part", name, there).at(cls.__name__, ModelError)
         if not part.has("State") or not issubclass(kind, part.element.State):
-            raise ModelError(f"{part.where}: {kind.__name__} is not a state of {part.kind}")
+            raise ModelError(
+                f"{part.where}: {kind.__name__} is not a state of {part.kind}",
+                name=part.where,
+                value=kind.__name__,
+            )
         return tuple(fields.index(part.state_name(each)) for each in part.element.State._fields)
 
     def _nothing(self) -> Any:
-        """Return a memory of NaN, for evaluations that must not depend on it."""
+        """Return a memory of NaN, for evaluations that must not depend on the memory."""
         return self.Memory._make(_NAN for _ in self.Memory._fields)
 
 
 def _part_values(w: Assembly[Any, Any], wanted: tuple[str, ...]) -> Iterator[tuple[str, Any]]:
-    """Yield the recorded outputs of all parts, and the losses of contacts."""
+    """Yield all parts' recorded outputs, and the contacts' losses."""
     for part in w.parts.values():
         for name, there in part.output.items():
             if there in wanted:
@@ -483,7 +494,7 @@ def _row(value: Any) -> tuple[Any, ...]:
 
 
 def _held(w: Any) -> Iterator[tuple[Sub[Any], Any, Instant]]:
-    """Yield each subassembly at an instant: its declaration, itself there, and its instant."""
+    """Yield each subassembly's declaration, the assembly at the instant, and its instant."""
     for name, sub in w.subs.items():
         inner = getattr(w, name)
         yield sub, inner, instant_of(inner, name)
@@ -501,25 +512,27 @@ def _known(
     """
     for name in values:
         if name not in names:
-            raise ModelError(
-                f"{type(model).__name__}.{method}: {unknown_name('signal', name, names)}"
+            raise unknown_name("signal", name, names).at(
+                f"{type(model).__name__}.{method}", ModelError
             )
     return dict(values)
 
 
 def _filled(model: Any, method: str, kind: Any, values: Mapping[str, Any]) -> Any:
-    """Return a signal tuple from the values of a method and of the parts.
+    """Return a signal tuple from a method's values and the parts' values.
 
     Raises
     ------
     ModelError
-        When neither has a field.
+        When a field has no value.
     """
     for name in kind._fields:
         if name not in values:
             raise ModelError(
                 f"{type(model).__name__}.{method} does not return {name!r}, and no part has it: "
-                f"add it to what {method} returns"
+                f"add it to the return value of {method}",
+                name=f"{type(model).__name__}.{method}",
+                value=name,
             )
     return kind(**{name: values[name] for name in kind._fields})
 
@@ -528,7 +541,7 @@ def _filled(model: Any, method: str, kind: Any, values: Mapping[str, Any]) -> An
 
 
 def _gather(cls: type[Any]) -> None:
-    """Derive State, Flow and Output of an assembly from its declarations."""
+    """Derive an assembly's State, Flow and Output from its declarations."""
     declared = {k: v for base in reversed(cls.__mro__) for k, v in vars(base).items()}
     cls.parts = {k: v for k, v in declared.items() if isinstance(v, Part)}
     cls.subs = {k: v for k, v in declared.items() if isinstance(v, Sub)}
@@ -538,15 +551,24 @@ def _gather(cls: type[Any]) -> None:
         if part.has("balance") and not part.has("mass"):
             raise ModelError(
                 f"{part.where}: {part.kind} has states and a balance, but no mass: define mass "
-                "there, or name the function rate where it returns derivatives"
+                "there, or rename the function to rate if it returns derivatives",
+                name=part.where,
+                valid="mass",
             )
         if not (part.has("balance") or part.has("rate")):
-            raise ModelError(f"{part.where}: {part.kind} has states, but no balance and no rate")
+            raise ModelError(
+                f"{part.where}: {part.kind} has states, but no balance and no rate",
+                name=part.where,
+                valid="balance",
+            )
         for name, signal in part.states().items():
             if name in states:
                 raise ModelError(
-                    f"{part.where}: another part has a state {name!r} too: give this one a suffix "
-                    "or another name, Part(..., suffix='_2') or Part(..., state={...})"
+                    f"{part.where}: another part has a state {name!r} too: add a suffix or another "
+                    "name, Part(..., suffix='_2') or Part(..., state={...})",
+                    name=part.where,
+                    value=name,
+                    valid="Part(..., suffix='_2') or Part(..., state={...})",
                 )
             states[name] = signal
     flows: dict[str, Signal] = {}
@@ -566,8 +588,10 @@ def _gather(cls: type[Any]) -> None:
     for name in signals_of(cls.Memory):
         if name in states or name in flows or name in shown:
             raise ModelError(
-                f"{cls.__name__}.Memory has a field {name!r}, and so has the recording from a part "
-                "or a wire: it would show the one in place of the other; rename the field"
+                f"{cls.__name__}.Memory has a field {name!r}, but a part or a wire already records "
+                "a signal of that name: rename the field",
+                name=f"{cls.__name__}.Memory",
+                value=name,
             )
     if _derives(declared.get("Output")):
         known = signals_of(cls.State) | signals_of(cls.Memory) | signals_of(cls.Flow)
@@ -575,14 +599,15 @@ def _gather(cls: type[Any]) -> None:
         names = cls.records or tuple(known)
         for name in names:
             if name not in known:
-                raise ModelError(f"{cls.__name__}.records: {unknown_name('signal', name, known)}")
+                error = unknown_name("signal", name, known)
+                raise error.at(f"{cls.__name__}.records", ModelError)
         cls.Output = _named_tuple(cls, "Output", {name: known[name] for name in names})
 
 
 def _take_over(
     cls: type[Any], states: dict[str, Signal], flows: dict[str, Signal], shown: dict[str, Signal]
 ) -> None:
-    """Add signals, frictions and limits of the subassemblies, by their names in the holder."""
+    """Add the subassemblies' signals, frictions and limits, by their names in the holder."""
     own = {kind: getattr(cls, kind, None) for kind in ("Memory", "Stimulus")}
     own = {kind: getattr(each, "own", each) for kind, each in own.items()}
     own = {kind: each if isinstance(each, type) else _Nothing for kind, each in own.items()}
@@ -597,10 +622,12 @@ def _take_over(
             for name in new:
                 if name in taken:
                     raise ModelError(
-                        f"{sub.where}: there is a signal {name!r} already: give it another prefix"
+                        f"{sub.where}: there is already a signal {name!r}: use another prefix",
+                        name=sub.where,
+                        value=name,
                     )
             known[kind].update(new)
-            there |= set(new) if kind in _RECORDED else set()  # what it records of these, once
+            there |= set(new) if kind in _RECORDED else set()  # recorded once
     if cls.subs:
         for kind, each in own.items():
             joined = _named_tuple(cls, kind, known[kind])
@@ -611,7 +638,7 @@ def _take_over(
                 fields = {**known["Memory"], **known["Stimulus"]}
                 if source not in fields:
                     error = unknown_name("signal", source, fields)
-                    raise ModelError(f"{sub.where}: {name} is fed by an {error}")
+                    raise error.at(f"{sub.where}: source of {name}", ModelError)
     _number_reactions(cls)
 
 
@@ -624,7 +651,7 @@ class _Nothing(NamedTuple):
 
 
 def _number_reactions(cls: type[Any]) -> None:
-    """Append the frictions and limits of the subassemblies, and store their places."""
+    """Append the subassemblies' frictions and limits, and store their places."""
     inner = {
         name: [tuple(map(sub.named, _names(type(sub.assembly), kind))) for kind in _REACTING]
         for name, sub in cls.subs.items()
@@ -642,13 +669,13 @@ def _number_reactions(cls: type[Any]) -> None:
 
 
 def _names(cls: type[Any], kind: str) -> tuple[str, ...]:
-    """Return the names of frictions or limits that a class declares; none by default."""
+    """Return the names of the frictions or limits that a class declares. Default: none."""
     names = getattr(cls, kind)
     return names if isinstance(names, tuple) else ()
 
 
 def _derives(kind: Any) -> bool:
-    """Return whether a signal tuple is derived from the parts, as the class declares none."""
+    """Return whether a signal tuple follows from the parts, since the class does not declare it."""
     return not isinstance(kind, type) or hasattr(kind, "derived")
 
 
@@ -663,17 +690,17 @@ def _named_tuple(owner: type, kind: str, signals: Mapping[str, Signal]) -> Any:
 
 
 def _stores(cls: type[Any]) -> Iterator[AnyPart]:
-    """Yield the parts of an assembly that have states."""
+    """Yield an assembly's parts with states."""
     yield from (part for part in cls.parts.values() if part.has("State"))
 
 
 def _contacts(cls: type[Any]) -> Iterator[AnyPart]:
-    """Yield the parts of an assembly that have contact forces."""
+    """Yield an assembly's parts with contact forces."""
     yield from (part for part in cls.parts.values() if part.has("Forces"))
 
 
 def contact_count(model: Any, par: Any) -> int:
-    """Return the number of contact forces of an assembly, including its subassemblies."""
+    """Return an assembly's number of contact forces, including its subassemblies."""
     own = sum(sum(part.group_sizes(par)) for part in _contacts(type(model)))
     return own + sum(
         contact_count(sub.assembly, sub.parameters(par)) for sub in model.subs.values()

@@ -1,11 +1,11 @@
-"""Declarations of brakes, and how bywire finds installed and loaded ones.
+"""Declarations of brakes, and the search for installed and loaded brakes.
 
 A brake is a package or a single file with one declaration::
 
     BRAKE = Brake("servo-axis", "a motor that turns a lever against a spring", __name__)
 
-bywire finds installed brakes by entry points of the group ``bywire.brakes``, ours among them, and
-others by `load_system`. Bench files never load a brake: they are untrusted.
+bywire finds installed brakes, including its own, by entry points of the group ``bywire.brakes``.
+`load_system` loads others from a path. Bench files never load a brake, since they are untrusted.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ GROUP = "bywire.brakes"
 
 
 class BrakeWarning(UserWarning):
-    """An installed brake is skipped."""
+    """Warning that bywire skips an installed brake."""
 
 
 @checked
@@ -49,7 +49,7 @@ class Brake:
     summary
         One line for listings.
     module
-        Its ``__name__``, to find its models, parameter sets, experiments, loops and the rest. In a
+        Its ``__name__``, where bywire finds its models, parameter sets, experiments and loops. In a
         package, each kind has its own module or folder; see ``bywire.core.registry``.
     """
 
@@ -59,7 +59,7 @@ class Brake:
 
     @property
     def file(self) -> str:
-        """File that declares it."""
+        """File that declares the brake."""
         return importlib.import_module(self.module).__file__ or self.module
 
     def _repr_html_(self) -> str:
@@ -86,7 +86,7 @@ def _installed() -> Mapping[str, Brake]:
     brakes: dict[str, Brake] = {}
 
     def order(point: EntryPoint) -> tuple[bool, str]:
-        """Put our brakes first, so that a brake that takes one of our names is skipped."""
+        """Sort bywire's brakes first, so another brake with one of their names is skipped."""
         return not point.module.startswith("bywire."), point.name
 
     for point in sorted(entry_points(group=GROUP), key=order):
@@ -97,7 +97,7 @@ def _installed() -> Mapping[str, Brake]:
             _require_new(brake, brakes)
         except Exception as error:
             place = _place_of(point.module)
-            reason = str(error) if isinstance(error, ModelError) else said_with_line(error, place)
+            reason = str(error) if isinstance(error, ModelError) else error_with_line(error, place)
             text = f"the installed brake {point.name!r} ({point.value}) is skipped: {reason}"
             warn_at_line(text, BrakeWarning, error, place)
         else:
@@ -117,14 +117,14 @@ def _place_of(module: str) -> str:
 
 
 def is_foreign(brake: Brake) -> bool:
-    """Return whether a brake is from another package; bywire skips its parts that fail."""
+    """Return whether another package provides a brake; bywire skips its parts that fail."""
     return brake.name not in _loaded and brake.module.partition(".")[0] != "bywire"
 
 
 def foreign_line(error: BaseException) -> str:
-    """Return an error with file and line if a brake that is not ours raised it; otherwise empty.
+    """Return an error with file and line if another package's brake raised it, otherwise "".
 
-    The innermost line in that brake's files counts.
+    The line is the innermost one in that brake's files.
     """
     folders = [
         str(Path(brake.file).parent if _is_package(brake) else brake.file)
@@ -134,7 +134,7 @@ def foreign_line(error: BaseException) -> str:
     frames = traceback.extract_tb(error.__traceback__)
     if not any(frame.filename.startswith(folder) for folder in folders for frame in frames):
         return ""
-    return said_with_line(error, *folders)
+    return error_with_line(error, *folders)
 
 
 def _is_package(brake: Brake) -> bool:
@@ -148,7 +148,7 @@ def loaded_files() -> tuple[str, ...]:
 
 
 def load_brakes(files: Iterable[str]) -> None:
-    """Load the brakes that another process had loaded by path; see `loaded_files`."""
+    """Load the brakes that another process has loaded by path; see `loaded_files`."""
     for file in files:
         load_system(file)
 
@@ -162,29 +162,30 @@ def load_system(path: str | Path) -> Brake:
     Parameters
     ----------
     path
-        Python file, or folder with an ``__init__.py``, that declares a ``BRAKE``; also that file,
-        or the folder of a project that keeps one such package in its ``src``.
+        Python file, or folder with an ``__init__.py``, that declares a ``BRAKE``; or that
+        ``__init__.py``; or a project's folder with a single such package in its ``src``.
 
     Returns
     -------
     Brake
-        The brake; the loaded one if it was loaded before.
+        The brake, which is loaded only once.
 
     Raises
     ------
     FileError
         When there is no such file or folder.
     ModelError
-        When it fails on import, or does not declare a brake with a name that is free.
+        When its import fails, or it does not declare a brake with an unused name.
     """
     place = Path(path).expanduser().resolve()
     place = place.parent if place.name == "__init__.py" else _package_of(place)
     source = place / "__init__.py" if place.is_dir() else place
     if not source.is_file() or source.suffix != ".py":
         raise FileError(
-            f"{path} does not declare a brake: give a Python file, a folder with an __init__.py, "
+            f"{path} does not declare a brake: use a Python file, a folder with an __init__.py, "
             "or a project with one such folder in src, that contains BRAKE = bywire.Brake(...)",
             name=str(path),
+            valid="BRAKE = bywire.Brake(...)",
         )
     known = next((b for b in _loaded.values() if Path(b.file).resolve() == source), None)
     if known is not None:
@@ -196,7 +197,7 @@ def load_system(path: str | Path) -> Brake:
 
 
 def _package_of(place: Path) -> Path:
-    """Return the one package that a project keeps in its folder src; any other place as it is."""
+    """Return the single package in a project's folder src, or the path itself without one."""
     packages = [] if (place / "__init__.py").exists() else [*place.glob("src/*/__init__.py")]
     return packages[0].parent if len(packages) == 1 else place
 
@@ -204,16 +205,25 @@ def _package_of(place: Path) -> Path:
 def _imported(place: Path, source: Path) -> ModuleType:
     name = place.name if place.is_dir() else place.stem
     if not name.isidentifier():
-        raise ModelError(f"{place}: its name must be one that Python can import, like servo_axis")
+        valid = "a name that Python can import, like servo_axis"
+        raise ModelError(
+            f"{place}: its name must be {valid}", name=str(place), value=name, valid=valid
+        )
     there = sys.modules.get(name)
     elsewhere = importlib.util.find_spec(name) if there is None else None
-    origin = elsewhere.origin if elsewhere is not None else None  # None: a mere folder of that name
-    if origin is not None and Path(origin).resolve() != source:  # the same where its folder is cwd
+    origin = (
+        elsewhere.origin if elsewhere is not None else None
+    )  # None: a folder that is not a package
+    if (
+        origin is not None and Path(origin).resolve() != source
+    ):  # equal if the folder is the working folder
         there = ModuleType(name)
         there.__file__ = origin
     if there is not None and Path(getattr(there, "__file__", None) or "").resolve() != source:
         raise ModelError(
-            f"{place}: there is a module {name!r} already ({_origin(there)}): give it another name"
+            f"{place}: the module name {name!r} is used already ({_origin(there)}): rename it",
+            name=str(place),
+            value=name,
         )
     spec = importlib.util.spec_from_file_location(
         name, source, submodule_search_locations=[str(place)] if place.is_dir() else None
@@ -230,8 +240,9 @@ def _imported(place: Path, source: Path) -> ModuleType:
             del sys.modules[loaded]
         if not isinstance(error, (Exception, SystemExit)):
             raise
-        message = said_with_line(error, str(source.parent) if place.is_dir() else str(source))
-        raise ModelError(f"{message}; fix it and load it again") from error
+        message = error_with_line(error, str(source.parent) if place.is_dir() else str(source))
+        text = f"{message}; fix it and load it again"
+        raise ModelError(text, name=str(place)) from error
     return module
 
 
@@ -241,12 +252,18 @@ def _declared(module: ModuleType, where: str) -> Brake:
         has = "no BRAKE" if brake is None else f"a BRAKE that is a {type(brake).__name__}"
         raise ModelError(
             f"{where} declares {has}: write BRAKE = bywire.Brake(name, summary, __name__) in "
-            f"{module.__file__}"
+            f"{module.__file__}",
+            name="BRAKE",
+            value=has,
+            valid="BRAKE = bywire.Brake(name, summary, __name__)",
         )
     if brake.module != module.__name__:
         raise ModelError(
             f"{module.__file__}: BRAKE is declared for the module {brake.module!r}: write "
-            f"Brake({brake.name!r}, ..., __name__)"
+            f"Brake({brake.name!r}, ..., __name__)",
+            name="BRAKE",
+            value=brake.module,
+            valid="__name__",
         )
     return brake
 
@@ -255,7 +272,9 @@ def _require_new(brake: Brake, known: Mapping[str, Brake]) -> None:
     if brake.name in known:
         raise ModelError(
             f"{brake.file} declares a brake {brake.name!r}, and so does {known[brake.name].file}: "
-            "rename one of them"
+            "rename one of them",
+            name="BRAKE",
+            value=brake.name,
         )
 
 
@@ -264,7 +283,7 @@ def _origin(module: ModuleType) -> str:
 
 
 def modules_of(brake: Brake, names: tuple[str, ...]) -> Iterator[ModuleType]:
-    """Yield the modules of a brake that may declare a kind of thing: its own, and those named.
+    """Yield a brake's modules that may declare a kind of thing: the main one, and some others.
 
     Parameters
     ----------
@@ -274,7 +293,7 @@ def modules_of(brake: Brake, names: tuple[str, ...]) -> Iterator[ModuleType]:
     Raises
     ------
     ModelError
-        When one of them fails on import.
+        When an import fails.
     """
     package = importlib.import_module(brake.module)
     yield package
@@ -293,7 +312,7 @@ def modules_below(name: str) -> Iterator[ModuleType]:
     Raises
     ------
     ModelError
-        When one fails on import.
+        When an import fails.
     """
     import pkgutil
 
@@ -311,14 +330,14 @@ def _attempted(name: str) -> ModuleType:
         if root == "bywire":
             raise
         folder = Path(getattr(sys.modules.get(root), "__file__", None) or "").parent
-        raise ModelError(said_with_line(error, str(folder))) from error
+        raise ModelError(error_with_line(error, str(folder)), name=name) from error
 
 
-# --- Errors and warnings of a brake's own code, with the line that its author wrote
+# --- Errors and warnings from a brake's code, with the author's line
 
 
-def said_with_line(error: BaseException, *inside: str) -> str:
-    """Return an error with the innermost line in files of these folders at which it was raised."""
+def error_with_line(error: BaseException, *inside: str) -> str:
+    """Return an error's text with file and line: the innermost line within these folders."""
     text = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
     text = str(error) if isinstance(error, BywireError) else text
     if isinstance(error, SyntaxError) and error.filename:
@@ -335,7 +354,7 @@ def said_with_line(error: BaseException, *inside: str) -> str:
 
 
 def _of_pydantic(error: Any) -> str:
-    """Return an error of pydantic in one line."""
+    """Return pydantic's error on one line."""
     lacking = [str(each["loc"][0]) for each in error.errors() if each["type"] == "missing"]
     wrong = [
         f"{'.'.join(map(str, each['loc']))}: {each['msg']}"
@@ -344,21 +363,21 @@ def _of_pydantic(error: Any) -> str:
     ]
     if lacking:
         names = ", ".join(lacking)
-        wrong.insert(0, f"{names}: give a value here, or a default in the class {error.title}")
+        wrong.insert(0, f"{names}: set a value here, or a default in the class {error.title}")
     return "; ".join(wrong)
 
 
 def warn_at_line(text: str, kind: type[Warning], error: BaseException, *inside: str) -> None:
-    """Warn at the line of an author's file that raised an error, not at one of ours.
+    """Warn at the author's line that raised an error, not at a line of bywire.
 
     Parameters
     ----------
     text, kind
-        Message of the warning, and its category.
+        The warning's message and category.
     error
-        The error; if it has a cause, the line is that of the cause.
+        The error; if it has a cause, the line is the cause's.
     inside
-        Folders or files of the author. If the error was not raised in them, the warning points to
+        The author's folders or files. If the error comes from elsewhere, the warning points to
         line 1 of the last one.
     """
     line = _innermost(error.__cause__ or error, *inside)
@@ -366,7 +385,7 @@ def warn_at_line(text: str, kind: type[Warning], error: BaseException, *inside: 
 
 
 def _innermost(error: BaseException, *inside: str) -> tuple[str, int] | None:
-    """Return file and line in some folders at which an error was raised; None if outside them."""
+    """Return file and line of an error within some folders, or None if it comes from elsewhere."""
     if isinstance(error, SyntaxError) and error.filename:
         return error.filename, error.lineno or 1
     lines = [

@@ -1,6 +1,6 @@
-"""Messages in the words of their reader: flags of a command, or arguments of a Python function.
+"""Wording of messages for their reader: a command's flags, or a Python function's arguments.
 
-A message names an argument by `option`. The use case declares which flag stands for it; see
+A message refers to an argument with `option`. The use case declares the corresponding flag; see
 `bywire.usecases`.
 """
 
@@ -18,7 +18,7 @@ _flags: dict[str, str] = {}
 
 @contextmanager
 def command_line() -> Iterator[None]:
-    """Have messages name flags until the block ends: a person typed a command."""
+    """Use flags in messages until the block ends, since a person typed a command."""
     _commands.append(None)
     try:
         yield
@@ -27,24 +27,24 @@ def command_line() -> Iterator[None]:
 
 
 def is_command_line() -> bool:
-    """Return whether a person typed a command, and no program called."""
+    """Return whether a person typed a command, rather than a program calling a function."""
     return bool(_commands)
 
 
 def flags() -> dict[str, str] | None:
-    """Return the flags that messages name, for a process that helps with a command."""
+    """Return the flags for messages, to pass to a command's worker processes; None in Python."""
     return dict(_flags) if _commands else None
 
 
-def speak_in(flags: dict[str, str] | None) -> None:
-    """Have this process word its messages as the one that started it does, see `flags`."""
+def use_flags(flags: dict[str, str] | None) -> None:
+    """Word this process's messages like those of its parent; see `flags`."""
     if flags is not None:
         _flags.update(flags)
         _commands.append(None)
 
 
 def name_flag(argument: str, flag: str) -> None:
-    """Declare which flag stands for an argument: the same one in every command.
+    """Declare an argument's flag, which is the same in every command.
 
     Raises
     ------
@@ -53,12 +53,12 @@ def name_flag(argument: str, flag: str) -> None:
     """
     if _flags.setdefault(argument, flag) != flag:
         raise ValueError(
-            f"argument {argument!r} has the flag {_flags[argument]} already, not {flag}"
+            f"argument {argument!r} already has the flag {_flags[argument]}, not {flag}"
         )
 
 
 def option(argument: str, value: str | bool | dict[str, str] | None = None) -> str:
-    """Return how the reader of a message writes an argument, with a value where one is given.
+    """Return an argument as the message's reader writes it, with its value if there is one.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def option(argument: str, value: str | bool | dict[str, str] | None = None) -> s
     return f"{argument}={value if value is True else json.dumps(value)}"
 
 
-# --- Warnings, which a command, a job or a process of a study tells in its own words
+# --- Warnings, which a command, a job or a study's process shows in its own way
 
 _FOR_DEVELOPERS = (
     DeprecationWarning,
@@ -93,14 +93,14 @@ _FOR_DEVELOPERS = (
     ImportWarning,
     ResourceWarning,
 )
-"""hidden by Python by default, because a user can do nothing about them"""
+"""categories that Python hides by default, because users cannot act on them"""
 
 
 @contextmanager
-def heard_warnings() -> Iterator[list[warnings.WarningMessage]]:
-    """Yield a list to which every warning is added until the block ends, each time it is given.
+def collected_warnings() -> Iterator[list[warnings.WarningMessage]]:
+    """Yield a list that collects every warning until the block ends, including repeated ones.
 
-    Those for developers are left out, unless whoever started Python asked for warnings.
+    It excludes warnings for developers, unless Python was started with options for warnings.
     """
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")

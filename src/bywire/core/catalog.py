@@ -21,7 +21,7 @@ Formula = Callable[[Any], Any]
 
 @dataclass(frozen=True)
 class Cited:
-    """A value of a parameter set with its provenance.
+    """A parameter set's value with its provenance.
 
     Parameters
     ----------
@@ -29,14 +29,14 @@ class Cited:
         Number, table or choice, in SI.
     kind
         ``paper``: printed in the source. ``derived``: follows from printed values.
-        ``chosen``: our choice, without a source. ``calibrated``: tuned to match a statement of
-        the source, which is then not evidence.
+        ``chosen``: our choice, without a source. ``calibrated``: tuned to match a statement in the
+        source, which then no longer counts as evidence.
     where
         Place in the source, or the reason.
     formula
-        Formula of a derived value; None if it does not follow from parameters of the set.
+        Formula of a derived value; None if it does not follow from the set's parameters.
     moved
-        New places of groups in the formula, by their original places.
+        New places of the formula's groups, by their original places.
     """
 
     value: Any
@@ -46,14 +46,14 @@ class Cited:
     moved: Mapping[str, str] = field(default_factory=dict, compare=False)
 
     def computed(self, values: Mapping[str, Any]) -> tuple[Any, frozenset[str]]:
-        """Return the result of the formula with values by dotted name, and the names that it reads.
+        """Return the formula's result for values by dotted name, and the names that it reads.
 
-        The result is NaN if it is not finite for these values.
+        The result is NaN if it is not finite.
 
         Raises
         ------
         ModelError
-            When it reads an unknown parameter.
+            When the formula reads an unknown parameter.
         """
         assert self.formula is not None
         read: set[str] = set()
@@ -64,15 +64,15 @@ class Cited:
         return value, frozenset(read)
 
     def moved_to(self, places: Mapping[str, str]) -> Cited:
-        """Return the value for a set in which groups have other places.
+        """Return the value for a set whose groups have other places.
 
-        ``{"": "rear"}``: all of them are in a group, for a set within another one.
+        ``{"": "rear"}``: all groups move into one group, for a set within another set.
         """
         return self if self.formula is None else replace(self, moved=places)
 
 
 class _Values:
-    """Values at their places, as in a parameter set, with a record of those that are read."""
+    """Values by attribute, as in a parameter set, with a record of the names that are read."""
 
     def __init__(
         self, values: Mapping[str, Any], moved: Mapping[str, str], read: set[str], place: str = ""
@@ -96,7 +96,7 @@ class _Values:
 
 
 def _moved(place: str, moved: Mapping[str, str]) -> str:
-    """Return a place in a set whose groups have moved."""
+    """Return the new place of a value after groups have moved."""
     if "" in moved:
         return f"{moved['']}.{place}"
     for group, there in moved.items():
@@ -118,9 +118,9 @@ def derived(value: Any, where: str) -> Cited:
     Parameters
     ----------
     value
-        The value, or a formula that computes it from parameters of the set:
-        ``derived(lambda par: 0.95 * par.body.g, "0.95 g")``. bywire warns if a bench changes
-        parameters of the formula but not the value.
+        The value, or a formula that computes it from the set's parameters:
+        ``derived(lambda par: 0.95 * par.body.g, "0.95 g")``. bywire warns if a bench changes the
+        formula's parameters but not the value.
     where
         Its origin, for readers.
     """
@@ -143,7 +143,7 @@ def calibrated(value: Any, where: str) -> Cited:
 
 # --- Parameter sets
 
-_SAME = 1e-9  # of a derived value: rounding of its formula
+_SAME = 1e-9  # relative tolerance of a derived value, for its formula's rounding
 
 
 @checked
@@ -164,7 +164,7 @@ class CitedSet:
     parameter_class
         Class that validates the values.
     values
-        Every value by dotted name, with its provenance; a plain one counts as chosen.
+        Every value by dotted name, with its provenance; a plain value counts as chosen.
     """
 
     name: str
@@ -186,11 +186,11 @@ class CitedSet:
         try:
             return self.parameter_class.create({k: c.value for k, c in self.values.items()})
         except ParameterError as error:
-            raise ParameterError(f"parameter set {self.name!r}: {error}") from None
+            raise error.at(f"parameter set {self.name!r}", ParameterError) from None
 
 
 def _computed_values(values: Mapping[str, Cited]) -> dict[str, Cited]:
-    """Return cited values, with derived ones from their formulas.
+    """Return cited values, with derived values computed from their formulas.
 
     Raises
     ------
@@ -207,7 +207,8 @@ def _computed_values(values: Mapping[str, Cited]) -> dict[str, Cited]:
             except KeyError:  # it reads a value that is not computed yet
                 continue
         if not ready:
-            raise ModelError(f"formulas of {', '.join(sorted(waiting))} depend on each other")
+            names = ", ".join(sorted(waiting))
+            raise ModelError(f"formulas of {names} depend on each other", name=names)
         known |= ready
         waiting = {name: each for name, each in waiting.items() if name not in ready}
     return {name: replace(each, value=known[name]) for name, each in values.items()}
@@ -250,16 +251,16 @@ class Outdated:
 def outdated_values(
     cited: Mapping[str, Cited], par: ParameterSet, changed: Collection[str]
 ) -> list[Outdated]:
-    """Return the derived values of a set that no longer match after some changes.
+    """Return a set's derived values that no longer match their formulas after some changes.
 
     Parameters
     ----------
     cited
-        Values of the changed set.
+        The changed set's cited values.
     par
         All parameters, including the changed ones.
     changed
-        Names of changed parameters; a derived value among them is intended.
+        Names of changed parameters; a derived value among them was changed on purpose.
     """
     found: list[Outdated] = []
     values: dict[str, Any] = {}
@@ -286,28 +287,30 @@ def main_set(assembly: str, beside: type | None = None) -> str:
     assembly
         Name of the assembly.
     beside
-        A class of the brake to search first, so that no other brake needs to be loaded.
+        A class of the brake to search first, to avoid loading other brakes.
 
     Raises
     ------
     ModelError
-        When there is none.
+        When there is no such set.
     """
     first = () if beside is None else (PARAMETER_SETS.beside(beside),)
     rest = (PARAMETER_SETS.of(brake.module) for brake in brakes().values())
-    for sets in chain(first, rest):  # lazily, since each loads its models
+    for sets in chain(first, rest):  # lazily, since each set loads its models
         for name, cited in sets.items():
             if cited.assembly == assembly:
                 return name
     raise ModelError(
-        f"there is no parameter set for a {assembly}: declare a bywire.CitedSet of that assembly"
+        f"there is no parameter set for a {assembly}: declare a bywire.CitedSet for that assembly",
+        name=assembly,
+        valid="a bywire.CitedSet",
     )
 
 
 def sets_of_loaded() -> tuple[str, ...]:
-    """Return the names of the parameter sets of all brakes that were loaded by path.
+    """Return the names of the parameter sets of all brakes loaded by path.
 
-    A user who loads a brake means that brake, so its set is the default if it is the only one.
+    A user who loads a brake intends to use it, so its set is the default if it has only one.
     """
     files = loaded_files()
     loaded = [brake.module for brake in brakes().values() if brake.file in files]
@@ -316,17 +319,17 @@ def sets_of_loaded() -> tuple[str, ...]:
 
 @checked
 def parameters(name: str) -> ParameterSet:
-    """Return the parameters of a set, validated.
+    """Return a set's validated parameters.
 
     Parameters
     ----------
     name
-        Name of the parameter set, see ``bywire list``.
+        Name of the parameter set (see ``bywire list``).
 
     Returns
     -------
     ParameterSet
-        The values by group, SI units inside.
+        The values by group, in SI units.
 
     Raises
     ------

@@ -1,14 +1,14 @@
-"""Processes that bywire starts, none of which takes code from the working folder.
+"""Child processes, none of which executes code from the working folder.
 
-Somebody who looks at a downloaded folder is in it, and a file ``ziglang.py``, an executable ``cc``
-or a library ``libm.so`` there must never run. An interpreter looks in its working folder for
-modules (``python -m``, ``python -c``), and so does every list of folders with an empty or relative
-entry, such as ``PATH=:/usr/bin``. Children of bywire therefore start elsewhere, and their lists
-hold absolute folders alone. All processes but copies of this one are started here.
+A user may run bywire within a downloaded folder. A file ``ziglang.py``, an executable ``cc`` or a
+library ``libm.so`` in that folder must never run. An interpreter searches its working folder for
+modules (``python -m``, ``python -c``). So does a search path with an empty or relative entry, such
+as ``PATH=:/usr/bin``. Child processes therefore start elsewhere, and their search paths contain
+only absolute folders. This module starts all processes except copies of this one.
 
-Two limits: what Python loads before its first line of ours (``python -m bywire`` looks in the
-working folder, the command ``bywire`` and ``python -P -m bywire`` do not), and folders that a
-caller's own script or notebook has on its path, which workers of that program share.
+There are two limits. Python loads modules before it executes bywire's first line:
+``python -m bywire`` searches the working folder, but the command ``bywire`` and
+``python -P -m bywire`` do not. And workers share the search path of a caller's script or notebook.
 """
 
 from __future__ import annotations
@@ -39,26 +39,26 @@ _LISTS = (
 )
 """environment variables that list folders with programs, libraries, headers and modules"""
 SAFE_PATH = "PYTHONSAFEPATH"
-"""environment variable with which no interpreter looks for modules where it was started"""
+"""environment variable that keeps interpreters from searching the working folder for modules"""
 _WARNINGS, _SILENT_TRACKER = "PYTHONWARNINGS", "ignore:resource_tracker:UserWarning"
 _ROOT = str(Path(__file__).resolve().parents[2])
 _ELSEWHERE = sys.prefix
-"""where children start: what runs this process stands there, and no folder of somebody else"""
+"""working folder of child processes: this interpreter's own folder, which is trusted anyway"""
 
 
 def _trusted_folders(
     entries: Iterable[str], untrusted: Sequence[str | Path] = (), *, keep: str = ""
 ) -> list[str]:
-    """Return the absolute folders of a list but the working folder and further ones.
+    """Return the absolute folders of a list, without the working folder and untrusted folders.
 
     Parameters
     ----------
     entries
-        Folders, as ``sys.path`` and ``PATH`` list them.
+        Folders, as listed in ``sys.path`` and ``PATH``.
     untrusted
-        Further folders that are left out, such as the one that is served.
+        Other folders to leave out, such as the folder that is served.
     keep
-        A folder that stays, even if it is one of those.
+        A folder to keep, even if it would be left out.
     """
     left_out = {os.path.realpath(each) for each in (os.curdir, *untrusted)} - {keep}
     return [
@@ -67,30 +67,30 @@ def _trusted_folders(
 
 
 def import_path(untrusted: Sequence[str | Path] = ()) -> list[str]:
-    """Return where this process and its children may import from; see `_trusted_folders`.
+    """Return the folders from which this process and its children may import.
 
-    The folder that bywire itself was imported from stays.
+    They include the folder that bywire was imported from. See `_trusted_folders`.
     """
     return _trusted_folders(sys.path, untrusted, keep=_ROOT)
 
 
 def leave_out_working_folder() -> None:
-    """Have this process, and every Python process below it, not import from the working folder."""
+    """Keep this process and its Python children from importing from the working folder."""
     sys.path[:] = import_path()
     os.environ[SAFE_PATH] = "1"
 
 
 @contextmanager
 def safe_start() -> Iterator[None]:
-    """Have interpreters that are started within the block not look in the working folder.
+    """Keep interpreters that start within the block from searching the working folder.
 
-    For `multiprocessing`, which starts workers, a server that forks, and a tracker of resources by
-    ``python -c``. Workers then take the path of this process.
+    `multiprocessing` starts workers, a fork server and a resource tracker with ``python -c``. The
+    workers then use this process's search path.
     """
     changes = {
         SAFE_PATH: "1",
         "PYTHONPATH": os.pathsep.join(import_path()),
-        # The tracker complains on standard error of what a killed command could not tidy up.
+        # The tracker would print what a killed command could not clean up.
         _WARNINGS: ",".join(filter(None, (os.environ.get(_WARNINGS), _SILENT_TRACKER))),
     }
     before = {name: os.environ.get(name) for name in changes}
@@ -106,40 +106,41 @@ def safe_start() -> Iterator[None]:
 
 
 def find_program(name: str) -> str | None:
-    """Return the path of a program, looked for in the absolute folders of ``PATH`` alone.
+    """Return a program's path, searched for only in the absolute folders of ``PATH``.
 
-    A path (``./my-cc``) is taken as it stands: who writes one means it.
+    A path such as ``./my-cc`` is used as it is, since its author chose that file.
     """
     if os.path.dirname(name):
-        found = shutil.which(name)
-        return None if found is None else os.path.abspath(found)
+        program = shutil.which(name)
+        return None if program is None else os.path.abspath(program)
     folders = _trusted_folders(os.environ.get("PATH", os.defpath).split(os.pathsep))
     return next(filter(None, (shutil.which(os.path.join(each, name)) for each in folders)), None)
 
 
 def environment(untrusted: Sequence[str | Path] = ()) -> dict[str, str]:
-    """Return the environment of a child: lists of folders are absolute, see `_trusted_folders`."""
-    made = dict(os.environ)
+    """Return a child's environment with absolute search paths; see `_trusted_folders`."""
+    variables = dict(os.environ)
     for name in _LISTS:
-        if name in made:
-            kept = _trusted_folders(made.pop(name).split(os.pathsep), untrusted)
-            made |= {name: os.pathsep.join(kept)} if kept else {}  # an empty one is the folder
-    return {**made, SAFE_PATH: "1"}
+        if name in variables:
+            trusted = _trusted_folders(variables.pop(name).split(os.pathsep), untrusted)
+            if trusted:  # an empty list would mean the working folder
+                variables[name] = os.pathsep.join(trusted)
+    return {**variables, SAFE_PATH: "1"}
 
 
 def python_command(*arguments: str) -> list[str]:
-    """Return the command line of a Python process, which takes `environment` and starts anywhere.
+    """Return the command line of a Python process, to be started with `environment`.
 
     Parameters
     ----------
     arguments
-        ``-m MODULE`` or ``-c TEXT``, and what follows.
+        ``-m MODULE`` or ``-c TEXT``, and the arguments after it.
     """
     return [sys.executable, "-P", *arguments]
 
 
 def module_command(library: str, *arguments: str) -> tuple[str, ...] | None:
-    """Return the command line of a program that a library brings; None where it is not installed.
+    """Return the command line of a library's program, or None if it is not installed.
 
     Examples
     --------
@@ -159,20 +160,20 @@ def start_python(
     stderr: int | None = None,
     bufsize: int = -1,
 ) -> subprocess.Popen[bytes]:
-    """Start a module of ours, which talks through its standard input and output.
+    """Start one of bywire's modules, which communicates through standard input and output.
 
-    Ctrl-C does not reach it: whoever starts it ends it. It begins outside of the working folder.
+    Ctrl-C does not reach the process: its parent must end it. It starts outside the working folder.
 
     Parameters
     ----------
     module, arguments
-        Its name, and what follows it on the command line.
+        The module's name, and its command-line arguments.
     further
-        Further variables of its environment.
+        Additional environment variables.
     untrusted
         See `_trusted_folders`.
     stderr, bufsize
-        As `subprocess.Popen` has them.
+        See `subprocess.Popen`.
     """
     path = os.pathsep.join(import_path(untrusted))
     return subprocess.Popen(
@@ -188,10 +189,9 @@ def start_python(
 
 
 def _tool_folders() -> dict[str, str]:
-    """Return variables that lead the extra's compiler to a folder that it can write to.
+    """Return environment variables that give the extra's compiler a writable cache folder.
 
-    It keeps what it makes in the user's cache folder, and ends where there is none, or where that
-    is on a read-only disk.
+    By default it caches in the user's cache folder, and fails if that is missing or read-only.
     """
     home = os.environ.get("HOME", "")
     above = os.environ.get("XDG_CACHE_HOME") or (os.path.join(home, ".cache") if home else "")
@@ -202,7 +202,7 @@ def _tool_folders() -> dict[str, str]:
 
 
 def _is_writable(folder: str) -> bool:
-    """Return whether a folder can be written to, or be made in one that can."""
+    """Return whether a folder is writable, or can be made in a writable folder."""
     if not os.path.isabs(folder):
         return False
     there = next(each for each in Path(folder, "zig", "x").parents if each.exists())
@@ -210,14 +210,14 @@ def _is_writable(folder: str) -> bool:
 
 
 def run_program(command: Sequence[str], seconds: float) -> subprocess.CompletedProcess[str]:
-    """Run a program to its end, outside of the working folder: its paths must be absolute.
+    """Run a program to its end, outside the working folder; its paths must be absolute.
 
     Raises
     ------
     OSError
-        When it does not start.
+        When the program does not start.
     TimeoutExpired
-        When it takes longer.
+        When it takes longer than ``seconds``.
     """
     return subprocess.run(
         command,

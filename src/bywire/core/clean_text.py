@@ -1,16 +1,16 @@
-"""Text from anywhere, without what could disturb a page, a figure or a terminal."""
+"""Cleaning of untrusted text for pages, figures and terminals."""
 
 from __future__ import annotations
 
 import unicodedata
 
-_WORD, _PATH, _MESSAGE = 120, 600, 3000  # characters that are shown of each
+_WORD, _PATH, _MESSAGE = 120, 600, 3000  # longest shown texts, in characters
 
 
 def clean(text: object) -> str:
-    """Return text without what could disturb a page, a figure or a terminal.
+    """Return text without characters that could disturb a page, a figure or a terminal.
 
-    White space becomes a plain space (line breaks stay); control characters, marks that reverse
+    White space becomes a plain space, except line breaks. Control characters, marks that reverse
     the reading direction and broken code points become the replacement character.
 
     Examples
@@ -30,12 +30,12 @@ def _clean_character(character: str) -> str:
 
 
 def shortened(text: str) -> str:
-    """Return a message of a length that can be read, with its beginning and its end.
+    """Shorten a message to a readable length; keep its beginning and its end.
 
     Examples
     --------
-    >>> len(shortened("unknown parameter '" + 400 * "x" + "': known are a, b"))
-    156
+    >>> len(shortened("unknown parameter '" + 400 * "x" + "': valid names are a, b"))
+    162
     """
     words = [_cut(word, _WORD if "/" not in word else _PATH) for word in text.split(" ")]
     return _cut(" ".join(words), _MESSAGE)

@@ -1,4 +1,4 @@
-"""Processes that compute for this one: copies of it where that is safe, and never left alone."""
+"""Worker processes: copies of this process where that is safe; they always end with it."""
 
 from __future__ import annotations
 
@@ -20,20 +20,21 @@ from types import ModuleType
 from typing import Any
 
 from bywire.core.brake import load_brakes, loaded_files
-from bywire.core.callers import flags, is_command_line, speak_in
+from bywire.core.callers import flags, is_command_line, use_flags
 from bywire.core.child_process import safe_start
 from bywire.core.errors import RunError
 from bywire.core.libraries import keep_one_thread
 
-_ENDING = 0.05  # s for which a thread that was joined may still be there
+_ENDING = 0.05  # s for which the system may still list a joined thread
 
 
 def may_copy() -> bool:
-    """Whether processes may be forked from this one: a command's, with a single thread.
+    """Return whether this process may fork: only a command's process with a single thread.
 
-    A copy has one thread. A lock that another thread held stays locked in it forever. The threads
-    of libraries count too, so the operating system counts them; `keep_one_thread` has the libraries
-    that commands load start none. A program of others is never copied: what it holds is unknown.
+    A copy has one thread. A lock that another thread held stays locked in it forever. Libraries'
+    threads count too, so the operating system counts them; with `keep_one_thread`, the libraries
+    that commands load start none. Other people's programs are never copied, since their locks are
+    unknown.
     """
     if sys.platform != "linux" or not is_command_line() or threading.active_count() > 1:
         return False
@@ -44,19 +45,19 @@ def may_copy() -> bool:
 
 
 def _thread_count() -> int:
-    """Number of threads of this process, as the operating system counts them."""
+    """Return the operating system's count of this process's threads."""
     return len(os.listdir("/proc/self/task"))
 
 
 class _WithoutMain(SpawnProcess):
-    """A process that loads what it computes, and not the program that asked for it.
+    """A process that loads the functions it computes, but not the calling program.
 
-    Python would run that program's file again in each: what stands there beside the call and,
-    where no ``if __name__ == "__main__":`` guards it, the call itself, which cannot be.
+    Python would execute that program's file again in each process. Without a guard
+    ``if __name__ == "__main__":``, that would repeat the call itself, which must not happen.
     """
 
     def start(self) -> None:
-        """Start it; what it is given comes from modules that it can import."""
+        """Start the process; its arguments come from modules that it can import."""
         main = sys.modules["__main__"]
         nameless = ModuleType("__main__")
         vars(nameless).update(vars(main), __spec__=None, __file__=None)
@@ -69,7 +70,7 @@ class _WithoutMain(SpawnProcess):
 
 
 class _Anew(SpawnContext):
-    """Starts processes that load all anew."""
+    """Context that starts processes without copied state."""
 
     Process = _WithoutMain
 
@@ -78,19 +79,19 @@ class _Anew(SpawnContext):
 def processes(
     count: int, prepare: Callable[..., object], *arguments: Any, is_copied: bool
 ) -> Iterator[ProcessPoolExecutor]:
-    """Yield processes that end with the block, whatever they are at, and with this process.
+    """Yield a pool of processes that end with the block, even if busy, and with this process.
 
-    Ctrl-C is for this process alone.
+    Ctrl-C reaches only this process.
 
     Parameters
     ----------
     count
-        How many, >= 1.
+        Number of processes, >= 1.
     prepare, arguments
-        What each of them calls first.
+        Function that each process calls first, and its arguments.
     is_copied
-        Whether they are copies of this process, which begin with all that it has loaded and
-        computed; others load what they need anew.
+        Whether they are copies of this process, which start with everything that it has loaded and
+        computed. Other processes load what they need.
     """
     with nullcontext() if is_copied else safe_start():
         pool = ProcessPoolExecutor(
@@ -105,18 +106,18 @@ def processes(
     is_over, ending = threading.Event(), threading.Lock()
     watch = threading.Thread(target=_break_off, args=(pool, workers, is_over, ending), daemon=True)
     try:
-        with _deaf_to_interrupts() if is_copied else nullcontext():
+        with _interrupts_blocked() if is_copied else nullcontext():
             for _ in range(count):
-                pool.submit(_nothing)  # which starts them
+                pool.submit(_nothing)  # starts a process
         workers += pool._processes.values()
         watch.start()
         yield pool
-    finally:  # at once, also after Ctrl-C: nobody waits for what they are at
+    finally:  # immediately, even after Ctrl-C: nobody needs the unfinished results
         with ending:
             is_over.set()
             _end(pool)
-        # With its threads: the next copies must find none, and Python's own end would meet them
-        # while they close what it writes to. The watch first: it may be at the pool's queue.
+        # End the pool's threads too: later copies need a single thread, and Python's shutdown would
+        # race with them. End the watch first, since it may be using the pool's queue.
         if watch.ident is not None:
             watch.join()
         pool.shutdown(wait=True, cancel_futures=True)
@@ -126,19 +127,19 @@ def processes(
 def processes_with_brakes(
     count: int, advice: str, prepare: Callable[..., object] | None = None, *arguments: Any
 ) -> Iterator[ProcessPoolExecutor]:
-    """Yield `processes` with the brakes of this one: copies of it where that is safe.
+    """Yield `processes` with this one's brakes: copies of this process where that is safe.
 
     Parameters
     ----------
     count, prepare, arguments
-        As of `processes`.
+        See `processes`.
     advice
-        Next step when one of them is killed.
+        Next step for the user when a process is killed.
 
     Raises
     ------
     RunError
-        When one of them is killed.
+        When a process is killed.
     """
     is_copied = may_copy()
     files = () if is_copied else loaded_files()  # a copy has them
@@ -161,7 +162,7 @@ def _know(
     *arguments: Any,
 ) -> None:
     load_brakes(files)
-    speak_in(words)
+    use_flags(words)
     if prepare is not None:
         prepare(*arguments)
 
@@ -172,11 +173,11 @@ def _break_off(
     is_over: threading.Event,
     ending: threading.Lock,
 ) -> None:
-    """Have a pool break when a process of it is killed, wherever that process was.
+    """Break a pool when one of its processes is killed, at any point of its work.
 
-    All of them answer through one pipe. Where it is killed within an answer that is longer than the
-    pipe holds, the pool, which would notice its end, waits for the rest of the answer, and the
-    others wait for their turn.
+    All processes send their results through one pipe. If a process is killed while it sends a
+    result longer than the pipe's buffer, the pool waits for the rest of that result and does not
+    notice. The other processes wait for their turn.
     """
     wait([process.sentinel for process in workers])
     with ending:
@@ -185,7 +186,7 @@ def _break_off(
 
 
 def _end(pool: ProcessPoolExecutor) -> None:
-    """End the processes of a pool, and have its thread learn that no more answers come."""
+    """End a pool's processes, and close their pipe so that the pool's thread stops waiting."""
     workers = [*(pool._processes or {}).values()]
     for process in workers:
         process.kill()
@@ -193,13 +194,13 @@ def _end(pool: ProcessPoolExecutor) -> None:
     while left:
         left = [each for each in left if each not in wait(left)]
     last_end: Connection = vars(pool._result_queue)["_writer"]
-    if not last_end.closed:  # its number may be another file's by now
+    if not last_end.closed:  # otherwise its number may belong to another file by now
         last_end.close()
 
 
 @contextmanager
-def _deaf_to_interrupts() -> Iterator[None]:
-    """Have Ctrl-C wait until the block ends; processes that it copies never hear it."""
+def _interrupts_blocked() -> Iterator[None]:
+    """Block Ctrl-C until the block ends; copies that are made within it never receive it."""
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
@@ -208,11 +209,11 @@ def _deaf_to_interrupts() -> Iterator[None]:
 
 
 def _nothing() -> None:
-    """Be a job that has a pool start its processes."""
+    """Do nothing; a pool starts a process for each job."""
 
 
 def _begin(prepare: Callable[..., object], *arguments: Any) -> None:
-    """Prepare a process of a core: Ctrl-C is for the one that asked, with which it ends."""
+    """Prepare a worker: ignore Ctrl-C, use one thread, and end with the parent."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     keep_one_thread()
     threading.Thread(target=_end_with_parent, daemon=True).start()
@@ -220,13 +221,13 @@ def _begin(prepare: Callable[..., object], *arguments: Any) -> None:
 
 
 def _prepare(prepared: bytes) -> None:
-    """Prepare a process that loads all anew: only now, when it ends with its parent."""
+    """Prepare a process without copied state, once it is sure to end with its parent."""
     prepare, arguments = ForkingPickler.loads(prepared)
     prepare(*arguments)
 
 
 def _end_with_parent() -> None:
-    """End this process when the one that asked is killed: it would wait for jobs forever."""
+    """End this process when its parent is killed; otherwise it would wait for jobs forever."""
     parent = parent_process()
     if parent is not None:
         parent.join()

@@ -1,9 +1,9 @@
-"""What functions compute, told from their text without its form: what identities are made of.
+"""Digest of functions' source code that does not depend on its layout, for identities.
 
-A digest covers functions with all that they reach by name: other functions, classes and constants.
-It ignores comments, docstrings, annotations, imports, the order of definitions and the files in
-which they stand. It is the same in every version of Python. Reached is what stands in given rooms,
-which are packages. All else counts by its name.
+The digest covers functions and everything that they reach by name: other functions, classes and
+constants. It ignores comments, docstrings, annotations, imports, the order of definitions and the
+files that contain them. It is the same in every version of Python. Only definitions in certain
+packages ("rooms") count by their source code; all others count by their name.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 
 _FORMLESS = {"ctx", "type_comment", "annotation", "returns", "type_params", "kind"}
-"""fields of a syntax tree that compute nothing"""
+"""fields of a syntax tree that do not affect results"""
 _NOTHING: Mapping[str, Any] = MappingProxyType({})
 _MUTABLE = (dict, list, set)
 _SCALARS = (str, int, float, complex, bool, bytes, type(None), Enum)
@@ -36,40 +36,40 @@ def definitions_digest(
     named: Callable[[str], Iterable[Any]] = lambda _: (),
     with_equations: bool = False,
 ) -> str:
-    """Digest of all that some objects compute with.
+    """Return a digest of all definitions that some objects compute with.
 
     Parameters
     ----------
     roots
-        Functions, classes, and objects or collections that hold some.
+        Functions, classes, and objects or collections that contain some.
     rooms
-        Packages and modules whose definitions count by their text.
+        Packages and modules whose definitions count by their source code.
     named
-        ``named(text)``: what a text in these definitions stands for, such as the entry of a
-        registry; nothing for most.
+        ``named(text)``: the objects that a text in these definitions refers to, such as a
+        registry's entry; none for most texts.
     with_equations
-        Whether models and their elements count by their text too; else only how they rest, for
-        their kernels tell the equations.
+        Whether models and their elements also count by their source code. Otherwise only a model's
+        ``rest`` counts, since the kernel already identifies the equations.
     """
-    found = _Reached(tuple(rooms), named, with_equations)
+    reached = _Reached(tuple(rooms), named, with_equations)
     for root in roots:
-        _take(found.visit(root))
-    return hashlib.sha256("\n".join(sorted(found.pieces)).encode()).hexdigest()
+        _run(reached.visit(root))
+    return hashlib.sha256("\n".join(sorted(reached.pieces)).encode()).hexdigest()
 
 
 _Steps = Iterator["_Steps"]
-"""what a definition reaches, one after the other"""
+"""visits of the objects that a definition reaches, one after the other"""
 
 
-def _take(steps: _Steps) -> None:
-    """Take steps, and those that each leads to, at any depth: chains may exceed Python's stack."""
+def _run(steps: _Steps) -> None:
+    """Run visits and their nested visits without recursion, which could exceed Python's stack."""
     stack = [steps]
     while stack:
-        further = next(stack[-1], None)
-        if further is None:
+        nested = next(stack[-1], None)
+        if nested is None:
             stack.pop()
         else:
-            stack.append(further)
+            stack.append(nested)
 
 
 class _Reached:
@@ -80,12 +80,12 @@ class _Reached:
     ) -> None:
         self.pieces: set[str] = set()
         self._rooms, self._named, self._with_equations = rooms, named, with_equations
-        self._seen: dict[int, Any] = {}  # alive, so that no address stands for two
+        self._seen: dict[int, Any] = {}  # kept alive, so that each address stays unique
         self._seen_collections: set[tuple[str, str]] = set()
         self._sources: dict[str, _Source] = {}
 
     def visit(self, value: Any, name: str = "") -> _Steps:
-        """Take in an object; ``name``: what a definition calls it."""
+        """Add an object; ``name``: its name in a definition."""
         if isinstance(value, _SCALARS):
             self.pieces.add(f"{name} = {value!r}")
             if isinstance(value, str):
@@ -133,13 +133,15 @@ class _Reached:
             return
         code = function.__code__
         nodes = self._source(code.co_filename, function.__globals__).nodes_of(code)
-        if not nodes:  # it was made by a library, or from text that is gone
+        if not nodes:  # made by a library, or from source code that is gone
             if not code.co_filename.startswith("<"):
                 self.pieces.add(f"{code.co_code.hex()} {code.co_names}")
             return
         for name, cell in zip(code.co_freevars, function.__closure__ or (), strict=True):
             content = _content(cell)
-            if name != "__class__" and not isinstance(content, _MUTABLE):  # what runs put in there
+            if name != "__class__" and not isinstance(
+                content, _MUTABLE
+            ):  # runs change mutable ones
                 yield self.visit(content, name)
         for node in nodes:
             yield self._visit_node(node, function.__globals__)
@@ -164,7 +166,7 @@ class _Reached:
         return self._sources[file]
 
     def _visit_node(self, node: ast.AST, names: Mapping[str, Any]) -> _Steps:
-        """Take in the text of a definition and what it names."""
+        """Add a definition's source code and the objects that it refers to."""
         self.pieces.add(_form(node))
         imported = dict(self._imported(node, names))
         known = ChainMap(imported, names)  # type: ignore[arg-type]
@@ -194,9 +196,9 @@ class _Reached:
             yield self.visit(functions)
 
     def _visit_assigned(self, name: str, names: Mapping[str, Any]) -> _Steps:
-        """Take in the text of a collection: runs may have changed what it holds since."""
+        """Add a collection's source code, since runs may have changed its content."""
         file = names.get("__file__") or ""
-        if (file, name) in self._seen_collections:  # its text may name itself
+        if (file, name) in self._seen_collections:  # its source code may refer to itself
             return
         self._seen_collections.add((file, name))
         source = self._source(file, names)
@@ -207,7 +209,7 @@ class _Reached:
                 yield self._visit_global(original, vars(holder))
 
     def _imported(self, node: ast.AST, names: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
-        """Yield what a definition imports itself, from the rooms."""
+        """Yield the names and objects that a definition itself imports from the rooms."""
         for holder, known_as, name in self._imports(node, names):
             module = sys.modules.get(f"{holder.__name__}.{name}")
             yield known_as, getattr(holder, name, module)
@@ -215,7 +217,7 @@ class _Reached:
     def _imports(
         self, node: ast.AST, names: Mapping[str, Any]
     ) -> Iterator[tuple[ModuleType, str, str]]:
-        """Yield what is imported from the rooms: from where, the name here, and the name there."""
+        """Yield imports from the rooms: module, name in this file, and name in that module."""
         for each in ast.walk(node):
             if isinstance(each, ast.ImportFrom):
                 package = str(names.get("__package__") or "")
@@ -240,12 +242,12 @@ def _fields(value: Any) -> Iterator[tuple[str, Any]]:
 def _content(cell: Any) -> Any:
     try:
         return cell.cell_contents
-    except ValueError:  # of a function that is not defined yet
+    except ValueError:  # for a function that is not defined yet
         return None
 
 
 def _module_named(node: ast.AST, names: Mapping[str, Any]) -> ModuleType | None:
-    """Return the module that an expression such as ``package.module`` names."""
+    """Return the module that an expression such as ``package.module`` refers to."""
     below: list[str] = []
     while isinstance(node, ast.Attribute):
         below.append(node.attr)
@@ -257,7 +259,7 @@ def _module_named(node: ast.AST, names: Mapping[str, Any]) -> ModuleType | None:
 
 
 def _computing(node: ast.AST) -> Iterator[ast.AST]:
-    """Yield all of a tree that computes: no annotations and no docstrings."""
+    """Yield a tree's nodes that affect results, without annotations and docstrings."""
     waiting = [node]
     while waiting:
         node = waiting.pop()
@@ -272,14 +274,14 @@ def _computing(node: ast.AST) -> Iterator[ast.AST]:
 
 
 def _is_silent(node: ast.AST) -> bool:
-    """Return whether a statement computes nothing: a docstring, an import, a pass."""
+    """Return whether a statement cannot affect results: a docstring, an import, a pass."""
     if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
         return isinstance(node.value.value, str)
     return isinstance(node, (ast.Import, ast.ImportFrom, ast.Pass))
 
 
 def _form(tree: ast.AST) -> str:
-    """Return a syntax tree as text, of which every version of Python makes the same."""
+    """Return a syntax tree as text that is the same in every version of Python."""
     text: list[str] = []
     waiting: list[Any] = [tree]
     while waiting:
@@ -288,7 +290,7 @@ def _form(tree: ast.AST) -> str:
             text.append(value)
         elif isinstance(value, list):
             waiting.extend(reversed(_row("[", [[v] for v in value if not _is_silent(v)], "]")))
-        elif isinstance(value, ast.JoinedStr):  # its constants are split as one likes
+        elif isinstance(value, ast.JoinedStr):  # versions of Python split its constants differently
             waiting.extend(reversed([_Sign("f("), *value.values, _Sign(")")]))
         elif isinstance(value, ast.Constant):
             text.append(repr(value.value))
@@ -305,13 +307,13 @@ def _form(tree: ast.AST) -> str:
 
 
 class _Sign(str):
-    """Text that goes into the form of a tree as it is."""
+    """Text that `_form` outputs unchanged."""
 
     __slots__ = ()
 
 
 def _row(opened: str, parts: list[list[Any]], closed: str) -> list[Any]:
-    """Return parts with commas between them, within brackets."""
+    """Return parts between brackets, separated by commas."""
     row: list[Any] = [_Sign(opened)]
     for number, part in enumerate(parts):
         row += [_Sign(","), *part] if number else part
@@ -319,7 +321,7 @@ def _row(opened: str, parts: list[list[Any]], closed: str) -> list[Any]:
 
 
 class _Source:
-    """The syntax tree of a file as it is now, with its functions and classes."""
+    """Syntax tree of a file's current content, with its functions and classes."""
 
     def __init__(self, file: str, names: Mapping[str, Any]) -> None:
         if file.startswith("<"):  # typed into a notebook, for instance
@@ -328,13 +330,13 @@ class _Source:
             linecache.checkcache(file)
         try:
             self.tree = ast.parse("".join(linecache.getlines(file)))
-        except SyntaxError:  # it was changed since it was loaded
+        except SyntaxError:  # the file has changed since it was loaded
             self.tree = ast.Module([], [])
 
     @functools.cached_property
     def _functions(self) -> Mapping[tuple[str, int], tuple[ast.AST, ...]]:
         """Functions by name and first line, decorators included."""
-        found: dict[tuple[str, int], tuple[ast.AST, ...]] = {}
+        functions: dict[tuple[str, int], tuple[ast.AST, ...]] = {}
         for node in ast.walk(self.tree):
             if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
                 line = min([node.lineno, *(each.lineno for each in node.decorator_list)])
@@ -343,15 +345,15 @@ class _Source:
                 key = ("<lambda>", node.lineno)
             else:
                 continue
-            found[key] = (*found.get(key, ()), node)
-        return found
+            functions[key] = (*functions.get(key, ()), node)
+        return functions
 
     def nodes_of(self, code: CodeType) -> tuple[ast.AST, ...]:
-        """Return a function; lambdas of the same line are told apart by nobody."""
+        """Return a function's nodes; lambdas on the same line are indistinguishable."""
         return self._functions.get((code.co_name, code.co_firstlineno), ())
 
     def assignments_of(self, name: str) -> Iterator[ast.stmt]:
-        """Yield the statements of the file that say what a name is."""
+        """Yield the file's statements that assign a name."""
         for node in self.tree.body:
             targets = (
                 node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", None)]
@@ -360,7 +362,7 @@ class _Source:
                 yield node
 
     def class_of(self, name: str) -> ast.ClassDef | None:
-        """Return a class by its qualified name; None where it is made by a function."""
+        """Return a class by its qualified name, or None if a function defines it."""
         body: list[ast.stmt] = self.tree.body
         node = None
         for part in name.split("."):

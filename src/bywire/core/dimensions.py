@@ -1,6 +1,6 @@
-"""Dimensions instead of numbers: equations evaluated on them reject sums of unlike quantities.
+"""Dimensions in place of numbers: equations evaluated on them reject sums of unlike quantities.
 
-They have no value, so that no operating point can hide a mistake, and need no unit library.
+Dimensions have no value, so no operating point can hide a mistake. They need no unit library.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _NAMED = (
     "Wb",
     "N*m/A",
 )
-"""units whose dimension is called by their name"""
+"""units whose name stands for their dimension"""
 _PURE = frozenset({"exp", "log", "sin", "cos", "arctan", "floor"})
 
 
@@ -48,18 +48,18 @@ class Dimension:
     Parameters
     ----------
     powers
-        Exponents of kg, m, s, A, K, mol and cd. Angles are pure numbers.
+        Exponents of kg, m, s, A, K, mol and cd. An angle is a pure number.
     """
 
     __slots__ = ("powers",)
-    __array_ufunc__ = None  # NumPy's scalars hand operations over to this class
+    __array_ufunc__ = None  # NumPy's scalars leave operations to this class
 
     def __init__(self, powers: tuple[float, ...]) -> None:
         self.powers = powers
 
     @classmethod
     def of(cls, unit: str) -> Dimension:
-        """Return the dimension of a unit, for instance ``"N*m"``.
+        """Return a unit's dimension, for instance of ``"N*m"``.
 
         Raises
         ------
@@ -127,7 +127,10 @@ class Dimension:
             for value in args:
                 if not _unknown(value) and any(_dimension(value).powers):
                     raise DimensionError(
-                        f"ops.{name} needs a pure number, not a quantity in {value}"
+                        f"ops.{name} needs a pure number, not a quantity in {value}",
+                        name=f"ops.{name}",
+                        value=str(value),
+                        valid="a pure number",
                     )
             return Dimension.of("1")
         if name == "sqrt":
@@ -136,20 +139,20 @@ class Dimension:
             return self
         if name in ("fmax", "fmin"):
             return _alike("compared", *args)
-        raise DimensionError(f"ops.{name} has no dimension")
+        raise DimensionError(f"ops.{name} has no dimension", name=f"ops.{name}")
 
 
 class Condition:
-    """Outcome of a comparison: both sides of ``ops.where`` count, no ``if`` can hang on it."""
+    """Outcome of a comparison: ``ops.where`` accepts it, but an ``if`` does not."""
 
     def __init__(self, left: Any, right: Any) -> None:
         _alike("compared", left, right)
 
     def __bool__(self) -> bool:
-        raise DimensionError("an if on a value: use core.ops.where")
+        raise DimensionError("an if on a value: use core.ops.where", valid="core.ops.where")
 
     def _bywire_op(self, name: str, *args: Any) -> Any:
-        _, then, otherwise = args  # of ops.where, the only one that takes a condition
+        _, then, otherwise = args  # from ops.where, the only function of a condition
         return _alike("chosen between", then, otherwise)
 
     def __and__(self, other: Any) -> Condition:
@@ -170,13 +173,14 @@ def _dimension(value: Any) -> Dimension:
 
 
 def _alike(verb: str, left: Any, right: Any) -> Any:
-    """Return the one dimension of two quantities; zero and what is unknown take the other's."""
+    """Return the common dimension of two quantities; zero and unknown ones have the other's."""
     for zero, other in ((left, right), (right, left)):
         if not isinstance(zero, Dimension) and (zero == 0 or _unknown(zero)):
             return other
     x, y = _dimension(left), _dimension(right)
     if x.powers != y.powers:
-        raise DimensionError(f"a quantity in {x} and one in {y} cannot be {verb}")
+        text = f"a quantity in {x} and one in {y} cannot be {verb}"
+        raise DimensionError(text, value=str(x), valid=str(y))
     return x
 
 
@@ -202,6 +206,6 @@ def _parsed(unit: str) -> Dimension:
 
 @cache
 def _names() -> dict[tuple[float, ...], str]:
-    """Return the usual name of every dimension that has one; of energy and torque, N*m."""
+    """Return the usual name of every named dimension; for energy and torque, N*m."""
     names = sorted((*_NAMED, *BASE), key=lambda name: (name == "J", name == "rad", name))
     return {_parsed(name).powers: name for name in reversed(names)}

@@ -1,13 +1,13 @@
-"""Exponential, logarithm, power, sine and cosine, in operations that all machines share.
+"""Exponential, logarithm, power, sine and cosine, identical on all machines.
 
-The C library of a system decides the last digit of these functions. Here they are sums and
-products in a fixed order, those of the kernels (``simulation/c_runtime.py``) and of exported
-ECUs, so that Python, kernel and target agree in every bit.
+The last digit of these functions depends on a system's C library. Here they are sums and products
+in a fixed order, the same as in the kernels (``simulation/c_runtime.py``) and in exported ECU code.
+Python, kernel and target therefore agree bit for bit.
 
 References
 ----------
 W. J. Cody and W. Waite, Software Manual for the Elementary Functions, 1980: reduction of
-arguments in parts. The series are Taylor's, that of the exponential is Remez'.
+arguments in parts. The series are Taylor series, except Remez's polynomial for the exponential.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import math
 import struct
 
 MAGIC = 6755399441055744.0
-"""1.5 * 2^52: added and taken off again, it leaves a whole number"""
+"""1.5 * 2^52: adding and subtracting it rounds to a whole number"""
 LN_2 = (6.93147180369123816490e-01, 1.90821492927058770002e-10)
 QUARTER = (
     0.63661977236758134308,
@@ -24,19 +24,19 @@ QUARTER = (
     6.07710050630396597660e-11,
     2.02226624879595063154e-21,
 )
-"""2/pi, and pi/2 in three parts, the first two of which a whole number multiplies exactly"""
+"""2/pi, and pi/2 in three parts; the first two times a whole number are exact"""
 
 SMALL = 0.78
-"""up to this angle [rad] there are no quarter turns to take off"""
+"""largest angle [rad] without a quarter turn to subtract"""
 FAR = 1e5
-"""beyond this angle [rad] turns are taken off first"""
+"""beyond this angle [rad], full turns are subtracted first"""
 FAR_PARTS = (102943.70806884766, 3.982688587811367e-06, 1.3253124088109142e-16)
 """2^14 turns in three parts"""
 FAR_PERIOD = 1.0 / (2.0 * math.pi * 2.0**14)
 LONGEST = 1e11
-"""beyond this angle [rad] its last digits are no part of a turn any more"""
+"""beyond this angle [rad], the last digit is too coarse to resolve a turn"""
 LEAST = 1e-300
-"""below, logarithms are the C library's"""
+"""below this number, logarithms come from the C library"""
 
 
 def _factorials(first: int, last: int, step: int, alternates: bool) -> tuple[float, ...]:
@@ -56,8 +56,8 @@ EXPONENTIAL = (
     2.7625176287774916e-07,
     2.497840191042191e-08,
 )
-"""of r^3 to r^11 behind 1 + r + r^2/2: the least largest relative error up to ln(2)/2, 5.9e-18, by
-Remez' exchange in 50 digits; Taylor's series to r^13 has 5.7e-18"""
+"""coefficients of r^3 to r^11 after 1 + r + r^2/2, by Remez's exchange in 50 digits: relative error
+at most 5.9e-18 up to ln(2)/2; the Taylor series up to r^13 has 5.7e-18"""
 SINE = _factorials(3, 15, 2, alternates=True)
 COSINE = _factorials(2, 16, 2, alternates=True)
 LOGARITHM = tuple(2.0 / n for n in range(3, 22, 2))
@@ -70,7 +70,7 @@ _UPPER = 0xFFFFFFFFF8000000
 
 
 def exp(x: float) -> float:
-    """Return e to the power of x, which counts as at least -708 and at most 709."""
+    """Return e to the power of x, with x limited to -708 to 709."""
     x = float(x)
     if x != x:
         return x
@@ -100,9 +100,9 @@ def cos(x: float) -> float:
 
 
 def _turned(x: float, quarter: int) -> float:
-    """Return the sine of x plus quarter turns."""
+    """Return the sine of x plus a number of quarter turns."""
     r, n = x, quarter
-    if abs(x) > SMALL:  # below, k is 0
+    if abs(x) > SMALL:  # for smaller angles, k is 0
         x = _near(x) if abs(x) > FAR else x
         k = (x * QUARTER[0] + MAGIC) - MAGIC
         r = ((x - k * QUARTER[1]) - k * QUARTER[2]) - k * QUARTER[3]
@@ -120,15 +120,15 @@ def _turned(x: float, quarter: int) -> float:
 
 
 def _near(x: float) -> float:
-    """Return a large angle without most of its turns."""
+    """Return a large angle minus most of its full turns."""
     if abs(x) > LONGEST:
-        return 0.0 * math.sin(x)  # which refuses what is infinite
+        return 0.0 * math.sin(x)  # raises ValueError for infinite x
     k = (x * FAR_PERIOD + MAGIC) - MAGIC
     return ((x - k * FAR_PARTS[0]) - k * FAR_PARTS[1]) - k * FAR_PARTS[2]
 
 
 def _log_parts(a: float) -> tuple[float, float]:
-    """Return log a, a > 0, as a sum: with a = m 2^k, m from sqrt(1/2) to sqrt(2)."""
+    """Return log a, a > 0, as a sum of two parts: a = m 2^k, m from sqrt(1/2) to sqrt(2)."""
     m, e = math.frexp(a)
     if m < _HALF_ROOT:
         m, e = 2.0 * m, e - 1
@@ -154,7 +154,7 @@ def log(a: float) -> float:
     Raises
     ------
     ValueError
-        Where a is not above 0.
+        When a is not > 0.
     """
     a = float(a)
     if not a >= LEAST or math.isinf(a):
@@ -164,7 +164,7 @@ def log(a: float) -> float:
 
 
 def power(a: float, b: float) -> float:
-    """Return a to the power of b, with the product b log a to twice the digits."""
+    """Return a to the power of b, computing the product b log a with twice the digits."""
     a, b = float(a), float(b)
     if not a >= LEAST or math.isinf(a) or math.isinf(b):
         return math.pow(a, b)
@@ -180,7 +180,7 @@ def power(a: float, b: float) -> float:
 
 
 def _upper(a: float) -> float:
-    """Return a without the lower half of its digits."""
+    """Return the upper half of a's digits."""
     (bits,) = struct.unpack("<Q", struct.pack("<d", a))
     (upper,) = struct.unpack("<d", struct.pack("<Q", bits & _UPPER))
     return float(upper)

@@ -1,6 +1,6 @@
-"""Sine, cosine and exponential of single-precision numbers, as exported ECUs compute them.
+"""Sine, cosine and exponential in single precision, as exported ECU code computes them.
 
-The same reductions and series as in `bywire.core.elementary`, with as many terms as 24 bits need.
+Reductions and series are the same as in `bywire.core.elementary`, with the terms that 24 bits need.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ LIMITS = (-87.0, 88.0)
 
 
 def exp(x: np.float32) -> np.float32:
-    """Return e to the power of x, which counts as at least -87 and at most 88."""
+    """Return e to the power of x, with x limited to -87 to 88."""
     if x != x:
         return x
     x = min(max(x, _N(LIMITS[0])), _N(LIMITS[1]))

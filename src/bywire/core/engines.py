@@ -1,7 +1,7 @@
-"""Engines that rooms above the simulation bring: declared where the package is put together.
+"""Engines from rooms above the simulation, declared where the package is assembled.
 
-A bench is told which engine serves by name, and the simulation makes it. What an upper room brings
-for that, it can only be handed from above.
+A bench selects its engine by name, and the simulation builds it. The simulation must not import an
+upper room, so the upper room registers its engine here.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ _DECLARED: dict[str, Make] = {}
 
 
 def declare_engine(name: str, make: Make) -> None:
-    """Let runs be computed by an engine of a room above, by name; again by another one instead."""
+    """Register the engine of an upper room under a name; a later engine replaces an earlier one."""
     _DECLARED[name] = make
 
 
 def declared_engines() -> dict[str, Make]:
-    """Return what was declared, by name."""
+    """Return the registered engines by name."""
     return dict(_DECLARED)

@@ -24,17 +24,19 @@ from collections.abc import Iterable
 from copy import copy
 from datetime import date, time
 from difflib import SequenceMatcher, get_close_matches
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
 from bywire.core.clean_text import shortened
 
+E = TypeVar("E", bound="BywireError")
+
 _SHOWN = 60  # characters of a value in a message
-_NEAR = 0.7  # least similarity of a suggestion in an error that lists all names
+_NEAR = 0.7  # lowest similarity of a suggestion in an error that lists all names
 _BARE_KEY = re.compile(r"[\w-]+", re.ASCII)
 
 
 class BywireError(Exception):
-    """Base of all errors raised on purpose: a text for the user, and fields for programs.
+    """Base of all errors that bywire raises on purpose: text for the user, fields for programs.
 
     Parameters
     ----------
@@ -57,8 +59,19 @@ class BywireError(Exception):
     def __str__(self) -> str:
         return shortened(super().__str__())
 
+    def at(self, place: str, kind: type[E]) -> E:
+        """Return an error of another kind with this one's fields and a place in front of its text.
+
+        Examples
+        --------
+        >>> error = unknown_name("state", "v", ["omega"]).at("Spindle.motor", ModelError)
+        >>> print(error)
+        Spindle.motor: unknown state 'v': valid names are omega
+        """
+        return kind(f"{place}: {self}", name=self.name, value=self.value, valid=self.valid)
+
     def reworded(self, text: str) -> Self:
-        """Return the same error with another text, for instance with the file's name in front.
+        """Return the same error with another text, such as one that starts with the file's name.
 
         Examples
         --------
@@ -192,21 +205,21 @@ def unknown_name(
 
 
 def unknown_of_few(kind: str, name: str, known: Iterable[str]) -> UnknownNameError:
-    """Build the error for an unknown name among few, with the nearest one and all in their order.
+    """Build the error for an unknown name where only a few are valid: the nearest, then all.
 
-    ``kind``, ``name``, ``known``: as of `unknown_name`.
+    The valid names keep their order. For the parameters, see `unknown_name`.
 
     Examples
     --------
     >>> print(unknown_of_few("key", "desing", ["vary", "design"]))
-    unknown key 'desing': did you mean 'design'? Known are vary, design
+    unknown key 'desing': did you mean 'design'? Valid names are vary, design
     >>> print(unknown_of_few("key", "frequency", ["vary", "design"]))
-    unknown key 'frequency': known are vary, design
+    unknown key 'frequency': valid names are vary, design
     """
     every = list(known)
     near = get_close_matches(name, every, n=1, cutoff=_NEAR)
-    meant = f"did you mean {near[0]!r}? Known" if near else "known"
-    text = f"unknown {kind} {quoted(name)}: {meant} are {_shown(every)}"
+    hint = f"did you mean {near[0]!r}? Valid" if near else "valid"
+    text = f"unknown {kind} {quoted(name)}: {hint} names are {_shown(every)}"
     return UnknownNameError(text, name=kind, value=name, valid=", ".join(every))
 
 
@@ -240,13 +253,13 @@ def quoted(value: object) -> str:
         return repr(value if len(value) <= _SHOWN else f"{value[:_SHOWN]}...")
     try:
         text = _as_toml(value)
-    except (ValueError, RecursionError):  # such a number inside, or lists a thousand levels deep
+    except (ValueError, RecursionError):  # such a number in a list, or lists nested a thousand deep
         return f"a {type(value).__name__}"
     return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}..."
 
 
 def _as_toml(value: object) -> str:
-    """Return a value in TOML notation; in Python's if TOML has none for it."""
+    """Return a value in TOML notation, or in Python's where TOML has no notation for it."""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, (date, time)):
@@ -264,7 +277,7 @@ def _key(name: str) -> str:
 
 
 def _listing(candidates: list[str]) -> str:
-    return f"known are {_shown(candidates)}" if candidates else "there are none here"
+    return f"valid names are {_shown(candidates)}" if candidates else "no names are defined here"
 
 
 def _shown(names: list[str]) -> str:

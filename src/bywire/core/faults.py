@@ -1,9 +1,9 @@
 """Fault modes that elements and brakes declare.
 
-The equations know three mechanisms: parameters that change at an instant, falsified signals between
-plant and controllers, and controllers that miss their ticks. An element names the parameters that
-its failure changes. A brake names the signals and the failures with several changes, in a module
-``faults`` of its package.
+The equations support three mechanisms: parameters that change at an instant, falsified signals
+between plant and controllers, and controllers that miss their ticks. An element lists the
+parameters that its failure changes. A brake declares the signals, and the failures with several
+changes, in a module ``faults`` of its package.
 """
 
 from __future__ import annotations
@@ -24,19 +24,19 @@ class ParameterFault:
     Parameters
     ----------
     name
-        Of the mode, for instance ``"demagnetized"``.
+        Name of the mode, for instance ``"demagnetized"``.
     summary
-        Description in one line.
+        One-line description.
     scaled
         Parameters that the fault multiplies by its value.
     value
-        Default of that factor.
+        Default value of that factor.
     replaced
-        Parameter that the fault sets to its value; instead of ``scaled``.
+        Parameter that the fault sets to its value, instead of ``scaled``.
     with_it
         Choices and other parameters that also change.
     needs
-        Choices of the assembly that this failure requires, by dotted name.
+        The assembly's choices that this failure requires, by dotted name.
     """
 
     name: str
@@ -61,18 +61,18 @@ class Channel:
     unit
         SI unit of values and offsets.
     signal
-        State that controllers read, field of their memory that acts on the plant, or stimulus.
+        State that controllers read, memory field that acts on the plant, or stimulus.
     side
         ``"reading"`` of a sensor, ``"drive"`` from controller to actuator, or ``"demand"``: a field
         of the stimulus. Undeclared demands are channels under their own names.
     seen
-        ``seen(value, par)``: the signal at a value; affine in it. The value itself by default.
+        ``seen(value, par)``: the signal at a value, affine in the value. Default: the value.
     stuck
         Default value of ``stuck``, in ``unit``.
     offset
-        Default of ``offset``, of ``drift`` per second, and of the standard deviation of ``noise``.
+        Default value of ``offset``, ``drift`` per second, and the standard deviation of ``noise``.
     task
-        Of a drive: the task that updates it, if that task may be late.
+        For a drive: the task that updates it, if that task may be late.
     """
 
     name: str
@@ -88,20 +88,20 @@ class Channel:
 
 @dataclass(frozen=True)
 class Fault:
-    """A failure of a brake that changes several parameters together.
+    """A brake's failure that changes several parameters together.
 
     Parameters
     ----------
     name
         Place and mode, for instance ``"battery.lost"``.
     summary
-        Description in one line.
+        One-line description.
     changes
         ``changes(par, value)``: parameters and choices that change, by dotted name.
     assembly
         Name of its assembly, or names of several.
     unit
-        SI unit of its value; empty if it has none.
+        SI unit of its value; empty if the fault has no value.
     value
         Default value.
     """
@@ -114,18 +114,18 @@ class Fault:
     value: float = 0.0
 
     def is_of(self, assembly: str) -> bool:
-        """Return whether the assembly of a name has this failure."""
+        """Return whether the assembly with a name has this failure."""
         return assembly in ((self.assembly,) if isinstance(self.assembly, str) else self.assembly)
 
 
 @dataclass(frozen=True)
 class Channels:
-    """The channels of an assembly.
+    """An assembly's channels.
 
     Parameters
     ----------
     name
-        Of the assembly.
+        Name of the assembly.
     channels
         Signals that faults can falsify, in addition to its demands.
     """
@@ -135,6 +135,6 @@ class Channels:
 
 
 CHANNELS = Kind("channel", ("faults",), instances(Channels))
-"""the channels of every assembly, by its name"""
+"""every assembly's channels, by the assembly's name"""
 FAULTS = Kind("fault", ("faults",), instances(Fault))
-"""failures of brakes that change several parameters"""
+"""failures that change several parameters of a brake"""

@@ -1,4 +1,4 @@
-"""Ctrl-C at the wrong moment: kept back where it would be lost, and noted where it is."""
+"""Ctrl-C at the wrong moment: deferred where it would be lost, raised again where it was lost."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _PAUSE = 0.2  # seconds until an interrupt that may have been swallowed is raise
 
 
 class _Interrupts:
-    """Ctrl-C in a command: noted, raised, and raised again where a library swallowed it."""
+    """Handler of Ctrl-C in a command, which raises again what a library has swallowed."""
 
     def __init__(self) -> None:
         self.arrived = False
@@ -26,38 +26,38 @@ class _Interrupts:
         self._again: threading.Timer | None = None
 
     def handle(self, number: int, frame: FrameType | None) -> None:
-        """Be the handler of the signal."""
+        """Handle the signal."""
         timer, self._again = self._again, None
         if timer is not None and not timer.is_alive() and not self._is_pending:
-            return  # the timer's own, which came too late
+            return  # sent by our timer, after the interrupt had been handled
         self.arrived = True
         self._is_pending = _in_library(frame)
         if self._is_pending:
             self._raise_again()
         raise KeyboardInterrupt
 
-    def swallowed(self, told: sys.UnraisableHookArgs) -> None:
-        """Be the hook for what Python drops, as what is raised while a weak reference ends."""
-        if isinstance(told.exc_value, KeyboardInterrupt):
+    def swallowed(self, dropped: sys.UnraisableHookArgs) -> None:
+        """Handle exceptions that Python drops, such as those in a weak reference's callback."""
+        if isinstance(dropped.exc_value, KeyboardInterrupt):
             self._is_pending = True
             self._raise_again()
         else:
-            self._hook(told)
+            self._hook(dropped)
 
     def _raise_again(self) -> None:
         self._again = threading.Timer(_PAUSE, _thread.interrupt_main)
         self._again.daemon = True
         self._again.start()
 
-    def heard(self) -> None:
-        """Raise it no more: somebody acts on it."""
+    def handled(self) -> None:
+        """Stop raising the interrupt again, because the program acts on it."""
         self._is_pending = False
         if self._again is not None:
             self._again.cancel()
 
 
 def _in_library(frame: FrameType | None) -> bool:
-    """Return whether CasADi has called what runs: it may swallow what is raised there."""
+    """Return whether CasADi called the running code; it may swallow exceptions raised there."""
     while frame is not None:
         if frame.f_globals.get("__name__", "").partition(".")[0] == "casadi":
             return True
@@ -68,19 +68,19 @@ def _in_library(frame: FrameType | None) -> bool:
 _current: list[_Interrupts] = []
 
 
-def interrupt_heard() -> None:
-    """Say that an interrupt is acted on, where KeyboardInterrupt was caught and work goes on."""
+def interrupt_handled() -> None:
+    """Declare an interrupt handled, where a caller caught KeyboardInterrupt and continues."""
     for each in _current:
-        each.heard()
+        each.handled()
 
 
 @contextmanager
 def interrupts_noted() -> Iterator[Callable[[], bool]]:
-    """Yield a function that tells whether Ctrl-C was pressed since the block began.
+    """Yield a function that returns whether Ctrl-C was pressed since the block began.
 
-    It raises KeyboardInterrupt, as ever; but CasADi may make an error of its own of what is raised
-    where it calls Python, or nothing at all, and Python itself drops what is raised while it tidies
-    up: then it is raised again until it is heard.
+    Ctrl-C raises KeyboardInterrupt as usual. Where CasADi calls Python, however, CasADi may replace
+    that exception with an error of its own, or drop it. Python itself drops exceptions that are
+    raised during cleanup. In these cases the interrupt is raised again until it is handled.
     """
     previous = signal.getsignal(signal.SIGINT)
     if threading.current_thread() is not threading.main_thread() or not callable(previous):
@@ -94,17 +94,17 @@ def interrupts_noted() -> Iterator[Callable[[], bool]]:
         yield lambda: interrupts.arrived
     finally:
         sys.unraisablehook = hook
-        interrupts.heard()
+        interrupts.handled()
         _current.remove(interrupts)
         signal.signal(signal.SIGINT, previous)
 
 
 @contextmanager
 def interrupts_deferred() -> Iterator[None]:
-    """Keep back Ctrl-C until the block ends; then raise KeyboardInterrupt.
+    """Defer Ctrl-C until the block ends; then raise KeyboardInterrupt.
 
-    For building symbolic graphs: CasADi swallows what is raised while it looks at its arguments,
-    a KeyboardInterrupt too, and the user's Ctrl-C would have no effect.
+    Use it while building symbolic graphs. CasADi swallows exceptions that are raised while it
+    inspects its arguments, including KeyboardInterrupt, so the user's Ctrl-C would have no effect.
     """
     previous = signal.getsignal(signal.SIGINT)
     if threading.current_thread() is not threading.main_thread() or not callable(previous):
@@ -117,12 +117,12 @@ def interrupts_deferred() -> Iterator[None]:
     finally:
         signal.signal(signal.SIGINT, previous)
         if arrived:
-            previous(signal.SIGINT, None)  # notes it, where somebody does
+            previous(signal.SIGINT, None)  # an enclosing `interrupts_noted` notes it
             raise KeyboardInterrupt
 
 
 class _Stops(threading.local):
-    """Events of which any ends what a thread does; the main thread has none, it is interrupted."""
+    """Events that stop a thread's work; the main thread has none, since Ctrl-C reaches it."""
 
     events: tuple[threading.Event, ...] = ()
 
@@ -135,9 +135,9 @@ def _take(events: tuple[threading.Event, ...]) -> None:
 
 
 def raise_if_stopped() -> None:
-    """Raise KeyboardInterrupt in a thread of `thread_pool` whose results nobody waits for any more.
+    """Raise KeyboardInterrupt in a thread of `thread_pool` whose results are no longer needed.
 
-    For loops that take long; between two calls of a kernel they ask.
+    Long loops call this between two calls of a kernel.
     """
     if any(event.is_set() for event in _stops.events):
         raise KeyboardInterrupt
@@ -145,14 +145,14 @@ def raise_if_stopped() -> None:
 
 @contextmanager
 def thread_pool(threads: int | None = None) -> Iterator[ThreadPoolExecutor]:
-    """Yield a pool of threads that end within a moment where an exception leaves the block.
+    """Yield a pool of threads that end promptly when an exception leaves the block.
 
-    Ctrl-C reaches the main thread alone. Threads that a thread of a pool starts end with it, too.
+    Ctrl-C reaches only the main thread. Threads that a pool's thread starts also end with it.
 
     Parameters
     ----------
     threads
-        How many, >= 1; all cores by default.
+        Number of threads, >= 1. Default: one per core.
     """
     stop = threading.Event()
     pool = ThreadPoolExecutor(

@@ -1,4 +1,4 @@
-"""Names that a package loads on their first use, stated once: by the stub beside the package."""
+"""Names that a package loads on first use; only the stub next to the package declares them."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from typing import Any
 
 
 class LazyNames:
-    """The names of a package.
+    """A package's lazily loaded names.
 
     Parameters
     ----------
     file
-        ``__init__.py`` of the package. A stub stands beside it, which type checkers read as well:
-        lines ``from HOME import NAME as NAME``. What is called otherwise at home is imported
-        ``as _NAME``, with a line ``NAME = _NAME`` for type checkers.
+        ``__init__.py`` of the package. The stub next to it, which type checkers also read, has
+        lines ``from HOME import NAME as NAME``. An object with another name in its home module is
+        imported ``as _NAME``, with a line ``NAME = _NAME`` for type checkers.
     """
 
     def __init__(self, file: str) -> None:
@@ -24,7 +24,7 @@ class LazyNames:
 
     @cached_property
     def homes(self) -> dict[str, tuple[str, str]]:
-        """Name -> module, and what it is called there."""
+        """Name -> module, and the object's name in that module."""
         lines = self._stub.read_text(encoding="utf-8").splitlines()
         words = [line.split() for line in lines if line.startswith("from ")]
         return {name.removeprefix("_"): (home, there) for _, home, _, there, _, name in words}
@@ -34,7 +34,7 @@ class LazyNames:
         return sorted(name for name in self.homes if not name.startswith("_"))
 
     def load(self, name: str) -> Any:
-        """Return what a name stands for; ``__all__`` for all of them.
+        """Return the object with a name, or the list of all names for ``__all__``.
 
         Raises
         ------

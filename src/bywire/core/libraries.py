@@ -1,11 +1,11 @@
-"""Libraries: their threads, what they do unasked, and how to install optional ones.
+"""Libraries: their threads, their unwanted imports, and how to install optional ones.
 
 Linear algebra runs on one thread. The systems here are small: tens of unknowns, Jacobians with a
-few columns. Threads of a BLAS then wait for each other longer than they compute, and they wait by
-spinning, which takes the cores from simulations: without them, reproducing Dardanelli et al. (2010)
-takes two thirds of the time. Sums are also the same on every number of cores.
+few columns. BLAS threads would wait for each other longer than they compute. They spin while they
+wait, which takes the cores from simulations: on one thread, reproducing Dardanelli et al. (2010)
+takes two thirds of the time. Sums are also independent of the number of cores.
 
-Nothing here changes a number of threads that the environment states.
+A number of threads that the environment sets is never changed here.
 """
 
 from __future__ import annotations
@@ -22,23 +22,23 @@ if TYPE_CHECKING:
     from threadpoolctl import threadpool_limits
 
 _DEFAULTS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-# Libraries that start threads as soon as they are loaded, which bywire never uses: numexpr beside
-# pandas, and the allocator of pyarrow. A process with threads cannot be copied.
+# Libraries that start threads on import, which bywire never uses: numexpr, which pandas loads, and
+# pyarrow's allocator. A process with threads cannot be copied safely.
 _IDLE_THREADS = {
     "NUMEXPR_NUM_THREADS": "1",
     "JE_ARROW_MALLOC_CONF": "background_thread:false",
 }
 VARIABLES = (*_DEFAULTS, "OMP_NUM_THREADS", "BLIS_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
-"""environment variables by which a user states a number of threads"""
+"""environment variables with which a user sets the number of threads"""
 
 
 def one_thread_variables() -> dict[str, str]:
-    """Environment variables of a child process whose libraries start no threads of their own."""
+    """Return environment variables for a child process whose libraries start no threads."""
     return {**dict.fromkeys(_DEFAULTS, "1"), "OMP_NUM_THREADS": "1", **_IDLE_THREADS}
 
 
 def keep_one_thread() -> None:
-    """Limit this process to one thread, whether or not its libraries are loaded."""
+    """Limit this process to one thread, even if its libraries are loaded already."""
     os.environ.update({k: v for k, v in _IDLE_THREADS.items() if k not in os.environ})
     if _is_chosen():
         return
@@ -51,9 +51,9 @@ def keep_one_thread() -> None:
 
 @contextmanager
 def on_one_thread() -> Iterator[None]:
-    """Compute on one thread in this block, in a process that belongs to the caller.
+    """Compute on one thread within this block, in a process that belongs to the caller.
 
-    Blocks may overlap, also in several threads: the last that ends restores the former limits.
+    Blocks may overlap, even in several threads. The last block to end restores the former limits.
     """
     if _is_chosen():
         yield
@@ -66,12 +66,12 @@ def on_one_thread() -> Iterator[None]:
 
 
 def _is_chosen() -> bool:
-    """Return whether the environment states a number of threads."""
+    """Return whether the environment sets the number of threads."""
     return any(os.environ.get(name) for name in VARIABLES)
 
 
 class _Limited:
-    """The limit of threads, in force while at least one block needs it."""
+    """Limit on threads, in force while at least one block needs it."""
 
     def __init__(self) -> None:
         self._lock = Lock()
@@ -79,7 +79,7 @@ class _Limited:
         self._limits: threadpool_limits | None = None
 
     def begin(self) -> None:
-        """Set the limit, unless it is set."""
+        """Set the limit unless it is set already."""
         with self._lock:
             if self._limits is None:
                 import scipy.linalg  # noqa: F401  its own BLAS must be loaded to be limited
@@ -100,7 +100,7 @@ class _Limited:
 _limited = _Limited()
 
 
-# --- Imports and messages that nobody here needs
+# --- Imports and messages that bywire does not need
 
 _modules: dict[str, Any] = sys.modules
 
@@ -108,20 +108,20 @@ _modules: dict[str, Any] = sys.modules
 def leave_out_dask() -> None:
     """Keep xarray from importing dask in this process.
 
-    To recognize arrays of dask, xarray imports ``dask.array`` wherever it is installed, which takes
-    as long as half a short run.
+    To recognize dask arrays, xarray imports ``dask.array`` if it is installed. That takes half as
+    long as a short run.
     """
     _modules.setdefault("dask", None)
 
 
 def allow_dask() -> None:
-    """Allow imports of dask again, before code is loaded that may need it."""
+    """Allow imports of dask again, before loading code that may need it."""
     if "dask" in _modules and _modules["dask"] is None:
         del _modules["dask"]
 
 
 def silence_matplotlib() -> None:
-    """Silence the note of matplotlib that its fonts are elsewhere because home is read-only."""
+    """Silence matplotlib's note that its fonts are elsewhere because home is read-only."""
     logging.getLogger("matplotlib").setLevel(logging.ERROR)
 
 
@@ -129,7 +129,7 @@ def silence_matplotlib() -> None:
 
 
 def how_to_install(extra: str) -> str:
-    """Return the command that installs an extra: in a clone, since the package is on no index.
+    """Return the command that installs an extra from a clone; no package index has bywire.
 
     Examples
     --------

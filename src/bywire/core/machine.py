@@ -1,4 +1,4 @@
-"""The machine: its memory, and how many threads or processes a piece of work gets."""
+"""The machine's memory, and the number of threads or processes for a piece of work."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ _FALLBACK = 8e9  # bytes
 
 @cache
 def machine_memory() -> float:
-    """Return the machine's memory in bytes; 8 GB where the system does not state it."""
+    """Return the machine's memory in bytes; 8 GB if the system does not report it."""
     try:
         return float(os.sysconf("SC_PHYS_PAGES")) * float(os.sysconf("SC_PAGE_SIZE"))
-    except (AttributeError, ValueError, OSError):  # not every system states it
+    except (AttributeError, ValueError, OSError):  # not every system reports it
         return _FALLBACK
 
 
 def address_space() -> int:
-    """Return the bytes of address space that this process may take; 0 where it is not limited."""
+    """Return this process's limit of address space in bytes; 0 if there is no limit."""
     if os.name != "posix":
         return 0
     import resource
@@ -33,9 +33,9 @@ def worker_count(workers: int | None = None, most: int | None = None) -> int:
     Parameters
     ----------
     workers
-        Number that the caller asks for, >= 1; one per core by default.
+        Number that the caller requests, >= 1. Default: one per core.
     most
-        Largest number that has something to do, for instance one for each case.
+        Largest useful number, such as one per case.
     """
     count = workers or os.cpu_count() or 1
     return count if most is None else max(1, min(count, most))

@@ -1,18 +1,18 @@
 """The model protocol: everything the engine needs from a brake, a rig or another system.
 
 A model is written as pure functions of named tuples. The engine evaluates them once on symbols
-and needs nothing else. A model has:
+and needs no other code of the model. A model has:
 
 * smooth dynamics in mass form, ``mass_k(xe) dx_k/dt = balance_k(x, xe, ...)``;
 * dry *frictions*: a velocity state whose equation carries a set-valued force between two bounds
   while it is exactly zero;
 * one-sided *limits*: a state that cannot fall below zero (a check valve, a stop);
 * *contact groups*: unilateral contacts whose compliances couple them;
-* *tasks*: the sampled controllers, each with its own period, working on a shared memory;
+* *tasks*: the sampled controllers, each with its own period, which share one memory;
 * *powers*, integrated along with the states, for the energy balance.
 
-``x`` enters the implicit solve; ``xe`` is the same state but value-only: it is not
-differentiated for the Newton matrix. Use it for slowly varying geometry and periodic terms.
+``x`` enters the implicit solve. ``xe`` is the same state as a value only: the Newton matrix omits
+its derivatives. Use it for slowly varying geometry and periodic terms.
 """
 
 from __future__ import annotations
@@ -41,8 +41,8 @@ class Task:
     period
         Sample time [s]; a whole number of substeps.
     tick
-        ``tick(x, memory, stimulus, par) -> memory``: reads the plant at the sampling instant
-        and returns the memory with this task's fields updated.
+        ``tick(x, memory, stimulus, par) -> memory``: reads the plant at the sampling instant and
+        returns the memory with this task's fields updated.
     """
 
     name: str
@@ -98,9 +98,9 @@ class Model(Protocol):
 
     @property
     def usually_open(self) -> tuple[bool, ...]:
-        """Per contact group, whether it rarely touches, as end stops do; none by default.
+        """Whether each contact group rarely touches, as end stops do. Default: none.
 
-        This affects speed only: an open group costs one check, a touching one the exact solution.
+        This affects speed only. An open group costs one check; a touching group is solved exactly.
         """
         return ()
 
@@ -113,7 +113,7 @@ class Model(Protocol):
         ...
 
     def balance(self, x: Any, xe: Any, memory: Any, par: Any, contact: tuple[float, ...]) -> Any:
-        """Return the smooth right-hand side, a State; without frictions and limits."""
+        """Return the smooth right-hand side, a State, without frictions and limits."""
         ...
 
     def bounds(
@@ -133,7 +133,7 @@ class Model(Protocol):
         return ()
 
     def gap(self, x: Any, xe: Any, par: Any) -> tuple[tuple[float, ...], ...]:
-        """Return per group the overlaps d, affine in x (and its rates through the states).
+        """Return the overlaps d of each group, affine in x (and in its rates through the states).
 
         The contact forces F >= 0 of a group solve ``C F - d >= 0, F (C F - d) = 0``.
         """
@@ -151,8 +151,8 @@ class Model(Protocol):
     ) -> Any:
         """Return the rates of the Flow at the midpoint of a substep.
 
-        ``xe`` is the predicted midpoint, as in ``balance``: periodic terms of it are computed only
-        once. ``rate`` is dx/dt; ``reaction`` holds the friction forces, then those of the limits.
+        ``xe`` is the predicted midpoint, as in ``balance``, so its periodic terms are computed only
+        once. ``rate`` is dx/dt. ``reaction`` contains the friction forces, then the limits' forces.
         """
         ...
 
@@ -165,19 +165,19 @@ class Model(Protocol):
         reaction: tuple[float, ...],
         flow: Any,
     ) -> Any:
-        """Return the recorded signals at an instant; ``reaction`` is that of the last substep."""
+        """Return the recorded signals at an instant; ``reaction`` is from the last substep."""
         ...
 
     def rest(self, par: Any) -> tuple[Any, Any]:
         """Return a State and a Memory in which the system rests without stimulus.
 
-        Generic experiments and checks start here. The default, all zeros, is right if nothing is
-        preloaded, filled or held.
+        Generic experiments and checks start here. The default, all zeros, fits a system in which
+        nothing is preloaded, filled or held.
         """
         return zeros(self.State), zeros(self.Memory)
 
     def watch(self, recording: Any, par: Any) -> list[str]:
-        """Return warnings about a recording, such as exceeded validity or touched stops; none here.
+        """Return warnings about a recording, such as an exceeded range of validity. Default: none.
 
         Parameters
         ----------
@@ -189,9 +189,9 @@ class Model(Protocol):
         return []
 
     def remarks(self, recording: Any, par: Any) -> list[str]:
-        """Return notes above the key figures of a run, such as on its controllers; none here.
+        """Return notes above a run's key figures, such as on its controllers. Default: none.
 
-        Unlike the texts of ``watch``, they are not warnings, and studies do not need them.
+        Unlike the texts of ``watch``, these are not warnings, and studies do not need them.
 
         Parameters
         ----------
@@ -203,27 +203,27 @@ class Model(Protocol):
         return []
 
     def watched(self, par: Any) -> tuple[str, ...] | None:
-        """Return the recorded signals that ``watch`` reads; None if they are unknown.
+        """Return the recorded signals that ``watch`` reads, or None if they are unknown.
 
-        Studies record only these and the signals of key figures and of the energy balance.
+        Studies record only these signals and those of key figures and the energy balance.
         """
         return None
 
     def silent(self, rows: Any, pars: Any) -> frozenset[str]:
-        """Return parts that ``watch`` can skip in several cases; see `Assembly.silent`."""
+        """Return the parts that ``watch`` can skip in several cases; see `Assembly.silent`."""
         return frozenset()
 
     def may_warn(self, rows: Any, pars: Any) -> Sequence[int]:
-        """Return the cases for which ``watch`` may return warnings; all by default.
+        """Return the cases for which ``watch`` may return warnings. Default: all.
 
-        ``rows``: signals of shape (cases, rows), ``rows.silent`` the parts `silent` in all of them;
-        ``pars``: parameters of each case.
+        ``rows``: signals of shape (cases, rows); ``rows.silent``: the parts that are `silent` in
+        all cases. ``pars``: parameters of each case.
         """
         return range(len(pars))
 
 
 def require_states(model: Any) -> None:
-    """Reject frictions and limits of a model that are not among its states.
+    """Reject a model's frictions and limits that are not among its states.
 
     Parameters
     ----------
@@ -243,11 +243,14 @@ def require_states(model: Any) -> None:
         cls = model if isinstance(model, type) else type(model)
         where = f"{place_of(cls)}: {model.name}: {kind}"
         if not isinstance(names, tuple):
-            raise ModelError(f"{where} = {names!r} must be a tuple of states, as ({fields[0]!r},)")
+            valid = f"a tuple of states, such as ({fields[0]!r},)"
+            raise ModelError(
+                f"{where} = {names!r} must be {valid}", name=kind, value=repr(names), valid=valid
+            )
         for name in names:
             if name not in fields:
                 error = unknown_name("state", str(name), fields)
-                raise ModelError(f"{where} names {name!r}, which is not a field of State: {error}")
+                raise error.at(f"{where} lists {name!r}, which is not a field of State", ModelError)
 
 
 def _declared(module: ModuleType) -> Iterator[type[Any]]:
@@ -260,25 +263,25 @@ def _declared(module: ModuleType) -> Iterator[type[Any]]:
 
 
 ASSEMBLIES: Kind[Any] = Kind("assembly", ("model", "models", "rigs"), _declared)
-"""the complete models of every brake, rigs included: classes, by their ``name``"""
+"""the complete models of every brake, including rigs: classes, by their ``name``"""
 
 
-# --- A model around another one
+# --- Model wrapped around another one
 
 _PROTOCOL = frozenset(name for name in vars(Model) if not name.startswith("_"))
 if TYPE_CHECKING:
     _Protocol = Model
 else:
-    _Protocol = object  # the defaults of the protocol must not hide the model inside
+    _Protocol = object  # the protocol's defaults must not hide the wrapped model
 
 
 class Wrapping(_Protocol):
-    """A model around another one; a subclass may declare another memory.
+    """A model wrapped around another one; a subclass may declare another memory.
 
     Parameters
     ----------
     inner
-        The model inside, which provides every protocol member that is not defined here.
+        The wrapped model, which provides every protocol member that is not defined here.
     """
 
     def __init__(self, inner: Model) -> None:
@@ -291,35 +294,35 @@ class Wrapping(_Protocol):
 
     @property
     def name(self) -> str:
-        """Name of the model inside."""
+        """Name of the wrapped model."""
         return self.inner.name
 
     @property
     def State(self) -> type[NamedTuple]:
-        """States of the model inside."""
+        """States of the wrapped model."""
         return self.inner.State
 
     @property
     def Memory(self) -> type[NamedTuple]:
-        """Memory of the model inside."""
+        """Memory of the wrapped model."""
         return self.inner.Memory
 
     @property
     def Flow(self) -> type[NamedTuple]:
-        """Integrals of the model inside."""
+        """Integrals of the wrapped model."""
         return self.inner.Flow
 
     @property
     def Output(self) -> type[NamedTuple]:
-        """Recorded signals of the model inside."""
+        """Recorded signals of the wrapped model."""
         return self.inner.Output
 
     def mass(self, xe: Any, par: Any) -> Any:
-        """Return the masses of the model inside."""
+        """Return the masses of the wrapped model."""
         return self.inner.mass(xe, par)
 
     def memory_inside(self, memory: Any) -> Any:
-        """Return the memory that acts on the plant inside."""
+        """Return the memory that acts on the wrapped model's plant."""
         return memory
 
     def balance(self, x: Any, xe: Any, memory: Any, par: Any, contact: tuple[float, ...]) -> Any:

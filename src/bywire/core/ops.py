@@ -1,10 +1,10 @@
 """Elementary functions that dispatch on the type of their argument.
 
-The equations of plant and control call these and nothing else, so that the same function runs
-on floats, NumPy arrays, CasADi symbols and any object that brings its own operations (a method
-``_bywire_op``, as the unit-carrying numbers of the dimension tests do). Floats need no CasADi.
-Exponential, logarithm, power, sine and cosine of a float are those of kernels and exported ECUs,
-in every bit; of an array they are NumPy's.
+The equations of plant and control call only these functions. The same equation therefore runs on
+floats, NumPy arrays, CasADi symbols and any object with its own operations (a method
+``_bywire_op``, as the dimension tests' quantities have). Floats do not need CasADi. For a float,
+exponential, logarithm, power, sine and cosine agree bit for bit with kernels and exported ECU code.
+For an array, they come from NumPy.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ _SINGLES: dict[str, Callable[..., Any]] = {
     "exp": elementary_single.exp,
     "sin": elementary_single.sin,
     "cos": elementary_single.cos,
-    # Of equal zeros the first, as of floats; NumPy's would take one or the other.
+    # Of 0.0 and -0.0 return the first, as for floats; NumPy may return either.
     "fmax": lambda x, y: max(np.float32(x), np.float32(y)),
     "fmin": lambda x, y: min(np.float32(x), np.float32(y)),
 }
@@ -61,7 +61,7 @@ def _apply(name: str, *args: Any) -> Any:
 
 
 def is_symbol(value: Any) -> bool:
-    """Return whether a value is a symbol, of which nobody can ask whether it is in range."""
+    """Return whether a value is a symbol, which cannot be compared with a range."""
     return type(value).__module__.startswith("casadi")
 
 
@@ -71,25 +71,25 @@ def exp(x: float) -> float:
 
 
 DECAYED = 40.0
-"""where ``decay`` ends: its value there, 4e-18, no longer shows beside 1"""
+"""argument beyond which ``decay`` is 0: exp(-40) = 4e-18 is below the resolution of 1.0"""
 
 
 def decay(x: float, *, rests: bool = False) -> float:
     """Return e to the power of -x for a pure number x >= 0, and exactly 0 beyond x = 40.
 
-    For terms that are added to something of the order of one: far out on a Stribeck curve, kernels
-    then skip the exponential.
+    Use it for terms that are added to a number of the order of one. Far out on a Stribeck curve,
+    kernels can then skip the exponential.
 
     Parameters
     ----------
     rests
-        Whether x is often exactly 0: kernels then skip the exponential there too, at the price of
-        two operations elsewhere.
+        Whether x is often exactly 0. Kernels then also skip the exponential at 0, at the cost of
+        two operations for other x.
     """
     if not rests:
         return where(x < DECAYED, exp(-x), 0.0)
     half = 0.5 * DECAYED
-    away = x - half  # one comparison for both ends
+    away = x - half  # a single comparison covers both ends
     return where(away * away < half * half, exp(-x), where(x < half, 1.0, 0.0))
 
 
@@ -129,12 +129,12 @@ def floor(x: float) -> float:
 
 
 def fmax(x: float, y: float) -> float:
-    """Return the larger of two quantities of one unit."""
+    """Return the larger of two quantities with the same unit."""
     return _apply("fmax", x, y)  # type: ignore[no-any-return]
 
 
 def fmin(x: float, y: float) -> float:
-    """Return the smaller of two quantities of one unit."""
+    """Return the smaller of two quantities with the same unit."""
     return _apply("fmin", x, y)  # type: ignore[no-any-return]
 
 
@@ -149,14 +149,14 @@ def clip(x: float, low: float, high: float) -> float:
 
 
 def where(condition: Any, then: float, otherwise: float) -> float:
-    """Return ``then`` where the condition holds, else ``otherwise``; both are evaluated."""
+    """Return ``then`` where the condition is true, else ``otherwise``; both are evaluated."""
     if isinstance(condition, (bool, np.bool_)):
         return then if condition else otherwise
     return _apply("where", condition, then, otherwise)  # type: ignore[no-any-return]
 
 
 def interpolate(x: float, xs: tuple[float, ...], ys: tuple[float, ...]) -> float:
-    """Return the piecewise linear function through (xs, ys), constant outside.
+    """Return the piecewise linear interpolation of (xs, ys), constant outside.
 
     Parameters
     ----------

@@ -7,8 +7,8 @@ from collections.abc import Iterable
 from bywire.core.errors import ParameterError
 
 DIGITS = 9
-"""digits of a whole number that counts something"""
-_INPUT = ("--input", "Inputs")  # of a command, and of a form
+"""largest number of digits of a count"""
+_INPUT = ("--input", "Inputs")  # in commands and in forms
 _CHANGE = "KEY=VALUE, for instance motor.R_m=0.4ohm"
 _FORMS = {
     **dict.fromkeys(
@@ -20,7 +20,7 @@ _FORMS = {
 
 
 def named(texts: Iterable[str] | None, flag: str) -> dict[str, str]:
-    """Return names and texts of an option ``NAME`` or ``NAME=TEXT``; texts are empty by default.
+    """Return names and texts of an option ``NAME`` or ``NAME=TEXT``. Default text: empty.
 
     Raises
     ------
@@ -50,7 +50,7 @@ def named(texts: Iterable[str] | None, flag: str) -> dict[str, str]:
 def changes(texts: Iterable[str] | None, flag: str = "--set") -> dict[str, str]:
     """Return keys and values of ``--set KEY=VALUE`` or a similar option.
 
-    A stimulus of ``--input`` alone is driven by the measured signal of its name.
+    With ``--input STIMULUS``, the measured signal of the same name drives the stimulus.
 
     Raises
     ------
@@ -64,7 +64,10 @@ def changes(texts: Iterable[str] | None, flag: str = "--set") -> dict[str, str]:
             value = equals = key
         if not equals or not key or not value:
             raise ParameterError(
-                f"{flag} {text}: write {_FORMS.get(flag, _CHANGE)}", name=flag, value=text
+                f"{flag} {text}: write {_FORMS.get(flag, _CHANGE)}",
+                name=flag,
+                value=text,
+                valid=_FORMS.get(flag, _CHANGE),
             )
         if key in values:
             raise ParameterError(
@@ -75,7 +78,7 @@ def changes(texts: Iterable[str] | None, flag: str = "--set") -> dict[str, str]:
 
 
 def read_count(text: str) -> int | None:
-    """Return a text of at most `DIGITS` digits as a whole number >= 0, or None.
+    """Return a text of at most `DIGITS` digits as a whole number >= 0; None for other texts.
 
     Examples
     --------

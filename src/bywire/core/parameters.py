@@ -50,7 +50,7 @@ class Leaf:
     low_open: bool
     high_open: bool
     is_whole: bool = False
-    """whether only whole numbers are valid"""
+    """whether the value must be a whole number"""
 
     def admits(self, value: float) -> bool:
         """Return whether a value [SI] is in the valid range."""
@@ -59,7 +59,7 @@ class Leaf:
 
     @property
     def range_text(self) -> str:
-        """Valid range as a text, for instance ``> 0 ohm``."""
+        """Valid range as text, for instance ``> 0 ohm``."""
         return self.range_in(self.unit.symbol)
 
     def range_in(self, symbol: str) -> str:
@@ -79,11 +79,11 @@ class Leaf:
 
 
 # --- Parameter sets
-# A *leaf* is a number with a unit; its dotted name (``motor.R_m``) is the same in Python, in
-# bench files, in recordings and on the command line. A *choice* is a field that selects
-# equations (``gear.law = "directional"``); it affects the compiled code, never a value.
+# A *leaf* is a number with a unit. Its dotted name (``motor.R_m``) is the same in Python, in bench
+# files, in recordings and on the command line. A *choice* is a field that selects equations
+# (``gear.law = "directional"``). It affects the compiled code, never a value.
 #
-# Studies and searches make thousands of sets a second that differ from one in the same few names.
+# Studies and searches make thousands of sets per second that differ in the same few names.
 
 S = TypeVar("S", bound=BaseModel)
 
@@ -92,7 +92,7 @@ KNOWN = "_known"
 
 
 def fields_of(node: BaseModel) -> dict[str, Any]:
-    """Return the fields of a set by name, in order, without cached values."""
+    """Return a set's fields by name, in order, without cached values."""
     kept, names = node.__dict__.copy(), _field_names(type(node))
     kept.pop(KNOWN, None)
     return kept if len(kept) == len(names) else {name: kept[name] for name in names}
@@ -115,7 +115,7 @@ def _reader(names: tuple[str, ...]) -> Callable[[Any], tuple[Any, ...]]:
 
 
 class Places(NamedTuple):
-    """Places of dotted names: fields of a set itself, and places in its groups."""
+    """Places of dotted names: a set's own fields, and places in its groups."""
 
     fields: tuple[tuple[str, str], ...]
     """field and dotted name"""
@@ -124,7 +124,7 @@ class Places(NamedTuple):
 
     @classmethod
     def of(cls, names: Sequence[str], prefix: str = "") -> Places:
-        """Return the places of names with the prefix of a group."""
+        """Return the places of names that start with a group's prefix."""
         own: list[tuple[str, str]] = []
         groups: dict[str, list[str]] = {}
         for name in names:
@@ -137,14 +137,14 @@ class Places(NamedTuple):
         return cls(tuple(own), tuple(inner))
 
     def filled(self, node: S, values: Mapping[str, Any]) -> S:
-        """Return a set with other values; if only groups change, check the set's rules alone.
+        """Return a set with other values; if only groups change, check only the set's own rules.
 
         Raises
         ------
         ValueError
-            When a value or a rule does not fit; pydantic's `ValidationError` is one.
+            When a value is not valid or a rule is broken; pydantic's `ValidationError` is one.
         AssertionError
-            When a rule of an author fails.
+            When an author's ``assert`` fails.
         """
         fields = fields_of(node)
         for name, inner in self.groups:
@@ -154,16 +154,16 @@ class Places(NamedTuple):
         rules = None if self.fields else _rules(type(node))
         if rules is None:
             return type(node).model_validate(fields)
-        made = type(node).__new__(type(node))
-        made.__setstate__({**node.__getstate__(), "__dict__": fields})  # as a copy is made
+        copy = type(node).__new__(type(node))
+        copy.__setstate__({**node.__getstate__(), "__dict__": fields})  # as pydantic's copy
         for rule in rules:
-            made = getattr(made, rule)()
-        return made
+            copy = getattr(copy, rule)()
+        return copy
 
 
 @cache
 def _rules(cls: type[BaseModel]) -> tuple[str, ...] | None:
-    """Return the rules of a class for a set of valid groups; None if it validates more."""
+    """Return a class's rules between valid groups, or None if it has other validators."""
     known, groups = cls.__pydantic_decorators__, cls.model_fields.values()
     judges = known.model_validators
     does_more = (
@@ -184,7 +184,40 @@ def _is_group(annotation: Any) -> bool:
     return isinstance(annotation, type) and issubclass(annotation, BaseModel)
 
 
-# --- Errors for values that are not valid: one line each
+# --- Errors for values that are not valid, with one line for each value
+
+
+class RuleError(ValueError):
+    """Two values of a parameter class that contradict each other, for the class's validator.
+
+    Parameters
+    ----------
+    name
+        Field of the class that is to be changed.
+    value
+        Its value with its unit.
+    valid
+        Its valid values, given the others; ends the sentence "it must be ...".
+    reason
+        Reason or next step; may be empty.
+
+    Examples
+    --------
+    >>> print(RuleError("l_f", "1.6 m", "< the wheelbase L = 1.4 m").error_in("body"))
+    body.l_f = 1.6 m must be < the wheelbase L = 1.4 m
+    """
+
+    def __init__(self, name: str, value: str, valid: str, reason: str = "") -> None:
+        super().__init__(f"{name} = {value} must be {valid}{reason and f': {reason}'}")
+        self.name, self.value, self.valid = name, value, valid
+
+    def error_in(self, group: str) -> ParameterError:
+        """Return the error for the user, with the field's dotted name."""
+        prefix = f"{group}." if group else ""
+        return ParameterError(
+            f"{prefix}{self}", name=prefix + self.name, value=self.value, valid=self.valid
+        )
+
 
 _BOOL, _TEXT = "it must be true or false", "it must be a text"
 _PLAIN_WORDS = {"bool_parsing": _BOOL, "bool_type": _BOOL, "string_type": _TEXT}
@@ -193,22 +226,22 @@ _PLAIN_WORDS = {"bool_parsing": _BOOL, "bool_type": _BOOL, "string_type": _TEXT}
 def refusal(
     error: ValidationError, owner: str, leaves: Mapping[str, Leaf], texts: Mapping[str, str]
 ) -> InputError:
-    """Return one error for all values that are not valid, with a line for each.
+    """Return a single error for all values that are not valid, with a line for each.
 
     Parameters
     ----------
     error
-        Error of pydantic.
+        Pydantic's error.
     owner
-        Name of the class of the parameter set.
+        Name of the parameter class.
     leaves
-        Its numbers by dotted name.
+        The class's numbers by dotted name.
     texts
         Original texts of numbers, by dotted name.
     """
     details: list[dict[str, Any]] = [dict(detail) for detail in error.errors()]
     places = {detail["loc"][:-1] for detail in details}
-    # A table with a wrong node also counts as too short; only the node gets a line.
+    # Pydantic also counts a table with a wrong node as too short; only the node gets a line.
     details = [d for d in details if not (_is_length(d) and d["loc"] in places)]
     each = [_explain(detail, owner, leaves, texts) for detail in details]
     if len(each) == 1:
@@ -225,7 +258,7 @@ def _explain(
     name = ".".join(str(part) for part in detail["loc"])
     value, kind = detail["input"], detail["type"]
     if kind == "missing":
-        return ParameterError(f"{owner}: {name} is missing: give it a value", name=name)
+        return ParameterError(f"{owner}: {name} is missing: add a value", name=name)
     if kind == "literal_error":
         return _unknown_choice(name, value, detail["ctx"]["expected"])
     leaf = leaves.get(name) or leaves.get(name.rpartition(".")[0])
@@ -235,9 +268,13 @@ def _explain(
         return _out_of_range(name, value, leaf, kind_text, texts.get(name, ""))
     if _is_length(detail):
         return _wrong_count(name, detail, texts)
+    rule = detail.get("ctx", {}).get("error")
+    if isinstance(rule, RuleError):
+        return rule.error_in(name)
     message = _PLAIN_WORDS.get(kind, str(detail["msg"]).removeprefix("Value error, "))
-    given = "" if isinstance(value, dict) else f", got {quoted(value)}"
-    return ParameterError(f"{name or owner}: {message}{given}", name=name or owner)
+    shown = "" if isinstance(value, dict) else quoted(value)
+    text = f"{name or owner}: {message}{shown and f', got {shown}'}"
+    return ParameterError(text, name=name or owner, value=shown)
 
 
 def _out_of_range(name: str, value: Any, leaf: Leaf, kind: str, text: str) -> InputError:
@@ -257,7 +294,8 @@ def _wrong_count(name: str, detail: Mapping[str, Any], texts: Mapping[str, str])
     valid = f"at least {context['min_length']}" if short else f"at most {context['max_length']}"
     written = [texts.get(f"{name}.{k}", "") for k in range(len(value))]
     got = quoted(", ".join(written)) if written and all(written) else quoted(value)
-    return ParameterError(f"{name} must have {valid} values, got {got}", name=name, valid=valid)
+    text = f"{name} must have {valid} values, got {got}"
+    return ParameterError(text, name=name, value=got, valid=valid)
 
 
 def _is_length(detail: Mapping[str, Any]) -> bool:
@@ -277,7 +315,7 @@ T = TypeVar("T", bound="ParameterSet")
 
 
 _SIMPLE = {float, str}  # types that do not depend on the notation
-_OBJECTS = "_carries_objects"  # in the dictionary of a set whose leaves need not be numbers
+_OBJECTS = "_carries_objects"  # in the __dict__ of a set whose leaves need not be numbers
 
 
 class ParameterSet(BaseModel):
@@ -299,14 +337,14 @@ class ParameterSet(BaseModel):
         ParameterError
             With field, value, unit and valid range.
         UnknownNameError
-            With the nearest known names.
+            With the nearest valid names.
         """
         return _validated(cls, {}, values)
 
     def replace(self, values: Mapping[str, Any]) -> Self:
         """Return a copy with other values at dotted names; the affected groups are validated.
 
-        If nothing changes, it is the set itself. A set of other objects than numbers
+        If nothing changes, the result is the set itself. A set with other objects than numbers
         (`with_leaves`) is not validated.
         """
         if _OBJECTS in self.__dict__:
@@ -314,9 +352,9 @@ class ParameterSet(BaseModel):
         numbers, choices = self._by_name("numbers"), self._by_name("choices")
         if _are_there(values, numbers, choices):
             return self
-        made = _exchanged(self, values)
+        copy = _exchanged(self, values)
         # All others are cached: thousands of sets per second differ from one in few values.
-        given = read(made, tuple(values))
+        given = read(copy, tuple(values))
         new = {name: value for name, value in given.items() if type(value) is float}
         chosen = {name: value for name, value in given.items() if type(value) is str}
         if (
@@ -324,22 +362,22 @@ class ParameterSet(BaseModel):
             and new.keys() <= numbers.keys()
             and chosen.keys() <= choices.keys()
         ):
-            made.__dict__[KNOWN] = {
+            copy.__dict__[KNOWN] = {
                 ("numbers", ""): numbers | new,
                 ("choices", ""): choices | chosen if chosen else choices,
             }
-        return made
+        return copy
 
     def flat(self) -> dict[str, Any]:
         """Return all leaves and choices by dotted name."""
         return dict(self._by_name("values"))
 
     def leaves(self) -> dict[str, float]:
-        """Return the numbers by dotted name, tables spread as ``name.0``, ``name.1``, ..."""
+        """Return the numbers by dotted name; a table becomes ``name.0``, ``name.1``, ..."""
         return dict(self._by_name("numbers"))
 
     def choices(self) -> dict[str, Any]:
-        """Return the structural choices by dotted name, with the length of every table."""
+        """Return the structural choices by dotted name, including every table's length."""
         return dict(self._by_name("choices"))
 
     def has_choices_of(self, other: ParameterSet) -> bool:
@@ -348,7 +386,7 @@ class ParameterSet(BaseModel):
         return here is there or here == there
 
     def value(self, name: str) -> Any:
-        """Return the leaf or choice of an existing dotted name; ``name.0`` for a table's nodes."""
+        """Return the leaf or choice with a known dotted name; ``name.0`` for a table's node."""
         value: Any = self
         for step in name.split("."):
             value = value[int(step)] if isinstance(value, tuple) else getattr(value, step)
@@ -361,7 +399,7 @@ class ParameterSet(BaseModel):
     def _by_name(self, kind: str, prefix: str = "") -> dict[str, Any]:
         """Return ``values``, ``numbers`` or ``choices`` by dotted name.
 
-        ``prefix``: prefix of the names. Groups that several sets share cache theirs.
+        ``prefix``: prefix of the names. A group that several sets share caches its content.
         """
         known = self._known
         if (kind, prefix) not in known:
@@ -375,21 +413,21 @@ class ParameterSet(BaseModel):
         return known[kind, prefix]
 
     def with_leaves(self, values: Mapping[str, Any]) -> Self:
-        """Return a set of the same structure that carries other objects as its numbers.
+        """Return a set of the same structure with other objects as its numbers.
 
-        Other values are unchanged. The objects (symbols, quantities with units) are not validated:
-        they are for evaluating equations, not for building parameter sets.
+        Other values are unchanged. The objects (symbols, quantities with units) are not validated.
+        They serve to evaluate equations, not to build parameter sets.
         """
         return cast(Self, _with_objects(_rebuilt(self, "", values)))
 
 
 def leaf_table(pars: Sequence[ParameterSet]) -> NDArray[np.float64]:
-    """Return the numbers of sets of one structure, shape (sets, leaves); see `leaves`.
+    """Return the numbers of sets with the same structure, shape (sets, leaves); see `leaves`.
 
     Raises
     ------
     TypeError, ValueError
-        When they contain other objects than numbers.
+        When they contain objects other than numbers.
     """
     each = [par._by_name("numbers").values() for par in pars]
     shape = (len(each), len(each[0]))
@@ -429,7 +467,7 @@ def choice_fields(cls: type[ParameterSet], prefix: str = "") -> tuple[str, ...]:
 def choices_of(cls: type[ParameterSet], name: str) -> tuple[Any, ...]:
     """Return the valid values of a structural choice; empty if any text is valid.
 
-    They are texts, or true and false.
+    The values are texts, or true and false.
     """
     *groups, last = name.split(".")
     for group in groups:
@@ -444,7 +482,7 @@ def require_units(cls: type[ParameterSet], prefix: str = "") -> None:
     Raises
     ------
     ModelError
-        With the first one and its place.
+        With the first such number and its place.
     """
     for name, info in cls.model_fields.items():
         inner = info.annotation
@@ -454,7 +492,9 @@ def require_units(cls: type[ParameterSet], prefix: str = "") -> None:
             raise ModelError(
                 f"{place_of(cls)}: {cls.__qualname__}.{name} is a number without a unit: write "
                 f'{name}: Annotated[float, Unit("kg")], "1" for a pure number, or a quantity '
-                "of core.quantities"
+                "of core.quantities",
+                name=f"{cls.__qualname__}.{name}",
+                valid='Annotated[float, Unit("kg")]',
             )
 
 
@@ -484,7 +524,7 @@ def _node_notes(annotation: Any) -> Iterator[Any]:
 
 
 def _entries(kind: str, name: str, value: Any) -> dict[str, Any]:
-    """Return a field's content of a kind, see `ParameterSet._by_name`."""
+    """Return a field's content of one kind; see `ParameterSet._by_name`."""
     if kind == "values":
         return {name: value}
     if isinstance(value, tuple):
@@ -500,7 +540,7 @@ def _is_number(value: Any) -> bool:
 
 
 def _rebuilt(node: ParameterSet, prefix: str, values: Mapping[str, Any]) -> ParameterSet:
-    """Return a set of objects; groups without new ones are unchanged."""
+    """Return a set of objects; groups without new objects are unchanged."""
     fields = fields_of(node)
     for name, value in fields.items():
         dotted = f"{prefix}{name}"
@@ -517,7 +557,7 @@ def _rebuilt(node: ParameterSet, prefix: str, values: Mapping[str, Any]) -> Para
 
 
 def _as_given(node: ParameterSet, prefix: str, values: Mapping[str, Any]) -> ParameterSet:
-    """Return a set of objects with others at dotted names."""
+    """Return a set of objects with other objects at dotted names."""
     fields: dict[str, Any] = {
         name: _as_given(value, f"{prefix}{name}.", values)
         if isinstance(value, ParameterSet)
@@ -527,9 +567,9 @@ def _as_given(node: ParameterSet, prefix: str, values: Mapping[str, Any]) -> Par
     return _with_objects(type(node).model_construct(**fields))
 
 
-def _with_objects(made: ParameterSet) -> ParameterSet:
-    made.__dict__[_OBJECTS] = True
-    return made
+def _with_objects(copy: ParameterSet) -> ParameterSet:
+    copy.__dict__[_OBJECTS] = True
+    return copy
 
 
 def _require_known(cls: type[ParameterSet], name: str) -> None:
@@ -539,7 +579,7 @@ def _require_known(cls: type[ParameterSet], name: str) -> None:
 
 
 def _plain(name: str, value: Any, texts: dict[str, str]) -> Any:
-    """Return a value without its original texts, which are stored by name."""
+    """Return a plain value, and store its original text by name."""
     if isinstance(value, tuple):
         return tuple(_plain(f"{name}.{k}", node, texts) for k, node in enumerate(value))
     if isinstance(value, Written):
@@ -572,16 +612,18 @@ def _exchanged(node: T, values: Mapping[str, Any]) -> T:
     if _SIMPLE.issuperset(map(type, values.values())):
         try:
             return _places(type(node), tuple(values)).filled(node, values)
-        except (ValueError, AssertionError):  # full validation below reports all errors together
+        except (
+            ValueError,
+            AssertionError,
+        ):  # the full validation below reports all errors together
             pass
     return _validated(type(node), fields_of(node), values)
 
 
 def _validated(cls: type[T], tree: dict[str, Any], values: Mapping[str, Any]) -> T:
-    """Return a set of a tree with other values at dotted names.
+    """Build a set from a tree with other values at dotted names.
 
-    Groups without changes are reused, since searches and studies build thousands of sets per
-    second.
+    Unchanged groups are reused, since searches and studies build thousands of sets per second.
     """
     texts: dict[str, str] = {}
     for name, value in values.items():
@@ -600,8 +642,8 @@ def _validated(cls: type[T], tree: dict[str, Any], values: Mapping[str, Any]) ->
 
 
 # --- Notes: the texts below the fields of a class
-# They are read on demand and not when a class is built, since reading sources took a tenth of every
-# command's start-up.
+# They are read on demand, since reading sources when a class is built took a tenth of every
+# command's start-up time.
 
 
 @cache
@@ -632,7 +674,7 @@ def field_notes(cls: type[ParameterSet], prefix: str = "") -> Mapping[str, str]:
 def _written_under_fields(cls: type) -> Mapping[str, str]:
     try:
         source = inspect.getsource(sys.modules[cls.__module__])
-    except (KeyError, OSError, TypeError):  # typed into a console: no source to read
+    except (KeyError, OSError, TypeError):  # typed into a console, so it has no source file
         return {}
     return _written_in(source).get(cls.__qualname__, {})
 
@@ -641,7 +683,7 @@ def _written_under_fields(cls: type) -> Mapping[str, str]:
 def _written_in(source: str) -> Mapping[str, Mapping[str, str]]:
     """Return the notes below the fields of all classes in a file, by qualified name.
 
-    All are read together, since `inspect` parses the whole file for each class.
+    They are read together, since `inspect` would parse the whole file for each class.
     """
     return {name: _texts(definition) for name, definition in _classes(ast.parse(source))}
 
@@ -659,7 +701,7 @@ def _classes(node: ast.AST, prefix: str = "") -> Iterator[tuple[str, ast.ClassDe
 
 
 def _texts(definition: ast.ClassDef) -> Mapping[str, str]:
-    """Return the strings right below the fields of a class, by field."""
+    """Return the strings directly below a class's fields, by field."""
     notes: dict[str, str] = {}
     for field, below in zip(definition.body, definition.body[1:], strict=False):
         match field, below:

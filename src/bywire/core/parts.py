@@ -65,25 +65,25 @@ class PartOptions(TypedDict, total=False):
     Parameters
     ----------
     par
-        Place of its parameters in those of the assembly; its own name by default.
+        Place of its parameters among the assembly's. Default: the part's name.
     suffix
-        Suffix of its states' names, for the second part of a kind: ``"_2"``.
+        Suffix of its states' names, for a second part of the same kind: ``"_2"``.
     state
-        Names of its states in the assembly, if they differ.
+        Names of its states in the assembly, if they differ from the element's.
     labels
-        Labels of its states, if they differ.
+        Labels of its states, if they differ from the element's.
     fixed
-        States that enter the element's own equations value-only: periodic terms, slow geometry.
+        States that enter the element's own equations as values only: periodic terms, slow geometry.
     output
-        Its outputs and contact forces that are signals of the assembly, by their names there; or
-        only the names if they are equal.
+        Outputs and contact forces that become signals of the assembly, by their names there. A
+        tuple of names suffices if the names are the same.
     loss
-        Name of the energy that its ``power_loss`` adds up to; or names, by function of the element.
-        Of a contact: its work minus its stored energy.
+        Name of the energy that is the integral of its ``power_loss``; or names, by function of the
+        element. For a contact: its work minus its stored energy.
     work
-        Of a contact: name of the energy that its ``power_in`` adds up to.
+        For a contact: name of the energy that is the integral of its ``power_in``.
     rarely
-        Of a contact: whether it rarely touches, like an end stop. This affects speed only.
+        For a contact: whether it rarely touches, like an end stop. This affects speed only.
     outside
         Whether the energy balance excludes its stored energy.
     """
@@ -104,21 +104,23 @@ OPTIONS = tuple(PartOptions.__annotations__)
 
 
 def _parameters_at(path: str, par: Any, where: str, declaration: str) -> Any:
-    """Return the parameters at a dotted path of those of an assembly.
+    """Return the group of an assembly's parameters at a dotted path.
 
-    ``where``: their owner; ``declaration``: how to declare their place.
+    ``where``: the group's owner; ``declaration``: how to declare the path.
 
     Raises
     ------
     ModelError
-        When there are none.
+        When there is no such group.
     """
     value = par
     for name in path.split("."):
         value = getattr(value, name, None)
     if value is None:
         raise ModelError(
-            f"{where}: the parameters have no {path!r}: give their place, {declaration}"
+            f"{where}: the parameters have no group {path!r}: specify it with {declaration}",
+            name=where,
+            value=path,
         )
     return value
 
@@ -129,7 +131,7 @@ class Part(Generic[X, U, F, P]):
     Parameters
     ----------
     element
-        Its module: State, Input, Output, Parameters and functions of them, by their usual names.
+        Its module, with State, Input, Output, Parameters and functions under their usual names.
     options
         See `PartOptions`.
     """
@@ -167,7 +169,7 @@ class Part(Generic[X, U, F, P]):
         unknown = set(options) - set(OPTIONS)
         if unknown:
             name = min(unknown)
-            raise ModelError(f"Part({self.kind}): {unknown_name('option', name, OPTIONS)}")
+            raise unknown_name("option", name, OPTIONS).at(f"Part({self.kind})", ModelError)
 
     def __set_name__(self, owner: type, name: str) -> None:
         self.name, self.where = name, f"{owner.__name__}.{name}"
@@ -187,7 +189,10 @@ class Part(Generic[X, U, F, P]):
         return instant.parts[self.name]
 
     def __set__(self, instance: Any, value: Any) -> None:
-        raise ModelError(f"{self.where} is a part: assign its input, w.{self.name}.u")
+        valid = f"w.{self.name}.u"
+        raise ModelError(
+            f"{self.where} is a part: assign its input, {valid}", name=self.where, valid=valid
+        )
 
     def has(self, function: str) -> bool:
         """Return whether the element defines a function."""
@@ -203,7 +208,9 @@ class Part(Generic[X, U, F, P]):
         """
         value = getattr(self.element, name, None)
         if not callable(value):
-            raise ModelError(f"{self.where}: {self.kind} has no function {name}: define it there")
+            raise ModelError(
+                f"{self.where}: {self.kind} has no function {name}: define it there", name=name
+            )
         return typing.cast(Callable[..., Any], value)
 
     def states(self) -> dict[str, Signal]:
@@ -213,7 +220,7 @@ class Part(Generic[X, U, F, P]):
         signals = signals_of(self.element.State)
         for name in (*self.renamed, *self.labels, *self.fixed):
             if name not in signals:
-                raise ModelError(f"{self.where}: {unknown_name('state', name, signals)}")
+                raise unknown_name("state", name, signals).at(self.where, ModelError)
         number = self.suffix.replace("_", " ")
         return {
             self.state_name(name): replace(s, label=self.labels.get(name, s.label) + number)
@@ -221,18 +228,18 @@ class Part(Generic[X, U, F, P]):
         }
 
     def state_name(self, name: str) -> str:
-        """Return the name in the assembly of one of its states."""
+        """Return a state's name in the assembly."""
         return self.renamed.get(name, name) + self.suffix
 
     def outputs(self) -> dict[str, Signal]:
-        """Return its outputs and contact forces that the assembly records, by their names there."""
+        """Return the outputs and contact forces that the assembly records, by their names there."""
         known: dict[str, Signal] = {}
         for kind in ("Output", "Forces"):
             if self.has(kind):
                 known |= signals_of(getattr(self.element, kind))
         for name in self.output:
             if name not in known:
-                raise ModelError(f"{self.where}: {unknown_name('output', name, known)}")
+                raise unknown_name("output", name, known).at(self.where, ModelError)
         number = self.suffix.replace("_", " ")
         return {
             there: replace(known[name], label=known[name].label + number)
@@ -247,7 +254,7 @@ class Part(Generic[X, U, F, P]):
 
     @cached_property
     def energies(self) -> dict[str, Signal]:
-        """Return the energies that its powers add up to, by name."""
+        """Return the integrals of its powers, by name."""
         if self.work:
             return {self.work: self._energy("power_in", self.work)}
         if self.has("Forces"):
@@ -256,7 +263,7 @@ class Part(Generic[X, U, F, P]):
 
     @cached_property
     def kept(self) -> dict[str, Signal]:
-        """Return the loss of a contact, from its work and its stored energy."""
+        """Return a contact's loss, which follows from its work and its stored energy."""
         if not self.has("Forces"):
             return {}
         return {name: self._energy(function, name) for name, function in self.losses.items()}
@@ -268,14 +275,16 @@ class Part(Generic[X, U, F, P]):
         if power is None:
             raise ModelError(
                 f"{self.where}: {self.kind}.{function} has no unit: annotate its result with "
-                "Annotated[float, Signal('W', label)]"
+                "Annotated[float, Signal('W', label)]",
+                name=f"{self.kind}.{function}",
+                valid="Annotated[float, Signal('W', label)]",
             )
         return Signal("J", power.label, role=power.role)
 
     def group_sizes(self, par: Any) -> tuple[int, ...]:
         """Return the number of forces in each contact group; 0 if a choice omits the group.
 
-        Groups of an element with ``exists(par)`` exist only if that function returns true.
+        If an element defines ``exists(par)``, its groups exist only where that function is true.
         """
         if not self.has("Forces"):
             return ()
@@ -285,19 +294,19 @@ class Part(Generic[X, U, F, P]):
         return sizes if there else (0,) * len(sizes)
 
     def parameters(self, par: Any) -> Any:
-        """Return its parameters from those of the assembly.
+        """Return its group of the assembly's parameters.
 
         Raises
         ------
         ModelError
-            When there are none at its place.
+            When there is no group at its path.
         """
         return _parameters_at(self.path, par, self.where, f"Part({self.kind}, par='...')")
 
     def state_at(self, instant: Instant, fixed: tuple[str, ...] | None) -> Any:
-        """Return its state; ``fixed`` names value-only states, None for all."""
+        """Return its state; ``fixed`` lists the value-only states, None for all of them."""
         if not self.has("State"):
-            raise ModelError(f"{self.where}: {self.kind} has no state")
+            raise ModelError(f"{self.where}: {self.kind} has no state", name=self.where)
         state_class: type[Any] = self.element.State
         return state_class._make(
             getattr(instant.xe if fixed is None or k in fixed else instant.x, self.state_name(k))
@@ -305,16 +314,16 @@ class Part(Generic[X, U, F, P]):
         )
 
     def forces_at(self, instant: Instant, par: Any) -> Any:
-        """Return its contact forces, modified by its element if that defines it."""
+        """Return its contact forces, modified by the element if it defines a modification."""
         if not self.has("Forces"):
-            raise ModelError(f"{self.where}: {self.kind} has no contact forces")
+            raise ModelError(f"{self.where}: {self.kind} has no contact forces", name=self.where)
         forces = self.element.Forces(*instant.contact[self.name])
         return self.element.bent(forces, par) if self.has("bent") else forces
 
 
-# --- Subassemblies: their names get a prefix, which their equations do not contain
+# --- Subassemblies: their names get a prefix in the holder; their own equations omit it
 # A subassembly is evaluated with slices of its holder's state, memory and forces. Its parameters
-# are a group of the holder's, so that a holder can contain the same assembly twice.
+# are a group of the holder's, so a holder can contain the same assembly twice.
 
 
 class Seen:
@@ -325,9 +334,9 @@ class Seen:
     recording
         Recording of the holder: an xarray.Dataset, or a similar object.
     names
-        Names in the recording by own names.
+        Names in the recording, by the subassembly's own names.
     place
-        Prefix of its parts in the names of silent parts.
+        Prefix of the subassembly's parts in the names of silent parts.
     """
 
     def __init__(self, recording: Any, names: Mapping[str, str], place: str) -> None:
@@ -348,7 +357,7 @@ class Seen:
         return self._recording[self._names.get(name, name)]
 
     def __getattr__(self, name: str) -> Any:
-        """Return an attribute of the Dataset, which is built on first use."""
+        """Return an attribute of the renamed Dataset, which is built on first use."""
         if name.startswith("_"):
             raise AttributeError(name)
         there = self._recording[list(self._names.values())]
@@ -372,17 +381,17 @@ class Sub(Generic[A]):
         Prefix of its signals and tasks: with ``"rear_"``, ``i`` becomes ``rear_i``. Kinds of
         signals stay in front: ``E_rear_copper``, ``noise_rear_p``.
     par
-        Place of its parameters in those of the holder; the name of the attribute by default.
+        Place of its parameters among the holder's. Default: the attribute's name.
     label
-        Its name in labels, energy balances and warnings; the prefix in words by default.
+        Its name in labels, energy balances and warnings. Default: the prefix in words.
     feeds
-        Fields of its stimulus -> fields of the holder's memory or stimulus that feed them. Other
-        fields become fields of the holder's stimulus.
+        Fields of its stimulus -> their sources, fields of the holder's memory or stimulus. Fields
+        without a source become fields of the holder's stimulus.
 
     Raises
     ------
     ModelError
-        For anything but an assembly, a prefix that is not valid, and unknown fields.
+        When it is not an assembly, for an invalid prefix, and for unknown fields.
     """
 
     name: str
@@ -404,20 +413,23 @@ class Sub(Generic[A]):
         self.feeds = dict(feeds or {})
         if not hasattr(kind, "parts"):
             raise ModelError(
-                f"Sub({kind.__name__}): it is not an assembly with a memory: hold a class that "
-                "inherits from Assembly and declares Memory"
+                f"Sub({kind.__name__}): it is not an assembly with a memory: use a class that "
+                "inherits from Assembly and declares Memory",
+                name=f"Sub({kind.__name__})",
+                valid="a class that inherits from Assembly and declares Memory",
             )
         if not f"{prefix}x".isidentifier() or prefix.startswith("_"):
             raise ModelError(
                 f"Sub({kind.__name__}): the prefix {prefix!r} is not valid: use a word and an "
-                "underscore, like 'rear_'"
+                "underscore, like 'rear_'",
+                name="prefix",
+                value=prefix,
+                valid="a word and an underscore, like 'rear_'",
             )
         for name in self.feeds:
             if name not in kind.Stimulus._fields:
-                raise ModelError(
-                    f"Sub({kind.__name__}): feeds names an "
-                    f"{unknown_name('stimulus', name, kind.Stimulus._fields)}"
-                )
+                error = unknown_name("stimulus", name, kind.Stimulus._fields)
+                raise error.at(f"Sub({kind.__name__}): feeds", ModelError)
         self.assembly: Any = kind() if made is kind else made
 
     def __set_name__(self, owner: type, name: str) -> None:
@@ -429,7 +441,7 @@ class Sub(Generic[A]):
     @overload
     def __get__(self, instance: Any, owner: type) -> A: ...
     def __get__(self, instance: Any, owner: type) -> Any:
-        """Return the declaration; for a holder at an instant, the assembly at that instant."""
+        """Return the declaration or, for a holder at an instant, the assembly at that instant."""
         if instance is None:
             return self
         instant = instant_of(instance, self.where)
@@ -438,7 +450,10 @@ class Sub(Generic[A]):
         return instant.held[self.name]
 
     def __set__(self, instance: Any, value: Any) -> None:
-        raise ModelError(f"{self.where} is an assembly: set its ports, w.{self.name}.PORT = ...")
+        valid = f"w.{self.name}.PORT = ..."
+        raise ModelError(
+            f"{self.where} is an assembly: set its ports, {valid}", name=self.where, valid=valid
+        )
 
     def _at(self, instant: Instant, holder: Any) -> Any:
         """Return the assembly at the holder's instant, not wired yet."""
@@ -464,7 +479,7 @@ class Sub(Generic[A]):
     # Names.
 
     def named(self, name: str) -> str:
-        """Return the name in the holder of a signal, or of a task."""
+        """Return the holder's name for a signal or a task."""
         head = next((each for each in _HEADS if name.startswith(each)), "")
         return f"{head}{self.prefix}{name.removeprefix(head)}"
 
@@ -477,7 +492,7 @@ class Sub(Generic[A]):
 
     @property
     def records(self) -> tuple[str, ...]:
-        """Its recorded signals, by the names in the holder."""
+        """Recorded signals, by their names in the holder."""
         return tuple(map(self.named, type(self.assembly).Output._fields))
 
     def _signal(self, name: str, signal: Signal) -> Signal:
@@ -504,7 +519,7 @@ class Sub(Generic[A]):
             return None if is_said else Role("source", "source")
         return Role("sink", signal.label)
 
-    # Tuples, inside and out.
+    # Tuples of the subassembly and of the holder.
 
     @cached_property
     def _places(self) -> dict[str, tuple[str, ...]]:
@@ -512,23 +527,23 @@ class Sub(Generic[A]):
         return {kind: tuple(map(self.named, names)) for kind, names in kinds.items()}
 
     def inside(self, kind: str, values: Any) -> Any:
-        """Return its own tuple of one of `KINDS` from the holder's; None if that is None."""
+        """Return the subassembly's tuple of one of `KINDS` from the holder's, or None for None."""
         if values is None:
             return None
         tuple_type = getattr(type(self.assembly), kind)
         return tuple_type._make(getattr(values, name) for name in self._places[kind])
 
     def outside(self, kind: str, values: Any) -> dict[str, Any]:
-        """Return the values of its own tuple of one of `KINDS` by their names in the holder."""
+        """Return the subassembly's values of one of `KINDS` by their names in the holder."""
         return dict(zip(self._places[kind], values, strict=True))
 
     def parameters(self, par: Any) -> Any:
-        """Return its parameters from those of the holder.
+        """Return its group of the holder's parameters.
 
         Raises
         ------
         ModelError
-            When there are none at its place.
+            When there is no group at its path.
         """
         declaration = f"Sub({type(self.assembly).__name__}, par='...')"
         return _parameters_at(self.path, par, self.where, declaration)
@@ -536,7 +551,7 @@ class Sub(Generic[A]):
     # Tasks.
 
     def tasks(self, par: Any) -> Iterator[Task]:
-        """Yield its tasks as tasks of the holder; ``par``: parameters of the holder."""
+        """Yield its tasks as tasks of the holder; ``par``: the holder's parameters."""
         for task in self.assembly.tasks(self.parameters(par)):
             yield Task(self.named(task.name), task.period, partial(self._tick, task.tick))
 
@@ -560,6 +575,6 @@ class Sub(Generic[A]):
     # Recordings.
 
     def seen(self, recording: Any) -> Seen:
-        """Return a recording, or rows of one, by the assembly's own names."""
+        """Return a recording, or some of its rows, by the assembly's own names."""
         names = dict(zip(type(self.assembly).Output._fields, self.records, strict=True))
         return Seen(recording, names, f"{self.name}.")

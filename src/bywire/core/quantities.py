@@ -1,7 +1,7 @@
 """Physical quantities: unit and valid range, declared once.
 
 A parameter's type defines unit and range: ``R_m: Resistance`` has the unit ``ohm`` and the range
-``> 0``. Values inside are SI with radians; files, commands and figures show ``display`` units.
+``> 0``. Internal values are SI with radians. Files, commands and figures show ``display`` units.
 """
 
 from __future__ import annotations
@@ -14,21 +14,21 @@ from pydantic import Field
 
 @dataclass(frozen=True)
 class Unit:
-    """SI unit of a quantity and its usual magnitude.
+    """A quantity's SI unit and usual magnitude.
 
     Parameters
     ----------
     symbol
         Unit, for instance ``"N*m/A"``; ``"1"`` for a pure number.
     nominal
-        Usual magnitude in that unit: scales tolerances and the samples of contract tests.
+        Usual magnitude in that unit, which scales tolerances and the samples of contract tests.
     """
 
     symbol: str
     nominal: float = 1.0
 
 
-# Units of files, command line and figures for quantities that are SI inside.
+# Units of files, command line and figures; internal values are SI.
 DISPLAY_UNITS = {
     "Pa": "bar",
     "Pa/A": "bar/A",
@@ -45,7 +45,7 @@ DISPLAY_UNITS = {
 
 
 def display_unit(symbol: str) -> str:
-    """Return the display unit of an SI unit."""
+    """Return an SI unit's display unit."""
     return DISPLAY_UNITS.get(symbol, symbol)
 
 
@@ -88,14 +88,14 @@ Conductance = Annotated[float, Unit("m**3/(s*Pa)", 1e-11), _NOT_NEGATIVE]
 
 # Thermal
 Temperature = Annotated[float, Unit("K", 400.0), _POSITIVE]
-"""absolute, shown in degrees Celsius; a difference has the unit ``delta_degC``, shown in K"""
+"""absolute, shown in degrees Celsius; differences have the unit ``delta_degC``, shown in K"""
 TemperatureCoefficient = Annotated[float, Unit("1/K", 2e-3), _NOT_NEGATIVE]
 HeatCapacity = Annotated[float, Unit("J/K", 1e3), _POSITIVE]
 HeatConductance = Annotated[float, Unit("W/K", 1.0), _NOT_NEGATIVE]
 
 # Tables
 Nodes = tuple[Annotated[float, _NOT_NEGATIVE], ...]
-"""numbers of a table; their unit is the field's"""
+"""a table's numbers, in the field's unit"""
 
 # Signals and control
 Duration = Annotated[float, Unit("s", 1e-3), _POSITIVE]

@@ -1,8 +1,9 @@
-"""The registry: all named things by kind, with their places.
+"""Registry of all named things by kind, with their places.
 
-A package declares each `Kind`, and a file declares each thing. General things are in that package.
-Those of a brake are in the module or folder of its package that the kind names (``experiments``,
-``loops``, ...), or in the brake's single file. So a new thing needs only a new file.
+A package declares each `Kind`, and a file declares each thing. General things are in the kind's
+package. A brake's things are in the module or folder of its package that the kind specifies
+(``experiments``, ``loops``, ...), or in the brake's single file. So a new thing needs only a new
+file.
 """
 
 from __future__ import annotations
@@ -35,14 +36,14 @@ from bywire.core.errors import ModelError, UnknownNameError, unknown_name
 
 
 def _declared_at(module: ModuleType, thing: object) -> str:
-    """Return file and line of a declaration in a module; the file alone if the line is unknown.
+    """Return file and line of a declaration in a module, or only the file if the line is unknown.
 
     Parameters
     ----------
     module
-        Module that declares it, as a variable or in a tuple; its imports have no line there.
+        Module that declares it, as a variable or in a tuple; imported things have no line.
     thing
-        Object, or class.
+        Object or class.
     """
     line = _declared_line(module, thing)
     file = module.__file__ or module.__name__
@@ -53,7 +54,7 @@ def _declared_line(module: ModuleType, thing: object) -> int:
     """Return the line on which a module declares a thing; 0 if unknown."""
     try:
         tree = ast.parse(inspect.getsource(module))
-    except (OSError, TypeError, SyntaxError):  # typed into a console, or changed since
+    except (OSError, TypeError, SyntaxError):  # typed into a console, or the file has changed
         return 0
     for node in tree.body:
         if isinstance(node, ast.ClassDef) and vars(module).get(node.name) is thing:
@@ -105,18 +106,18 @@ class Kind(Generic[T]):
     name
         Name of the kind in messages, for instance ``"experiment"``.
     folders
-        Modules or folders of a brake's package that declare such things.
+        Modules or folders of a brake's package that declare things of this kind.
     read
         ``read(module)``: the things that a module declares.
     home
         Dotted name of the package of general things; empty if all belong to brakes.
     declared
-        Object that declares one, for instance ``"a Loop"``. The error for an unknown name gives it
-        if a brake has none.
+        Object that declares such a thing, for instance ``"a Loop"``. The error for an unknown name
+        contains it if a brake has no such thing.
 
     Notes
     -----
-    Kinds of the same name share their things' names: each name is unique among them.
+    Kinds with the same name share one namespace: each thing's name is unique among them.
     """
 
     name: str
@@ -133,25 +134,25 @@ class Kind(Generic[T]):
         return {thing.name: thing for thing, _ in _all(self)}
 
     def find(self, name: str) -> T:
-        """Return the thing of a name.
+        """Return the thing with a name.
 
         Raises
         ------
         UnknownNameError
-            With the nearest known names.
+            With the nearest valid names.
         """
         thing: T = _found(self, name, tuple(brakes().values()))
         return thing
 
     def get(self, name: str) -> T | None:
-        """Return the thing of a name, or None. See `guess`."""
+        """Return the thing with a name, or None. See `guess`."""
         return self.guess(name) or self.all().get(name)
 
     def unknown(self, name: str, *others: Kind[Any]) -> UnknownNameError:
         """Return the error for an unknown name.
 
-        It lists the nearest known names (brakes loaded from files first) and the brakes that
-        declare none, with instructions.
+        It lists the nearest valid names, those of brakes loaded from files first, and the loaded
+        brakes without such a thing, with instructions.
         """
         kinds = (self, *others)
         title = " or ".join(dict.fromkeys(kind.name for kind in kinds))
@@ -164,21 +165,21 @@ class Kind(Generic[T]):
             first=[n for kind in kinds for module in loaded for n in kind.of(module)],
         )
         hints = [
-            f"the brake {brake.name!r} declares no {title}: that takes {self.declared} in a module "
-            f"or folder {' or '.join(self.folders)} of its package, or in its file, see "
-            "docs/modeling.md"
+            f"the brake {brake.name!r} declares no {title}: declare {self.declared} in a module or "
+            f"folder {' or '.join(self.folders)} of its package, or in its file (see "
+            "docs/modeling.md)"
             for brake in brakes().values()
             if self.declared and not any(kind.of(brake.module) for kind in kinds)
         ]
         if self.declared and not files and "did you mean" not in str(error):
             loading = "--system PATH, or " * is_command_line() + "bywire.load_system"
-            hints.append(f"that of a brake of your own takes {loading}")
+            hints.append(f"load your own brake with {loading}")
         return error.reworded("; ".join([str(error), *hints]).replace("?; ", "? "))
 
     def guess(self, name: str) -> T | None:
-        """Return the thing of a name if a file with that name, or one that quotes it, declares it.
+        """Return the thing with a name if a file that has or quotes that name declares it.
 
-        This avoids loading whole folders, which takes a second if there are many things.
+        This avoids loading whole folders, which takes a second for a large number of things.
         """
         stem = name.replace("-", "_")
         if not stem.isidentifier():
@@ -196,12 +197,12 @@ class Kind(Generic[T]):
         return None
 
     def of(self, module: str) -> Mapping[str, T]:
-        """Return the things of a module's brake."""
+        """Return the things that a module's brake declares."""
         owner = next((brake for brake in brakes().values() if brake.module == module), None)
         return {thing.name: thing for thing, _ in _declared(self, owner)} if owner else {}
 
     def own(self, module: str, name: str) -> T | None:
-        """Return the thing of a name from a module's brake, or None.
+        """Return the thing with a name from a module's brake, or None.
 
         Raises
         ------
@@ -217,18 +218,18 @@ class Kind(Generic[T]):
         return None
 
     def beside(self, cls: type) -> Mapping[str, T]:
-        """Return the things of a class's brake; all things if the class is in no brake.
+        """Return the things of a class's brake, or all things if the class belongs to no brake.
 
-        Other brakes are not loaded.
+        This does not load other brakes.
         """
         where = cls.__module__ + "."
         homes = [b.module for b in brakes().values() if where.startswith(f"{b.module}.")]
         return self.of(max(homes, key=len)) if homes else self.all()
 
     def owner(self, name: str) -> str:
-        """Return the module of the brake that declares a thing; empty for a general one.
+        """Return the module of the brake that declares a thing; empty for a general thing.
 
-        The search stops at the first match, so that other brakes are not loaded.
+        The search stops at the first match, to avoid loading other brakes.
         """
         for brake in brakes().values():
             try:
@@ -262,7 +263,7 @@ def _spec(module: str) -> ModuleSpec | None:
 
 
 def _quoting(name: str, home: str) -> Iterator[str]:
-    """Yield the modules of a file or a folder whose source quotes a name, loading no others."""
+    """Yield a file's or folder's modules whose source code quotes a name; load no others."""
     spec = _spec(home)
     folders = spec.submodule_search_locations if spec is not None else None
     if folders is None:
@@ -290,19 +291,19 @@ def instances(kind: type[Thing]) -> Callable[[ModuleType], Iterable[Thing]]:
 
 
 def _all(kind: Kind[Any]) -> tuple[tuple[Any, str], ...]:
-    """Return every thing of a kind with the module of its brake.
+    """Return every thing of a kind with its brake's module.
 
     Raises
     ------
     ModelError
-        When two things of different places have one name.
+        When two things from different places have the same name.
     """
     return _gathered(kind, tuple(brakes().values()))
 
 
 @cache
 def _found(kind: Kind[Any], name: str, known: tuple[Brake, ...]) -> Any:
-    """Return the thing of a name among some brakes, cached since studies look up names per case.
+    """Return the thing with a name among some brakes; cached, since studies call it for each case.
 
     Raises
     ------
@@ -339,7 +340,7 @@ def _gathered(kind: Kind[Any], known: tuple[Brake, ...]) -> tuple[tuple[Any, str
 
 
 def _of_others(kind: Kind[Any], *owners: Brake) -> dict[str, tuple[Any, str, ModuleType]]:
-    """Return all things of kinds with the same name, general ones and those of some brakes."""
+    """Return the things of all kinds with the same name: general things and some brakes' things."""
     return {
         thing.name: (thing, "", module)
         for other in _KINDS
@@ -354,20 +355,22 @@ def _require_new(
     new: tuple[tuple[Any, ModuleType], ...],
     known: Mapping[str, tuple[Any, str, ModuleType]],
 ) -> None:
-    """Reject things whose name is taken, in the same brake or in an earlier one."""
+    """Reject things whose name is used already, in the same brake or in an earlier one."""
     seen = {name: (thing, module) for name, (thing, _, module) in known.items()}
     for thing, module in new:
         first, place = seen.setdefault(thing.name, (thing, module))
         if first is not thing:
             raise ModelError(
                 f"{_declared_at(module, thing)}: the {kind.name} {thing.name!r} is declared in "
-                f"{_declared_at(place, first)} already: give this one another name"
+                f"{_declared_at(place, first)} already: rename it",
+                name=kind.name,
+                value=thing.name,
             )
 
 
 @cache
 def _declared(kind: Kind[Any], owner: Brake | None) -> tuple[tuple[Any, ModuleType], ...]:
-    """Return the general things of a kind, or those of a brake, each with its module."""
+    """Return a kind's general things, or a brake's, each with its module."""
     if owner is not None:
         modules = modules_of(owner, kind.folders)
     else:
@@ -376,12 +379,12 @@ def _declared(kind: Kind[Any], owner: Brake | None) -> tuple[tuple[Any, ModuleTy
 
 
 def pick(known: Mapping[str, Thing], name: str, kind: str) -> Thing:
-    """Return the thing of a name.
+    """Return the thing with a name.
 
     Raises
     ------
     UnknownNameError
-        With the nearest known names; ``kind`` is their kind.
+        With the kind of the thing and the nearest valid names.
     """
     if name not in known:
         raise unknown_name(kind, name, known)

@@ -1,8 +1,8 @@
 """Atomic writing of files, and temporary folders that are removed even after a killed process.
 
-A process locks its folder of temporary files. The next process at the same place removes folders
-without a lock, whose process was killed. On file systems without locks (Windows, some network
-drives), folders are removed after a day.
+A process locks its folder of temporary files. The next process at the same place removes unlocked
+folders, whose processes were killed. On file systems without locks (Windows, some network drives),
+folders are removed after a day.
 """
 
 from __future__ import annotations
@@ -28,26 +28,26 @@ if sys.platform != "win32":
 PREFIX = ".bywire-"
 """prefix of temporary folders' names"""
 
-NULL_CHARACTER = "a path cannot hold a null character"
-"""message for a path with which Python raises ValueError, independent of its version"""
+NULL_CHARACTER = "a path cannot contain a null character"
+"""message for a path with a null character, the same in every version of Python"""
 
 UNFINISHED = "unfinished"
 """file that marks a folder with an incomplete result"""
 
-_OLD = 86400.0  # seconds; without locks, younger ones may be in use
+_OLD = 86400.0  # seconds; without locks, younger folders may be in use
 
 
 @contextmanager
 def replacing(target: Path) -> Iterator[Path]:
-    """Yield a path to write, which replaces the target file at the end of the block.
+    """Yield a path to write to; it replaces the target file at the end of the block.
 
-    If the block fails, or the process is killed, the target is unchanged. The path has the same
-    name, in a hidden folder next to the target.
+    If the block fails or the process is killed, the target is unchanged. The path has the target's
+    name, in a hidden folder next to it.
 
     Raises
     ------
     OSError
-        When the folder cannot be written to.
+        When the folder is not writable.
     """
     with scratch_folder(target.parent) as folder:
         fresh = folder / target.name
@@ -56,31 +56,31 @@ def replacing(target: Path) -> Iterator[Path]:
 
 
 def claim(fresh: Path, names: Iterable[Path]) -> Path | None:
-    """Give a written file the first of some names that nothing has yet, whoever else asks for it.
+    """Rename a written file to the first free name, safely if other processes do the same.
 
     Parameters
     ----------
     fresh
-        The file, in a temporary folder beside the names.
+        The file, in a temporary folder on the same file system.
     names
-        Where it may go.
+        Paths to try, in order.
 
     Returns
     -------
     pathlib.Path or None
-        Where it is; None where all names are taken.
+        The file's new path, or None if all names are taken.
 
     Raises
     ------
     OSError
-        When the folder cannot be written to.
+        When the folder is not writable.
     """
     for path in names:
         try:
             os.link(fresh, path)
         except FileExistsError:
             continue
-        except OSError:  # a file system without links: an empty file holds the name meanwhile
+        except OSError:  # a file system without links: reserve the name with an empty file
             try:
                 os.close(os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY))
             except FileExistsError:
@@ -92,12 +92,12 @@ def claim(fresh: Path, names: Iterable[Path]) -> Path | None:
 
 @contextmanager
 def made_folder(folder: Path) -> Iterator[None]:
-    """Make a folder with its parents; what was made and is empty in the end is removed.
+    """Make a folder with its parents; at the end, remove those that were made and are empty.
 
     Raises
     ------
     OSError
-        When it cannot be made.
+        When the folder cannot be made.
     """
     missing = [each for each in (folder, *folder.parents) if not os.path.lexists(each)]
     try:
@@ -114,12 +114,12 @@ def made_folder(folder: Path) -> Iterator[None]:
 
 @contextmanager
 def scratch_folder(parent: Path) -> Iterator[Path]:
-    """Yield a fresh folder in another, and remove it with all that is in it.
+    """Yield a new folder within another, and remove it with its content at the end.
 
     Raises
     ------
     OSError
-        When the folder cannot be written to.
+        When the folder is not writable.
     """
     sweep(parent)
     folder, lock = _locked(parent)
@@ -131,7 +131,7 @@ def scratch_folder(parent: Path) -> Iterator[Path]:
 
 
 def process_folder() -> Path:
-    """Return the temporary folder of this process, which nobody else can read.
+    """Return this process's temporary folder, which no other user can read.
 
     Raises
     ------
@@ -142,8 +142,9 @@ def process_folder() -> Path:
         return _folder_of(os.getpid())
     except OSError as error:
         raise FileError(
-            f"a temporary folder cannot be made ({error.strerror or error}): free some space "
-            "there, or set TMPDIR to another folder"
+            f"bywire cannot make a temporary folder ({error.strerror or error}): free some space "
+            "there, or set TMPDIR to another folder",
+            name="TMPDIR",
         ) from None
 
 
@@ -154,7 +155,7 @@ def _folder_of(process: int) -> Path:
     folder, _ = _locked(parent)  # until the process ends
 
     def remove() -> None:
-        if os.getpid() == process:  # not in what was forked from it
+        if os.getpid() == process:  # not in forked copies
             shutil.rmtree(folder, ignore_errors=True)
 
     atexit.register(remove)
@@ -171,13 +172,13 @@ def require_finished(folder: Path) -> None:
     """
     if (folder / UNFINISHED).exists():
         raise FileError(
-            f"{folder} holds a result that is incomplete: run the command that wrote it again",
+            f"{folder} contains an incomplete result: rerun the command that wrote it",
             name=str(folder),
         )
 
 
 def sweep(parent: Path) -> None:
-    """Remove leftovers of killed processes in a folder, as far as possible."""
+    """Remove the leftovers of killed processes from a folder, as far as possible."""
     with contextlib.suppress(OSError), os.scandir(parent) as entries:
         for each in entries:
             if each.name.startswith(PREFIX) and each.is_dir(follow_symlinks=False):
@@ -188,7 +189,7 @@ def _remove_left(folder: Path) -> None:
     try:
         status = folder.stat(follow_symlinks=False)
     except OSError:
-        return  # gone since it was listed: its process has ended in between
+        return  # its process has ended and removed it since the listing
     if sys.platform != "win32" and status.st_uid != os.getuid():
         return
     try:
@@ -203,13 +204,13 @@ def _remove_left(folder: Path) -> None:
 
 
 def _locked(parent: Path) -> tuple[Path, int | None]:
-    """Return a new folder and the holder of its lock; None without locks."""
+    """Return a new folder and its lock, or None on file systems without locks."""
     while True:
         folder = Path(tempfile.mkdtemp(prefix=PREFIX, dir=parent))
         try:
             lock = _lock(folder)
         except (BlockingIOError, FileNotFoundError):
-            continue  # another process is about to remove it, or has done so
+            continue  # another process is removing it, or has removed it
         except OSError:
             return folder, None
         if folder.exists():
@@ -218,7 +219,7 @@ def _locked(parent: Path) -> tuple[Path, int | None]:
 
 
 def _lock(folder: Path) -> int | None:
-    """Take the lock of a folder, which a process keeps until it ends, however that is."""
+    """Lock a folder until this process ends, even if it is killed."""
     if sys.platform == "win32":
         return None
     number = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)

@@ -1,7 +1,7 @@
 """Sections of files: each key is declared once, as a typed field.
 
 Reading a section converts texts with units to numbers [SI]. An error is one sentence with the key,
-its value, what is valid and the nearest match. No message of pydantic itself reaches a user.
+its value, the valid values and the nearest match. Users never see pydantic's own messages.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ Name = Annotated[str, Field(pattern=r"\S")]
 Names = tuple[str, ...]
 """a list of names"""
 Table = Annotated[Mapping[str, Any], Field(default_factory=dict)]
-"""a section whose keys are names of parameters, faults or figures, not fields; empty by default"""
+"""a section whose keys are names of parameters, faults or figures, not fields; default: empty"""
 
 _VALID: Mapping[Any, str] = {str: "a text", bool: "true or false", tuple: "a list of names"}
 
@@ -38,7 +38,7 @@ class Hint:
 
 
 class Section(BaseModel):
-    """Base of all sections: immutable, no unknown keys. The model is built on first use."""
+    """Base of all sections: immutable, without unknown keys. Pydantic's model is built lazily."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, defer_build=True)
 
@@ -51,16 +51,16 @@ class Section(BaseModel):
         content
             The table's content.
         where
-            Its name in errors: ``"[design]"``, or for a whole file ``"a study file"``.
+            Its name in errors: ``"[design]"``, or ``"a study file"`` for a whole file.
 
         Raises
         ------
         UnknownNameError
-            For an unknown key or choice.
+            For unknown keys and choices.
         UnitError
-            For a number without its unit, or with a unit that does not fit.
+            When a number has no unit, or one that does not fit.
         ParameterError
-            For a value that is missing, of the wrong type, or out of range.
+            When a value is missing, of the wrong type, or out of range.
         """
         fields = cls.model_fields
         place, within = (f"{where} ", f"{where[1:-1]}.") if where.startswith("[") else ("", "")
@@ -76,7 +76,7 @@ class Section(BaseModel):
             return cls.model_validate(values)
         except ValidationError as error:
             key, *inner = error.errors()[0]["loc"]
-            raise _refused(fields[str(key)], content, place, str(key), inner) from None
+            raise _rejection(fields[str(key)], content, place, str(key), inner) from None
 
     @classmethod
     def written_out(cls, content: Any) -> Any:
@@ -112,28 +112,31 @@ def _value(info: FieldInfo, value: Any, name: str, key: str) -> Any:
 
 
 def table_of(value: Any, where: str) -> dict[str, Any]:
-    """Return the keys and values of a section; raise an error for anything else."""
+    """Return a section's keys and values; reject anything else."""
     if not isinstance(value, Mapping):
-        raise ParameterError(f"{where} must be a section with key = value lines", name=where)
+        valid = "a section with key = value lines"
+        raise ParameterError(
+            f"{where} must be {valid}", name=where, value=quoted(value), valid=valid
+        )
     return dict(value)
 
 
 def _sections(kind: type[Section], value: Any, where: str) -> tuple[Section, ...]:
     if not isinstance(value, list) or not all(isinstance(each, Mapping) for each in value):
-        raise ParameterError(f"write {where} with double brackets, once for each entry", name=where)
+        raise ParameterError(f"write {where} with double brackets, once per entry", name=where)
     return tuple(kind.read(each, where) for each in value)
 
 
-def _refused(
+def _rejection(
     info: FieldInfo, content: Mapping[str, Any], place: str, key: str, inner: Sequence[Any]
 ) -> InputError:
-    """Return the error for a field's value that is not valid or is missing.
+    """Return the error for a field whose value is missing or not valid.
 
     ``inner``: the value's place within the field.
     """
     hint = _hint(info)
     if key not in content:
-        return ParameterError(f"{place}{key} is missing: {hint or 'give it a value'}", name=key)
+        return ParameterError(f"{place}{key} is missing: {hint or 'add a value'}", name=key)
     name, value, kind, unit = f"{place}{key}", content[key], _kind(info.annotation), _unit(info)
     if kind is Mapping:
         name, value, kind = f"[{key}] {inner[0]}", value[inner[0]], get_args(info.annotation)[-1]
@@ -158,8 +161,9 @@ def _refused(
         )
     if kind is Literal and not hint:
         return unknown_name(name, str(value), get_args(info.annotation))
-    reason = f": {hint}" if hint else f" must be {_VALID[kind]}"
-    return ParameterError(f"{name} = {quoted(value)}{reason}")
+    valid = "" if hint else _VALID[kind]
+    text = f"{name} = {quoted(value)}" + (f": {hint}" if hint else f" must be {valid}")
+    return ParameterError(text, name=name, value=quoted(value), valid=valid)
 
 
 def _unit(info: FieldInfo) -> Unit | None:

@@ -1,4 +1,4 @@
-"""Signals: unit, label and role of the fields of State, Input, Output and Memory tuples."""
+"""Signals: unit, label and role of each field of State, Input, Output and Memory tuples."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from bywire.core.arguments import checked
 from bywire.core.errors import ModelError, place_of
 
 T = TypeVar("T", bound=tuple[Any, ...])
-_NOISE = "noise_"  # prefix of stimuli that are noise
+_NOISE = "noise_"  # prefix of noise stimuli
 
 
 @dataclass(frozen=True)
 class Role:
-    """Role of an energy in the balance of a run.
+    """Role of an energy in a run's energy balance.
 
     Parameters
     ----------
@@ -28,19 +28,19 @@ class Role:
         ``"source"`` of energy, or ``"sink"`` (losses and stores). A time at standstill has
         ``"standstill"``.
     returns
-        Of a sink: energy that it may return. A loss returns none, and bywire warns if one does.
-        ``"taken"``: at most the energy taken, like a spring that starts slack. ``"any"``: like a
-        store that starts full, or air that may be warmer.
+        For a sink: energy that it may return. A loss returns none; bywire warns if it does.
+        ``"taken"``: at most the absorbed energy, like a spring that starts slack. ``"any"``: like
+        a store that starts full, or air that may be warmer.
     label
         Name in the balance.
     split
-        Of a sink: whether its energy during standstill is listed separately, as holding.
+        For a sink: whether the balance lists its energy during standstill separately, as holding.
     whole
-        Of a source: the source that it replaces if it is recorded.
+        For a source: the source that it replaces if it is recorded.
     rest, rest_label
-        Sink of the difference between the two.
+        Sink that absorbs the difference between the two sources.
     book
-        Name of the separate balance that contains it; empty for that of the actuator.
+        Name of the separate balance that contains it; empty for the actuator's balance.
     """
 
     side: Literal["source", "sink", "standstill"]
@@ -68,11 +68,11 @@ class Signal:
     set_point_of
         Name of the signal for which this is the set point, for figures; may be empty.
     role
-        Role in the energy balance, of an energy or of a power whose integral is one.
+        Role in the energy balance of an energy, or of a power that is integrated to an energy.
     low, high
         Bounds of its valid range, in that unit: a gauge pressure is not below vacuum, an opening is
-        not negative. `bywire.check` stays within. ``Ge(0)`` after the Signal of an annotation has
-        the same effect.
+        not negative. `bywire.check` uses only values within. ``Ge(0)`` after an annotation's Signal
+        has the same effect.
     """
 
     unit: str
@@ -90,12 +90,12 @@ class Signal:
 
 @dataclass(frozen=True)
 class Limited:
-    """Limit of a command, beside the Signal of a field of the memory.
+    """Limit of a command, next to the Signal of a memory field.
 
     Parameters
     ----------
     by
-        Dotted name of the parameter that the command's magnitude never exceeds; or the name of the
+        Dotted name of the parameter that the command's magnitude never exceeds, or name of the
         stimulus that the command never exceeds.
     """
 
@@ -119,7 +119,7 @@ Overlap = Annotated[float, Signal("m", "overlap", 1e-4)]
 
 @cache
 def signals_of(tuple_type: type[NamedTuple]) -> dict[str, Signal]:
-    """Return the signals of a NamedTuple class, in the order of its fields.
+    """Return a NamedTuple class's signals, in the order of its fields.
 
     Every field must be annotated ``Annotated[float, Signal(...)]``.
     """
@@ -130,14 +130,16 @@ def signals_of(tuple_type: type[NamedTuple]) -> dict[str, Signal]:
         if signal is None:
             raise ModelError(
                 f"{place_of(tuple_type)}: {tuple_type.__qualname__}.{name} has no Signal annotation"
-                f': write {name}: Annotated[float, Signal("m", "what it is")]'
+                f': write {name}: Annotated[float, Signal("m", "what it is")]',
+                name=f"{tuple_type.__qualname__}.{name}",
+                valid='Annotated[float, Signal("m", "what it is")]',
             )
         signals[name] = signal
     return signals
 
 
 def signal_in(annotation: Any) -> Signal | None:
-    """Return the Signal of an annotation with the bounds after it, or None."""
+    """Return an annotation's Signal with the bounds after it, or None."""
     signal = next((n for n in _notes(annotation) if isinstance(n, Signal)), None)
     if signal is None:
         return None
@@ -150,11 +152,11 @@ def signal_in(annotation: Any) -> Signal | None:
 
 @cache
 def ranges_of(tuple_type: type[NamedTuple]) -> dict[str, tuple[float, float]]:
-    """Return the ranges that are declared next to a Signal, bounds included.
+    """Return the ranges that are declared next to Signals, bounds included.
 
-    Controllers and runs reject values outside.
-    ``Annotated[float, Signal(...), Ge(0), Le(1)]`` declares one. Bounds that follow from the unit
-    alone, such as vacuum for a gauge pressure, are not included.
+    Controllers and runs reject values outside these ranges.
+    ``Annotated[float, Signal(...), Ge(0), Le(1)]`` declares a range. Bounds that follow from the
+    unit alone, such as vacuum for a gauge pressure, are not included.
     """
     hints = typing.get_type_hints(tuple_type, include_extras=True)
     ends = {name: _ends(hint) for name, hint in hints.items()}
@@ -182,7 +184,7 @@ def _ends(annotation: Any) -> tuple[float, float]:
 
 @cache
 def limits_of(tuple_type: type[NamedTuple]) -> dict[str, Limited]:
-    """Return the limits of the commands among the signals of a NamedTuple class."""
+    """Return the limits of the commands among a NamedTuple class's signals."""
     hints = typing.get_type_hints(tuple_type, include_extras=True)
     return {
         name: note
@@ -197,7 +199,7 @@ def _number(end: Any) -> float:
 
 
 def without_noise(stimuli: Iterable[str]) -> list[str]:
-    """Return the names of stimuli that a user can drive: all except noise, which is drawn.
+    """Return the names of the stimuli that a user can drive: all except random noise.
 
     Examples
     --------
@@ -208,7 +210,7 @@ def without_noise(stimuli: Iterable[str]) -> list[str]:
 
 
 def places_of(model: Any) -> dict[str, type[NamedTuple]]:
-    """Return the signal tuples of a model by their role."""
+    """Return a model's signal tuples by their role."""
     return {
         "recording": model.Output,
         "state": model.State,
@@ -221,12 +223,12 @@ def places_of(model: Any) -> dict[str, type[NamedTuple]]:
 def merged_signals(
     tuples: Iterable[tuple[str, type[NamedTuple]]],
 ) -> list[tuple[str, Signal, tuple[str, ...]]]:
-    """Return one row per name, unit and label, with all places of such a signal.
+    """Return one row per name, unit and label, with all places of that signal.
 
     Parameters
     ----------
     tuples
-        Places and signal tuples, as of :func:`places_of`.
+        Places and signal tuples, from :func:`places_of`.
     """
     places: dict[tuple[str, Signal], list[str]] = {}
     for place, each in tuples:
@@ -238,14 +240,14 @@ def merged_signals(
 
 
 def joined(module: str, name: str, *tuples: type[Any]) -> Any:
-    """Join signal tuples into one that the module exports under the name.
+    """Join signal tuples into a single tuple that the module exports under the name.
 
-    It serves as one memory for several controllers.
+    The result serves as the common memory of several controllers.
 
     Raises
     ------
     ModelError
-        When two of them have a field of the same name.
+        When two tuples have a field of the same name.
     """
     fields: list[tuple[str, Any]] = []
     for each in tuples:
@@ -253,8 +255,9 @@ def joined(module: str, name: str, *tuples: type[Any]) -> Any:
         for field in each._fields:
             if field in dict(fields):
                 raise ModelError(
-                    f"{place_of(each)}: {each.__qualname__}.{field}: another tuple that is joined "
-                    "to this one has such a field too; rename one"
+                    f"{place_of(each)}: {each.__qualname__}.{field}: another joined tuple has a "
+                    "field of this name too; rename one",
+                    name=f"{each.__qualname__}.{field}",
                 )
             fields.append((field, hints[field]))
     make: Callable[..., Any] = NamedTuple
@@ -265,5 +268,5 @@ def joined(module: str, name: str, *tuples: type[Any]) -> Any:
 
 @checked
 def zeros(tuple_type: type[T]) -> T:
-    """Return a signal tuple whose every field is 0.0."""
+    """Return a signal tuple with 0.0 in every field."""
     return tuple_type(*(0.0 for _ in tuple_type._fields))  # type: ignore[attr-defined,arg-type]

@@ -1,10 +1,10 @@
-"""State of the source files that affect results, and whether this process runs exactly them.
+"""State of the source files that affect results, and whether this process runs exactly these files.
 
-What was made of them can be kept for a later process as long as they stay as they are. Times of
-change tell that only with care: a file that is saved after it was loaded, or twice within the
-clock's tick, differs from what runs. And a program that uses bywire may put functions of its own in
-the place of ours. So only a command is sure to run what its files say, and only files that were
-left alone for a while before it started.
+Data derived from the files stay valid for later processes until a file changes. Modification times
+alone do not show every change. A file that is saved after loading, or twice within the clock's
+resolution, differs from the running code. A program that uses bywire may also replace bywire's
+functions. So only a command certainly runs the code in its files, and only if they did not change
+for a while before it started.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from pathlib import Path
 import bywire.core
 
 TICK = 2_000_000_000
-"""coarsest resolution [ns] of the times that file systems keep"""
+"""coarsest resolution [ns] of file systems' modification times"""
 
 _ROOMS = ("bywire.core.", "bywire.plant", "bywire.control", "bywire.simulation", "bywire.brakes")
 _HARMLESS = {
@@ -46,10 +46,10 @@ _started: list[int] = []
 
 @contextmanager
 def command() -> Iterator[None]:
-    """Mark a command: a process in which, until the block ends, nothing but files' code runs.
+    """Mark this process as a command, which runs only code from files until the block ends.
 
-    Where code that shapes models is loaded already, somebody else did so before and may have
-    changed it: then nothing is marked.
+    If code that shapes models is loaded already, another program loaded it and may have changed
+    it. In that case the process is not marked.
     """
     shaping = {name for name in sys.modules if name.startswith(_ROOMS)} - _HARMLESS
     _started[:] = [] if shaping else [time.time_ns()]
@@ -61,14 +61,14 @@ def command() -> Iterator[None]:
 
 @dataclass(frozen=True)
 class SourceState:
-    """State of bywire's files and of every brake's.
+    """State of the files of bywire and of every brake.
 
     Parameters
     ----------
     digest
-        What changes when a file is changed, added, moved or taken away.
+        Digest that changes when a file is changed, added, moved or removed.
     newest
-        Time of the latest change [ns].
+        Time of the most recent change [ns].
     """
 
     digest: str
@@ -76,18 +76,18 @@ class SourceState:
 
     @property
     def is_running(self) -> bool:
-        """Whether this process certainly runs the code in the files."""
+        """Whether this process certainly runs the files' code."""
         return bool(_started) and self.newest < _started[0] - TICK
 
 
 def source_state() -> SourceState:
-    """Return the state of all files by path, number, size and times of change."""
+    """Return the state of all files from paths, inode numbers, sizes and modification times."""
     import hashlib
 
     digest, newest = hashlib.sha256(), 0
     for path in _files():
         digest.update(f"{path}\0".encode(errors="surrogateescape"))
-        with suppress(OSError):  # a link to nowhere, or gone by now
+        with suppress(OSError):  # a broken link, or a file that was removed meanwhile
             seen = os.stat(path)
             newest = max(newest, seen.st_mtime_ns, seen.st_ctime_ns)
             line = (seen.st_ino, seen.st_size, seen.st_mtime_ns, seen.st_ctime_ns)
@@ -96,7 +96,7 @@ def source_state() -> SourceState:
 
 
 def _files() -> Iterator[str]:
-    """Yield every file, whatever its kind: equations may come with tables."""
+    """Yield every file of any kind, since equations may read tables."""
     from bywire.core.brake import brakes
 
     package = Path(bywire.core.__file__ or "").parents[1]

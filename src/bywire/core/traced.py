@@ -1,7 +1,7 @@
-"""Numbers that remember how they are computed, so that a part of a model's equations runs alone.
+"""Numbers that record how they are computed, so that some of a model's equations can run alone.
 
-A model's equations are run once on `Traced` numbers; of what they give, any part then runs on the
-rows of a recording, and nothing else of the model with it.
+A model's equations run once on `Traced` numbers. Any of their results can then be evaluated on a
+recording's rows, without the rest of the model.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ class Traced:
     Parameters
     ----------
     operation
-        Operation that computes it; None for a named number.
+        Operation that computes the number; None for a named number.
     inputs
-        Operands; the name of a named number.
+        Operands, or the name of a named number.
     """
 
     __slots__ = ("inputs", "operation")
-    __array_ufunc__ = None  # NumPy's numbers leave the operation to this one
+    __array_ufunc__ = None  # NumPy's numbers leave operations to this class
 
     def __init__(self, operation: Callable[..., Any] | None, *inputs: Any) -> None:
         self.operation, self.inputs = operation, inputs
@@ -56,7 +56,7 @@ for _name in (*_BOTH, "neg", "pos", "abs", "lt", "le", "gt", "ge", "eq", "ne"):
 def names_in(values: Any, marks: Mapping[int, Any] | None = None) -> Iterator[Any]:
     """Yield the names that a value, or a tuple of values, depends on.
 
-    ``marks``: by the identity of a traced number, what is yielded of it in place of its names.
+    ``marks``: object to yield instead of the names, by the identity of a traced number.
     """
     waiting, seen = [values], set()
     while waiting:
@@ -73,23 +73,22 @@ def names_in(values: Any, marks: Mapping[int, Any] | None = None) -> Iterator[An
                 waiting += each.inputs
 
 
-def computed(values: Any, given: Mapping[str, Any]) -> Any:
-    """Evaluate a value, or a tuple of values, for given names."""
-    return _computed(values, given, {})
+def computed(values: Any, operands: Mapping[str, Any]) -> Any:
+    """Evaluate a value, or a tuple of values, with operands by name."""
+    return _computed(values, operands, {})
 
 
-def _computed(each: Any, given: Mapping[str, Any], known: dict[int, Any]) -> Any:
-    """Return a value; what shared operations gave is ``known`` by their identity."""
-    # A function within `computed` would refer to itself, and keep recordings until Python looks
-    # for garbage.
+def _computed(each: Any, operands: Mapping[str, Any], known: dict[int, Any]) -> Any:
+    """Return a value; ``known`` caches the results of shared operations by their identity."""
+    # A nested function would refer to itself, and keep recordings alive until garbage collection.
     if isinstance(each, tuple):
-        rows = [_computed(inner, given, known) for inner in each]
+        rows = [_computed(inner, operands, known) for inner in each]
         return each._make(rows) if hasattr(each, "_make") else tuple(rows)
     if not isinstance(each, Traced):
         return each
     if each.operation is None:
-        return given[each.inputs[0]]
+        return operands[each.inputs[0]]
     if id(each) not in known:
-        inputs = [_computed(inner, given, known) for inner in each.inputs]
+        inputs = [_computed(inner, operands, known) for inner in each.inputs]
         known[id(each)] = each.operation(*inputs)
     return known[id(each)]

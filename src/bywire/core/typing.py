@@ -1,4 +1,4 @@
-"""Types that signatures of all rooms share."""
+"""Types for signatures in all rooms."""
 
 from __future__ import annotations
 

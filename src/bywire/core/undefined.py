@@ -1,7 +1,7 @@
-"""Data classes in which NaN says that a number is not defined: equal where both are not.
+"""Data classes in which NaN means "undefined": two undefined numbers are equal.
 
-Plain ones compared tuples up to Python 3.12, in which the same NaN object is equal to itself; from
-3.13 on they compare numbers, and no NaN is equal to any.
+Up to Python 3.12, plain data classes compare tuples, in which the same NaN object equals itself.
+From 3.13 on they compare the numbers, and no NaN equals another.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import Any
 
 
 class EqualWhereUndefined:
-    """Base of such a data class, which is declared with ``eq=False``."""
+    """Base class of such a data class; declare the data class with ``eq=False``."""
 
     def __eq__(self, other: object) -> bool:
         if type(other) is not type(self):

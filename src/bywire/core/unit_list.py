@@ -1,7 +1,7 @@
-"""The closed list of units that users and measuring programs write, and products of them.
+"""Closed list of units that users and measuring programs write, and products of them.
 
-Nothing else is a unit here. An open dictionary reads ``Nm`` as a yarn count, ``ma`` as a
-thousandth of a year and ``U/min`` as an enzyme's activity, each without a word.
+bywire rejects all other units. An open dictionary silently reads ``Nm`` as a yarn count, ``ma`` as
+a thousandth of a year and ``U/min`` as an enzyme's activity.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ from functools import cache, lru_cache
 from bywire.core.errors import UnitError, quoted
 
 BASES = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
-"""base units, including the radian, so that an angular speed is not a frequency"""
+"""base units, including the radian, which distinguishes angular speed from frequency"""
 
 _LONGEST = 100  # characters of a unit
-_NEAR = 0.75  # resemblance of a spelling that was meant
-_MOST = 99  # exponent of a base unit
+_NEAR = 0.75  # lowest similarity of a suggested spelling
+_MOST = 99  # largest exponent of a base unit
 
-# Number, SI unit, prefixes, spellings that take them, and words, which take an s, a capital and the
-# words of the prefixes. A "~" stands for a blank.
+# Number, SI unit, prefixes, spellings that accept the prefixes, and words, which accept a plural s,
+# a capital letter and the prefixes as words. A "~" stands for a blank.
 _ROWS = (
     ("1", "m", "n u m c d k", "m", "meter metre"),
     ("0.0254", "m", "", "in inch Inch inches", ""),
@@ -184,8 +184,8 @@ _REFERENCES = {
     "gauge": ("(g)", "~g", "g", "_g", "~rel", "(rel)", "_rel", "~gauge", "(ü)", "ü", "~ü"),
     "absolute": ("(a)", "~a", "a", "_a", "~abs", "(abs)", "_abs", "~absolute"),
 }
-# Only the requested quantity decides between the two meanings of such a letter. Declared units use
-# the first one.
+# Only the requested quantity distinguishes the two meanings of such a letter. Declared units use
+# the first meaning.
 _TWO_MEANINGS = {
     "g": ("gram", "g_n"),
     "mg": ("milligram", "mg_n"),
@@ -197,10 +197,10 @@ _LOGARITHMIC = frozenset(
     ["dB", "dBA", "dB(A)", "dBm", "dBV", "dBu", "dBW", "dBFS", "dBc", "Np", "pH", "oct", "dec"]
 )
 _IN_QUOTIENTS = {"U": "rev", "r": "rev"}
-"""as in U/min and mm/r; alone, they are not units"""
+"""as in U/min and mm/r; on their own, they are not units"""
 
 _PLAIN = str.maketrans(
-    {  # signs that look alike, or that mean the same
+    {  # characters that look the same or mean the same
         "\u03bc": "µ",
         "\u2126": "Ω",
         "º": "°",
@@ -226,27 +226,27 @@ _POWER = re.compile(rf"(?:\*\*|\^)({_EXPONENT})")
 
 
 class UnknownUnitError(UnitError):
-    """A text that is neither a listed unit nor a product of them; its message gives the reason."""
+    """A text that is neither a listed unit nor a product of listed units."""
 
 
 class UnreadableUnitError(UnknownUnitError):
-    """A text without the form of a unit."""
+    """A text that does not have the form of a unit."""
 
 
 @dataclass(frozen=True)
 class Scale:
-    """Scale of a unit in SI: value = factor * number + zero.
+    """A unit's scale in SI: value = factor * number + zero.
 
     Parameters
     ----------
     ratio, turns
-        Its factor is ``ratio * pi**turns``.
+        The factor is ``ratio * pi**turns``.
     powers
-        Exponents of the base units, see `BASES`.
+        Exponents of the base units; see `BASES`.
     terms
-        SI units in its product, with their exponents.
+        SI units of the product, with their exponents.
     zero
-        Its zero in SI: 273.15 K for degC.
+        The unit's zero in SI: 273.15 K for degC.
     reference
         ``"gauge"`` or ``"absolute"``, if a unit of pressure defines it.
     """
@@ -260,19 +260,19 @@ class Scale:
 
     @property
     def factor(self) -> float:
-        """What one of it is in SI, as a difference."""
+        """Size of one unit in SI, as a difference."""
         return float(self.ratio) * math.pow(math.pi, self.turns)
 
     @property
     def symbol(self) -> str:
-        """The SI unit of its quantity, for instance ``V/(N*m)``."""
+        """SI unit of the same quantity, for instance ``V/(N*m)``."""
         above = "*".join(_raised(name, power) for name, power in self.terms if power > 0)
         below = [_raised(name, -power) for name, power in self.terms if power < 0]
         under = below[0] if len(below) == 1 else f"({'*'.join(below)})"
         return (above or "1") + (f"/{under}" if below else "")
 
     def times(self, other: Scale, power: float = 1) -> Scale:
-        """Return the product with a power of another one; in products, zeros do not count."""
+        """Return the product with a power of another scale; in products, zeros do not count."""
         powers = tuple(a + power * b for a, b in zip(self.powers, other.powers, strict=True))
         if max(map(abs, powers)) > _MOST or abs(power) > _MOST:
             raise UnreadableUnitError("the unit has too large an exponent")
@@ -292,13 +292,13 @@ _ONE = Scale(Fraction(1), 0, (0,) * len(BASES), ())
 
 
 def scale_of(text: str) -> Scale:
-    """Return the scale of a unit in SI.
+    """Return a unit's scale in SI.
 
     Raises
     ------
     UnknownUnitError
-        When it is neither a listed unit nor a product of them, when it has two meanings, and when
-        it is logarithmic.
+        When it is neither a listed unit nor a product of listed units, when it has two meanings,
+        and when it is logarithmic.
 
     Examples
     --------
@@ -310,22 +310,24 @@ def scale_of(text: str) -> Scale:
         plain = _plain(text)
         two = next(names for key, names in _TWO_MEANINGS.items() if key in _names(plain))
         raise UnknownUnitError(
-            f"the unit {quoted(text)} has two meanings: write {two[0]!r} or {two[1]!r} in it"
+            f"the unit {quoted(text)} has two meanings: write {two[0]!r} or {two[1]!r} in it",
+            value=quoted(text),
+            valid=f"{two[0]!r} or {two[1]!r}",
         )
     return meanings[0]
 
 
 @lru_cache(4096)
 def meanings_of(text: str) -> tuple[Scale, ...]:
-    """Return what a unit is in SI, of ``g``, ``C`` and ``F`` both meanings; SI's own is the first.
+    """Return a unit's scales in SI: two for ``g``, ``C`` and ``F``, the SI meaning first.
 
     Raises
     ------
     UnknownUnitError
-        When it is neither a listed unit nor a product of them, or logarithmic.
+        When it is neither a listed unit nor a product of listed units, or logarithmic.
     """
     if len(text) > _LONGEST:
-        raise UnreadableUnitError(f"{quoted(text)} is longer than any unit")
+        raise UnreadableUnitError(f"{quoted(text)} is longer than any unit", value=quoted(text))
     plain = _plain(text)
     if plain in _spellings():
         return (_spellings()[plain],)
@@ -339,8 +341,20 @@ def spellings() -> Iterator[str]:
     yield from _TWO_MEANINGS
 
 
+def units_by_symbol() -> dict[str, list[str]]:
+    """Return the listed units by the SI unit of their quantity, one spelling each, for choosers."""
+    found: dict[str, list[str]] = {}
+    rows = {(number, symbol): row for number, symbol, *row in reversed(_ROWS)}  # one a size
+    for (_, symbol), (prefixes, names, words) in reversed(rows.items()):
+        first = (names or words).split()[0]
+        spelled = ["", *prefixes.split()] if names else [""]
+        found.setdefault(symbol, []).extend(f"{prefix}{first}" for prefix in spelled)
+    found["K"] += [names.split()[0] for _, _, names in _TEMPERATURES]
+    return found
+
+
 def _plain(text: str) -> str:
-    """Return a unit with one sign for each meaning."""
+    """Return a unit with a single character for each meaning."""
     plain = re.sub(" +", " ", text.translate(_PLAIN)).strip(" ")
     raised = _RAISED_POWER.sub(lambda m: f"^{'-' * len(m[1])}{_RAISED.index(m[2])}", plain)
     squeezed = _BRACKETED_POWER.sub(r"^\1", raised)
@@ -359,14 +373,14 @@ def _squeezed(name: str) -> str:
 
 @cache
 def _with_hyphens_and_blanks() -> re.Pattern[str]:
-    """Return what finds the spellings with a blank or a hyphen in a product."""
+    """Return a pattern for the spellings with a blank or a hyphen in a product."""
     names = [name for name in _spellings() if " " in name or "-" in name]
     every = "|".join(re.escape(name) for name in sorted(names, key=len, reverse=True))
     return re.compile(rf"(?<![{_LETTERS}_])(?:{every})(?![{_LETTERS}_0-9])")
 
 
 class _Reader:
-    """Reads a product of units from left to right."""
+    """Parser that reads a product of units from left to right."""
 
     def __init__(self, text: str, plain: str, meaning: int) -> None:
         self._text, self._plain, self._meaning, self._at = text, plain, meaning, 0
@@ -379,14 +393,14 @@ class _Reader:
         if self._at != len(self._plain):
             raise self._unreadable()
         if self._unknown:
-            raise UnknownUnitError(self._why_not(self._unknown))
+            raise UnknownUnitError(self._why_not(self._unknown), value=quoted(self._unknown))
         return scale
 
     def _product(self) -> Scale:
         """Read factors up to a closing bracket or the end."""
         scale, power, is_divided = _ONE, 1, False
         is_first, has_sign = True, False
-        if one := _NUMERATOR.match(self._plain, self._at):  # of 1/s and (1)/s
+        if one := _NUMERATOR.match(self._plain, self._at):  # in 1/s and (1)/s
             self._at, is_first = one.end(), self._plain.startswith(("/", " /"), one.end())
         while self._at < len(self._plain):
             match = _TOKEN.match(self._plain, self._at)
@@ -453,12 +467,14 @@ class _Reader:
     def _ambiguous(self) -> UnknownUnitError:
         return UnknownUnitError(
             f"the unit {quoted(self._text)} can be read in two ways: put the divisor in brackets, "
-            "as in J/(kg*K), or write it last"
+            "as in J/(kg*K), or write it last",
+            value=quoted(self._text),
         )
 
     def _unreadable(self) -> UnreadableUnitError:
         return UnreadableUnitError(
-            f"{quoted(self._text)} is not written like a unit such as N*m/rad or m**3/s"
+            f"{quoted(self._text)} does not have the form of a unit such as N*m/rad or m**3/s",
+            value=quoted(self._text),
         )
 
 
@@ -467,19 +483,19 @@ def _exponent(text: str) -> float:
 
 
 def _nearest(name: str) -> list[str]:
-    """Return the spellings that may be meant: those in other capitals first."""
+    """Return similar spellings: those that differ only in capital letters first."""
     folded = [each for each in _spellings() if each.casefold() == name.casefold()]
     return folded[:3] or get_close_matches(name, _spellings(), n=2, cutoff=_NEAR)
 
 
 @cache
 def _spellings() -> dict[str, Scale]:
-    """Return every spelling of every unit of the list."""
+    """Return every spelling of every listed unit."""
     listed: dict[str, Scale] = {}
 
     def add(name: str, scale: Scale) -> None:
         if listed.setdefault(name, scale) != scale:
-            raise AssertionError(f"two units are written {name!r}")
+            raise AssertionError(f"two units have the spelling {name!r}")
 
     for number, symbol, prefixes, names, words in _ROWS:
         scale = _scaled(number, _si(symbol))
@@ -518,7 +534,7 @@ def _inflected(word: str) -> Iterator[str]:
 
 
 def _scaled(number: str, scale: Scale) -> Scale:
-    """Return a unit that is a number times another; ``pi`` stands first or last in it."""
+    """Return a number times another unit; ``pi`` is first or last in the number's text."""
     turns = number.count("pi")
     plain = number.replace("2*pi", "2").replace("pi", "1")
     above, _, below = plain.partition("/")
@@ -532,7 +548,7 @@ def _larger(scale: Scale, power: int) -> Scale:
 
 @cache
 def _si(symbol: str) -> Scale:
-    """Return an SI unit or a product of them such as ``m**3/s``."""
+    """Return an SI unit, or a product of SI units such as ``m**3/s``."""
     scale = _ONE
     above, _, below = symbol.partition("/")
     for product, sign in ((above, 1), (below, -1)):
@@ -546,7 +562,7 @@ def _si(symbol: str) -> Scale:
 
 @cache
 def _powers(name: str) -> tuple[float, ...]:
-    """Return the exponents of the base units in an SI unit with a name."""
+    """Return the exponents of the base units in a named SI unit."""
     if name in BASES:
         return tuple(int(base == name) for base in BASES)
     scale = _ONE

@@ -22,25 +22,27 @@ F = TypeVar("F")
 
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*(.*?)\s*", re.DOTALL)
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-_SIGNS = {"ohm": "Ω", "percent": "%", "degree": "°", "deg": "°", "degC": "°C"}
+_SIGNS = {"um": "µm", "ohm": "Ω", "percent": "%", "degree": "°", "deg": "°", "degC": "°C"}
+_DIFFERENCES = {"K": "delta_degC", "%": "percentage points", "percent": "percentage points"}
 _LONGEST = 100  # characters; keeps patterns fast on hostile text
 _WORDS = {"1": "a pure number", "delta_degC": "a temperature difference in K"}
 ICE = 273.15
 """0 degC [K]"""
-# Elsewhere a radian counts as a pure number: N*m is N*m/rad. Here 60 rpm would become 6.28 Hz, 1
-# would become 57 degrees, and 2 mm would become 2 mm/rad where 2 mm/rev may be meant.
+# Elsewhere a radian counts as a pure number: N*m equals N*m/rad. With that rule here, 60 rpm would
+# become 6.28 Hz, 1 would become 57 degrees, and 2 mm would become 2 mm/rad although the user may
+# mean 2 mm/rev.
 _NO_MATTER_OF_RAD = ("Hz", "rad/s", "rad", "1", "m/rad")
 
 
 class Written(float):
-    """A number in SI that remembers how it was written, for errors to repeat.
+    """A number in SI that remembers its original text, which errors quote.
 
     Parameters
     ----------
     value
         The number, SI.
     text
-        Text that it was read from, for instance ``"-0.02mm"``.
+        Original text, for instance ``"-0.02mm"``.
     """
 
     text: str
@@ -62,7 +64,7 @@ def parse(value: str | float, symbol: str, name: str, nominal: float = 1.0) -> f
     Parameters
     ----------
     value
-        Text with a unit such as ``"9 mm"``, or a plain number, which is taken as SI.
+        Text with a unit such as ``"9 mm"``, or a plain number in SI.
     symbol
         Requested SI unit, ``"1"`` for a pure number.
     name
@@ -73,8 +75,8 @@ def parse(value: str | float, symbol: str, name: str, nominal: float = 1.0) -> f
     Raises
     ------
     UnitError
-        When the text is not a quantity, or its unit has another dimension. A text may only contain
-        a number and a product of unit names; it is never evaluated.
+        When the text is not a quantity, or its unit has another dimension. A text contains only a
+        number and a product of unit names; bywire never evaluates it as code.
     ParameterError
         When the number is not finite.
 
@@ -89,6 +91,7 @@ def parse(value: str | float, symbol: str, name: str, nominal: float = 1.0) -> f
             f"{example(symbol, nominal)!r}",
             name=name,
             value=quoted(value),
+            valid="one number",
         )
     try:
         number = _number(value, symbol, name, nominal) if isinstance(value, str) else float(value)
@@ -101,26 +104,35 @@ def parse(value: str | float, symbol: str, name: str, nominal: float = 1.0) -> f
 
 def _number(text: str, symbol: str, name: str, nominal: float) -> float:
     match = _NUMBER.fullmatch(text) if len(text) <= _LONGEST else None
-    write = f"write for instance {example(symbol, nominal)!r}"
+    valid = repr(example(symbol, nominal))
+    write, fields = f"write for instance {valid}", {"name": name, "value": quoted(text)}
     if match is None:
-        raise UnitError(f"{name} = {quoted(text)} is not a quantity: {write}")
+        raise UnitError(
+            f"{name} = {quoted(text)} is not a quantity: {write}", **fields, valid=valid
+        )
     size, unit = float(match[1]), match[2]
     try:
         meanings = meanings_of(unit or "1")
     except UnreadableUnitError:
-        raise UnitError(f"{name} = {quoted(text)} is not a quantity: {write}") from None
+        reason = f"{name} = {quoted(text)} is not a quantity: {write}"
+        raise UnitError(reason, **fields, valid=valid) from None
     except UnknownUnitError as error:
-        raise UnitError(f"{name} = {text!r}: {error}; {write}") from None
+        reason = f"{name} = {text!r}: {error}; {write}"
+        raise UnitError(reason, **fields, valid=valid) from None
     scale = next((each for each in meanings if _measures(each, symbol)), None)
     if scale is None:
         raise UnitError(
             f"{name} = {text!r} has the wrong unit: {unit or 'a pure number'} cannot be "
-            f"converted to {_words(symbol)}; {write}"
+            f"converted to {_words(symbol)}; {write}",
+            **fields,
+            valid=valid,
         )
     if scale.reference == "absolute":
         raise UnitError(
-            f"{name} = {text!r}: bywire cannot tell whether {name} is absolute or relative to "
-            f"ambient pressure: convert it to the one that the bench needs, and {write}"
+            f"{name} = {text!r}: bywire cannot determine whether {name} is absolute or relative to "
+            f"ambient pressure: convert it to the kind that the bench needs, and {write}",
+            **fields,
+            valid=valid,
         )
     return _converted(size, _in_si(size, scale))
 
@@ -160,7 +172,7 @@ def base_powers(unit: str, bases: tuple[str, ...]) -> tuple[float, ...]:
     Raises
     ------
     UnitError
-        When it is no unit of the list, nor a product of them.
+        When it is neither a listed unit nor a product of listed units.
 
     Examples
     --------
@@ -172,22 +184,22 @@ def base_powers(unit: str, bases: tuple[str, ...]) -> tuple[float, ...]:
 
 
 def si_value(number: float, unit: str) -> float:
-    """Return a number of a declared unit in SI."""
+    """Convert a number from a declared unit to SI."""
     return _in_si(number, _of_symbol(unit))
 
 
 def has_own_zero(unit: str, symbol: str) -> bool:
-    """Return whether zero of a unit is not zero in an SI unit: of degC and degF in K."""
+    """Return whether a unit's zero differs from the SI unit's, as that of degC differs from K."""
     return parse(f"0 {unit}", symbol, unit) != 0.0
 
 
 def _of_symbol(symbol: str) -> Scale:
-    """Return the scale of an SI unit or of a declared unit, in which C is coulomb."""
+    """Return the scale of an SI unit or a declared unit, where C means coulomb."""
     return meanings_of(symbol)[0]
 
 
 def _converted(size: float, number: float) -> float:
-    """Round a converted number, so that 9 mm is 0.009, not 0.009000000000000001; keep SI values."""
+    """Round a converted number, so 9 mm is 0.009, not 0.009000000000000001; keep SI values."""
     return size if number == size else float(f"{number:.15g}")
 
 
@@ -224,12 +236,12 @@ def shown(value: float, symbol: str, unit: str = "") -> str:
 
 
 def convert(value: F, symbol: str, unit: str) -> F:
-    """Return a value, or an array, given in one unit in another of the same dimension."""
+    """Convert a value or an array from one unit to another of the same dimension."""
     if symbol == unit:
         return value
     before, after = _of_symbol(symbol), _of_symbol(unit)
     if before.powers[:-1] != after.powers[:-1]:
-        raise UnitError(f"{symbol} cannot be converted to {unit}")
+        raise UnitError(f"{symbol} cannot be converted to {unit}", value=symbol, valid=unit)
     ratio, turns = before.ratio / after.ratio, before.turns - after.turns
     number: Any = value
     if before.zero:
@@ -248,18 +260,22 @@ def convert(value: F, symbol: str, unit: str) -> F:
 def difference_unit(symbol: str) -> str:
     """Return the SI unit of differences; for temperatures, a unit without an offset.
 
+    Percentages differ by percentage points.
+
     Examples
     --------
     >>> shown(20.0, "K"), shown(20.0, difference_unit("K")), difference_unit("Pa")
     ('-253.15 degC', '20 K', 'Pa')
+    >>> shown(3.8, difference_unit("%"))
+    '3.8 percentage points'
     """
-    return "delta_degC" if symbol == "K" else symbol
+    return _DIFFERENCES.get(symbol, symbol)
 
 
 def display_factor(symbol: str) -> float:
     """Return the factor from a difference in the SI unit to one in the display unit.
 
-    For values themselves it is valid only where both units have the same zero, see `convert`.
+    For values themselves, it is valid only if both units have the same zero; see `convert`.
 
     Examples
     --------
@@ -271,7 +287,7 @@ def display_factor(symbol: str) -> float:
 
 
 def example(symbol: str, nominal: float = 1.0) -> str:
-    """Return a valid example of a quantity, with its usual magnitude where one is declared.
+    """Return a valid example of a quantity, with its declared usual magnitude if it has one.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""What elements say of a recording: where their range was left, and when first."""
+"""Elements' warnings about a recording: which range was exceeded, and when first."""
 
 from __future__ import annotations
 
@@ -13,36 +13,37 @@ F = TypeVar("F", bound=Callable[..., list[str]])
 
 
 def row_by_row(watch: F) -> F:
-    """Declare that an element's ``watch`` judges each row alone.
+    """Declare that an element's ``watch`` judges each row on its own.
 
-    It warns exactly if at least one row alone would make it warn. It is then asked once of the
-    rows of many cases, (cases, rows) each: they are silent mostly.
+    It warns exactly if at least one row on its own would make it warn. Studies then call it once
+    with the rows of many cases, shape (cases, rows), since most cases have no warnings.
     """
     watch.row_by_row = True  # type: ignore[attr-defined]
     return watch
 
 
 def outside(values: Any, low: float, high: float) -> Any:
-    """Return where values leave a range; what is not known lies in it."""
+    """Return which values are outside a range; NaN counts as inside."""
     return np.logical_or(np.less(values, low), np.greater(values, high))
 
 
 def highest(values: Any) -> float:
-    """Return the largest of some values; NaN where one is not known."""
+    """Return the largest value, or NaN if a value is NaN."""
     return float(np.max(values))
 
 
 def first(t: Array, happens: Any, text: str, after: str = "") -> list[str]:
-    """Return a warning with the time of the first row in which something happens, if in one.
+    """Return a warning with the time of the first row in which an event occurs, if any.
 
     Parameters
     ----------
     t
         Times of the rows [s], shape (n,).
     happens
-        Whether it happens in each row, shape (n,), or one for all; of many cases (cases, n).
+        Whether the event occurs in each row, shape (n,), or a single value; shape (cases, n) for
+        several cases.
     text, after
-        What is said before and behind the time.
+        Text of the warning before and after the time.
     """
     if not np.any(happens):
         return []

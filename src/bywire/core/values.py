@@ -1,4 +1,4 @@
-"""Values as users write them: texts with units become SI numbers, tables, or choices."""
+"""Conversion of users' values: texts with units become SI numbers, tables, or choices."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ _ZERO = re.compile(r"\s*[+-]?(?:0+\.?0*|\.0+)\s*")
 def parsed(cls: type[ParameterSet], values: Mapping[str, Any], kind: str) -> dict[str, Any]:
     """Return values by dotted name, numbers in SI.
 
-    ``cls``: class of the parameter set that they are for; ``values``: numbers (SI), texts with
-    units, sequences of these for tables, or choices; ``kind``: what errors call the names.
+    ``cls``: the parameter class. ``values``: numbers (SI), texts with units, sequences of these for
+    tables, or choices. ``kind``: the kind of the names in errors.
 
     Raises
     ------
     UnknownNameError
-        With the nearest known names.
+        With the nearest valid names.
     UnitError
         When a text is not a quantity or its unit has another dimension.
     ParameterError
-        When several values are given for a single number, or a number is not finite.
+        When there are several values for a single number, or a number is not finite.
     """
     leaves, choices = leaf_fields(cls), choice_fields(cls)
     accepted: dict[str, Any] = {}
@@ -50,6 +50,7 @@ def number(value: Any, symbol: str, name: str, nominal: float = 1.0) -> float:
             f"{name} = {quoted(value)} must be one value, not several",
             name=name,
             value=quoted(value),
+            valid="one value",
         )
     return _quantity(value, symbol, name, nominal)
 
@@ -61,7 +62,7 @@ def written(value: Any, symbol: str, name: str, nominal: float = 1.0) -> float:
 
 
 def nodes(value: Any, symbol: str, name: str, nominal: float = 1.0) -> tuple[float, ...]:
-    """Return the nodes of a table from a sequence, or from a text with commas, each with its unit.
+    """Return a table's nodes from a sequence, or from a text with commas, each with its unit.
 
     Examples
     --------
@@ -79,7 +80,7 @@ def nodes(value: Any, symbol: str, name: str, nominal: float = 1.0) -> tuple[flo
 
 
 def _listed(text: str, symbol: str, name: str, nominal: float) -> tuple[float, ...]:
-    """Return the nodes of a table from one text."""
+    """Return a table's nodes from a single text."""
     parts = [part.strip() for part in text.split(",")]
     try:
         return tuple(
@@ -87,16 +88,16 @@ def _listed(text: str, symbol: str, name: str, nominal: float) -> tuple[float, .
             for k, part in enumerate(parts)
         )
     except UnitError as error:
-        raise UnitError(f"{error}; commas separate several values") from None
+        raise error.reworded(f"{error}; commas separate several values") from None
 
 
 def require_units(cls: type[ParameterSet], values: Mapping[str, Any], level_unit: str = "") -> None:
-    """Reject plain numbers of a file where a unit is required; zero needs none.
+    """Reject a file's plain numbers where a unit is required; zero needs none.
 
     Parameters
     ----------
     cls
-        Class of the parameter set that the values are for.
+        The parameter class of the values.
     values
         Values by dotted name. Unknown names and values that are not numbers are skipped.
     level_unit
@@ -105,7 +106,7 @@ def require_units(cls: type[ParameterSet], values: Mapping[str, Any], level_unit
     Raises
     ------
     UnitError
-        The same error as for the number as a text.
+        The same error as for the number's text.
     """
     leaves = leaf_fields(cls)
     for name in values.keys() & leaves.keys():
@@ -140,9 +141,9 @@ class _Unquoted(str):
 
 
 def _plain_text(value: float) -> str:
-    """Return a plain number of a file as a text, which errors quote as the file has it.
+    """Return a file's plain number as a text that errors quote without quotation marks.
 
-    A text without a required unit is an error, whereas a number would be taken as SI.
+    A text without its required unit is an error, whereas a number would count as SI.
 
     Examples
     --------

@@ -1,7 +1,7 @@
-"""Warnings of an assembly's elements about a recording, evaluated in every row.
+"""Elements' warnings about a recording, evaluated in every row.
 
-The inputs of an element depend on few states. The assembly's equations are traced once per
-structure, and only those that lead to watching elements are evaluated on a recording.
+An element's inputs depend on few states. The assembly's equations are traced once per structure.
+Only the equations that lead to elements with a ``watch`` function are evaluated on a recording.
 """
 
 from __future__ import annotations
@@ -17,19 +17,19 @@ from bywire.core.traced import Traced, computed, names_in
 from bywire.core.wires import Instant, Wired
 
 _NAN = float("nan")
-_PARAMETER = "."  # before the name of one, among names of signals
+_PARAMETER = "."  # prefix of a parameter's name among signal names
 
 
 class Watching(Model):
-    """Warnings of an assembly about recordings, from its elements and subassemblies."""
+    """An assembly's warnings about recordings, from its elements and subassemblies."""
 
     parts: ClassVar[dict[str, Any]]
     subs: ClassVar[dict[str, Any]]
 
     def watch(self, recording: Any, par: Any) -> list[str]:
-        """Return the warnings of the elements about a recording, evaluated in every row.
+        """Return the elements' warnings about a recording, evaluated in every row.
 
-        Signals that are not recorded cause no warnings.
+        Signals that were not recorded cause no warnings.
         """
         within = (
             f"{sub.label}: {text}"
@@ -39,7 +39,7 @@ class Watching(Model):
         return [*_warnings_of(self, recording, par), *within]
 
     def watched(self, par: Any) -> tuple[str, ...] | None:
-        """Return the signals that ``watch`` reads; None if it is written by hand."""
+        """Return the signals that ``watch`` reads, or None if a subclass overrides ``watch``."""
         if type(self).watch is not Watching.watch:
             return None
         names = [*watched_by_elements(self, par)]
@@ -51,7 +51,7 @@ class Watching(Model):
         return tuple(names)
 
     def silent(self, rows: Any, pars: Sequence[Any]) -> frozenset[str]:
-        """Return the names of parts whose elements have no warnings in any of several cases.
+        """Return the names of the parts without warnings in any of several cases.
 
         ``rows``: signals of shape (cases, rows); ``pars``: parameters of each case.
         """
@@ -65,7 +65,7 @@ class Watching(Model):
     def may_warn(self, rows: Any, pars: Sequence[Any]) -> Sequence[int]:
         """Return the cases for which ``watch`` may warn; none if all parts are silent.
 
-        It returns all cases if ``watch`` is written by hand, unless this method is too.
+        It returns all cases if a subclass overrides ``watch`` but not this method.
         """
         if type(self).watch is not Watching.watch or not self.are_silent(rows):
             return range(len(pars))
@@ -76,7 +76,7 @@ class Watching(Model):
         return tuple(sorted({case for cases in within for case in cases}))
 
     def are_silent(self, rows: Any) -> bool:
-        """Return whether no part has a warning, by ``rows.silent`` of the cases."""
+        """Return whether ``rows.silent`` covers every part that watches."""
         watching = (part.name for part in self.parts.values() if part.has("watch"))
         return all(name in rows.silent for name in watching)
 
@@ -86,30 +86,30 @@ _KNOWN: dict[Any, _Felt] = {}
 
 
 def _warnings_of(model: Any, recording: Any, par: Any) -> list[str]:
-    """Return the warnings of an assembly's elements; see `Assembly.watch`."""
+    """Return the elements' warnings; see `Assembly.watch`."""
     silent = getattr(recording, "silent", ())
-    felt = tuple(each for each in _felt(model, par) if each[0].name not in silent)
+    felt = tuple(each for each in _watching_parts(model, par) if each[0].name not in silent)
     if not felt:
         return []
-    return [text for _, texts in _said(model, felt, recording, par) for text in texts]
+    return [text for _, texts in _warnings_by_part(model, felt, recording, par) for text in texts]
 
 
 def silent_parts(model: Any, rows: Any, pars: Sequence[Any]) -> frozenset[str]:
-    """Return the parts of an assembly whose elements have no warnings in any of several cases.
+    """Return an assembly's parts without warnings in any of several cases.
 
-    ``rows``: signals of shape (cases, rows). Only elements that are watched row by row can be
-    evaluated. Parameters that differ between the cases are arrays of shape (cases, 1).
+    ``rows``: signals of shape (cases, rows). Only elements that judge each row alone can be
+    evaluated. Parameters that differ between the cases become arrays of shape (cases, 1).
     """
     felt = tuple(
         (part, each)
-        for part, each in _felt(model, pars[0])
+        for part, each in _watching_parts(model, pars[0])
         if hasattr(part.element.watch, "row_by_row")
     )
     joined = _joined(pars)
     silent = set()
     for each in felt:
         try:
-            ((part, texts),) = _said(model, (each,), rows, joined, len(pars) > 1)
+            ((part, texts),) = _warnings_by_part(model, (each,), rows, joined, len(pars) > 1)
         except (TypeError, ValueError):  # it needs or returns something other than a single number
             continue
         if not texts:
@@ -118,7 +118,7 @@ def silent_parts(model: Any, rows: Any, pars: Sequence[Any]) -> frozenset[str]:
 
 
 def _joined(pars: Sequence[Any]) -> Any:
-    """Join sets of one structure; where they differ, the result has an array of all values."""
+    """Join sets of one structure: values that differ become arrays over the sets."""
     if len(pars) == 1:
         return pars[0]
     names, table = tuple(pars[0].leaves()), leaf_table(pars)
@@ -126,16 +126,16 @@ def _joined(pars: Sequence[Any]) -> Any:
     return pars[0].with_leaves({names[k]: table[:, k : k + 1] for k in differs})
 
 
-def _said(
+def _warnings_by_part(
     model: Any, felt: _Felt, rows: Any, par: Any, is_joined: bool = False
 ) -> Iterator[tuple[Any, list[str]]]:
-    """Yield the parts that watch, with their warnings about rows.
+    """Yield each part that watches, with its warnings about rows.
 
     ``is_joined``: whether ``par`` joins the sets of several runs.
     """
     with np.errstate(all="ignore"):
-        given = _Given(rows, par, is_joined)
-        values = computed(tuple(tuple(each.values()) for _, each in felt), given)
+        operands = _Operands(rows, par, is_joined)
+        values = computed(tuple(tuple(each.values()) for _, each in felt), operands)
         for (part, names), each in zip(felt, values, strict=True):
             wired: Any = Wired(part, Instant(None, None, None, par, model.shared))
             more = dict(zip(names, each, strict=True))
@@ -143,14 +143,14 @@ def _said(
 
 
 def watched_by_elements(model: Any, par: Any) -> tuple[str, ...]:
-    """Return the signals that determine the watched inputs of an assembly's elements."""
-    felt = tuple(value for _, each in _felt(model, par) for value in each.values())
+    """Return the signals that determine the inputs of the elements' ``watch`` functions."""
+    felt = tuple(value for _, each in _watching_parts(model, par) for value in each.values())
     return tuple(name for name in names_in(felt) if not name.startswith(_PARAMETER))
 
 
-def _felt(model: Any, par: Any) -> _Felt:
-    """Return the parts that watch, with the functions from signals to their inputs."""
-    # Attributes of an instance may appear in the equations.
+def _watching_parts(model: Any, par: Any) -> _Felt:
+    """Return the parts that watch, with their inputs as traced functions of signals."""
+    # An instance with attributes is not cached, since its equations may use them.
     key = None if vars(model) else (type(model), tuple(par.choices().items()))
     if key in _KNOWN:
         return _KNOWN[key]
@@ -170,8 +170,8 @@ def _felt(model: Any, par: Any) -> _Felt:
     return felt
 
 
-class _Given(dict[str, Any]):
-    """Rows of signals and values of parameters by name; NaN for signals not recorded."""
+class _Operands(dict[str, Any]):
+    """Signals' rows and parameters' values by name; NaN for signals that were not recorded."""
 
     def __init__(self, recording: Any, par: Any, is_joined: bool) -> None:
         self._recording, self._par, self._is_joined = recording, par, is_joined
@@ -180,4 +180,6 @@ class _Given(dict[str, Any]):
         if not name.startswith(_PARAMETER):
             return self._recording[name].values if name in self._recording else _NAN
         value = self._par.value(name[len(_PARAMETER) :])
-        return np.asarray(value) if self._is_joined else value  # as of arrays, 1 / 0 is infinite
+        return (
+            np.asarray(value) if self._is_joined else value
+        )  # an array, so that 1 / 0 is infinite

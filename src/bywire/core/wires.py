@@ -1,4 +1,4 @@
-"""Wires: signals that an assembly declares, and values of its equations at an instant."""
+"""Wires: signals that an assembly declares, and the values of its equations at an instant."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Wired(Generic[X, U, F, P]):
 
     @property
     def xe(self) -> X:
-        """State, value-only."""
+        """State as a value only; see `bywire.core.model`."""
         return self._part.state_at(self._instant, None)  # type: ignore[no-any-return]
 
     @property
@@ -52,10 +52,10 @@ class Wired(Generic[X, U, F, P]):
         return self._part.parameters(self._instant.par)  # type: ignore[no-any-return]
 
     def vary(self, **values: Any) -> None:
-        """Make some of its parameters depend on the state, by their values at this instant.
+        """Set parameters of the part that depend on the state, by their values at this instant.
 
-        Call it in ``wire``, above all reads of them. They may depend on value-only states (``xe``).
-        ``mass`` and ``matrix`` still read the original values.
+        Call it in ``wire`` before any read of them. The values may depend on value-only states
+        (``xe``). ``mass`` and ``matrix`` still use the original values.
 
         Raises
         ------
@@ -65,9 +65,9 @@ class Wired(Generic[X, U, F, P]):
         given: Any = self.par
         for name in values:
             if name not in type(given).model_fields:
-                where = f"{self._part.where}: {line()} varies an"
-                raise ModelError(f"{where} {unknown_name('parameter', name, dict(given))}")
-        # Between valid values; symbols could not be validated.
+                error = unknown_name("parameter", name, dict(given))
+                raise error.at(f"{self._part.where}: {line()} vary", ModelError)
+        # Not validated, since the values may be symbols.
         self._varied = type(given).model_construct(**{**dict(given), **values})
 
     @property
@@ -83,28 +83,35 @@ class Wired(Generic[X, U, F, P]):
         if self._input is None:
             raise ModelError(
                 f"{self._part.where}: its input is read before it is wired: assign "
-                f"w.{self._part.name}.u = {self._part.kind}.Input(...) in wire, above that"
+                f"w.{self._part.name}.u = {self._part.kind}.Input(...) in wire before that",
+                name=self._part.where,
+                valid=f"w.{self._part.name}.u = {self._part.kind}.Input(...)",
             )
         return self._input  # type: ignore[no-any-return]
 
     @u.setter
     def u(self, value: U) -> None:
-        wanted = getattr(self._part.element, "Input", None)
-        if wanted is None or not isinstance(value, wanted):
-            takes = "no input" if wanted is None else f"a {self._part.kind}.Input"
+        expected = getattr(self._part.element, "Input", None)
+        if expected is None or not isinstance(value, expected):
+            valid = "no input" if expected is None else f"a {self._part.kind}.Input"
+            actual = f"{type(value).__module__}.{type(value).__name__}"
             raise ModelError(
-                f"{self._part.where}: {line()} assigns a {type(value).__module__}."
-                f"{type(value).__name__} as its input, but it takes {takes}"
+                f"{self._part.where}: {line()} assigns a {actual} as its input, but it accepts "
+                f"{valid}",
+                name=self._part.where,
+                value=actual,
+                valid=valid,
             )
         if self._input is not None:
             raise ModelError(
-                f"{self._part.where}: {line()} assigns its input a second time: wire it once"
+                f"{self._part.where}: {line()} assigns its input a second time: wire it once",
+                name=self._part.where,
             )
         self._input = self._instant.marked(f"{self._part.name}.u", value)
         self._instant.note(f"{self._part.name}.u")
 
     def call(self, function: Callable[..., Any], **more: Any) -> Any:
-        """Call a function of the element with arguments by their names."""
+        """Call an element's function with arguments according to their names."""
         return function(
             *(
                 more[name] if name in more else self._argument(name, function)
@@ -113,9 +120,9 @@ class Wired(Generic[X, U, F, P]):
         )
 
     def felt(self, function: Callable[..., Any]) -> dict[str, Any]:
-        """Return the arguments of an element's function that are not parameters, by name."""
-        wanted = [name for name in arguments(function) if name in ("x", "xe", "u", "f")]
-        return {name: self._argument(name, function) for name in wanted}
+        """Return the arguments of an element's function by name, without parameters."""
+        expected = [name for name in arguments(function) if name in ("x", "xe", "u", "f")]
+        return {name: self._argument(name, function) for name in expected}
 
     def _argument(self, name: str, function: Callable[..., Any]) -> Any:
         if name == "x":
@@ -124,40 +131,44 @@ class Wired(Generic[X, U, F, P]):
             return getattr(self, name)
         if name in self._instant.shared:
             return getattr(self._instant.par, name)
+        valid = "x, u, f, par"
         raise ModelError(
-            f"{self._part.where}: {self._part.kind}.{function.__name__} takes {name!r}, which is "
-            f"not available: use x, u, f, par or a parameter that the assembly names in shared "
-            f"({', '.join(self._instant.shared) or 'none so far'})"
+            f"{self._part.where}: {self._part.kind}.{function.__name__} has an argument {name!r}, "
+            f"which is not available: use {valid} or a group that the assembly lists in shared "
+            f"({', '.join(self._instant.shared) or 'none so far'})",
+            name=f"{self._part.kind}.{function.__name__}",
+            value=name,
+            valid=valid,
         )
 
 
 @dataclass
 class Instant:
-    """Instant and values of a model's evaluation.
+    """Values of a model's evaluation at an instant.
 
     Parameters
     ----------
     x, xe
-        State, and the same value-only.
+        State, and the same state as a value only.
     shared
-        Groups of parameters that elements take by name.
+        Parameter groups that elements receive as arguments by name.
     contact
-        Contact forces by part, and by subassembly.
+        Contact forces by part and by subassembly.
     lines
         File and line of every assignment of a wire or input, if requested.
     mark
-        ``mark(name, value)``: replacement for every assigned wire and input, to follow
+        ``mark(name, value)``: replacement for every assigned wire and input, used to trace
         connections.
     held
         Subassemblies at the same instant.
     forces
         Contact forces in the order of the protocol; None if unknown.
     wiring
-        Wires it once, at the first read; None afterward.
+        Function that wires the assembly once, at the first read; None afterward.
     is_held
-        Whether another assembly holds it, and sets its ports.
+        Whether another assembly contains it and sets its ports.
     ports
-        Values of ports that are not set; 0 by default.
+        Values of ports that are not set. Default: 0.
     """
 
     x: Any
@@ -180,7 +191,7 @@ class Instant:
     ports: Mapping[str, Any] = field(default_factory=dict)
 
     def settle(self) -> None:
-        """Wire the assembly unless this is done or in progress."""
+        """Wire the assembly unless it is wired or being wired."""
         wiring, self.wiring = self.wiring, None
         if wiring is not None:
             wiring()
@@ -190,7 +201,7 @@ class Instant:
         return value if self.mark is None else self.mark(name, value)
 
     def note(self, name: str) -> None:
-        """Store the line in which a signal was set."""
+        """Store the line that sets a signal."""
         if self.lines is not None:
             self.lines[name] = line()
 
@@ -201,13 +212,15 @@ def instant_of(instance: Any, where: str) -> Instant:
     Raises
     ------
     ModelError
-        When there is none, since parts have values only at an instant.
+        When it is not evaluated, since parts have values only at an instant.
     """
     instant = vars(instance).get("_instant")
     if instant is None:
         raise ModelError(
-            f"{where} has no value here: within wire and its like take it from w, elsewhere from "
-            "model.at(state, memory, par)"
+            f"{where} has no value here: in wire, power or record read it from w, elsewhere from "
+            "model.at(state, memory, par)",
+            name=where,
+            valid="model.at(state, memory, par)",
         )
     return typing.cast(Instant, instant)
 
@@ -266,35 +279,42 @@ class Wire(_Named):
     def unset(self, instant: Instant) -> None:
         """Raise the error for a read before the assignment."""
         raise ModelError(
-            f"{self.where} is read before it is set: assign w.{self.name} = ... in wire, above that"
+            f"{self.where} is read before it is set: assign w.{self.name} = ... in wire before "
+            "that",
+            name=self.where,
+            valid=f"w.{self.name} = ...",
         )
 
     def __set__(self, instance: Any, value: float) -> None:
         instant = instant_of(instance, self.where)
         if self.name in instant.wires:
-            raise ModelError(f"{self.where}: {line()} sets it a second time: set a wire once")
+            raise ModelError(
+                f"{self.where}: {line()} sets it a second time: set a wire once", name=self.where
+            )
         instant.wires[self.name] = instant.marked(self.name, value)
         instant.note(self.name)
 
 
 class Port(Wire):
-    """A wire that the holder of an assembly sets; without a holder 0, or the value from ``wire``.
+    """A wire that an assembly's holder sets; without a holder, 0 or the value from ``wire``.
 
-    The holder sets it, ``w.brake.PORT = ...``, above all reads of that assembly's wires.
+    The holder sets it, ``w.brake.PORT = ...``, before any read of that assembly's wires.
     """
 
     def unset(self, instant: Instant) -> None:
-        """Use the default without a holder; with one, raise the error."""
+        """Use the default without a holder; raise the error with a holder."""
         if instant.is_held:
             raise ModelError(
                 f"{self.where} is read before the holder sets it: assign w.NAME.{self.name} = ... "
-                "in its wire, above what reads wires or inputs of w.NAME"
+                "in its wire before any read of wires or inputs of w.NAME",
+                name=self.where,
+                valid=f"w.NAME.{self.name} = ...",
             )
         instant.wires[self.name] = instant.marked(self.name, instant.ports.get(self.name, 0.0))
 
 
 class Integral(_Named):
-    """A quantity that is integrated along with the states; ``power`` returns its rate."""
+    """A quantity integrated along with the states; ``power`` returns its rate."""
 
 
 class Shown(_Named):

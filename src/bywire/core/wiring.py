@@ -1,4 +1,4 @@
-"""Wiring of an assembly, derived from its equations: completeness, and connections of parts."""
+"""An assembly's wiring, derived from its equations: completeness, and connections of parts."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def check_wiring(model: _AnyAssembly, par: ParameterSet) -> None:
     Raises
     ------
     ModelError
-        With class, file and line, part, signal, both units and the next step.
+        With class, file and line, part, signal, both units, and the next step.
     """
     at = _Operands(model, par)
     w = at.wired("wire")
@@ -83,13 +83,14 @@ class _Operands:
             yield from self.forces(sub.assembly, sub.parameters(par))
 
     def dimension(self, unit: str, what: str) -> Dimension:
-        """Return the dimension of a unit; an error names its owner."""
+        """Return the dimension of a unit; an error contains the unit's owner."""
         try:
             if not unit:
                 raise UnitError("it has no unit: write '1' for a pure number")
             return Dimension.of(unit)
         except UnitError as error:
-            raise ModelError(f"{_place(self.model)}: {what}: {error}") from None
+            text = f"{_place(self.model)}: {what}: {error}"
+            raise ModelError(text, name=what, value=unit) from None
 
     def wired(self, method: str) -> _AnyAssembly:
         """Return the assembly at an instant, with the lines in which its wires were set."""
@@ -109,14 +110,17 @@ class _Operands:
         return wired
 
     def evaluated(self, method: str, function: Callable[..., Any], *arguments: Any) -> Any:
-        """Return the result of an equation; an error gives its line."""
+        """Return the result of an equation; an error contains the equation's line."""
         try:
             return function(*arguments)
         except UnitError as error:
             where = _line_of(error, self.model)
             raise ModelError(
                 f"{type(self.model).__name__}.{method}, {where}: {error}: correct the equation or "
-                "the unit that one of its quantities is declared with"
+                "the declared unit of one of its quantities",
+                name=f"{type(self.model).__name__}.{method}",
+                value=error.value,
+                valid=error.valid,
             ) from None
 
 
@@ -127,7 +131,9 @@ def _check_inputs(model: _AnyAssembly, at: _Operands, w: _AnyAssembly) -> None:
         if name not in instant.wires:
             raise ModelError(
                 f"{_place(model)}: the wire {name} ({wire.signal.label}) is never set: assign "
-                f"w.{name} = ... [{wire.signal.unit}] in wire"
+                f"w.{name} = ... [{wire.signal.unit}] in wire",
+                name=name,
+                valid=wire.signal.unit,
             )
         _require(
             model, "wire", name, instant.wires[name], wire.signal.unit, wire.signal.label, instant
@@ -137,9 +143,12 @@ def _check_inputs(model: _AnyAssembly, at: _Operands, w: _AnyAssembly) -> None:
             continue
         value = vars(getattr(w, part.name))["_input"]
         if value is None:
+            valid = f"{part.kind}.Input({', '.join(part.element.Input._fields)})"
             raise ModelError(
                 f"{_place(model)}: the input of {part.name} is never wired: assign w.{part.name}.u "
-                f"= {part.kind}.Input({', '.join(part.element.Input._fields)}) in wire"
+                f"= {valid} in wire",
+                name=part.name,
+                valid=valid,
             )
         for (field, signal), each in zip(
             signals_of(part.element.Input).items(), value, strict=True
@@ -157,16 +166,20 @@ def _check_held(model: _AnyAssembly, par: ParameterSet) -> None:
     running = {task.name for task in model.tasks(par)}
     for sub in model.subs.values():
         for name, source in sub.feeds.items():
-            wanted, given = signals_of(sub.assembly.Stimulus)[name].unit, known[source].unit
-            if not fits(Dimension.of(given), wanted):
+            valid, unit = signals_of(sub.assembly.Stimulus)[name].unit, known[source].unit
+            if not fits(Dimension.of(unit), valid):
                 raise ModelError(
-                    f"{sub.where}: its {name} is in {wanted}, but is fed by {source} in {given}"
+                    f"{sub.where}: its {name} is in {valid}, but its source {source} is in {unit}",
+                    name=name,
+                    value=unit,
+                    valid=valid,
                 )
         missing = [task.name for task in sub.tasks(par) if task.name not in running]
         if missing:
             raise ModelError(
                 f"{_place(model, 'tasks')}: the task {missing[0]} of {sub.name} never runs: add "
-                "*super().tasks(par) to what tasks returns"
+                "*super().tasks(par) to the return value of tasks",
+                name=missing[0],
             )
 
 
@@ -183,11 +196,14 @@ def _check_contacts(model: _AnyAssembly, at: _Operands) -> None:
     for group, rows in zip(gaps, matrices, strict=True):
         for overlap, row in zip(group, rows, strict=True):
             force = next(forces)
-            wanted = next((c * force for c in row if isinstance(c, Dimension)), overlap)
-            if isinstance(overlap, Dimension) and not fits(overlap, str(wanted)):
+            valid = next((c * force for c in row if isinstance(c, Dimension)), overlap)
+            if isinstance(overlap, Dimension) and not fits(overlap, str(valid)):
                 raise ModelError(
-                    f"{_place(model)}: an overlap in {overlap} meets a compliance times a force in "
-                    f"{wanted}: the units must match"
+                    f"{_place(model)}: an overlap is in {overlap}, but compliance times force is "
+                    f"in {valid}: the units must match",
+                    name="overlap",
+                    value=str(overlap),
+                    valid=str(valid),
                 )
 
 
@@ -232,13 +248,15 @@ def _require(
     meaning = f" ({label})" if label else ""
     raise ModelError(
         f"{type(model).__name__}.{method}, {where or _place(model, method)}: {name}{meaning} is in "
-        f"{unit}, but is given a quantity in {shown}: correct "
-        "the assigned value or the declared unit"
+        f"{unit}, but its assigned value is in {shown}: correct the value or the declared unit",
+        name=name,
+        value=str(shown),
+        valid=unit,
     )
 
 
 def _assigned(name: str) -> str:
-    """Yield the assigned values; a part's input is one item."""
+    """Return the name under which a wire or a part's input was assigned; an input is one item."""
     return name.rpartition(".")[0] if ".u." in name else name
 
 
@@ -256,12 +274,12 @@ def _place(model: _AnyAssembly, method: str = "wire") -> str:
     try:
         line = inspect.getsourcelines(function)[1]
         return f"{cls.__name__}, {inspect.getsourcefile(function)}, line {line}"
-    except (OSError, TypeError):  # typed in, not read from a file
+    except (OSError, TypeError):  # typed into a console, so it has no file
         return cls.__name__
 
 
 def _line_of(error: BaseException, model: _AnyAssembly) -> str:
-    """Return the innermost line outside of the numbers' own operations."""
+    """Return the innermost line outside the operations of dimensions."""
     checkers = {__file__, inspect.getsourcefile(Dimension), inspect.getsourcefile(fits)}
     frames = [
         f
@@ -272,9 +290,9 @@ def _line_of(error: BaseException, model: _AnyAssembly) -> str:
 
 
 # --- Connections of parts
-# ``wire`` and the tasks are run once on numbers that remember how they are computed; wires and
-# inputs are marked as they are set. A value is connected to everything it is computed from, up to
-# the next mark.
+# ``wire`` and the tasks run once on numbers that remember how they are computed. Setting a wire or
+# an input marks its value. A value is connected to all values that it is computed from, up to the
+# next mark.
 
 Kind = Literal["part", "wire", "task", "stimulus"]
 FRICTION = "friction"
@@ -282,21 +300,21 @@ FRICTION = "friction"
 
 
 class Node(NamedTuple):
-    """A part, a wire, a task of the ECU, or the stimulus of the bench, by its name there."""
+    """A part, a wire, an ECU task, or the bench's stimulus, with its name in the assembly."""
 
     kind: Kind
     name: str
 
 
 STIMULUS = Node("stimulus", "demand")
-"""demand of the bench or a driver"""
+"""demand from the bench or a driver"""
 
 
 @dataclass(frozen=True)
 class Connection:
-    """Connection from a node to another one.
+    """Connection from one node to another.
 
-    ``port``: input of a part, signal that a task reads; empty where the target is a wire.
+    ``port``: input of a part, or signal that a task reads; empty if the target is a wire.
     """
 
     source: Node
@@ -313,11 +331,11 @@ class Network:
     name
         Of the assembly.
     nodes
-        Parts, wires and tasks in the order of declaration; first the stimulus if a task reads it.
+        The stimulus if a task reads it, then parts, wires and tasks in the order of declaration.
     labels
-        Description of each: the kind of a part's element, or a wire's label.
+        Description of each node: the kind of a part's element, or a wire's label.
     ports
-        Inputs of each part and task, by node, in order; wires have none.
+        Inputs of each part and task in order, by node; wires have none.
     connections
         Connections without duplicates, in the order of their targets.
     """
@@ -385,7 +403,7 @@ class _Trace:
     def __init__(self, model: Assembly[Any, Any], par: Any) -> None:
         self.model = model
         self._marks: dict[int, tuple[Node, Any]] = {}
-        self._kept: list[Traced] = []  # keeps marks alive, whose identity counts
+        self._kept: list[Traced] = []  # keeps marks alive, since their identity matters
         self.owners = {
             part.state_name(state): Node("part", part.name)
             for part in model.parts.values()
@@ -443,7 +461,7 @@ class _Trace:
         }
 
     def memory_of(self, name: str) -> dict[str, Node]:
-        """Return a subassembly's memory by its own names, with the tasks that update it."""
+        """Return a subassembly's memory by its own names, with the task that updates each field."""
         sub, node = self.model.subs[name], Node("part", name)
         own = dict(zip(sub.signals("Memory"), sub.assembly.Memory._fields, strict=True))
         raw = tuple(value for at, value in self._marks.values() if at == node)
@@ -453,7 +471,7 @@ class _Trace:
         }
 
     def _mark(self, name: str, value: Any) -> Any:
-        """Return a value that is marked with its wire or input."""
+        """Return a value marked with its wire or input."""
         within = name.partition("/")[0]
         if within != name:
             node, is_one = Node("part", within), not isinstance(value, tuple)
@@ -472,7 +490,7 @@ class _Trace:
         return marked
 
     def _ticks(self, par: Any) -> Iterator[tuple[Node, dict[str, Node], set[str]]]:
-        """Yield tasks, the signals that they read with their sources, and the memory they use."""
+        """Yield each task, the sources of the signals that it reads, and the memory it uses."""
         stimulus = self.model.Stimulus._make(
             Traced(None, f"u.{k}") for k in self.model.Stimulus._fields
         )
@@ -511,7 +529,7 @@ class _Trace:
         return self.owners.get(leaf)
 
     def nodes(self, connections: Iterable[Connection]) -> tuple[Node, ...]:
-        """Return all nodes; the stimulus only if something is connected to it."""
+        """Return all nodes; the stimulus is included only if something is connected to it."""
         asked = [STIMULUS] if any(c.source == STIMULUS for c in connections) else []
         parts = (Node("part", name) for name in (*self.model.parts, *self.model.subs))
         return (*asked, *self.ticks, *(Node("wire", name) for name in self.wires), *parts)

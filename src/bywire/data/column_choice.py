@@ -227,7 +227,7 @@ def every_signal(
     if meaning.clock is not None and meaning.clock.column:
         clocks |= {_column(file, source, meaning.clock.column, "time.column").name}
     elif clocks == {None} or meaning.clock is not None:
-        clocks |= {_usual_clock(source)}
+        clocks |= {usual_clock(source)}
     names = [name for name in source.columns if name not in clocks]
     return {name: SignalMapping(name, name) for name in names}
 
@@ -297,7 +297,7 @@ def _clock(file: Path, source: Source, column: Column, given: Clock | None) -> C
         given = replace(given, unit=given.unit or _title_unit(source, given.column))
         clock = _column(file, source, given.column, "time.column", given.number)
     else:
-        name = column.clock or _usual_clock(source)
+        name = column.clock or usual_clock(source)
         if name is None:
             before = (
                 "; if other lines precede the table, give their number as skip_lines in a mapping"
@@ -328,7 +328,7 @@ def _clock(file: Path, source: Source, column: Column, given: Clock | None) -> C
     return Clock(clock.name, unit)
 
 
-def _usual_clock(source: Source) -> str | None:
+def usual_clock(source: Source) -> str | None:
     """Return the column named time or t; T in kelvin is not a time."""
     columns = source.columns
     for usual in _CLOCKS:

@@ -44,7 +44,7 @@ def _compared_outputs(
     case, data
         Run of the model, and measured signals.
     wanted
-        Outputs; by default all measured ones that show the quality of fit.
+        Outputs; default: all measured ones that show the quality of fit.
     driven
         Stimulus -> measured signal; these are not compared by default.
 
@@ -172,9 +172,9 @@ def measured_run(
         Measured signals over ``time`` [s], SI; resampled if the model's steps require it. The
         run starts with the record; a negative start time is that of the experiment.
     inputs
-        Stimulus of the model -> measured signal; by default all of the same name.
+        Stimulus of the model -> measured signal; default: all of the same name.
     outputs
-        Outputs of the model, measured under the same names; by default all except flags,
+        Outputs of the model, measured under the same names; default: all except flags,
         accumulated signals (energies, times) and constant ones.
     case
         Label of the experiment's run; the first one by default.

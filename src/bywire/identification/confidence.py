@@ -45,7 +45,12 @@ class Uncertainty:
 
 
 def uncertainty(
-    jacobian: Array, residuals: Array, instruments: Array | None = None, prior_rows: int = 0
+    jacobian: Array,
+    residuals: Array,
+    instruments: Array | None = None,
+    prior_rows: int = 0,
+    *,
+    ordered: bool = True,
 ) -> Uncertainty:
     r"""Return the covariance of a least-squares estimate.
 
@@ -72,6 +77,8 @@ def uncertainty(
         Instruments of an instrumental-variable estimate, shape (n, p); the Jacobian by default.
     prior_rows
         Last rows that are independent, with a standard deviation of one: prior knowledge.
+    ordered
+        False if the order means nothing, as for single statements: they count as independent.
 
     References
     ----------
@@ -87,23 +94,24 @@ def uncertainty(
     bread = np.linalg.pinv((Z.T @ jacobian) / np.outer(scale, scale))
     known = (Z[n - prior_rows :].T @ Z[n - prior_rows :]) / np.outer(scale, scale)
     candidates: list[Uncertainty] = []
-    for together in _TOGETHER:
+    for together in _TOGETHER if ordered else (1,):
         r, rows = _blocks(residuals[data], together), _blocks(Z[data] / scale, together)
         if together > 1 and not _still_told(r, rows, Z[data] / scale):
             break
-        middle, freedom, colored = _spread(r, rows, p)
+        middle, freedom, colored = _spread(r, rows, p, ordered)
         if not candidates or colored:
             candidates.append(Uncertainty(bread @ middle @ bread.T, freedom, colored))
 
     def volume(candidate: Uncertainty) -> float:
         return float(np.sum(np.log(np.maximum(np.diag(candidate.covariance), 1e-300))))
 
-    worst = _as_scattered(max(candidates, key=volume), (Z[data] / scale) @ bread.T, residuals[data])
+    likely = max(candidates, key=volume)
+    worst = _as_scattered(likely, (Z[data] / scale) @ bread.T, residuals[data], ordered)
     covariance = worst.covariance + bread @ known @ bread.T
     return Uncertainty(covariance / np.outer(scale, scale), worst.freedom, worst.colored)
 
 
-def _as_scattered(sure: Uncertainty, influence: Array, r: Array) -> Uncertainty:
+def _as_scattered(sure: Uncertainty, influence: Array, r: Array, ordered: bool) -> Uncertainty:
     """Return an uncertainty with the deviations of the scores if these refute its own.
 
     Parameters
@@ -114,6 +122,8 @@ def _as_scattered(sure: Uncertainty, influence: Array, r: Array) -> Uncertainty:
         Effect of each residual on each unknown, shape (n, p).
     r
         Residuals, shape (n,).
+    ordered
+        Whether neighbors belong together, so that blocks of them count as well.
     """
     from scipy import special  # of which stats is made, and takes long to load
 
@@ -123,7 +133,8 @@ def _as_scattered(sure: Uncertainty, influence: Array, r: Array) -> Uncertainty:
         influence, r = later[::-1], filtered(model.coefficients, [1.0], r)
     n, p = influence.shape
     largest, freedom = np.ones(p), sure.freedom
-    for groups in (n, *(count for count in _GROUPS if n >= 10 * count)):
+    sizes = (n, *(count for count in _GROUPS if ordered and n >= 10 * count))
+    for groups in sizes:
         begins = np.linspace(0, n, groups, endpoint=False).astype(int)
         scores = np.add.reduceat(influence * r[:, None], begins, axis=0)
         shares = np.add.reduceat(influence**2, begins, axis=0)
@@ -155,10 +166,10 @@ def _still_told(r: Array, rows: Array, whole: Array) -> bool:
     return bool(r.size >= _BLOCKS * rows.shape[1] and kept.all())
 
 
-def _spread(r: Array, rows: Array, unknowns: int) -> tuple[Array, float, bool]:
+def _spread(r: Array, rows: Array, unknowns: int, ordered: bool) -> tuple[Array, float, bool]:
     """Return the scores' covariance, degrees of freedom, and whether neighbors are correlated."""
     n = r.size
-    if is_white(r):
+    if not ordered or is_white(r):
         freedom = max(n - unknowns, 1)
         return float(r @ r) / freedom * (rows.T @ rows), float(freedom), False
     model = autoregression(r)

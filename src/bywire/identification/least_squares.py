@@ -472,7 +472,11 @@ def _at_minimum(problem: Problem, solution: Solution, loss: Loss) -> tuple[Estim
     rows = J.copy()
     rows[: r.size - known] *= _bread(slopes, len(problem.unknowns))
     sure = uncertainty(
-        rows * scale, np.concatenate((psi, r[r.size - known :])), J * scale, prior_rows=known
+        rows * scale,
+        np.concatenate((psi, r[r.size - known :])),
+        J * scale,
+        prior_rows=known,
+        ordered=not problem.parts or any(part.count > 1 for part in problem.parts),
     )
     best = Estimate(
         unknowns=problem.unknowns,

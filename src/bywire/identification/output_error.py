@@ -120,7 +120,7 @@ class NoPower(NamedTuple):
 class Driven(Model):
     """A model whose inputs were measured; a subclass has ``name``, ``State`` and ``Input``.
 
-    Besides them it gives ``mass`` and ``balance``, which gets an ``Input`` as its memory; what it
+    It also has ``mass`` and ``balance``, which gets an ``Input`` as its memory; what it
     shows are its states unless it has an ``Output`` and ``output`` of its own. Inputs hold for
     ``par.T_s``, the sample time, or for what ``period`` returns.
     """
@@ -320,8 +320,8 @@ def even_interval(t: Array) -> float:
     """Return the interval of evenly spaced times [s].
 
     Instants may lie off an even grid by a thousandth of its step, as clocks jitter and round. The
-    interval is the number of fewest digits whose grid they lie on: 24 ns of jitter at 1 kHz are
-    no step of 0.999999922 ms, which nothing divides.
+    interval is the number of fewest digits whose grid they lie on: 24 ns of jitter at 1 kHz do
+    not make a step of 0.999999922 ms, which nothing divides.
 
     Raises
     ------

@@ -52,7 +52,7 @@ class Question:
     bench
         A `Bench`, the path of a bench file, or an experiment's name.
     inputs
-        Stimulus of the model -> measured signal, or column such as ``"Demand [bar]"``; by default
+        Stimulus of the model -> measured signal, or column such as ``"Demand [bar]"``; default:
         all of the same name.
     outputs
         Output of the model -> standard deviation of its noise, such as ``"0.02 bar"``, its column,

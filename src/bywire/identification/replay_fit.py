@@ -42,7 +42,7 @@ class Lag:
     correlation
         Correlation coefficient at that lag, -1 to 1; negative for signals of opposite sign.
     at_limit
-        Whether the lag lies at the end of the range that was searched, and so is none.
+        Whether the lag lies at the end of the range that was searched, and is therefore not valid.
     """
 
     value: float

@@ -39,7 +39,7 @@ def sample(reading: Reading, noise: Noise, par: Parameters) -> Reading:
     reading
         Share of the span at the input.
     noise
-        A sample of a standard normal variable; the recording keeps its seed.
+        A sample of a standard normal variable; the recording contains its seed.
     """
     return rounded(noisy(reading, noise, par), par)
 

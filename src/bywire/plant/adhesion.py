@@ -9,7 +9,7 @@ from annotated_types import Ge, Gt, Le
 from pydantic import Field, model_validator
 
 from bywire.core import ops
-from bywire.core.parameters import ParameterSet
+from bywire.core.parameters import ParameterSet, RuleError
 from bywire.core.quantities import Unit
 from bywire.core.signals import Signal
 
@@ -25,7 +25,7 @@ Stiffness = Annotated[float, Signal("1", "stiffness factor", 10.0), Ge(8), Le(40
 Shape = Annotated[float, Signal("1", "shape factor", 1.6), Ge(1.5), Le(1.9)]
 Largest = Annotated[float, Signal("1", "largest adhesion", 1.0), Gt(0)]
 Curvature = Annotated[float, Signal("1", "curvature factor", 0.5), Ge(0), Le(0.9)]
-_NEWTON, _LEVEL, _LEAST = 3, 1e-4, 1e-16  # steps; least slope, in slip; floor of roots
+_NEWTON, _LEVEL, _LEAST = 3, 1e-4, 1e-16  # steps; smallest slope, in slip; floor of roots
 _MAGIC_NEWTON = 6  # steps, from the tangent at zero; enough up to E = 1 and a peak at 6/B
 
 
@@ -50,15 +50,15 @@ class SurfaceParameters(ParameterSet):
     @model_validator(mode="after")
     def _has_a_peak(self) -> SurfaceParameters:
         if not self.c1 * self.c2 > self.c3:
-            raise ValueError(
-                f"c1 c2 = {self.c1 * self.c2:g} must be > c3 = {self.c3:g}: the adhesion must "
-                "rise with slip first"
-            )
+            reason = "at no slip, the adhesion must rise with slip"
+            raise RuleError("c1 c2", f"{self.c1 * self.c2:g}", f"> c3 = {self.c3:g}", reason)
         locked = angle(1.0, surface_of(self))
         if not 0.5 * math.pi < locked < math.pi:
-            raise ValueError(
-                f"C arctan(B - E (B - arctan B)) = {locked:.4g} rad must lie between pi/2 and pi: "
-                "the adhesion must have its peak below a slip of 1, and be positive there"
+            raise RuleError(
+                "C arctan(B - E (B - arctan B))",
+                f"{locked:.4g} rad",
+                "between pi/2 and pi",
+                "the adhesion must peak below a slip of 1 and be positive at a slip of 1",
             )
         return self
 
@@ -112,10 +112,10 @@ def burckhardt_peak(ground: Surface) -> Slip:
 def burckhardt_rising(
     mu: Annotated[float, Signal("1", "adhesion", 1.0), Ge(0)], ground: Surface
 ) -> Slip:
-    """Return the slip below that of the peak at which the adhesion is ``mu``, within 5e-6.
+    """Return the slip below the peak's slip at which the adhesion is ``mu``, within 5e-6.
 
-    By Newton's method from below: from the slip without the curve's linear fall, or from the
-    parabola through the peak, whichever is closer.
+    Newton's method approaches it from below. It starts at the slip without the curve's linear fall
+    or at the parabola through the peak, whichever is closer.
     """
     c1, c2, c3 = ground.c1, ground.c2, ground.c3
     peak = burckhardt_peak(ground)
@@ -126,7 +126,7 @@ def burckhardt_rising(
     for _ in range(_NEWTON):
         decay = ops.exp(-c2 * slip)
         left = mu - c1 * (1.0 - decay) + c3 * slip
-        # The curve is level at the peak: avoid a division of rounding errors by zero.
+        # The curve is level at the peak: the lower bound avoids dividing rounding errors by zero.
         slip = slip + left / ops.fmax(c1 * c2 * decay - c3, _LEVEL * bend)
     return ops.fmin(slip, peak)
 
@@ -157,7 +157,7 @@ def magic_rising(
 
     .. math:: (1 - E) z + E \arctan z = \tan(\theta/C), \quad z = B \lambda
 
-    By Newton's method from z = tan(theta/C), which approaches the root from one side for every E.
+    Newton's method from z = tan(theta/C) approaches the root from one side for every E.
     """
     part = theta / ground.C
     target = ops.sin(part) / ops.cos(part)
@@ -188,7 +188,7 @@ def held(slip: Slip, ground: Surface, par: Parameters) -> Rising:
     The second value is the slip on the rising branch with the same adhesion.
     """
     if par.curve == "magic-formula":
-        # The adhesion at an angle beyond pi/2 equals that at the same distance before it.
+        # The sine is symmetric about pi/2, so the rising branch has the mirrored angle.
         theta = ops.fmax(angle(slip, ground), 0.5 * math.pi)
         return Rising(ground.D * ops.sin(theta), magic_rising(math.pi - theta, ground))
     peak = burckhardt_peak(ground)

@@ -45,7 +45,7 @@ class Parameters(ParameterSet):
     """characteristic speed of the Stribeck peak"""
 
 
-FAULTS = (ParameterFault("worn", "more friction", ("C_0", "C_1", "C_2", "T_nu"), 5.0),)
+FAULTS = (ParameterFault("worn", "higher friction", ("C_0", "C_1", "C_2", "T_nu"), 5.0),)
 
 
 class Input(NamedTuple):
@@ -65,7 +65,7 @@ def friction(u: Input, par: Parameters) -> Annotated[float, Signal("N*m", "beari
     Notes
     -----
     The paper's exponential contains the signed speed and would grow without bound in one direction;
-    we use the magnitude. The grease term has a reference point, so that no coefficient has a hidden
+    we use the magnitude. The grease term has a reference point, so no coefficient has a hidden
     unit. The paper writes ``G_nu (nu |omega|)^k_nu`` with nu in mm^2/s.
 
     References

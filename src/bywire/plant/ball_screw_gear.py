@@ -16,7 +16,7 @@ class Parameters(ParameterSet):
     ``law = "paper"`` uses eq. (8), whose constant efficiency lets the gear *generate* energy when
     the load drives it. ``law = "directional"`` makes the loss a load-dependent friction,
     (1/eta_g - 1) times the load torque, in both directions (back-driven efficiency
-    2 - 1/eta_g). It never generates energy and holds at rest.
+    2 - 1/eta_g). This friction never generates energy, and it holds the load at rest.
     """
 
     k_g: GearRatio
@@ -24,7 +24,7 @@ class Parameters(ParameterSet):
     eta_g: Fraction
     """efficiency of gear and screw, driving"""
     law: Literal["paper", "directional"]
-    """effect of the efficiency: as in eq. (8), or as a friction that depends on direction"""
+    """effect of the efficiency: as in eq. (8), or as direction-dependent friction"""
     J_mot: Inertia
     """inertia of rotor, gear and screw at the motor shaft"""
     M_mc: Mass

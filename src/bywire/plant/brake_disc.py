@@ -27,14 +27,14 @@ class Parameters(ParameterSet):
     r_eff: Length
     """effective radius of the pads' friction"""
     T_drag: Torque
-    """torque of pads that drag without pressure; 0 if they do not"""
+    """torque of pads that drag without pressure; 0 for free pads"""
 
 
 FAULTS = (
     ParameterFault("glazed", "lower pad friction", ("mu_pad",), 0.7),
     ParameterFault(
         "dragging",
-        "a piston sticks in its caliper: pads drag, by the torque",
+        "a piston sticks in its caliper and pads drag (value: torque)",
         replaced="T_drag",
         value=10.0,
     ),
@@ -61,5 +61,5 @@ def torque_per_pressure(
 
 
 def output(u: Input, par: Parameters) -> Output:
-    """Return the torque; without pressure, only that of dragging pads."""
+    """Return the torque; without pressure, only dragging pads contribute."""
     return Output(torque=ops.fmax(torque_per_pressure(par) * u.p, par.T_drag))

@@ -25,7 +25,7 @@ GaugePressure = Annotated[float, Signal("Pa", "pressure", 2e6), Ge(0)]
 
 
 class Parameters(ParameterSet):
-    """Newtonian fluid of constant bulk modulus; air, if any, does not move or dissolve."""
+    """Newtonian fluid with a constant bulk modulus; entrained air does not move or dissolve."""
 
     beta: Annotated[float, Unit("Pa", 1e9), Field(gt=0, allow_inf_nan=False)]
     """bulk modulus"""
@@ -46,14 +46,14 @@ class Parameters(ParameterSet):
 FAULTS = (
     ParameterFault(
         "air",
-        "gas bubbles in the chamber, by their volume",
+        "gas bubbles in the chamber (value: volume)",
         replaced="V_air",
         value=8.8e-9,
         with_it={"air": "entrained"},
     ),
     ParameterFault(
         "air-in-line",
-        "gas bubbles in line and caliper, by their volume",
+        "gas bubbles in line and caliper (value: volume)",
         replaced="V_air",
         value=1.28e-6,
         with_it={"air": "caliper"},
@@ -85,8 +85,8 @@ def compliance(u: Chamber, par: Parameters) -> FluidCompliance:
 
     .. math:: \frac{V - V_g}{\beta} + \frac{V_g}{n (p_{atm} + p)}
 
-    The fluid fills the rest of the volume: with V instead of V - V_g, the stored energy would not
-    be the integral of the powers.
+    The fluid fills only the volume that the gas leaves. With V instead of V - V_g, the stored
+    energy would not be the integral of the powers.
     """
     if par.air != "entrained":
         return u.V / par.beta
@@ -148,7 +148,7 @@ def inflow_energy(p: GaugePressure, par: Parameters) -> Energy:
 def flow_energy(
     p: Annotated[float, Signal("Pa", "pressure", 2e6)], par: Parameters
 ) -> EnthalpyDensity:
-    r"""Return the energy that a volume flow carries at a pressure, per volume.
+    r"""Return the energy per volume of a flow at a pressure.
 
     .. math:: h(p) = \beta (e^{p/\beta} - 1) \approx
         p (1 + \tfrac{z}{2} (1 + \tfrac{z}{3} (1 + \tfrac{z}{4}))), \quad z = p/\beta
@@ -178,5 +178,5 @@ def convected_power(
     p: Annotated[float, Signal("Pa", "pressure", 2e6)],
     par: Parameters,
 ) -> Power:
-    """Return the power that a flow q carries at pressure p."""
+    """Return the power transported by a flow q at pressure p."""
     return q * flow_energy(p, par)

@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 
 from bywire.core import ops
 from bywire.core.faults import ParameterFault
-from bywire.core.parameters import ParameterSet
+from bywire.core.parameters import ParameterSet, RuleError
 from bywire.core.quantities import Area, Conductance, Nodes, Stiffness, Unit, Volume
 from bywire.core.signals import Energy, FluidCompliance, Power, Signal
 from bywire.plant import brake_fluid
@@ -37,20 +37,20 @@ class Parameters(ParameterSet):
     K_pd: Stiffness
     """stiffness of pads and caliper"""
     p_table: Annotated[Nodes, Unit("Pa", 1e6)]
-    """pressures of the table, from 0, increasing; used by law "table" only"""
+    """pressures of the table, increasing from 0 (law "table")"""
     V_table: Annotated[Nodes, Unit("m**3", 1e-7)]
-    """volumes of the table, from 0, increasing; used by law "table" only"""
+    """volumes of the table, increasing from 0 (law "table")"""
 
     leak: Literal["tight", "leaking"]
     """whether fluid is lost to the outside"""
     G_leak: Conductance
-    """conductance of the leak; used by leak "leaking" only"""
+    """conductance of the leak (leak "leaking")"""
     fluid_heat: Literal["off", "warming"]
     """whether the fluid in the caliper warms"""
     V_hot: Volume
-    """volume of the fluid that warms; used by fluid_heat "warming" only"""
+    """volume of the warming fluid (fluid_heat "warming")"""
     alpha_V: Expansion
-    """its expansion by volume"""
+    """volumetric expansion coefficient of the warming fluid"""
     T_rate: WarmingRate
     """temperature rate of the warming fluid"""
 
@@ -58,13 +58,15 @@ class Parameters(ParameterSet):
     def _table_is_a_curve(self) -> Parameters:
         p, V = self.p_table, self.V_table
         if len(p) != len(V):
-            raise ValueError(f"caliper.p_table has {len(p)} nodes and V_table {len(V)}")
+            valid = f"of the same length as V_table, {len(V)} nodes"
+            raise RuleError("p_table", f"{len(p)} nodes", valid)
         if self.law == "table" and len(p) < 2:
-            raise ValueError("caliper.law = 'table' needs p_table and V_table of 2 nodes or more")
+            reason = "law = 'table' interpolates the table"
+            raise RuleError("p_table", f"{len(p)} nodes", "of 2 nodes or more", reason)
         for name, nodes in (("p_table", p), ("V_table", V)):
             rising = all(a < b for a, b in pairwise(nodes))
             if nodes and (nodes[0] != 0.0 or not rising):
-                raise ValueError(f"caliper.{name} must start at 0 and increase, got {nodes}")
+                raise RuleError(name, str(nodes), "a table that starts at 0 and increases")
         return self
 
 
@@ -72,14 +74,14 @@ FAULTS = (
     ParameterFault("soft", "softer pads or a hose that swells", ("K_pd",), 0.5),
     ParameterFault(
         "leaking",
-        "fluid is lost to the outside, by the leak's conductance",
+        "fluid leaks to the outside (value: conductance)",
         replaced="G_leak",
         value=1e-13,
         with_it={"leak": "leaking"},
     ),
     ParameterFault(
         "heated",
-        "fluid in the caliper warms and expands, by the rate",
+        "fluid in the caliper warms and expands (value: temperature rate)",
         replaced="T_rate",
         value=1.0,
         with_it={"fluid_heat": "warming"},

@@ -1,6 +1,6 @@
-"""Screw of a clearance adjuster: reduces the clearance while it turns, and otherwise holds.
+"""Screw of a clearance adjuster: turning reduces the clearance, otherwise the screw holds it.
 
-A controller sets its speed. It is self-locking, so that no load drives it.
+A controller sets its speed. The screw is self-locking, so no load drives it.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ class Parameters(ParameterSet):
     tooth: Length
     """clearance removed by a tooth"""
     tau_turn: Lag
-    """time constant of its speed behind that of its drive"""
+    """time constant with which the screw's speed follows the drive's"""
 
 
 class State(NamedTuple):
@@ -55,8 +55,7 @@ def rate(x: State, u: Input, par: Parameters) -> Rate:
 
     .. math:: \tau \ddot c + \dot c = s \dot n
 
-    with a pitch s per tooth. After whole teeth were turned, the clearance has changed by whole
-    teeth.
+    with a pitch s per tooth. Whole teeth of the drive change the clearance by whole teeth.
     """
     if par.law == "none":
         return Rate(0.0, 0.0)

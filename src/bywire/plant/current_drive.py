@@ -25,9 +25,9 @@ class Parameters(ParameterSet):
     """Continuous current controller; the PWM ripple (40 kHz) is averaged out."""
 
     f_demand: Frequency
-    """corner of the demand's filter"""
+    """corner frequency of the demand's filter"""
     f_sense: Frequency
-    """corner of the current measurement's filter"""
+    """corner frequency of the current measurement's filter"""
     G_sense: Factor
     """scale of the current measurement; 1 if calibrated"""
     i_max: Current
@@ -46,7 +46,7 @@ class Parameters(ParameterSet):
 
 FAULTS = (
     ParameterFault("under-voltage", "lower voltage at the power stage", ("V_dc",), 0.5),
-    ParameterFault("scale", "current measurement is scaled by a factor", ("G_sense",), 0.5),
+    ParameterFault("scale", "scaled current measurement", ("G_sense",), 0.5),
     ParameterFault("derated", "lower current limit", ("i_max",), 0.5),
 )
 

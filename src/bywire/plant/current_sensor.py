@@ -7,7 +7,7 @@ from typing import Annotated, NamedTuple
 from pydantic import model_validator
 
 from bywire.core import ops
-from bywire.core.parameters import ParameterSet
+from bywire.core.parameters import ParameterSet, RuleError
 from bywire.core.quantities import SignedCurrent
 from bywire.core.signals import Signal
 from bywire.core.typing import Array
@@ -28,9 +28,7 @@ class Parameters(ParameterSet):
     @model_validator(mode="after")
     def _ordered(self) -> Parameters:
         if not self.i_low < self.i_high:
-            raise ValueError(
-                f"current_sensor.i_low = {self.i_low:g} A must be < i_high = {self.i_high:g} A"
-            )
+            raise RuleError("i_low", f"{self.i_low:g} A", f"< i_high = {self.i_high:g} A")
         return self
 
 

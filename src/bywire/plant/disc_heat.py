@@ -8,7 +8,7 @@ from annotated_types import Ge, Le
 from pydantic import Field, model_validator
 
 from bywire.core import ops
-from bywire.core.parameters import ParameterSet
+from bywire.core.parameters import ParameterSet, RuleError
 from bywire.core.quantities import Area, HeatCapacity, HeatConductance, Temperature, Unit, Weight
 from bywire.core.signals import Energy, Power, Role, Signal
 from bywire.core.typing import Array
@@ -50,7 +50,7 @@ class Parameters(ParameterSet):
     epsilon: Weight
     """emissivity of the discs"""
     sigma: Annotated[float, Unit("W/(m**2*K**4)", 5.67e-8), Field(ge=0, allow_inf_nan=False)]
-    """constant of Stefan and Boltzmann"""
+    """Stefan-Boltzmann constant"""
     G_dp: HeatConductance
     """conductance from discs to applied pads"""
     G_open: HeatConductance
@@ -62,25 +62,23 @@ class Parameters(ParameterSet):
     T_a: Temperature
     """temperature of the air, and of all bodies before the first stop"""
     T_1: Temperature
-    """temperature of the discs up to which the pads have their cold friction"""
+    """temperature of the discs up to which the pads have the friction of cold pads"""
     T_2: Temperature
-    """temperature of the discs above which the pads fade no further"""
+    """temperature of the discs above which the pads are fully faded"""
     f: Weight
     """friction of fully faded pads, relative to that of cold pads"""
     T_boil: Temperature
     """boiling point of the fluid at atmospheric pressure, fresh"""
     T_wet: Temperature
-    """boiling point of the fluid at atmospheric pressure, with 3.7 % of water"""
+    """boiling point of the fluid at atmospheric pressure, with 3.7 % water"""
     T_most: Temperature
     """temperature of the discs up to which these values are valid"""
 
     @model_validator(mode="after")
     def _fades_upward(self) -> Parameters:
         if not self.T_1 < self.T_2:
-            raise ValueError(
-                f"T_1 = {shown(self.T_1, 'K')} must be < T_2 = {shown(self.T_2, 'K')}: pads "
-                "fade from T_1 to T_2"
-            )
+            reason = "pads fade from T_1 to T_2"
+            raise RuleError("T_1", shown(self.T_1, "K"), f"< T_2 = {shown(self.T_2, 'K')}", reason)
         return self
 
 
@@ -140,7 +138,7 @@ class Flows(NamedTuple):
 def friction(
     T_disc: Kelvin, par: Parameters
 ) -> Annotated[float, Signal("1", "friction relative to that of cold pads", 1.0)]:
-    r"""Return the friction of the pads relative to that of cold ones.
+    r"""Return the pads' friction relative to cold pads.
 
     .. math:: \mu/\mu_0 = 1 - (1 - f)\, \mathrm{clip}((T_d - T_1)/(T_2 - T_1), 0, 1)
     """
@@ -167,7 +165,7 @@ def flows(x: State, u: Input, par: Parameters) -> Flows:
         P_{fa} = G_f (T_f - T_a)
     """
     warmer = x.T_disc - par.T_a
-    # T_d^4 - T_a^4, in factors: no digits are lost next to the air's temperature
+    # T_d^4 - T_a^4 in factors, which loses no digits near the air's temperature
     radiated = (x.T_disc * x.T_disc + par.T_a * par.T_a) * (x.T_disc + par.T_a) * warmer
     through = par.G_open + (par.G_dp - par.G_open) * u.pressed
     return Flows(

@@ -14,7 +14,7 @@ Watts = Annotated[float, Signal("W", "power", 50.0)]
 
 
 class Parameters(ParameterSet):
-    """Stiff supply and lossless power stages: all power beyond that of the motors is standby."""
+    """Stiff supply and lossless power stages: all power in addition to the motors' is standby."""
 
     P_standby: Annotated[float, Unit("W", 20.0), Field(ge=0, allow_inf_nan=False)]
     """power of the drives' electronics, both together"""

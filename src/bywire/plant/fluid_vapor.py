@@ -8,7 +8,7 @@ from annotated_types import Ge
 from pydantic import Field, model_validator
 
 from bywire.core import ops
-from bywire.core.parameters import ParameterSet
+from bywire.core.parameters import ParameterSet, RuleError
 from bywire.core.quantities import Temperature, Unit, Volume
 from bywire.core.signals import Signal
 from bywire.core.units import shown
@@ -32,21 +32,25 @@ class Parameters(ParameterSet):
     V: Volume
     """volume of the hot fluid"""
     growth: Growth
-    """vapor per volume of this fluid and kelvin above its boiling point, at ambient pressure"""
+    """vapor volume per fluid volume and kelvin above the boiling point, at ambient pressure"""
     T_most: Temperature
     """temperature of the fluid up to which these values are valid"""
 
     @model_validator(mode="after")
     def _boils_within_its_range(self) -> Parameters:
-        if not self.T_wet <= self.T_dry < self.T_most:
-            raise ValueError(
-                f"T_wet = {shown(self.T_wet, 'K')}, T_dry = {shown(self.T_dry, 'K')} and "
-                f"T_most = {shown(self.T_most, 'K')} must rise: water lowers the boiling point"
-            )
+        T_dry = shown(self.T_dry, "K")
+        if not self.T_wet <= self.T_dry:
+            reason = "water lowers the boiling point"
+            raise RuleError("T_wet", shown(self.T_wet, "K"), f"<= T_dry = {T_dry}", reason)
+        if not self.T_dry < self.T_most:
+            raise RuleError("T_dry", T_dry, f"< T_most = {shown(self.T_most, 'K')}")
         if self.water > self.water_wet:
-            raise ValueError(
-                f"water = {self.water:g} must be <= water_wet = {self.water_wet:g}, up to which "
-                "the boiling point is known: lower water, or set T_wet to that of wetter fluid"
+            raise RuleError(
+                "water",
+                f"{self.water:g}",
+                f"<= water_wet = {self.water_wet:g}",
+                "the boiling point is known up to water_wet. Lower water, or set water_wet and "
+                "T_wet to the values of wetter fluid",
             )
         return self
 

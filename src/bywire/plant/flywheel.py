@@ -20,14 +20,14 @@ RunOut = Annotated[float, Unit("m", 4e-6), Field(ge=0, allow_inf_nan=False)]
 
 
 class Parameters(ParameterSet):
-    """Rigid disc and flywheel; the braking moment is a friction, so that the disc really stops.
+    """Rigid disc and flywheel; the braking moment is dry friction, so the disc stops completely.
 
     ``law``: with ``"coasting"``, the brake slows the disc down; with ``"driven"``, a proportional
     speed controller of the AC motor keeps its speed near ``Omega_0``.
     """
 
     law: Literal["coasting", "driven"]
-    """whether the AC motor drives while the brake works"""
+    """whether the AC motor drives the disc during braking"""
     J_F: BigInertia
     """inertia of flywheel and disc"""
     Omega_0: DiscSpeed

@@ -26,7 +26,7 @@ class Parameters(ParameterSet):
     tau_F: TimeConstant
     """damping over stiffness of sensor and screws"""
     f_F: Frequency
-    """corner of its amplifier's filter"""
+    """corner frequency of the amplifier's filter"""
 
 
 class State(NamedTuple):

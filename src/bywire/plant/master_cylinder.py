@@ -7,7 +7,7 @@ from typing import Annotated, NamedTuple
 from annotated_types import Ge
 from pydantic import model_validator
 
-from bywire.core.parameters import ParameterSet
+from bywire.core.parameters import ParameterSet, RuleError
 from bywire.core.quantities import Area, Damping, Length
 from bywire.core.signals import Energy, FluidCompliance, Power, Role, Signal
 from bywire.plant import brake_fluid
@@ -36,18 +36,16 @@ class Parameters(ParameterSet):
     @model_validator(mode="after")
     def _ordered(self) -> Parameters:
         if not self.x_nominal < self.s_mc:
-            raise ValueError(
-                f"master_cylinder.x_nominal = {self.x_nominal:g} m must be < the "
-                f"chamber length s_mc = {self.s_mc:g} m"
-            )
+            valid = f"< the chamber length s_mc = {self.s_mc:g} m"
+            raise RuleError("x_nominal", f"{self.x_nominal:g} m", valid)
         if not self.x_rest < self.x_end:
-            raise ValueError(
-                f"master_cylinder.x_end = {self.x_end:g} m must be > x_rest = {self.x_rest:g} m"
-            )
+            raise RuleError("x_end", f"{self.x_end:g} m", f"> x_rest = {self.x_rest:g} m")
         if not self.x_end < self.s_mc:
-            raise ValueError(
-                f"master_cylinder.x_end = {self.x_end:g} m must be < the chamber length "
-                f"s_mc = {self.s_mc:g} m: move the end stop forward or lengthen the chamber"
+            raise RuleError(
+                "x_end",
+                f"{self.x_end:g} m",
+                f"< the chamber length s_mc = {self.s_mc:g} m",
+                "move the end stop forward or lengthen the chamber",
             )
         return self
 

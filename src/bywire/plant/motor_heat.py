@@ -11,7 +11,7 @@ from typing import Annotated, Literal, NamedTuple
 from annotated_types import Ge
 from pydantic import model_validator
 
-from bywire.core.parameters import ParameterSet
+from bywire.core.parameters import ParameterSet, RuleError
 from bywire.core.quantities import (
     HeatCapacity,
     HeatConductance,
@@ -57,7 +57,7 @@ class Parameters(ParameterSet):
     a_K: TemperatureCoefficient
     """fall of the torque constant with the housing's temperature, magnets"""
     T_ref: Temperature
-    """temperature at which the motor's resistance and torque constant are stated"""
+    """temperature at which the motor's resistance and torque constant are valid"""
     T_a: Temperature
     """temperature of the air, and of the motor at the start"""
     T_most: Temperature
@@ -67,9 +67,12 @@ class Parameters(ParameterSet):
     def _magnets_hold(self) -> Parameters:
         rise = self.T_most - self.T_ref
         if not self.a_K * rise < 1.0:
-            raise ValueError(
-                f"a_K = {self.a_K:g} 1/K makes the torque constant zero or negative at T_most = "
-                f"{shown(self.T_most, 'K')}: it must be < {1.0 / rise:.3g} 1/K"
+            raise RuleError(
+                "a_K",
+                f"{self.a_K:g} 1/K",
+                f"< {1.0 / rise:.3g} 1/K",
+                f"otherwise the torque constant is not positive at T_most = "
+                f"{shown(self.T_most, 'K')}",
             )
         return self
 

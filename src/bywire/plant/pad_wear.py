@@ -23,11 +23,11 @@ class Parameters(ParameterSet):
     """Pads that share the friction work: of a brake, or of all brakes of an axle."""
 
     kappa_0: WearPerWork
-    """volume worn per friction work below T_hot"""
+    """wear volume per friction work below T_hot"""
     T_hot: AbsoluteTemperature
     """temperature above which wear grows"""
     T_act: Activation
-    """its growth: activation energy over gas constant"""
+    """activation energy over gas constant, which determines the growth of wear above T_hot"""
     n_pads: Count
     """number of pads that share the work"""
     A_pad: Area

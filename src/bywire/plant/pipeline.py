@@ -27,7 +27,7 @@ class Parameters(ParameterSet):
     k_lf: Factor
     """coefficient of the laminar resistance; 32 in the paper, 8 in textbooks"""
     Re_max: Factor
-    """Reynolds number above which the flow is not laminar and the element warns"""
+    """Reynolds number above which the flow is not laminar and bywire warns"""
 
 
 FAULTS = (ParameterFault("kinked", "narrower pipe", ("d_pl",), 0.3),)

@@ -1,9 +1,9 @@
 """Friction between the caliper's piston and its seal: pressure that does not move the pads.
 
 A massless piston whose friction depends on its speed would chatter. Here the flow is set-valued.
-Fluid moves the piston in if the line pressure exceeds that of the pads by more than the friction,
-and out if it is below it by more. In between, the piston rests and nothing flows. Both flows are
-one-sided contact forces, whose compliance is the line's resistance.
+Fluid moves the piston in if the line pressure exceeds the pads' pressure by more than the friction,
+and out if it is lower by more than the friction. In between, the piston rests and the flow is zero.
+Both flows are one-sided contact forces, whose compliance is the line's resistance.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class Parameters(ParameterSet):
 FAULTS = (
     ParameterFault(
         "stuck",
-        "the piston sticks in its seal, by the friction force",
+        "the piston sticks in its seal (value: friction force)",
         replaced="F_fr",
         value=60.0,
         with_it={"law": "sticking"},

@@ -1,4 +1,4 @@
-"""Planetary gear of one stage: the sun drives, the ring rests, the carrier is driven."""
+"""Single-stage planetary gear: the sun is the input, the carrier the output, the ring is fixed."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Annotated, NamedTuple
 from pydantic import Field, model_validator
 
 from bywire.core import ops
-from bywire.core.parameters import ParameterSet
+from bywire.core.parameters import ParameterSet, RuleError
 from bywire.core.quantities import Fraction, Unit
 from bywire.core.signals import Power, Signal
 
@@ -15,7 +15,7 @@ Teeth = Annotated[float, Unit("1", 30.0), Field(ge=6, le=500, allow_inf_nan=Fals
 
 
 class Parameters(ParameterSet):
-    """Rigid and massless; the teeth rub with a friction proportional to their load.
+    """Rigid and massless, with tooth friction proportional to the load.
 
     Each stage is a separate part. Inertias belong to the shafts.
     """
@@ -30,10 +30,8 @@ class Parameters(ParameterSet):
     @model_validator(mode="after")
     def _planets_fit(self) -> Parameters:
         if not self.z_sun < self.z_ring:
-            raise ValueError(
-                f"z_ring = {self.z_ring:g} must be > z_sun = {self.z_sun:g}: the planets run "
-                "between them"
-            )
+            reason = "the planets are between them"
+            raise RuleError("z_ring", f"{self.z_ring:g}", f"> z_sun = {self.z_sun:g}", reason)
         return self
 
 

@@ -7,7 +7,7 @@ from typing import Annotated, Literal, NamedTuple
 from pydantic import model_validator
 
 from bywire.core import ops
-from bywire.core.parameters import ParameterSet
+from bywire.core.parameters import ParameterSet, RuleError
 from bywire.core.quantities import SignedPressure
 from bywire.core.signals import Signal
 from bywire.core.typing import Array
@@ -30,9 +30,7 @@ class Parameters(ParameterSet):
     @model_validator(mode="after")
     def _ordered(self) -> Parameters:
         if not self.p_low < self.p_high:
-            raise ValueError(
-                f"pressure_sensor.p_low = {self.p_low:g} Pa must be < p_high = {self.p_high:g} Pa"
-            )
+            raise RuleError("p_low", f"{self.p_low:g} Pa", f"< p_high = {self.p_high:g} Pa")
         return self
 
 

@@ -11,7 +11,7 @@ from bywire.core.signals import Power, Signal
 
 
 class Parameters(ParameterSet):
-    """Rigid and massless; the teeth rub with a friction proportional to their load."""
+    """Rigid and massless, with tooth friction proportional to the load."""
 
     r_p: Length
     """pitch radius of the pinion"""

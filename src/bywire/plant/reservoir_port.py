@@ -17,25 +17,25 @@ Stroke = Annotated[float, Signal("m", "stroke from the retracted end", 1e-3)]
 class Parameters(ParameterSet):
     """Port between chamber and reservoir.
 
-    With any law, the cup seal admits fluid when the pressure would fall below ambient (the model's
-    one-sided limit). With ``law = "dead-stroke"``, an orifice is also open until the piston has
-    traveled ``x_port`` from its retracted end. With ``law = "leaking"``, the cup seal leaks fluid
-    back at every stroke.
+    With any law, the cup seal admits fluid if the pressure would otherwise fall below ambient (the
+    model's one-sided limit). With ``law = "dead-stroke"``, an orifice is also open until the piston
+    has traveled ``x_port`` from its retracted end. With ``law = "leaking"``, the cup seal leaks
+    fluid back at every stroke.
     """
 
     law: Literal["makeup", "dead-stroke", "leaking"]
     """whether the piston uncovers a port near its retracted end, or its cup seal leaks"""
     x_port: Length
-    """stroke from the retracted end in which the piston covers the port (law "dead-stroke")"""
+    """stroke from the retracted end at which the piston covers the port (law "dead-stroke")"""
     G_port: Conductance
     """conductance of the fully open port (law "dead-stroke"), or of the leak (law "leaking")"""
 
 
 FAULTS = (
-    ParameterFault("blocked", "the uncovered port lets no fluid back", ("G_port",), 0.0),
+    ParameterFault("blocked", "no fluid returns through the open port", ("G_port",), 0.0),
     ParameterFault(
         "leaking",
-        "the cup seal lets fluid back, by its conductance",
+        "the cup seal leaks fluid back (value: conductance)",
         replaced="G_port",
         value=1e-13,
         with_it={"law": "leaking"},

@@ -7,7 +7,7 @@ from typing import Annotated, Literal, NamedTuple
 from pydantic import Field, model_validator
 
 from bywire.core import ops
-from bywire.core.parameters import ParameterSet
+from bywire.core.parameters import ParameterSet, RuleError
 from bywire.core.quantities import Factor, Unit
 from bywire.core.signals import Signal
 from bywire.plant.adhesion import Surface, SurfaceParameters, surface_of
@@ -19,7 +19,7 @@ Gradient = Annotated[float, Unit("1", 0.05), Field(gt=-1, lt=1, allow_inf_nan=Fa
 SurfaceName = Literal[
     "dry-asphalt", "wet-asphalt", "dry-concrete", "dry-cobble", "wet-cobble", "snow", "ice", "own"
 ]
-"""names of surfaces in experiments; ``own`` is that of the parameters"""
+"""names of surfaces in experiments; ``own`` is the surface of the parameters"""
 
 
 class Slope(NamedTuple):
@@ -40,8 +40,8 @@ SURFACES = {
 }
 """values for car tyres from open code, attributed there to M. Burckhardt,
 Fahrwerktechnik: Radschlupf-Regelsysteme (1993); c3 of ice circulates as 0, which has no peak. The
-Magic Formulas are fitted to these curves: the same peak at the same slip, and of all such those
-with the least squares from no slip to a locked wheel"""
+Magic Formulas are fitted to these curves: the same peak at the same slip, and least squares from
+no slip to a locked wheel"""
 
 
 class Parameters(ParameterSet):
@@ -54,22 +54,24 @@ class Parameters(ParameterSet):
     grip: Factor
     """factor on the adhesion of every surface"""
     x_change: Distance
-    """start of the further surface, from the front wheel's position at time zero"""
+    """start of the second surface, from the front wheel's position at time zero"""
     x_back: Distance
-    """end of the further surface, from the same origin"""
+    """end of the second surface, from the same origin"""
     ramp: Ramp
     """length of the transition between surfaces and slopes"""
     gradient: Gradient
     """rise over run, uphill positive"""
     gradient_further: Gradient
-    """the same on the further stretch"""
+    """rise over run on the second stretch"""
 
     @model_validator(mode="after")
     def _has_no_gap(self) -> Parameters:
         if not self.x_back >= self.x_change + self.ramp:
-            raise ValueError(
-                f"x_back = {self.x_back:g} m must be >= x_change + ramp = "
-                f"{self.x_change + self.ramp:g} m: the further surface begins before it ends"
+            raise RuleError(
+                "x_back",
+                f"{self.x_back:g} m",
+                f">= x_change + ramp = {self.x_change + self.ramp:g} m",
+                "the second surface starts before it ends",
             )
         return self
 
@@ -78,7 +80,7 @@ Place = Annotated[float, Signal("m", "position along the road", 30.0)]
 
 
 def share(x: Place, par: Parameters) -> Annotated[float, Signal("1", "share of the further road")]:
-    """Return the share of the further stretch at a position, 0 to 1."""
+    """Return the share of the second stretch at a position, 0 to 1."""
     begun = ops.clip((x - par.x_change) / par.ramp, 0.0, 1.0)
     return begun - ops.clip((x - par.x_back) / par.ramp, 0.0, 1.0)
 

@@ -18,8 +18,9 @@ BackEfficiency = Annotated[float, Unit("1", 0.5), Field(ge=0, le=1, allow_inf_na
 class Parameters(ParameterSet):
     """Massless screw with friction proportional to its load.
 
-    ``law``: ``"load"`` (reading A) makes the loss a friction by the axial force, set-valued at
-    rest; ``"drive"`` (reading B) loses (1 - eta_f) of the motor's torque in either direction.
+    ``law``: with ``"load"`` (reading A), the loss is a friction proportional to the axial force and
+    set-valued at rest. With ``"drive"`` (reading B), (1 - eta_f) of the motor's torque is lost in
+    either direction.
     """
 
     lead: Length
@@ -27,7 +28,7 @@ class Parameters(ParameterSet):
     eta_f: Fraction
     """efficiency when the screw drives the load"""
     eta_b: BackEfficiency
-    """efficiency when the load drives the screw; with 2 - 1/eta_f both losses are equal"""
+    """efficiency when the load drives the screw; 2 - 1/eta_f makes both losses equal"""
     law: Literal["load", "drive"]
     """quantity to which the loss is proportional: the axial force or the motor's torque"""
 

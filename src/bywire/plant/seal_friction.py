@@ -20,8 +20,8 @@ from bywire.core.signals import Power, Signal
 class Parameters(ParameterSet):
     """Asymmetric Stribeck friction, torques at the motor shaft.
 
-    Valid for pressures >= 0. At rest the friction is set-valued: it can have any value between
-    its two breakaway torques, and the piston really sticks.
+    Valid for pressures >= 0. At rest the friction is set-valued: it can have any value between its
+    two breakaway torques, so the piston sticks completely.
     """
 
     T_pr: Torque
@@ -43,7 +43,7 @@ class Parameters(ParameterSet):
 FAULTS = (
     ParameterFault(
         "swollen",
-        "more friction, by the same factor in both directions",
+        "higher friction, by the same factor in both directions",
         ("T_pr", "f_cfr_p", "f_cfr_n"),
         1.9,
     ),

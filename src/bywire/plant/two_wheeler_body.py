@@ -8,7 +8,7 @@ from typing import Annotated, Literal, NamedTuple
 from pydantic import Field, model_validator
 
 from bywire.core import ops
-from bywire.core.parameters import ParameterSet
+from bywire.core.parameters import ParameterSet, RuleError
 from bywire.core.quantities import Duration, Length, Unit
 from bywire.core.signals import Energy, Power, Role, Signal
 from bywire.core.typing import Array
@@ -20,7 +20,7 @@ Sine = Annotated[float, Signal("1", "sine of the slope", 0.05)]
 Cosine = Annotated[float, Signal("1", "cosine of the slope", 1.0)]
 Drag = Annotated[float, Signal("W", "air drag", role=Role("sink", "air drag", book="vehicle"))]
 _DEGREES = 180.0 / math.pi
-_LEAST_FACTOR = 1e-9  # below, the load lies at one of its ends
+_LEAST_FACTOR = 1e-9  # for smaller factors, the load is at one of its limits
 
 
 class Parameters(ParameterSet):
@@ -56,10 +56,8 @@ class Parameters(ParameterSet):
     @model_validator(mode="after")
     def _stands(self) -> Parameters:
         if not self.l_f < self.L:
-            raise ValueError(
-                f"l_f = {self.l_f:g} m must be < the wheelbase L = {self.L:g} m: the center of "
-                "gravity lies between the wheels"
-            )
+            reason = "the center of gravity is between the wheels"
+            raise RuleError("l_f", f"{self.l_f:g} m", f"< the wheelbase L = {self.L:g} m", reason)
         return self
 
 
@@ -140,7 +138,7 @@ def rear_load(
     cosine: Cosine,
     par: Parameters,
 ) -> Annotated[float, Signal("N", "load of the rear wheel", 1e3)]:
-    r"""Return the load that holds the body level, between zero and the whole weight.
+    r"""Return the rear load that keeps the body level, between zero and the whole weight.
 
     .. math:: N_r = (m g l_f \cos\gamma - F h - F_d (h - h_a))/L
     """
@@ -161,10 +159,10 @@ def rigid_rear_load(
         N_r \left(1 + (\mu_r - \mu_f) h/L\right)
             = (m g \cos\gamma\, (l_f - \mu_f h) - F_d (h - h_a))/L
 
-    Load on the rear wheel reduces that of the front wheel, whose force then pitches less. If the
+    Load on the rear wheel unloads the front wheel, whose force then causes less pitching. If the
     factor on the left is not positive, no load between the limits is stable: a rear wheel that
-    sinks slightly sinks further. It then carries no load if the right-hand side is negative, and
-    the whole weight if that is positive.
+    sinks slightly sinks further. The rear wheel then carries no load if the right-hand side is
+    negative, and the whole weight if it is positive.
     """
     carried = mu_f * par.m * par.g * cosine * par.h + F_d * (par.h - par.h_a)
     left = static_load(cosine, par) - carried / par.L
@@ -256,4 +254,4 @@ def watch(t: Array, x: State, par: Parameters) -> list[str]:
     pitch = _DEGREES * x.phi
     most = f" (pitch up to {highest(pitch):.3g} deg, limit {highest(limit):.3g} deg)"
     text = "the rider goes over the handlebar: the center of gravity passes the front wheel"
-    return first(t, pitch > limit, text, f"{most}, and the rest is no longer a stop")
+    return first(t, pitch > limit, text, f"{most}, so the rest of the run is not a stop")

@@ -57,7 +57,7 @@ class Limits(NamedTuple):
 
 
 class Input(NamedTuple):
-    """Speeds, load, surface, and `limits`, which are value-only."""
+    """Speeds, load, surface, and `limits`, which are values only."""
 
     v: Annotated[float, Signal("m/s", "vehicle speed", 20.0)]
     v_wheel: Annotated[float, Signal("m/s", "speed of the tread", 20.0)]
@@ -92,7 +92,7 @@ def braking_slip(u: Contact, par: Parameters) -> Slip:
 def limits(u: Contact, par: Parameters) -> Limits:
     """Return the limits of the force: the peak up to its slip, the curve beyond.
 
-    The deflection is that of the rising branch of the curve for the adhesion.
+    The deflection follows from the slip on the curve's rising branch with the same adhesion.
     """
     mu, slip = adhesion.held(ops.fabs(braking_slip(u, par)), _ground(u), par)
     return Limits(mu, par.sigma * slip)
@@ -119,19 +119,21 @@ def sliding(x: State, u: Input) -> Annotated[float, Signal("1", "tyre slides")]:
 def force_over_load(
     x: State, u: Input, par: Parameters
 ) -> Annotated[float, Signal("1", "braking force over load", 1.0)]:
-    """Return the force over the load: that of the limited deflection, damped near standstill.
+    """Return force over load, from the limited deflection and damping near standstill.
 
-    Damping does not raise the limit of the force.
+    Damping does not raise the force's limit.
     """
     slides = sliding(x, u)
-    # An absolute value would have no slope at zero, where a free wheel rolls.
+    # An absolute value has no slope at zero, the operating point of a freely rolling wheel.
     bent = ops.where(x.u < 0, -x.u, x.u)
     held = adhesion.adhesion(bent / par.sigma, _ground(u), par)
     size = ops.where(slides > 0, u.mu_max, ops.fmin(held, u.mu_max))
     elastic = ops.where(x.u < 0, -size, size)
     slow = ops.fmin(ops.fabs(u.v) / par.v_low, 1.0)
     faded = par.c_t * (u.v - u.v_wheel) * 0.5 * (1.0 + ops.cos(math.pi * slow))
-    damping = ops.where(slow < 1.0, faded, 0.0)  # a kernel's branch: most of a stop is fast
+    damping = ops.where(
+        slow < 1.0, faded, 0.0
+    )  # becomes a branch in the kernel, which most of a stop skips
     return ops.clip(elastic + (1.0 - slides) * damping, -u.mu_max, u.mu_max)
 
 

@@ -22,7 +22,7 @@ class Parameters(ParameterSet):
     """
 
     law: Literal["ideal", "pulses"]
-    """whether the sensor measures edges only, or the angle at any time"""
+    """whether the sensor measures only edges, or the angle at any time"""
     pulses: Annotated[float, Unit("1", 48.0), Field(ge=1, allow_inf_nan=False)]
     """pulses per revolution"""
     omega_min: Annotated[float, Unit("rad/s", 0.1), Field(gt=0, allow_inf_nan=False)]

@@ -138,7 +138,7 @@ def _hysteresis_loop(result: Result) -> list[Shown]:
     figure = hysteresis_loop(
         result.recordings, setting.response, setting.drive, setting.demand, setting.smoothing
     )
-    caption = "Drive over response, up and down again."
+    caption = "Response over drive, up and down again."
     return [Shown("hysteresis-loop", figure, caption)]
 
 

@@ -68,7 +68,7 @@ def channel(recording: xr.Dataset, name: str) -> Channel:
             valid="time",
         )
     if array.size == 0:
-        raise ParameterError(f"{name} has no samples: there is nothing to draw", name=name)
+        raise ParameterError(f"{name} has no samples to draw", name=name)
     symbol = str(array.attrs.get("units", "1"))
     unit = display_unit(symbol)
     return Channel(

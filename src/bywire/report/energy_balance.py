@@ -11,7 +11,7 @@ from bywire.bench.energy_ledger import Ledger, actuator_ledger, ledger
 from bywire.core.errors import ParameterError
 from bywire.report import style
 from bywire.report.channel import channel
-from bywire.report.wording import amount
+from bywire.report.wording import amount, part_text
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -163,9 +163,8 @@ def _colors(sinks: Sequence[str]) -> dict[str, str]:
 def _stack(axes: Axes, row: float, entries: list[Entry], total: float) -> None:
     left = 0.0
     for entry in entries:
-        share = f"{100 * entry.energy / total:.3g} %"
-        digits = max(3, len(f"{entry.energy:.0f}"))  # no powers of ten for kilojoules
-        label = f"{entry.label}: {amount(entry.energy, 'J', digits)} ({share})"
+        share = part_text(100 * entry.energy / total, "%", 100.0)
+        label = f"{entry.label}: {part_text(entry.energy, 'J', total)} ({share})"
         axes.barh(
             row,
             entry.energy,

@@ -13,7 +13,7 @@ from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.typing import Array
 from bywire.report import style
 from bywire.report.channel import Channel, channel, kept_samples
-from bywire.report.wording import amount, duration
+from bywire.report.wording import amount
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -31,7 +31,7 @@ def hysteresis_loop(
     demand: str = "",
     average: float = 0.0,
 ) -> Figure:
-    """Draw drive over response, applying solid and releasing dashed, one color per recording.
+    """Draw response over drive, applying solid and releasing dashed, one color per recording.
 
     Parameters
     ----------
@@ -58,8 +58,8 @@ def hysteresis_loop(
     figure, (axes,) = style.new_figure(4.2)
     for k, (label, recording) in enumerate(recordings.items()):
         color = style.SEQUENCE[k % len(style.SEQUENCE)]
-        x, y = channel(recording, response), channel(recording, drive)
-        by = channel(recording, demand) if demand in recording.data_vars else y
+        x, y = channel(recording, drive), channel(recording, response)
+        by = channel(recording, demand) if demand in recording.data_vars else x
         turn = _turn(by.values)
         if average > 0:
             kept = np.union1d(kept_samples(x.time, x.values), kept_samples(x.time, y.values))
@@ -80,7 +80,7 @@ def hysteresis_loop(
         Line2D([], [], color=style.GRAY, linestyle="--", label="releasing"),
     ]
     if average > 0:
-        label = f"ripple around the average over {duration(average)}"
+        label = f"ripple around the average over {amount(average, 's', 3)}"
         opacity = style.PALE_OPACITY
         handles.append(Line2D([], [], color=style.GRAY, linewidth=6.0, alpha=opacity, label=label))
     style.legend_above(axes, handles)

@@ -108,11 +108,14 @@ def fragment_html(document: Document, notes: Sequence[str] = ()) -> str:
     numbered = _numbered(document.page)
     warnings = [Section("Warnings", [Listing(notes)])] if notes else []
     sections = [*warnings, *document.page]
+    numbered.is_sortable = True
     parts = [
         f"<h3>{_text(document.title)}</h3>\n<p>{_text(document.summary)}</p>",
         _banner(document.banner) if document.banner is not None else "",
         *(_section(section, k, numbered) for k, section in enumerate(sections, 1)),
     ]
+    if any("<table>" in part for part in parts):
+        parts.append(f"<script>{_file('sort.js')}</script>")
     return '<div class="bywire">\n' + "\n".join(part for part in parts if part) + "\n</div>"
 
 
@@ -143,6 +146,7 @@ class _Numbered:
     def __init__(self, figures: Sequence[str], has_figures: bool) -> None:
         self.figures = iter(figures)
         self.has_figures = has_figures
+        self.is_sortable = False
         self.figure_numbers = count(1)
         self.table_numbers = count(1)
 
@@ -196,18 +200,39 @@ def _block(block: Block, numbered: _Numbered) -> str:
     if block.caption:
         number = next(numbered.table_numbers)
         caption = f"<figcaption>Table {number}. {_text(block.caption)}</figcaption>\n"
-    return f"<figure>\n{caption}{table_html(block.table)}\n</figure>"
+    table = table_html(block.table, is_sortable=numbered.is_sortable)
+    return f"<figure>\n{caption}{table}\n</figure>"
 
 
-def table_html(table: Table) -> str:
-    """Return a table as HTML; every text in it is escaped."""
+def _verdicts_first(table: Table) -> Table:
+    """Return a table whose limits and verdicts are visible on a phone: errors come after them."""
+    headings = [column.heading for column in table.columns]
+    if not {"numerical error", "verdict"} <= set(headings):
+        return table
+    order = list(range(len(headings)))
+    order.insert(headings.index("verdict"), order.pop(headings.index("numerical error")))
+    return Table(
+        tuple(table.columns[k] for k in order),
+        tuple(tuple(row[k] for k in order) for row in table.rows),
+    )
+
+
+def table_html(table: Table, *, is_sortable: bool = False) -> str:
+    """Return a table as HTML; every text in it is escaped.
+
+    Cells of a sortable table have their numbers in an attribute, in one unit.
+    """
+    table = _verdicts_first(table)
     heading = "".join(
         f'<th scope="col"{_number_class(column)}>{escape(column.heading)}</th>'
         for column in table.columns
     )
     body = "\n".join(
         "<tr>"
-        + "".join(_table_cell(c, column) for c, column in zip(row, table.columns, strict=True))
+        + "".join(
+            _table_cell(cell, column, is_sortable)
+            for cell, column in zip(row, table.columns, strict=True)
+        )
         + "</tr>"
         for row in table.rows
     )
@@ -218,11 +243,13 @@ def table_html(table: Table) -> str:
     )
 
 
-def _table_cell(cell: Cell, column: Column) -> str:
+def _table_cell(cell: Cell, column: Column, is_sortable: bool) -> str:
+    number = cell.value if is_sortable else None
+    data = "" if number is None else f' data-value="{number}"'
     text = escape(_MARKS[cell.verdict] + cell.text).replace("\n", "<br>")
     if cell.verdict != "none":
-        return f'<td class="{cell.verdict}{" number" * column.numeric}">{text}</td>'
-    return f"<td{_number_class(column)}>{text}</td>"
+        return f'<td class="{cell.verdict}{" number" * column.numeric}"{data}>{text}</td>'
+    return f"<td{_number_class(column)}{data}>{text}</td>"
 
 
 def _number_class(column: Column) -> str:

@@ -20,7 +20,7 @@ from bywire.core.scratch import UNFINISHED, scratch_folder
 PAGE = "report.html"
 """file of the page, which lists the files of its result"""
 
-_SAYS = "This result was not written to its end: the same command writes it anew. Its files:"
+_SAYS = "This result was not written to its end: the same command writes it again. Its files:"
 _OURS = (".html", ".json", ".nc", ".png", ".toml")
 _META = "bywire-files"
 _HEAD = 65536  # characters of a page that contain its list, which is at the beginning

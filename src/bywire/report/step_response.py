@@ -18,7 +18,7 @@ from bywire.report import style
 from bywire.report.channel import Channel, channel, decimate
 from bywire.report.panels import Role
 from bywire.report.stated_levels import draw_stated
-from bywire.report.wording import duration
+from bywire.report.wording import amount
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -197,7 +197,7 @@ def step_response(
             linewidth=0.9,
             zorder=3.3,
             color=style.STROKES[role].color,
-            label=f"averaged over {duration(smoothing)}",
+            label=f"averaged over {amount(smoothing, 's', 3)}",
         )
     if set_point is not None:
         style.draw_channel(axes, channel(recording, set_point), Role.SET_POINT)
@@ -220,7 +220,9 @@ def _mark_facts(axes: Axes, shown: Channel, limits: StepLimits, facts: StepFacts
         shares = (facts.rise_from, facts.rise_to)
         levels = [convert(limits.level(share), shown.symbol, shown.unit) for share in shares]
         times = [scale * _first_crossing(shown, limits, level) for level in levels]
-        label = f"rise {100 * shares[0]:g} to {100 * shares[1]:g} %: {duration(facts.rise_time)}"
+        label = (
+            f"rise {100 * shares[0]:g} to {100 * shares[1]:g} %: {amount(facts.rise_time, 's', 3)}"
+        )
         axes.plot(times, levels, "o", color=style.BLACK, markersize=4.5, zorder=4, label=label)
     if _given(facts.overshoot):
         time, peak = _peak(shown, limits)
@@ -244,7 +246,7 @@ def _mark_facts(axes: Axes, shown: Channel, limits: StepLimits, facts: StepFacts
             linestyle="-.",
             linewidth=1.2,
             zorder=2.4,
-            label=f"settling ({100 * limits.band:g} %): {duration(facts.settling_time)}",
+            label=f"settling ({100 * limits.band:g} %): {amount(facts.settling_time, 's', 3)}",
         )
 
 

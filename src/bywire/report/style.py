@@ -18,7 +18,7 @@ from bywire.core.quantities import display_unit
 from bywire.core.typing import Array
 from bywire.report.channel import COLUMNS, Channel, decimate
 from bywire.report.panels import Role
-from bywire.report.wording import clean, duration, in_display_unit, unit_text
+from bywire.report.wording import amount, clean, in_display_unit, unit_text
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -241,7 +241,7 @@ def draw_channel(
             )
         shown, width = average
         pale = "" if role is Role.SET_POINT else " (pale: ripple)"
-        label = f"{label}, {duration(width)} average{pale}"
+        label = f"{label}, {amount(width, 's', 3)} average{pale}"
     axes.plot(
         *decimate(scale * shown.time, shown.values),
         color=look.color,

@@ -9,7 +9,14 @@ from typing import Literal
 
 from bywire.bench.requirements import COMPARE
 from bywire.core.units import difference_unit
-from bywire.report.wording import amount, clean, error_text, measured_amount, unit_text
+from bywire.report.wording import (
+    amount,
+    beside_limit,
+    clean,
+    error_text,
+    measured_amount,
+    unit_text,
+)
 
 Verdict = Literal["good", "bad", "open", "none"]
 
@@ -42,9 +49,11 @@ def amount_cell(value: float | None, unit: str, digits: int = 4) -> Cell:
     return Cell(amount(value, unit, digits), value=math.nan if value is None else value, unit=unit)
 
 
-def measured_cell(value: float | None, unit: str, error: float, digits: int = 4) -> Cell:
+def measured_cell(
+    value: float | None, unit: str, error: float, digits: int = 4, like: float | None = None
+) -> Cell:
     """Return the cell of a number with the significant digits of its error; see `amount_cell`."""
-    text = measured_amount(value, unit, error, digits)
+    text = measured_amount(value, unit, error, digits, like)
     return Cell(text, value=math.nan if value is None else value, unit=unit)
 
 
@@ -197,7 +206,7 @@ def kpi_table(rows: Iterable[KpiRow]) -> Table:
         tuple(
             (
                 Cell(clean(row.name)),
-                measured_cell(row.value, row.unit, row.error),
+                _value_cell(row),
                 *((_error_cell(row),) * estimated),
                 *((Cell(clean(row.limit) or "-"), OUTCOMES[row.outcome]) * limited),
                 *((Cell(clean(row.stated) or "-"),) * stated),
@@ -209,8 +218,15 @@ def kpi_table(rows: Iterable[KpiRow]) -> Table:
     )
 
 
+def _value_cell(row: KpiRow) -> Cell:
+    value, error, unit = beside_limit(row.value, row.error, row.unit, row.limit)
+    text = measured_amount(value, unit, error)
+    return Cell(text, value=math.nan if row.value is None else row.value, unit=row.unit)
+
+
 def _error_cell(row: KpiRow) -> Cell:
-    text = error_text(row.value, row.unit, row.error, row.converges)
+    value, error, unit = beside_limit(row.value, row.error, row.unit, row.limit)
+    text = error_text(value, unit, error, row.converges)
     return Cell(text, value=row.error, unit=row.unit)
 
 

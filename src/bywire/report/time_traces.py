@@ -18,7 +18,7 @@ from bywire.report.panels import Panel, Role, Trace, declared_panels, panels_by_
 from bywire.report.stated_levels import draw_stated
 from bywire.report.step_response import StepLimits, draw_limits
 from bywire.report.style import Color, inside, value_color, value_scale
-from bywire.report.wording import duration
+from bywire.report.wording import amount
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -515,8 +515,8 @@ def overlaid_panels(
     present = _chosen(data)
     if not present:
         raise ParameterError(
-            f"the {len(recordings)} recordings share no signal over time that moves: there is "
-            "nothing to overlay"
+            f"the {len(recordings)} recordings share no signal over time that moves, so "
+            "they cannot be overlaid"
         )
     looks = _looks(list(recordings), scale, skipped)
     heights = [panel.height for panel, _ in present]
@@ -618,7 +618,7 @@ def _draw_panel(
         if len(lines) > 1 or width:  # the label of an ordinate is what its lines have in common
             dash = _DOTS if k > 0 else "-"
             label = channel(recordings[0], trace.variable).label
-            label += f", {duration(width)} average" if width else ""
+            label += f", {amount(width, 's', 3)} average" if width else ""
             entries.append(entry(label, style.GRAY, dash))
     for target in [t for t in targets if t not in lines]:
         entries += _draw_target(

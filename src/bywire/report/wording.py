@@ -13,6 +13,19 @@ from bywire.core.units import unit_text as unit_text
 
 F = TypeVar("F")
 
+BY_SIZE: dict[str, tuple[tuple[float, str], ...]] = {
+    "s": ((0.0, "ms"), (1.0, "s")),
+    "m": ((0.0, "um"), (1e-4, "mm"), (1.0, "m")),
+    "N": ((0.0, "N"), (1e3, "kN")),
+    "Pa": ((0.0, "Pa"), (1e2, "bar")),
+    "J": ((0.0, "J"), (1e3, "kJ"), (1e6, "MJ")),
+    "W": ((0.0, "W"), (1e3, "kW")),
+}
+"""units by SI unit, each with the least magnitude in the SI unit from which it is used"""
+_OF_NOTHING = {"s": "ms"}  # units of zero, where it is not the display unit
+_ROUNDING = 1e-9  # share of the largest magnitude, below which a number is a rounding error
+_LEAST = 1e-3  # least error of zero that is written, in its unit
+
 
 def in_display_unit(value: F, symbol: str) -> tuple[F, str]:
     """Return a value, or an array, and its unit in display units: bar instead of Pa."""
@@ -21,9 +34,10 @@ def in_display_unit(value: F, symbol: str) -> tuple[F, str]:
 
 
 def readable_unit(size: float, symbol: str) -> str:
-    """Return the most readable unit for a figure of a given size.
+    """Return the most readable unit for a number of a given size.
 
-    Times below 1 s are in ms; lengths from 1 m on, those of roads and not of pistons, are in m.
+    This is the one rule for terminals, reports, pages and figures: see `BY_SIZE`. Other quantities
+    have one unit for all sizes, see `bywire.core.quantities.DISPLAY_UNITS`.
 
     Parameters
     ----------
@@ -36,12 +50,13 @@ def readable_unit(size: float, symbol: str) -> str:
     --------
     >>> readable_unit(0.06, "s"), readable_unit(41.0, "m"), readable_unit(0.002, "m")
     ('ms', 'm', 'mm')
+    >>> readable_unit(12500.0, "N"), readable_unit(2e6, "Pa"), readable_unit(2e-5, "m")
+    ('kN', 'bar', 'um')
     """
-    if symbol == "s" and abs(size) < 1.0:
-        return "ms"
-    if symbol == "m" and abs(size) >= 1.0:
-        return "m"
-    return display_unit(symbol)
+    if not size or symbol not in BY_SIZE:
+        return _OF_NOTHING.get(symbol, display_unit(symbol))
+    # A hair's breadth below a boundary is the boundary: 0.9999999 s is not 1000 ms.
+    return next(u for least, u in reversed(BY_SIZE[symbol]) if abs(size) * (1 + 1e-6) >= least)
 
 
 def readable_units(symbol: str) -> str:
@@ -49,63 +64,62 @@ def readable_units(symbol: str) -> str:
 
     Examples
     --------
-    >>> readable_units("m"), readable_units("Pa")
-    ('mm or m', 'bar')
+    >>> readable_units("m"), readable_units("Pa"), readable_units("ohm")
+    ('um, mm or m', 'Pa or bar', 'ohm')
     """
-    return " or ".join(dict.fromkeys(readable_unit(size, symbol) for size in (0.0, math.inf)))
+    *first, last = [unit for _, unit in BY_SIZE.get(symbol, ((0.0, display_unit(symbol)),))]
+    return f"{', '.join(first)} or {last}" if first else last
 
 
 def amount(value: float | None, symbol: str, digits: int = 4, like: float | None = None) -> str:
-    """Return a value with its unit in ``digits`` significant digits.
+    """Return a value with its unit in ``digits`` significant digits; a whole count in all digits.
 
     Parameters
     ----------
     value
         Number in ``symbol``; ``None`` where there is none, NaN where it is not defined.
     symbol
-        Unit; SI units are shown in their display unit.
+        Unit; SI units are shown in their most readable unit, see `readable_unit`.
     digits
         Significant digits.
     like
-        Largest magnitude of the figure with this value, in ``symbol``. It determines the unit, so
-        that a figure of many cases has one unit, see `readable_unit`. By default the value itself
-        counts, and times are in s.
+        Largest magnitude of the numbers beside this one, in ``symbol``. It determines the unit, so
+        that a figure of many cases has one unit, and what is a rounding error beside it is 0. By
+        default the value itself counts.
 
     Examples
     --------
     >>> amount(2.5e6, "Pa"), amount(None, "Pa"), amount(0.034, "1"), amount(1187.0, "Hz", 3)
     ('25 bar', '-', '0.034', '1190 Hz')
-    >>> amount(0.0125, "m"), amount(41.07, "m")
-    ('12.5 mm', '41.07 m')
-    >>> amount(0.962, "s"), amount(0.962, "s", like=0.962), amount(0.9, "m", like=1.1)
-    ('0.962 s', '962 ms', '0.9 m')
+    >>> amount(0.0125, "m"), amount(41.07, "m"), amount(12654.0, "1"), amount(1e-14, "%", like=5.0)
+    ('12.5 mm', '41.07 m', '12654', '0 %')
+    >>> amount(0.962, "s"), amount(0.9, "m", like=1.1)
+    ('962 ms', '0.9 m')
     """
     if value is None:
         return "-"
     if math.isnan(value):
         return "not defined"
-    if like is None and symbol == "s":
-        number, unit = float(value), "s"
-    else:
-        number, unit = _readable(float(value), value if like is None else like, symbol)
-    written = unit_text(unit)
-    figures = f"{number:.{digits}g}"
-    if "e+" in figures:  # 1.19e+03
-        figures = f"{float(figures):g}"
-    return figures + (f" {written}" if written else "")
+    size = abs(value) if like is None else abs(like)
+    number, unit = _readable(float(value), size, symbol)
+    if like is not None and abs(value) < _ROUNDING * size < math.inf:
+        number = 0.0
+    return _with_unit(_figures(number, symbol, digits), unit)
 
 
-def measured_amount(value: float | None, symbol: str, error: float, digits: int = 4) -> str:
-    """Return a value with the significant digits of its error and its unit; times below 1 s in ms.
+def measured_amount(
+    value: float | None, symbol: str, error: float, digits: int = 4, like: float | None = None
+) -> str:
+    """Return a value with the significant digits of its error, and its unit.
 
-    The last digit written has the place of the error's first one.
+    The last digit written has the place of the error's first one. A value below its error is 0.
 
     Parameters
     ----------
     value
         Number in ``symbol``; ``None`` where there is none, NaN where it is not defined.
-    symbol
-        Unit; SI units are shown in their display unit.
+    symbol, like
+        As in `amount`.
     error
         Numerical error, in ``symbol``; NaN if it is not known.
     digits
@@ -118,27 +132,32 @@ def measured_amount(value: float | None, symbol: str, error: float, digits: int 
     >>> measured_amount(5.0823, "percent", 0.2), measured_amount(3.1416, "1", 0.0)
     ('5.1 %', '3.142')
     >>> measured_amount(0.0, "bar", 1e-10), measured_amount(0.004, "1", 0.02)
-    ('0 bar', '0.00')
+    ('0 bar', '0')
     """
     if value is None or not (math.isfinite(value) and math.isfinite(error)):
-        return amount(value, symbol, digits)
-    number, unit = _readable(value, value, symbol)
-    possible = _readable_difference(error, value, symbol)[0]
-    last = math.floor(math.log10(possible)) if possible > 0 else -400  # no float has that place
-    first = math.floor(math.log10(abs(number))) if number else last
-    if last <= first - digits + 1 or last == -400:
-        figures = f"{number:.{digits}g}"
-        figures = f"{float(figures):g}" if "e+" in figures else figures
-    else:
-        rounded = round(number, -last)
-        is_nothing = rounded == 0 and -last >= digits  # many zeros show no more than one digit
-        figures = "0" if is_nothing else f"{rounded:.{max(0, -last)}f}"
-    written = unit_text(unit)
-    return figures + (f" {written}" if written else "")
+        return amount(value, symbol, digits, like)
+    size = value if like is None else like
+    number, unit = _readable(value, size, symbol)
+    possible = _readable_difference(error, size, symbol)[0]
+    if abs(number) < possible:
+        return _with_unit("0", unit)
+    last = math.floor(math.log10(possible)) if possible > 0.0 else _last_place(number, digits)
+    if last <= _last_place(number, digits):
+        return _with_unit(_figures(number, symbol, digits), unit)
+    return _with_unit(f"{round(number, -last):.{max(0, -last)}f}", unit)
 
 
-def error_text(value: float | None, symbol: str, error: float, converges: bool = True) -> str:
+def error_text(
+    value: float | None,
+    symbol: str,
+    error: float,
+    converges: bool = True,
+    like: float | None = None,
+) -> str:
     """Return an error with one digit, in the unit of the value in `measured_amount`.
+
+    An error below the value's last digit is ``"< "`` that digit, or a thousandth of the unit beside
+    zero.
 
     ``converges``: whether it is an error, rather than a bound of an unknown one.
 
@@ -146,20 +165,80 @@ def error_text(value: float | None, symbol: str, error: float, converges: bool =
     --------
     >>> error_text(0.062195, "s", 2.6e-4), error_text(3.2, "1", 0.0)
     ('0.3 ms', '0')
+    >>> error_text(60.0, "m", 1e-7), error_text(5.08, "%", 0.03)
+    ('< 0.01 m', '0.03 percentage points')
     """
     if value is None or math.isnan(value) or math.isnan(error):
         return "-"
     if math.isinf(error):
         return "unknown"
-    number, unit = _readable_difference(error, value, symbol)
+    size = value if like is None else like
+    number, unit = _readable_difference(error, size, symbol)
+    if not number:
+        return "0"
+    shown = _readable(value, size, symbol)[0]
+    least = _LEAST if abs(shown) < number else 10.0 ** _last_place(shown, 4)
+    if number < least:
+        return f"< {_with_unit(f'{least:g}', unit)}"
+    text = _with_unit(f"{float(f'{number:.1g}'):g}", unit)
+    return text if converges else f"up to {text}"
+
+
+def beside_limit(
+    value: float | None, error: float, symbol: str, limit: str
+) -> tuple[float | None, float, str]:
+    """Return a value, its error and their unit: in percent where its limit is in percent.
+
+    Examples
+    --------
+    >>> beside_limit(0.75, 0.01, "1", ">= 80 %")
+    (75.0, 1.0, '%')
+    """
+    if symbol != "1" or not limit.endswith("%"):
+        return value, error, symbol
+    return None if value is None else 100.0 * value, 100.0 * error, "%"
+
+
+def part_text(value: float, symbol: str, whole: float) -> str:
+    """Return a part of a whole; what does not count beside the whole is ``"< "`` a bound.
+
+    Examples
+    --------
+    >>> part_text(3.21987, "J", 21.7), part_text(8e-6, "J", 21.7), part_text(-1e-13, "J", 21.7)
+    ('3.22 J', '< 0.001 J', '0 J')
+    """
+    number, unit = _readable(value, whole, symbol)
+    least = 10.0 ** _last_place(_readable(whole, whole, symbol)[0], 5)
+    if abs(value) < _ROUNDING * abs(whole):
+        return _with_unit("0", unit)
+    if abs(number) < least:
+        return f"{'<' if value > 0.0 else '> -'} {_with_unit(f'{least:g}', unit)}"
+    return _with_unit(_figures(number, symbol, 4), unit)
+
+
+def _last_place(number: float, digits: int) -> int:
+    """Return the power of ten of the last significant digit of a number; far below all for 0."""
+    return math.floor(math.log10(abs(number))) - digits + 1 if number else -400
+
+
+def _figures(number: float, symbol: str, digits: int) -> str:
+    """Return a number without its unit."""
+    if symbol == "1" and number.is_integer() and abs(number) < 1e9:
+        return f"{number:.0f}"
+    figures = f"{number:.{digits}g}"
+    return f"{float(figures):g}" if "e+" in figures else figures  # 1.19e+03
+
+
+def _with_unit(figures: str, unit: str) -> str:
     written = unit_text(unit)
-    text = f"{float(f'{number:.1g}'):g}" + (f" {written}" if written and number else "")
-    return text if converges or not number else f"up to {text}"
+    return figures + (f" {written}" if written else "")
 
 
 def _readable_difference(number: float, value: float, symbol: str) -> tuple[float, str]:
     """Return a difference in the most readable unit of a value; for temperatures in K."""
-    return _readable(number, value, difference_unit(symbol))
+    unit = difference_unit(symbol)
+    shown = readable_unit(value, symbol) if unit == symbol else display_unit(unit)
+    return convert(float(number), unit, shown), shown
 
 
 def _readable(number: float, value: float, symbol: str) -> tuple[float, str]:
@@ -180,8 +259,3 @@ def range_text(leaf: Leaf) -> str:
         if math.isfinite(bound):
             limits.append(f"{sign if is_open else sign + '='} {amount(bound, leaf.unit.symbol, 6)}")
     return " and ".join(limits) or "any finite number"
-
-
-def duration(seconds: float) -> str:
-    """Return a time span in ms or s, whichever is easier to read."""
-    return f"{1e3 * seconds:.3g} ms" if abs(seconds) < 1.0 else f"{seconds:.4g} s"

@@ -35,7 +35,7 @@
     return made;
   }
 
-  // Make a panel over time stretch: what its clip path holds, and its ticks anew. Null for pixels.
+  // Make a panel over time stretch: what its clip path holds, and its ticks again. Null for pixels.
   function stretchable(svg, axes, [x0, y0, w, h]) {
     const left = x0 + axes.box[0] * w, right = x0 + axes.box[2] * w, bottom = y0 + (1 - axes.box[1]) * h;
     const isOurs = ({ firstElementChild: { x, y, height } }) => Math.abs(x.baseVal.value - left) < 1

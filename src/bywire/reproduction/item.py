@@ -205,10 +205,14 @@ class RootCause:
         The cause with its numbers, in a few sentences.
     explains
         Ids of the statements that it explains; ``*`` matches anything.
+    is_within_source
+        Whether the source contradicts itself, or a law of physics: its statements cannot all hold.
+        Otherwise bywire's model contradicts the source.
     """
 
     text: str
     explains: tuple[str, ...]
+    is_within_source: bool = False
 
     def explained(self, items: Iterable[Item]) -> list[Item]:
         """Return the disagreements that it explains."""

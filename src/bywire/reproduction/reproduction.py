@@ -25,7 +25,6 @@ from bywire.report.document import (
     Details,
     Document,
     FigureBlock,
-    Flat,
     Listing,
     Paragraph,
     Section,
@@ -246,6 +245,56 @@ class Part:
     tables: Mapping[str, Table] = field(default_factory=dict)
 
 
+@dataclass(frozen=True)
+class Contradiction:
+    """Disagreements of one kind, with their causes.
+
+    Parameters
+    ----------
+    title
+        Who contradicts whom.
+    causes
+        Causes, the most serious first.
+    items
+        Statements that disagree.
+    """
+
+    title: str
+    causes: Sequence[RootCause]
+    items: Sequence[Item]
+
+    def counted(self, judged: int) -> str:
+        """Return the number of statements among all that have a verdict."""
+        return f"{len(self.items)} of {judged} judged statements"
+
+    @property
+    def lines(self) -> list[str]:
+        """The causes; a sentence if disagreements have no known cause."""
+        explained = {i.id for cause in self.causes for i in cause.explained(self.items)}
+        rest = [item.id for item in self.items if item.id not in explained]
+        unknown = [f"Without a known cause: {', '.join(rest)}."] if rest else []
+        return [*_cause_lines(self.causes, self.items), *unknown]
+
+    @property
+    def listing(self) -> Listing:
+        """Title and causes for a terminal."""
+        return Listing(self.lines or ["No statement."], self.title)
+
+    @property
+    def blocks(self) -> list[Block]:
+        """Causes for a page."""
+        return [Listing(self.lines)] if self.lines else [Paragraph("No statement.")]
+
+
+def _cause_lines(causes: Iterable[RootCause], items: Sequence[Item]) -> list[str]:
+    lines = []
+    for cause in causes:
+        number = len(cause.explained(items))
+        plural = "" if number == 1 else "s"
+        lines.append(f"{cause.text} [{number} disagreement{plural}]")
+    return lines
+
+
 @dataclass(frozen=True, eq=False)
 class Reproduction(Answer):
     """The reproduction of a source.
@@ -291,33 +340,54 @@ class Reproduction(Answer):
     @property
     def in_short(self) -> list[str]:
         """Lines with the root causes, then the counts of verdicts for each parameter set."""
-        lines = []
-        for cause in self.causes:
-            number = len(cause.explained(self.items))
-            plural = "" if number == 1 else "s"
-            lines.append(f"{cause.text} [{number} disagreement{plural}]")
-        return lines + [
+        return [*_cause_lines(self.causes, self.items), *self._counts()]
+
+    def _counts(self) -> list[str]:
+        return [
             f"{self.sets.get(name, f'@{name}' if name else 'Main set')}: {counted}."
             for name, counted in tallies(self.items).items()
         ]
 
+    @property
+    def contradictions(self) -> tuple[Contradiction, Contradiction]:
+        """Disagreements with bywire, and disagreements within the source."""
+        within = [cause for cause in self.causes if cause.is_within_source]
+        others = [cause for cause in self.causes if not cause.is_within_source]
+        apart = [item for item in self.items if item.agrees is False]
+        explained = {item.id for cause in within for item in cause.explained(apart)}
+        return (
+            Contradiction(
+                "bywire contradicts the paper",
+                others,
+                [item for item in apart if item.id not in explained],
+            ),
+            Contradiction(
+                "The paper contradicts itself",
+                within,
+                [item for item in apart if item.id in explained],
+            ),
+        )
+
     def document(self) -> Document:
-        """Return statements with computed numbers, part by part, and the disagreements."""
-        short = Listing(self.in_short)
+        """Return contradictions, then statements with computed numbers, part by part."""
         hint = f"bywire reproduce {self.source} --out FOLDER"
+        counts = Listing(self._counts(), "Verdicts by parameter set")
+        contradictions = self.contradictions
         return Document(
             f"Reproduction of {self.source}",
             self.citation,
-            sections=lambda: self._sections(short),
+            sections=lambda: self._sections(counts),
             brief=[
-                *self._tables(),
-                "In short",
-                short,
+                *(f"{each.title}: {each.counted(self._judged)}" for each in contradictions),
+                *(text for each in contradictions for text in ("", each.listing)),
                 "",
+                counts,
+                "",
+                *self._tables(),
                 f"Report with notes, tolerances and figures: {hint}",
             ],
             data=self._data(),
-            banner=Banner(f"All statements together: {_tally(self.items)}"),
+            banner=Banner(self._verdict()),
             attachments=[
                 recording_file(f"{_stem(name)}.nc", recording)
                 for name, recording in self.recordings.items()
@@ -325,18 +395,34 @@ class Reproduction(Answer):
             record="results.json",
         )
 
-    def _tables(self) -> list[str | Flat]:
-        """Return the tables for a terminal: the parts' tables, and the verdicts of all others."""
+    @property
+    def _judged(self) -> int:
+        return sum(item.agrees is not None for item in self.items)
+
+    def _verdict(self) -> str:
+        ours, theirs = (len(each.items) for each in self.contradictions)
+        agree = _tally(self.items).agree
+        return (
+            f"bywire contradicts the paper in {ours} of {self._judged} judged statements, the "
+            f"paper contradicts itself in {theirs}, and {agree} agree"
+        )
+
+    def _tables(self) -> list[str | Block]:
+        """Return the tables for a terminal: the parts' tables, and, folded, all other verdicts."""
         rest = [item for part in self.parts if not part.tables for item in part.items]
-        lines: list[str | Flat] = [TableBlock(verdicts(rest)), ""] if rest else []
+        lines: list[str | Block] = []
+        lines += [Details("All statements", [TableBlock(verdicts(rest))]), ""] if rest else []
         for title, table in (pair for part in self.parts for pair in part.tables.items()):
             lines += [title, TableBlock(table), ""]
         return lines
 
-    def _sections(self, short: Listing) -> list[Section]:
-        apart = [item for item in self.items if item.agrees is False]
-        sections = [Section("In short", [short, Paragraph(_KINDS)])]
-        sections += [Section("Disagreements", [TableBlock(statements(apart))])] if apart else []
+    def _sections(self, counts: Listing) -> list[Section]:
+        sections = []
+        for each in self.contradictions:
+            table = [TableBlock(statements(each.items))] if each.items else []
+            title = f"{each.title}: {each.counted(self._judged)}"
+            sections.append(Section(title, [*each.blocks, *table]))
+        sections.append(Section("Verdicts", [replace(counts, title=""), Paragraph(_KINDS)]))
         for part in self.parts:
             blocks: list[Block] = [Paragraph(part.text)]
             blocks += [FigureBlock(e.figure, e.caption, _stem(e.name)) for e in part.exhibits]

@@ -32,6 +32,8 @@ class Field:
         or a ``thing`` or ``things``: a known name, or a file of the folder.
     hint
         Help of the command's option.
+    example
+        Value that the field shows while it is empty.
     choices
         Returns the known names.
     offered
@@ -48,6 +50,7 @@ class Field:
     label: str
     kind: Kind = "text"
     hint: str = ""
+    example: str = ""
     choices: Callable[[], Sequence[str]] | None = None
     offered: Callable[[Contents], Sequence[str]] | None = None
     is_required: bool = False

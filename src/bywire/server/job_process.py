@@ -21,9 +21,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from bywire.core.callers import heard_warnings
+from bywire.core.callers import collected_warnings
 from bywire.core.errors import BywireError
-from bywire.core.interrupts import interrupt_heard, interrupts_noted
+from bywire.core.interrupts import interrupt_handled, interrupts_noted
 from bywire.server.study_so_far import begin_to_tell, tell
 
 _PAUSE = 0.1  # s between two messages on progress
@@ -42,7 +42,7 @@ def main() -> None:
             threading.Thread(target=_end_with_the_server, daemon=True).start()
             _compute(json.loads(line))
         except KeyboardInterrupt as stop:
-            interrupt_heard()
+            interrupt_handled()
             tell(canceled=" ".join(map(str, stop.args)))
         except Exception as error:
             if was_interrupted():
@@ -90,7 +90,7 @@ def _compute(order: Mapping[str, Any]) -> None:
     load_matplotlib()
     os.chdir(order["folder"])
     task, out = tasks()[order["task"]], Path(order["out"])
-    with heard_warnings() as caught, command_line():
+    with collected_warnings() as caught, command_line():
         for path in order["systems"]:
             load_system(path)
         answer = task.compute(order["asked"], out, _Words())

@@ -53,6 +53,8 @@ def _hint(field: Field) -> str:
 
 
 def _entry(field: Field, there: Contents, attributes: str, chosen: str) -> str:
+    if field.example:
+        attributes += f' placeholder="{text(field.example)}"'
     if field.kind in _LINES:
         return f'<textarea rows="2" spellcheck="false" {attributes}>{text(chosen)}</textarea>'
     if field.kind in ("file", "files"):
@@ -84,7 +86,8 @@ def _drop(chosen: str) -> str:
     return (
         f'<div class="drop">{chosen}\n<label class="pick">or drop a file here, or '
         '<span>choose one</span><input type="file" class="upload"></label>\n'
-        '<progress class="sent" max="1" value="0" hidden></progress></div>'
+        '<progress class="sent" max="1" value="0" hidden></progress></div>\n'
+        '<div class="columns" aria-live="polite" hidden></div>'
     )
 
 
@@ -119,6 +122,7 @@ def frame(title: str, summary: str, body: Iterable[str], *, largest: int) -> str
 <title>{text(title)}</title>
 <link rel="stylesheet" href="/assets/page.css">
 <link rel="stylesheet" href="/assets/serve.css">
+<script src="/assets/columns.js" defer></script>
 <script src="/assets/serve.js" defer></script>
 </head>
 <body data-largest="{largest}">

@@ -12,6 +12,7 @@ from typing import Final
 
 from bywire.core.errors import FileError, ParameterError, quoted, unknown_name
 from bywire.core.scratch import scratch_folder
+from bywire.server.columns import meanings_for, shown_columns
 from bywire.server.contents import REPORT, contents, endings
 from bywire.server.exchange import LIVE, SANDBOX, RefusedError, Reply, Request, page, plain
 from bywire.server.field import is_file_name
@@ -38,11 +39,7 @@ def uploaded(place: Place, request: Request, name: str, largest: int) -> Path:
         If the disk is full.
     """
     if Path(safe_name(name)).suffix.lower() not in endings():
-        raise RefusedError(
-            415,
-            f"{name[:100]!r} does not have the suffix of a measurement format. Valid suffixes are "
-            f"{', '.join(endings())}",
-        )
+        raise _unknown_format(name)
     request.require_length(largest, "a measurement")
     if request.length == 0:
         raise RefusedError(400, f"{name[:100]!r} is empty. Check the recording")
@@ -58,6 +55,14 @@ def uploaded(place: Place, request: Request, name: str, largest: int) -> Path:
                 stream.write(piece)
                 left -= len(piece)
         return place.kept(fresh, name)
+
+
+def _unknown_format(name: str) -> RefusedError:
+    return RefusedError(
+        415,
+        f"{name[:100]!r} does not have the ending of a measurement format: known are "
+        f"{', '.join(endings())}",
+    )
 
 
 # --- Progress of a study
@@ -87,6 +92,7 @@ _KINDS: Final = {
 _ASSETS: Final = {
     "page.css": ("bywire.report", "page.css", "text/css; charset=utf-8"),
     "serve.css": ("bywire.server", "assets/serve.css", "text/css; charset=utf-8"),
+    "columns.js": ("bywire.server", "assets/columns.js", "text/javascript; charset=utf-8"),
     "serve.js": ("bywire.server", "assets/serve.js", "text/javascript; charset=utf-8"),
 }
 
@@ -225,6 +231,20 @@ def _upload(service: Service, request: Request, rest: str) -> Reply:
     return plain({"file": service.place.named(path)}, 201)
 
 
+def _columns(service: Service, request: Request, rest: str) -> Reply:
+    """Return a measurement's columns, and the signals that they may be."""
+    del rest
+    path = service.place.file(request.query.get("file", ""))
+    if path.suffix.lower() not in endings():
+        raise _unknown_format(path.name)
+    bench = request.query.get("bench", "")
+    with service.reading:
+        file = _path_of(service.place, bench) if bench else None
+        known = meanings_for(file, request.query.get("method", ""))
+    with service.plotting:
+        return plain({**shown_columns(service.place, path), **known})
+
+
 def _subject(request: Request) -> str:
     name = request.query.get("of", "")
     if not name:
@@ -251,6 +271,7 @@ _ROUTES: Final[dict[str, dict[str, Route]]] = {
     "/task/": {"GET": _task},
     "/file/": {"GET": _file},
     "/assets/": {"GET": _asset},
+    "/api/columns": {"GET": _columns},
     "/api/jobs": {"GET": _all_jobs, "POST": _begin},
     "/api/jobs/": {"GET": _job, "POST": _cancel},
     "/api/measurements/": {"PUT": _upload},

@@ -32,6 +32,8 @@ class Service:
         Token of the link.
     reading
         Lock to read a bench in the server's process, because registries are not thread-safe.
+    plotting
+        Lock to read a measurement for a first plot, because several would need too much memory.
     """
 
     place: Place
@@ -40,6 +42,7 @@ class Service:
     largest: int = LARGEST_FILE
     token: str = field(default_factory=new_token)
     reading: threading.Lock = field(default_factory=threading.Lock)
+    plotting: threading.Lock = field(default_factory=threading.Lock)
 
 
 @contextmanager

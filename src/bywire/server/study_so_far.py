@@ -72,7 +72,7 @@ class StudyProgress:
         tell(so_far=so_far(kept_study(self._folder).findings))
 
     def _report(self) -> None:
-        from bywire.usecases.study_report import study_report
+        from bywire.usecases.study import study_report
 
         written = study_report(self._folder).write(self._folder)
         if any(path.suffix == REPORT for path in written):

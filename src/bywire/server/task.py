@@ -175,6 +175,7 @@ def _field(argument: Argument) -> Field:
         ask.label,
         kind,
         "" if ask.ticked else ask.help,
+        ask.example,
         _words_of(argument),
         offered if ask.offered else None,
         is_required=argument.is_required or argument.is_many,

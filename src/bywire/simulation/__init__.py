@@ -1,1 +1,1 @@
-"""The engine: time stepping, kernel emission, compilation, runs. It is independent of any brake."""
+"""Time stepping, kernel emission, compilation, and runs, independent of any brake."""

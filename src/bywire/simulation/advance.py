@@ -1,4 +1,4 @@
-"""Advance of a run: chunk by chunk, and through changes of its parameters."""
+"""Advance of a run in chunks, and through changes of its parameters."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from bywire.core.errors import ParameterError, SolverError, WorkLimitError
-from bywire.core.interrupts import interrupt_heard
+from bywire.core.interrupts import interrupt_handled
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import Role, Signal, signals_of
 from bywire.core.typing import Array
@@ -23,7 +23,7 @@ from bywire.simulation.schedule import Layout, Schedule
 Progress = Callable[[float], None]
 
 _CHUNK_SECONDS = 0.1
-_PART = 8.0  # ordinary substeps that take about as long as a part of a cut one
+_PART = 8.0  # cost of a cut substep's part, in ordinary substeps
 
 
 def advance_all(
@@ -36,23 +36,23 @@ def advance_all(
     last: int | None = None,
     most: float = math.inf,
 ) -> int:
-    """Advance in chunks that leave room for progress and interrupts; return frames done.
+    """Advance in chunks with progress and interrupts between them; return the finished frames.
 
     Parameters
     ----------
     engine, request
         Engine and its request.
     vector
-        State vector of the engine, updated in place; after an interrupt it contains the state
-        after the finished frames.
+        The engine's state vector, updated in place. After an interrupt it contains the state after
+        the finished frames.
     values
         Recorded rows from the first frame on, filled in place, shape (rows, signals).
     progress
         Called with the finished share, 0 to 1, after every chunk.
     begin, last
-        First frame and end frame; those of the run by default.
+        First frame and end frame. Default: those of the run.
     most
-        Work limit of the run; see `work_of`.
+        The run's work limit; see `work_of`.
 
     Raises
     ------
@@ -72,7 +72,7 @@ def advance_all(
         try:
             engine.advance(request, vector, begin, end, values[row:])
         except KeyboardInterrupt:
-            interrupt_heard()
+            interrupt_handled()
             vector[:] = saved
             return begin
         require_finite(
@@ -84,7 +84,7 @@ def advance_all(
             if progress is not None:
                 progress(end / schedule.frames)
         except KeyboardInterrupt:
-            interrupt_heard()
+            interrupt_handled()
             return begin
         elapsed = max(time.perf_counter() - started, 1e-9)
         factor = min(max(_CHUNK_SECONDS / elapsed, 0.5), 8.0)
@@ -105,8 +105,8 @@ def require_work(work: Any, most: Any) -> None:
     """Raise ``WorkLimitError`` if a run exceeds its work limit."""
     if np.any(work > most):
         raise WorkLimitError(
-            f"the run takes more work than {np.min(most):.3g} substeps: contacts or frictions "
-            "rarely settle; look for an extreme parameter",
+            f"the run needs more work than {np.min(most):.3g} substeps, since contacts or "
+            "frictions rarely settle. Look for an extreme parameter",
             name="work",
             value=f"{np.min(most):.3g} substeps",
         )
@@ -115,18 +115,21 @@ def require_work(work: Any, most: Any) -> None:
 def require_finite(layout: Layout, vector: Array, what: str) -> None:
     """Raise ``SolverError`` if a carried value of one or several runs is infinite or NaN.
 
-    Checking the states alone is not enough: a friction whose force is NaN would seem to stick.
+    Checking only the states is not enough: a friction with a NaN force would seem to stick.
     """
     if not np.all(np.isfinite(vector[: layout.start["counters"]])):
         raise SolverError(
-            f"{what}: look for a parameter far from its usual magnitude, or take a smaller step"
+            f"{what}: a signal is not finite. Look for a parameter far from its usual magnitude, "
+            "or use a smaller step",
+            name="signal",
+            value="not finite",
         )
 
 
 # --- Changes: between two frames, with all states and memories kept
-# If such a parameter belongs to an energy store, the change does work. This work is recorded, so
-# that it is part of the energy balance, not of its closing error. A contact's loss is its work
-# minus its stored energy, and therefore includes the work of a change there.
+# If such a parameter belongs to an energy store, the change does work. This work is recorded, so it
+# is part of the energy balance and not of its closing error. A contact's loss is its work minus its
+# stored energy, and therefore includes the work of a change in that contact.
 
 _PUT_IN = "E_change"
 _TOLERANCE = 1e-9
@@ -142,8 +145,8 @@ class Change:
         Time since the start of the run [s], rounded up to a frame. Every tick and every recorded
         row begins a frame.
     par
-        All parameters from then on. Choices may differ if they leave the model's states, its
-        memory and the sample times unchanged.
+        All parameters from that time on. Choices may differ if the model's states, its memory and
+        the sample times stay the same.
     """
 
     time: float
@@ -174,7 +177,7 @@ def pieces(
 
 
 def require_unchanged(changes: Sequence[Change], what: str) -> None:
-    """Reject changes of a run for results that would ignore them.
+    """Reject a run's changes for results that would ignore them.
 
     Raises
     ------
@@ -184,7 +187,7 @@ def require_unchanged(changes: Sequence[Change], what: str) -> None:
     if changes:
         raise ParameterError(
             f"{what} are not available for a run whose parameters change, for instance by a fault: "
-            "leave the change out, or set the parameters from the start",
+            "remove the change, or set the parameters from the start",
             name="changes",
         )
 
@@ -193,7 +196,7 @@ def require_unchanged(changes: Sequence[Change], what: str) -> None:
 def put_in_signals(output: type) -> Mapping[str, Signal]:
     """Return the signals for the work of changes, one for each energy balance of an Output.
 
-    The signal of the first balance, the actuator's own if there is one, has the plain name.
+    The first balance's signal has the plain name; it is the actuator's balance if there is one.
     """
     books = dict.fromkeys(_books(output).values())
     first = "" if "" in books else next(iter(books), "")
@@ -208,10 +211,10 @@ def put_in_signals(output: type) -> Mapping[str, Signal]:
 
 
 def energies(output: type, names: Sequence[str]) -> Array:
-    """Return which outputs are stored energies, and of which energy balance.
+    """Return which outputs are stored energies, and in which energy balance.
 
-    Integrals do not jump at changes, stored energies do. Shape (balances, outputs), 1 if an output
-    belongs to the balance, in the order of `put_in_signals`.
+    Stored energies jump at changes; integrals do not. The shape is (balances, outputs), with 1 if
+    an output belongs to the balance, in the order of `put_in_signals`.
     """
     books = _books(output)
     signals = put_in_signals(output).values()
@@ -229,7 +232,7 @@ def energy_of(engine: Engine, request: Request, vector: Array, books: Array) -> 
 
     ``books``: `energies` of all outputs.
     """
-    end = request.schedule.frames  # a stretch without frames: only the row at its end
+    end = request.schedule.frames  # a stretch without frames has only the row at its end
     row = np.empty((1, books.shape[1]))
     asked = replace(request, selection=np.arange(books.shape[1], dtype=np.int32))
     engine.advance(asked, vector.copy(), end, end, row)

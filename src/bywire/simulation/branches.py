@@ -1,8 +1,8 @@
-"""Savings in a kernel: values that depend on a mode only, branches not taken, ramps.
+"""Savings in a kernel: values that depend only on a mode, branches not taken, and ramps.
 
-A mode is a set of a few truth values. Some values depend on these and on parameters only, such as
-the matrix of a substep, its pivots and their reciprocals. The kernel recomputes them when a truth
-value changes: a few hundred times in a run of many thousand substeps.
+A mode is a set of a few truth values. Some values depend only on these and on parameters, such as a
+substep's matrix, its pivots and their reciprocals. The kernel recomputes them when a truth value
+changes: a few hundred times in a run of many thousand substeps.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ class Modes:
     first
         Nodes that determine the truth values, in order.
     atoms
-        The truth values; empty if a mode does not pay.
+        The truth values; empty if a mode does not pay off.
     values
-        Nodes to recompute when one of them changes, in order; no truth values.
+        Nodes to recompute when a truth value changes, in order, without truth values.
     rest
         All other nodes, in order.
     """
@@ -111,7 +111,7 @@ def _classified(
 def _poor_atoms(
     graph: Graph, order: Sequence[Node], deciding: dict[Node, frozenset[Node]]
 ) -> set[Node]:
-    """Return truth values that determine too little to pay."""
+    """Return truth values that determine too few values to pay off."""
     worth: dict[Node, float] = {}
     for node in order:
         price = 0.0 if graph.nodes[node].op in _FREE else cost(graph, node)
@@ -139,9 +139,9 @@ class Arm:
     nodes
         Nodes computed in it, in order.
     kept
-        Those of them that a later selection with the same condition takes over.
+        Nodes that a later selection with the same condition reuses.
     taken
-        Nodes taken over from earlier arms.
+        Nodes reused from earlier arms.
     """
 
     nodes: tuple[Node, ...] = ()
@@ -164,12 +164,12 @@ def branched(
     order
         Operations, arguments first.
     kept
-        Those that are also read from outside.
+        Operations whose results are also read from outside.
 
     Returns
     -------
     tuple
-        The order without them, and the needs of both arms by selection.
+        The order without these nodes, and both arms by selection.
     """
     users: dict[Node, list[Node]] = {}
     for node in order:
@@ -192,7 +192,7 @@ def branched(
         ]
         if len(alike) > 1 and (together := _together(graph, order, alike, users, fixed)):
             arms.update(together)
-            fixed.update(together)  # they stay where the first selection computes them for all
+            fixed.update(together)  # computed once, by the first selection
             inside.update(n for each in together.values() for arm in each for n in arm.nodes)
             continue
         cones = [_cone(graph, (node,), place, users, fixed) for place in (1, 2)]
@@ -211,7 +211,7 @@ def _together(
     users: Mapping[Node, Sequence[Node]],
     kept: Collection[Node],
 ) -> dict[Node, Arms]:
-    """Return the arms of selections with one condition; none if they need nothing costly."""
+    """Return the arms of selections with a common condition; none without costly nodes."""
     pinned = {*kept, *selections}
     cones, pays = [], False
     for place in (1, 2):
@@ -250,7 +250,7 @@ def _arm(graph: Graph, selection: Node, place: int) -> Node | None:
 
 
 def _needs(graph: Graph, end: Node | None, cone: Collection[Node]) -> set[Node]:
-    """Return the nodes of a cone on which a value depends."""
+    """Return a cone's nodes on which a value depends."""
     needs: set[Node] = set()
     stack = [] if end is None else [end]
     while stack:
@@ -264,7 +264,7 @@ def _needs(graph: Graph, end: Node | None, cone: Collection[Node]) -> set[Node]:
 def _read(
     graph: Graph, selection: Node, place: int, computed: Collection[Node], cone: Collection[Node]
 ) -> set[Node]:
-    """Return the nodes of a cone that an arm's text names; truth values name their operands."""
+    """Return a cone's nodes in an arm's text, in which truth values appear as their operands."""
     end = _arm(graph, selection, place)
     stack = [a for node in computed for a in graph.arguments(node)]
     stack += [] if end is None else [end]
@@ -331,9 +331,9 @@ def branch(
 
 # --- Values that depend only on ramps are kept while the ramps are constant
 # A ramp is a linear function of states between two limits, such as the share of a road's second
-# surface over the place. It is at a limit nearly all the time. Values that depend only on it and on
-# parameters, such as a peak of adhesion with its logarithm, then need not be recomputed. The
-# values do not change.
+# surface along the road. It is at a limit nearly all the time. Values that depend only on ramps and
+# parameters, such as an adhesion peak with its logarithm, then need not be recomputed. Results stay
+# the same.
 
 _LINEAR = ("add", "sub", "neg", "mul")
 _OPPOSITE = {"fmin": "fmax", "fmax": "fmin"}
@@ -350,7 +350,7 @@ class Remembered:
     values
         Nodes to recompute when a ramp moves, in order.
     read
-        Those of them that are read elsewhere.
+        Nodes that are read elsewhere.
     """
 
     ramps: tuple[Node, ...]
@@ -374,7 +374,7 @@ def remembered(
     order
         Operations of a substep, arguments first.
     kept
-        Those that are also read from outside.
+        Operations whose results are also read from outside.
     states
         Nodes that already exist and are linear in states.
     level

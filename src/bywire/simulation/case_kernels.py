@@ -1,7 +1,7 @@
 """Kernels for many cases: lanes of the processor's vectors, or threads of a graphics processor.
 
-The engine's name selects the kind. Both have the same interface and compute a group of cases at a
-time.
+The engine's name selects the kind. Both kinds have the same interface and compute a group of cases
+at a time.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from bywire.simulation.program import Program
 
 PAIRED = 32
-"""least number of cases for kernels that alternate two vectors: with fewer, lanes would be idle"""
+"""smallest number of cases for kernels that alternate two vectors; fewer would leave lanes idle"""
 
 
 class CaseKernel(Protocol):
@@ -36,7 +36,7 @@ class CaseKernel(Protocol):
     lanes
         Number of cases in a group.
     at_once
-        Best number of threads that call it.
+        Best number of calling threads.
     """
 
     layout: Layout
@@ -66,8 +66,8 @@ class CaseKernel(Protocol):
 class LaneKernel:
     """Compiled kernel for a group of cases and a selection of signals.
 
-    ``signals``: number of recorded outputs; ``ends``: number of those, the last ones, that are
-    recorded in the first and last rows only.
+    ``signals``: number of recorded outputs. ``ends``: number of the outputs at the end of the list
+    that are recorded only in the first and last rows.
     """
 
     ENTRY = "bw_run_lanes"
@@ -95,8 +95,8 @@ class LaneKernel:
     ) -> LaneKernel:
         """Emit the kernel of a program, and compile it unless it is in the cache.
 
-        ``in_pairs``: whether there are enough cases for two vectors, if these pay; ``ends``: see
-        `LaneKernel`.
+        ``in_pairs``: whether there are enough cases for two vectors, if these pay off. ``ends``:
+        see `LaneKernel`.
         """
         from bywire.simulation.emit_lanes import emit_lanes, takes_turns
         from bywire.simulation.stages import build_stages, layout_of
@@ -136,8 +136,8 @@ class LaneKernel:
             Shape (cases, recorded rows of these frames, signals), of any strides; lanes beyond
             the cases are not recorded.
         ends
-            Destination of the signals of the first and last rows; None for a kernel without such
-            signals, and if no row is an end.
+            Destination for the signals that are recorded only in the first and last rows; None for
+            a kernel without such signals, and if these frames contain neither row.
         """
         own = stimulus.ndim == 3
         apart = [stride // rows.itemsize for stride in rows.strides]
@@ -184,7 +184,7 @@ def case_kernel(
 ) -> CaseKernel:
     """Return the kernel for a number of cases that records some outputs, by index.
 
-    ``ends``: see `LaneKernel`; a graphics processor has none.
+    ``ends``: see `LaneKernel`; kernels for a graphics processor have none.
 
     Raises
     ------

@@ -1,8 +1,8 @@
 """The C compiler, and the folder of compiled kernels: only the user may write there.
 
-bywire runs a file only if it, its folder and every folder above belong to the user or to root, and
-nobody else may write to them. A folder above may also be one like ``/tmp``, in which others cannot
-replace files that are not theirs. Digests detect damage, not intent: anyone who can write a library
+bywire executes a file only if the file, its folder and every parent folder belong to the user or to
+root, and nobody else may write to them. A parent folder may also be like ``/tmp``, where users
+cannot replace each other's files. Digests detect damage, not intent: anyone who can write a library
 can also write its digest. On Windows, permissions are not file modes, and bywire does not check the
 user's folders.
 """
@@ -43,19 +43,19 @@ def cache_folder() -> Path:
 def usable_folder() -> Path:
     """Return an existing, writable folder for kernels that belongs to the user alone.
 
-    It is the cache folder if that is possible, else a new temporary folder for this process.
+    It is the cache folder if possible, otherwise a new temporary folder for this process.
 
     Raises
     ------
     CompilerError
-        When ``BYWIRE_CACHE`` names a folder that others may write to, or a relative one.
+        When ``BYWIRE_CACHE`` is a relative path, or a folder that others may write to.
     """
     folder = cache_folder()
     if not folder.is_absolute():  # relative to the working folder, which may be another user's
         if "BYWIRE_CACHE" in os.environ:
             raise CompilerError(
-                f"BYWIRE_CACHE = {folder} is relative, so that kernels of the working folder would "
-                f"run: name an absolute folder, such as {folder.absolute()}, or unset it",
+                f"BYWIRE_CACHE = {folder} is relative, so bywire would run kernels from the "
+                f"working folder: set an absolute folder, such as {folder.absolute()}, or unset it",
                 name="BYWIRE_CACHE",
                 value=str(folder),
                 valid="an absolute folder",
@@ -64,7 +64,7 @@ def usable_folder() -> Path:
     try:
         for each in reversed(
             (folder, *folder.parents)
-        ):  # one by one, or the folders above get other permissions
+        ):  # one by one, so that parent folders get the same permissions
             each.mkdir(mode=0o700, exist_ok=True)
         with scratch_folder(folder):
             pass
@@ -73,15 +73,15 @@ def usable_folder() -> Path:
     place = open_to_others(folder)
     if not place:
         return folder
-    advice = f"{place} is not yours alone, and others could put code there"
+    advice = f"other users can write to {place}, so they could put code there"
     if "BYWIRE_CACHE" in os.environ:
         raise CompilerError(
-            f"BYWIRE_CACHE = {folder}: {advice}: name a new folder within a folder that only you "
-            "can write to, or unset it",
+            f"BYWIRE_CACHE = {folder}: {advice}: set it to a new folder within a folder that only "
+            "you can write to, or unset it",
             name="BYWIRE_CACHE",
             value=str(folder),
         )
-    _warn_once(f"compiled kernels are not kept: {advice}: set BYWIRE_CACHE to a folder of yours")
+    _warn_once(f"bywire does not cache kernels: {advice}: set BYWIRE_CACHE to your own folder")
     return process_folder()
 
 
@@ -118,7 +118,7 @@ def _is_closed(status: os.stat_result, is_above: bool) -> bool:
 
 
 def _is_private(group: int) -> bool:
-    """Return whether a group is the private group of a user, as many systems create."""
+    """Return whether a group is a user's private group, as many systems create it."""
     if sys.platform == "win32":
         return True
     try:
@@ -153,12 +153,12 @@ def is_intact(library: Path, entry: str) -> bool:
 
 
 def digest_of(library: Path) -> Path:
-    """Return the file with the digest of a library."""
+    """Return the file with a library's digest."""
     return library.with_suffix(".sha256")
 
 
 def _content(path: Path) -> bytes:
-    """Return the bytes of a file that only the user can have written."""
+    """Return a file's bytes if only the user can have written them."""
     place = open_to_others(path)
     if place:
         raise PermissionError(place)
@@ -166,9 +166,9 @@ def _content(path: Path) -> bytes:
 
 
 def _is_whole(content: bytes) -> bool:
-    """Return whether a library is as long as its header states: loading others would crash."""
+    """Return whether a library has the length in its header; loading others would crash."""
     if content[:4] != b"\x7fELF":
-        return len(content) > 4  # of another system
+        return len(content) > 4  # a format of another system
     if len(content) < 64 or content[4] != 2:
         return False
     (table,) = struct.unpack_from("=Q", content, 40)
@@ -184,21 +184,22 @@ def load(library: Path, entry: str) -> ctypes.CDLL:
     Raises
     ------
     CompilerError
-        When the library is not the user's alone, or cannot be loaded.
+        When others may write to the library, or it cannot be loaded.
     """
     try:
         place = open_to_others(library)
         if place:
             raise CompilerError(
-                f"{library} is not loaded: {place} is not yours alone, and others could put code "
-                "there: set BYWIRE_CACHE to a new folder within a folder that only you can write "
-                "to",
+                f"bywire does not load {library}: other users can write to {place}, so they could "
+                "put code there: set BYWIRE_CACHE to a new folder within a folder that only you "
+                "can write to",
                 name=str(library),
             )
         loaded = ctypes.CDLL(str(library.resolve(strict=True)))
         getattr(loaded, entry)
     except (OSError, AttributeError) as error:
-        raise CompilerError(f"{library} cannot be loaded ({error}): delete it") from None
+        text = f"{library} cannot be loaded ({error}): delete it"
+        raise CompilerError(text, name=str(library)) from None
     return loaded
 
 
@@ -210,8 +211,8 @@ def sha256(path: Path) -> str:
 # --- The compiler
 
 # Kernels compare and select all the time: without these flags, maxima become branches. A compiler
-# that may fuse products and sums rounds a case in lanes differently than alone, and differently on
-# another processor: saving 1 % of the time in lanes does not justify that.
+# that fuses products and sums rounds a case in lanes differently from a single run, and differently
+# on another processor. Saving 1 % of the time in lanes does not justify that.
 KERNEL_MATH = (
     "-fno-math-errno",
     "-fno-trapping-math",
@@ -244,7 +245,7 @@ _QUICK = ("-Og", "-fira-region=one", "-DQUICK")
 _GCC_ONLY = frozenset({*_BRANCHES, *_SHARED, *_SCHEDULED, "-fira-region=one"})
 TIMEOUT = 300.0
 _OTHERWISE = (
-    "set BYWIRE_CC to another C compiler, or to none, with which runs are about 200 times slower"
+    "set BYWIRE_CC to another C compiler, or to none, which makes runs about 200 times slower"
 )
 
 
@@ -259,42 +260,42 @@ class Compiler:
     label
         Name in messages and recordings, with its version.
     quick
-        Whether to compile in half the time, for kernels that run a tenth slower, with the same
-        digits by GCC.
+        Whether to compile in half the time. The kernels run a tenth slower; with GCC, results stay
+        bit for bit the same.
     """
 
     command: tuple[str, ...]
     label: str
     quick: bool = False
 
-    def flags(self, wanted: tuple[str, ...]) -> tuple[str, ...]:
-        """Return its flags for those of GCC at full optimization."""
+    def flags(self, optimized: tuple[str, ...]) -> tuple[str, ...]:
+        """Return this compiler's flags for GCC's flags at full optimization."""
         if self.quick:
-            rest = (each for each in wanted if each != "-O2" and each not in _SCHEDULED)
-            wanted = (*_QUICK, *rest)
+            rest = (each for each in optimized if each != "-O2" and each not in _SCHEDULED)
+            optimized = (*_QUICK, *rest)
         is_clang = "clang" in self.label
-        return tuple(flag for flag in wanted if not (is_clang and flag in _GCC_ONLY))
+        return tuple(flag for flag in optimized if not (is_clang and flag in _GCC_ONLY))
 
 
 @cache
 def find_compiler() -> Compiler | None:
-    """Return the system's C compiler, else that of the extra ``bywire[compiler]``, else None.
+    """Return the system's C compiler, else the extra ``bywire[compiler]``'s, else None.
 
-    ``BYWIRE_CC`` names another one; ``BYWIRE_CC=none`` disables compilation. ``BYWIRE_CC_QUICK=1``
-    makes it compile quickly, for many kernels with short runs.
+    ``BYWIRE_CC`` selects another compiler; ``BYWIRE_CC=none`` disables compilation.
+    ``BYWIRE_CC_QUICK=1`` makes it compile quickly, for many kernels with short runs.
     """
-    wanted = os.environ.get("BYWIRE_CC", "")
-    if wanted == "none":
+    requested = os.environ.get("BYWIRE_CC", "")
+    if requested == "none":
         return None
     is_quick = _is_quick()
-    if wanted:
-        if program := find_program(wanted):
+    if requested:
+        if program := find_program(requested):
             return _labeled((program,), is_quick)
         raise CompilerError(
-            f"BYWIRE_CC = {wanted!r} is not a program: "
+            f"BYWIRE_CC = {requested!r} is not a program: "
             "unset it, or set it to a C compiler or 'none'",
             name="BYWIRE_CC",
-            value=wanted,
+            value=requested,
             valid="a C compiler or 'none'",
         )
     commands: list[tuple[str, ...]] = [
@@ -309,7 +310,7 @@ def find_compiler() -> Compiler | None:
 
 
 def bundled_compiler() -> tuple[str, ...] | None:
-    """Return the command of the extra's C compiler, for all systems; None if it is missing."""
+    """Return the command of the extra's C compiler, or None if it is not installed."""
     return module_command("ziglang", "cc")
 
 
@@ -343,7 +344,7 @@ def _labeled(command: tuple[str, ...], is_quick: bool) -> Compiler:
         text = f"the C compiler {command[0]} does not report its version: {_OTHERWISE}"
         raise CompilerError(text, name=command[0])
     first = (done.stdout.splitlines() or [Path(command[0]).name])[0].strip()
-    # Part of the label, which identifies the compiler in kept kernels and recordings.
+    # "quick" is part of the label, which identifies the compiler in cached kernels and recordings.
     return Compiler(command, f"{first}, quick" if is_quick else first, is_quick)
 
 
@@ -365,7 +366,7 @@ def load_library(
     library = compile_library(source, flags, compiler, entry)
     try:
         return load(library, entry), library
-    except CompilerError:  # of another system, or damaged before its digest was written
+    except CompilerError:  # from another system, or damaged before its digest was written
         digest_of(library).unlink(missing_ok=True)
     library = compile_library(source, flags, compiler, entry)
     return load(library, entry), library
@@ -377,7 +378,7 @@ def compile_library(
     """Return the file of the shared library of a C source; compile it unless it is in the cache.
 
     The library is written to a temporary name and renamed, so that processes can compile the same
-    kernel at the same time. A digest beside it detects damage.
+    kernel at the same time. A digest next to it detects damage.
 
     Parameters
     ----------
@@ -408,8 +409,9 @@ def compile_library(
         _compiled_into(library, source, flags, compiler)
     except OSError as error:
         raise CompilerError(
-            f"a compiled kernel cannot be written to {folder} ({error.strerror}): make room there, "
-            "or set BYWIRE_CACHE to another folder"
+            f"bywire cannot write a compiled kernel to {folder} ({error.strerror}): free some "
+            "space there, or set BYWIRE_CACHE to another folder",
+            name=str(folder),
         ) from None
     return library
 
@@ -452,13 +454,17 @@ def _compile(compiler: Compiler, flags: tuple[str, ...], source: Path, target: P
         done = run_program(command, TIMEOUT)
     except subprocess.TimeoutExpired:
         raise CompilerError(
-            f"{compiler.label} took longer than {TIMEOUT:g} s for a kernel: {_OTHERWISE}"
+            f"{compiler.label} took longer than {TIMEOUT:g} s for a kernel: {_OTHERWISE}",
+            name=compiler.label,
+            valid=f"{TIMEOUT:g} s",
         ) from None
     except OSError as error:
         reason = error.strerror or str(error)
-        raise CompilerError(f"{compiler.label} did not run ({reason}): {_OTHERWISE}") from None
+        text = f"{compiler.label} did not run ({reason}): {_OTHERWISE}"
+        raise CompilerError(text, name=compiler.label) from None
     if done.returncode != 0 or not target.exists():
         message = "\n".join(done.stderr.splitlines()[:6]) or "without a message"
         raise CompilerError(
-            f"{compiler.label} rejected a generated kernel:\n{message}\n{_OTHERWISE}"
+            f"{compiler.label} rejected a generated kernel:\n{message}\n{_OTHERWISE}",
+            name=compiler.label,
         )

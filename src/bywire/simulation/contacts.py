@@ -1,4 +1,4 @@
-"""Unilateral contacts: closed contacts and their forces from a small complementarity problem."""
+"""Unilateral contacts: a small complementarity problem determines closed contacts and forces."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from bywire.simulation.symbols import SX, column, depends, nonlinear, scalars, s
 
 
 def active_stiffness(C: Any, d: Any) -> Any:
-    """Return K of the active subset of a contact group, shape (n, n): forces are K times overlaps.
+    """Return the stiffness K of a contact group's active subset, shape (n, n), with forces K d.
 
     Rows and columns of inactive contacts are zero. The active subset S solves the problem
-    F = C_SS^-1 d_S >= 0 in S and C F - d >= 0 outside S. The function takes the subset whose
-    smallest slack is largest: choosing by "slack > 0" would lose all force in exact ties. Slacks
-    of inactive contacts are in force units (divided by C_kk).
+    F = C_SS^-1 d_S >= 0 in S and C F - d >= 0 outside S. The function chooses the subset with the
+    largest minimum slack. Choosing by "slack > 0" would lose all force in exact ties. Slacks of
+    inactive contacts are divided by C_kk, so they have the unit of a force.
 
     Parameters
     ----------
@@ -84,20 +84,20 @@ def _largest(cases: list[tuple[Any, Any]]) -> Any:
     return best
 
 
-# --- Contacts of a model: overlaps, stiffness of closed contacts, consistency
+# --- A model's contacts: overlaps, stiffness of closed contacts, consistency
 
 
 def contact_forces(model: Model, par: ParameterSet, x: Any) -> Any:
     """Return the forces of all contacts at an instant, for recordings.
 
-    The forces of a substep hold at its midpoint: recorded, they would be half a substep old.
+    A substep's forces are valid at its midpoint. In a recording, they would be half a substep old.
     """
     overlap = gaps(model, par, x, x)
     return stiffness(model, par, overlap, exact=True) @ overlap
 
 
 def _groups(model: Model, par: ParameterSet, exact: bool) -> list[tuple[Any, slice, bool]]:
-    """Return compliances, place among all contacts, and whether the pass assumes them open."""
+    """Return each group's compliances, its place, and whether the pass assumes it open."""
     matrices, groups, at = model.compliance(par), [], 0
     rarely = model.usually_open or (False,) * len(matrices)
     for C, rare in zip(matrices, rarely, strict=True):
@@ -127,7 +127,7 @@ def stiffness(model: Model, par: ParameterSet, d: Any, exact: bool) -> Any:
 
 
 def gaps(model: Model, par: ParameterSet, x: Any, xe: Any) -> Any:
-    """Return all overlaps at a state, see `overlaps`."""
+    """Return all overlaps at a state; see `overlaps`."""
     return overlaps(model, par)(x, xe)
 
 
@@ -151,7 +151,9 @@ def overlaps(model: Model, par: ParameterSet) -> Callable[[Any, Any], Any]:
     gap = column([d for group in groups for d in group])
     if any(nonlinear(gap, state)):
         raise SolverError(
-            f"{model.name}: the overlaps of contacts must be affine in the state", name="overlaps"
+            f"{model.name}: the overlaps of contacts must be affine in the state",
+            name="overlaps",
+            valid="affine in the state",
         )
     slope = ca.jacobian(gap, state)
     rest = ca.substitute(gap, state, SX.zeros(n))
@@ -166,15 +168,15 @@ def overlaps(model: Model, par: ParameterSet) -> Callable[[Any, Any], Any]:
 def violations(model: Model, par: ParameterSet, d: Any, F: Any, exact: bool) -> list[Any]:
     """Return values that are positive where a contact set contradicts the computed midpoint.
 
-    If all forces of the assumed set push, and no overlap outside it remains, they are the unique
-    solution. This check is cheaper than choosing the set again.
+    If all forces in the assumed set push, and no overlap remains outside the set, the forces are
+    the unique solution. This check is cheaper than choosing the set again.
 
     Parameters
     ----------
     d, F
         Overlaps and forces of all contacts, shape (n,) each.
     exact
-        As in `stiffness`.
+        See `stiffness`.
     """
     violated: list[Any] = []
     for rows, place, is_open in _groups(model, par, exact):
@@ -182,27 +184,27 @@ def violations(model: Model, par: ParameterSet, d: Any, F: Any, exact: bool) -> 
         closed = rows @ force
         for k in range(overlap.shape[0]):
             lack = overlap[k] - closed[k]
-            # If a force pushes, the lack is zero except for rounding.
+            # If a force pushes, the remaining overlap is zero except for rounding.
             wrong = ca.if_else(force[k] > 0, 0, ca.fmax(lack, -force[k]))
             violated.append(overlap[k] if is_open else wrong)
     return violated
 
 
-# --- Resolution of the contacts by the step: stiff, lightly damped contacts rebound incorrectly
+# --- Resolution of contacts: stiff, lightly damped contacts rebound incorrectly at long steps
 # Contact begins and ends with a substep, each time slightly early or late. Consider a contact
 # without damping that oscillates at omega with its bodies. Its rebound is up to 3 % faster or
 # slower than the approach at h omega = 0.5, 11 % at 1, 25 % at 1.5, and 2.2 times faster at 4,
-# although every substep settles. Damping of at least about half the critical one keeps it bounded.
+# although every substep settles. A damping ratio of at least about 0.5 keeps the error bounded.
 
 SAFE, DAMPED = 1.0, 0.5  # h omega, and damping ratio
-# A contact's compliance may depend on its force: then every slope counts, not only the first.
+# A contact's compliance may depend on its force, so every slope counts, not only the first.
 LOADS = (0.0, *(10.0 ** (0.5 * k) for k in range(-6, 15)))  # N or N m
 
 
 def contact_jacobians(model: Model, par: ParameterSet, x: Any, m: Any, p: Any) -> Any:
     """Return the function (x, m, p) -> Jacobians of dx/dt, contacts open and all closed.
 
-    If the balance is nonlinear in the contact forces, there is one for each of ``LOADS``.
+    If the balance is nonlinear in the contact forces, there is one Jacobian for each of ``LOADS``.
     """
     groups = [C for C in model.compliance(par) if C]
     K = ca.diagcat(*(_stiffness(C) for C in groups)) if groups else SX(0, 0)
@@ -225,7 +227,7 @@ def _stiffness(C: Any) -> Any:
 def unresolved(
     opened: NDArray[np.float64], closed: Sequence[NDArray[np.float64]], step: float
 ) -> list[str]:
-    """Return a warning on the step for the closed contacts of each case; empty without one.
+    """Return each case's warning on the step for closed contacts; empty if the step is fine.
 
     Parameters
     ----------
@@ -255,8 +257,8 @@ def _too_fast(opened: NDArray[np.float64], closed: NDArray[np.float64], step: fl
         if swings.any():
             swinging = omega[k][swings][0]
             texts[k] = (
-                f"a closed contact swings at {swinging / (2 * np.pi):.4g} Hz, too fast for steps "
-                f"of {step * 1e6:g} us: rebounds may be wrong; take steps of at most "
+                f"a closed contact oscillates at {swinging / (2 * np.pi):.4g} Hz, too fast for "
+                f"steps of {step * 1e6:g} us, so rebounds may be wrong. Use steps of at most "
                 f"{SAFE / swinging * 1e6:.2g} us, a softer contact, or more damping"
             )
     return texts

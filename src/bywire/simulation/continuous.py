@@ -1,8 +1,8 @@
 """Plant in continuous time: equations between events, for solvers that locate the events.
 
 Set-valued forces become modes that only events change. A body with dry friction slides forward or
-backward, or sticks until the force on it leaves the bounds of the friction. A state with a limit
-is similar: its force is any push away from the limit. A contact presses or is open.
+backward, or sticks until the applied force exceeds the friction bounds. A state with a limit is
+similar: its force is any push away from the limit. A contact is closed or open.
 """
 
 from __future__ import annotations
@@ -21,20 +21,20 @@ from bywire.simulation.symbols import SX, column, scalars, symbol_tuple
 
 @dataclass(frozen=True)
 class Continuous:
-    """Symbolic functions of a plant between two events.
+    """A plant's symbolic functions between two events.
 
     Parameters
     ----------
     modal
-        States that carry a set-valued force: those with friction, then those with a limit.
+        States with a set-valued force: first those with friction, then those with a limit.
     contacts
         Number of contacts.
     closing
-        ``(x, p) -> closed``: 1 for each contact that presses, else 0.
+        ``(x, p) -> closed``: 1 for each closed contact, else 0.
     equations
         ``(x, m, p, closed) -> (balance, mass, low, high, pressed, lack)``: right-hand sides without
         set-valued forces and factors of the derivatives, (nx,) each; bounds of the set-valued
-        forces; for each contact the force that presses it alone, and its overlap minus its
+        forces; for each contact its force if it alone were closed, and its overlap minus its
         elastic deflection.
     output
         ``(x, m, p, closed, reaction, flow) -> o``: recorded signals; ``flow``: integrals.
@@ -55,7 +55,7 @@ def build_continuous(model: Model, par: ParameterSet) -> Continuous:
     model
         The system.
     par
-        Any parameter set of the required structure: its numbers become arguments.
+        Any parameter set with the required structure; its numbers become arguments.
     """
     names = tuple(par.leaves())
     p, x = SX.sym("p", len(names)), SX.sym("x", len(model.State._fields))
@@ -108,7 +108,7 @@ def _compliance(model: Model, par: ParameterSet) -> Any:
 
 
 def _forces(C: Any, overlap: Any, closed: Any) -> Any:
-    """Return the contact forces F: C F = d for contacts that press, zero for the others."""
+    """Return the contact forces F: C F = d for closed contacts, zero for open ones."""
     n = overlap.shape[0]
     if n == 0:
         return SX(0, 1)

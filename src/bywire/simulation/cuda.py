@@ -1,7 +1,7 @@
 """Many cases on a graphics processor, one thread per case: CUDA C, kernels, memory, and errors.
 
-The compiler, NVIDIA's NVRTC library, needs neither a graphics processor nor a driver. Its results
-are kept beside compiled kernels.
+The compiler, NVIDIA's NVRTC library, needs neither a graphics processor nor a driver. bywire caches
+its results with the compiled kernels.
 """
 
 from __future__ import annotations
@@ -37,10 +37,10 @@ from bywire.simulation.program import Program
 from bywire.simulation.schedule import Layout, Schedule
 from bywire.simulation.stages import Stages, build_stages, layout_of, leaf_count
 
-# Fused products and sums would give other digits than the processor's kernels. The source does not
-# declare each function as one for the device.
+# Fused products and sums would round differently from the processor's kernels. The source does not
+# declare each function as a device function.
 OPTIONS = ("--fmad=false", "--device-as-default-execution-space")
-OTHERWISE = "or take engine = 'auto', which computes on this machine's processor"
+OTHERWISE = "or use engine = 'auto', which computes on this machine's processor"
 
 
 def bindings(name: str) -> ModuleType:
@@ -49,7 +49,7 @@ def bindings(name: str) -> ModuleType:
     Raises
     ------
     DeviceError
-        When the extra that contains it is not installed; the message names the command.
+        When the extra that contains it is not installed; the message contains the command.
     """
     try:
         return importlib.import_module(f"cuda.bindings.{name}")
@@ -63,14 +63,14 @@ def bindings(name: str) -> ModuleType:
 
 
 def cuda_binary(source: str, capability: int, entry: str) -> bytes:
-    """Return the code of a kernel for a graphics processor; compile it unless it is kept.
+    """Return a kernel's code for a graphics processor; compile it unless it is in the cache.
 
     Parameters
     ----------
     source
         CUDA C of the kernel.
     capability
-        Compute capability of the processor, ten times the major number plus the minor one, for
+        The processor's compute capability: ten times the major number plus the minor number, for
         instance 90.
     entry
         Name of the kernel's function.
@@ -94,14 +94,18 @@ def cuda_binary(source: str, capability: int, entry: str) -> bytes:
         _, known = nvrtc.nvrtcGetSupportedArchs()
     except RuntimeError:  # the bindings are installed, but the library is not
         raise DeviceError(
-            f"NVIDIA's compiler NVRTC cannot be loaded; {how_to_install('gpu')}; {OTHERWISE}"
+            f"NVIDIA's compiler NVRTC cannot be loaded; {how_to_install('gpu')}; {OTHERWISE}",
+            name="NVRTC",
         ) from None
     target = max((each for each in known if each <= capability), default=0)
     if not target:
         raise DeviceError(
             f"NVRTC {version[0]}.{version[1]} compiles for graphics processors of compute "
             f"capability {min(known) / 10:.1f} and later, not for {capability / 10:.1f}: install "
-            f"an older release of it, {OTHERWISE}"
+            f"an older release of NVRTC, {OTHERWISE}",
+            name="NVRTC",
+            value=f"{capability / 10:.1f}",
+            valid=f"{min(known) / 10:.1f} and later",
         )
     is_own = target == capability
     options = (f"--gpu-architecture={'sm' if is_own else 'compute'}_{target}", *OPTIONS)
@@ -129,10 +133,11 @@ def _compiled(nvrtc: Any, text: str, options: tuple[str, ...], is_own: bool) -> 
             given = [each.encode() for each in options]
             (error,) = nvrtc.nvrtcCompileProgram(program, len(given), given)
         if int(error):
-            said = _text(nvrtc.nvrtcGetProgramLogSize, nvrtc.nvrtcGetProgramLog, program)
-            lines = said.rstrip(b"\0").decode(errors="replace").splitlines()
+            log = _text(nvrtc.nvrtcGetProgramLogSize, nvrtc.nvrtcGetProgramLog, program)
+            lines = log.rstrip(b"\0").decode(errors="replace").splitlines()
             message = "\n".join(line for line in lines if line.strip())[:2000] or error.name
-            raise CompilerError(f"NVRTC rejected a generated kernel:\n{message}\n{OTHERWISE}")
+            text = f"NVRTC rejected a generated kernel:\n{message}\n{OTHERWISE}"
+            raise CompilerError(text, name="NVRTC")
         if is_own:
             return _text(nvrtc.nvrtcGetCUBINSize, nvrtc.nvrtcGetCUBIN, program)
         return _text(nvrtc.nvrtcGetPTXSize, nvrtc.nvrtcGetPTX, program)
@@ -151,8 +156,8 @@ def _text(size_of: Any, fill: Any, program: Any) -> bytes:
 # --- The device and its driver
 
 VARIABLE = "BYWIRE_GPU"
-"""environment variable with the number of the graphics processor, if there are several"""
-_NO_DRIVER = "the driver's library is not there"
+"""environment variable with the graphics processor's number, if there are several"""
+_NO_DRIVER = "the driver's library is missing"
 _OUT_OF_MEMORY = 2  # CUDA_ERROR_OUT_OF_MEMORY
 _MEGA = 1e6
 
@@ -214,39 +219,40 @@ class CudaDevice:
 
     @contextmanager
     def _current(self) -> Iterator[None]:
-        """Let only the calling thread use the device, which has a single queue anyway."""
+        """Reserve the device for the calling thread; the device has a single queue anyway."""
         with self._lock:
             self._checked(self._driver.cuCtxSetCurrent(self._context))
             yield
 
-    def _checked(self, answer: Any, wanted: int = 0) -> Any:
-        """Return the results of a function of the driver, without its status.
+    def _checked(self, answer: Any, size: int = 0) -> Any:
+        """Return the results of a driver function, without its status.
 
         Raises
         ------
         DeviceError
-            When the status is an error; ``wanted``: number of requested bytes.
+            When the status is an error. ``size``: number of requested bytes.
         """
         status, *values = answer
         if not int(status):
             return values[0] if len(values) == 1 else values
         if int(status) == _OUT_OF_MEMORY:
-            unknown, *sizes = self._driver.cuMemGetInfo()  # it may have no free memory at all
+            unknown, *sizes = self._driver.cuMemGetInfo()  # it may have no free memory
             left = (
                 ""
                 if int(unknown)
                 else "{:.4g} of {:.4g} MB are free: ".format(*(size / _MEGA for size in sizes))
             )
-            what = f"no room for {wanted / _MEGA:.3g} MB" if wanted else "no free memory"
+            what = f"no room for {size / _MEGA:.3g} MB" if size else "no free memory"
             raise DeviceError(
-                f"{self.label} has {what}: {left}end other programs on it, name another one by "
-                f"{VARIABLE}, {OTHERWISE}",
+                f"{self.label} has {what}: {left}end other programs on it, select another one "
+                f"with {VARIABLE}, {OTHERWISE}",
                 name=self.label,
             )
-        _, said = self._driver.cuGetErrorString(status)
-        text = (said or b"").decode(errors="replace") or status.name
+        _, reason = self._driver.cuGetErrorString(status)
+        text = (reason or b"").decode(errors="replace") or status.name
         where = getattr(self, "label", "a graphics processor")
-        raise DeviceError(f"{where} failed: {text} ({status.name}); start again, {OTHERWISE}")
+        message = f"{where} failed: {text} ({status.name}); start again, {OTHERWISE}"
+        raise DeviceError(message, name=where, value=status.name)
 
 
 class Memory:
@@ -306,7 +312,7 @@ class Memory:
 
 @cache
 def find_device() -> CudaDevice:
-    """Return the graphics processor to use: the first one, or that of ``BYWIRE_GPU``.
+    """Return the graphics processor to use: the first one, or the one in ``BYWIRE_GPU``.
 
     Raises
     ------
@@ -321,44 +327,46 @@ def find_device() -> CudaDevice:
         status, count = driver.cuInit(0)[0], 0
         if not int(status):
             status, count = driver.cuDeviceGetCount()
-        said = "" if not int(status) else status.name
+        reason = "" if not int(status) else status.name
     except RuntimeError:
-        said, count = _NO_DRIVER, 0
-    if said or not count:
-        why = f" ({said})" if said else ""
+        reason, count = _NO_DRIVER, 0
+    if reason or not count:
+        why = f" ({reason})" if reason else ""
         raise DeviceError(
             f"engine 'cuda' finds no NVIDIA graphics processor{why}: check that nvidia-smi lists "
             f"one, {OTHERWISE}",
             name="engine",
             value="cuda",
+            valid="engine = 'auto'",
         )
-    wanted = os.environ.get(VARIABLE, "0")
-    number = read_count(wanted)
+    requested = os.environ.get(VARIABLE, "0")
+    number = read_count(requested)
     if number is None or number >= count:
         raise ParameterError(
-            f"{VARIABLE} = {quoted(wanted)} is not a graphics processor: there "
+            f"{VARIABLE} = {quoted(requested)} is not a graphics processor: there "
             f"{'is one, 0' if count == 1 else f'are {count}, 0 to {count - 1}'}",
             name=VARIABLE,
-            value=wanted,
+            value=requested,
             valid="0" if count == 1 else f"0 to {count - 1}",
         )
     return CudaDevice(driver, number)
 
 
 # --- Kernels of many cases
-# The processor computes cases in batches that fit into its memory, and a batch in pieces of time.
-# The rows of a piece are fetched before the next one, and no piece blocks a display for long.
+# The graphics processor computes cases in batches that fit into its memory, and a batch in pieces
+# of time. The host fetches a piece's rows before the next piece, and no piece blocks a display for
+# long.
 #
-# Each number of a case is next to the same number of the next case, so that threads that run
-# together access adjacent memory. Rows have the layout of the caller's array. Each thread has its
-# own branches and cuts, like a single run.
+# Each number of a case is next to the same number of the next case, so threads that run together
+# access adjacent memory. Rows have the layout of the caller's array. Each thread has its own
+# branches and cuts, like a single run.
 
 ENTRY = "bw_run_cases"
 """name of the kernel's function"""
 THREADS = 64
-"""threads of a block; they share a processor's registers, and each takes as many as possible"""
+"""threads per block; they share a multiprocessor's registers, and each uses as many as possible"""
 
-# After `emission.PLAN`: number of cases, whether each has its own stimulus, the first row of the
+# After `stages.PLAN`: number of cases, whether each has its own stimulus, the first row of the
 # stimulus in memory, and the distances between the entries of two cases, rows and signals.
 _BEGIN = """const int64_t cases = plan[8 + {tasks}], own = plan[9 + {tasks}];
   const int64_t ahead = plan[10 + {tasks}], by_case = plan[11 + {tasks}];
@@ -399,7 +407,7 @@ def emit_cuda(stages: Stages) -> str:
 
 MOST = 2**15
 """cases of a batch: number of threads that the largest processors hold at a time"""
-_SUBSTEPS = 5000  # of a piece of time
+_SUBSTEPS = 5000  # substeps per piece of time
 _SHARE = 0.5  # share of the free memory for a batch; threads' stacks and other data also need some
 _FLOAT = 8  # bytes
 
@@ -432,7 +440,7 @@ class CudaKernel:
         Raises
         ------
         DeviceError
-            When memory does not hold a single case.
+            When a single case does not fit into memory.
         """
         free = self._device.free()
         size = self._size(schedule)
@@ -440,7 +448,10 @@ class CudaKernel:
         if most < 1:
             raise DeviceError(
                 f"{self._device.label} has {free / 1e6:.3g} MB free, of which a case may use half, "
-                f"but it needs {size / 1e6:.3g} MB: record fewer signals, or less often"
+                f"but a case needs {size / 1e6:.3g} MB: record fewer signals, or less often",
+                name=self._device.label,
+                value=f"{size / 1e6:.3g} MB",
+                valid=f"{free / 1e6:.3g} MB free",
             )
         batches = -(-count // most)
         sized = copy.copy(self)
@@ -484,9 +495,9 @@ class CudaKernel:
                 ahead = first // schedule.stimulus_frames
                 memory.put(given, stimulus[ahead : last // schedule.stimulus_frames + 1])
                 recording.begin(rows_between(schedule, first, last))
-                said = [*plan_array(schedule, first, last, self._signals)]
-                said += [self.lanes, own, ahead, *recording.apart]
-                memory.put(plan, np.array(said, dtype=np.int64))
+                numbers = [*plan_array(schedule, first, last, self._signals)]
+                numbers += [self.lanes, own, ahead, *recording.apart]
+                memory.put(plan, np.array(numbers, dtype=np.int64))
                 memory.run(
                     self._function,
                     -(-self.lanes // THREADS),
@@ -506,7 +517,7 @@ class CudaKernel:
 
 
 def _frames(schedule: Schedule) -> int:
-    """Return the frames of a piece of time."""
+    """Return the number of frames in a piece of time."""
     return max(_SUBSTEPS // schedule.substeps, 1)
 
 
@@ -525,7 +536,7 @@ class _Recording:
         self.begin(0)
 
     def begin(self, count: int) -> None:
-        """Make room for a number of further rows."""
+        """Make room for more rows."""
         shape = self._lanes, count, self._rows.shape[2]
         self._target = self._rows[:, self._at : self._at + count]
         own = self._room[: math.prod(shape)].reshape([shape[axis] for axis in self._order])
@@ -546,7 +557,7 @@ class _Recording:
 def rows_between(schedule: Schedule, begin: int, end: int) -> int:
     """Return the number of rows recorded from frame begin to before end, or to the run's end.
 
-    The kernel counts them in the same way, by its plan.
+    The kernel counts them the same way, by its plan.
     """
     every = schedule.record_frames
     return -(-(end + int(end == schedule.frames)) // every) - -(-begin // every)
@@ -563,13 +574,13 @@ def _most_rows(schedule: Schedule) -> int:
 
 
 def _pieces(schedule: Schedule, begin: int, end: int) -> list[tuple[int, int]]:
-    """Return the frames at which pieces begin and end; at the end of a run only its row remains."""
+    """Return the frames at which pieces begin and end; at a run's end only its row remains."""
     edges = [*range(begin, end, _frames(schedule)), end]
     return list(pairwise(edges)) or [(begin, end)]
 
 
 class CudaEngine:
-    """Single runs on the graphics processor: a batch of one; slow, with the digits of a batch."""
+    """Single runs on the graphics processor: slow, but bit for bit the same as in a batch."""
 
     def __init__(self, program: Program) -> None:
         self._kernel = CudaKernel(find_device(), build_stages(program))

@@ -1,7 +1,7 @@
-"""Kernel of an ensemble: as many cases side by side as the processor's vectors hold.
+"""Kernel of an ensemble: as many cases side by side as fit into the processor's vectors.
 
-A short substep spends as much time on the latency of dependent operations as on computing. The
-kernel then alternates two vectors, statement by statement: each computes while the other waits.
+In a short substep, the latency of dependent operations costs as much time as computing. The kernel
+then alternates two vectors, statement by statement: each computes while the other waits.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ class Lanes:
         self._later = [n for n in self.mode.rest if n not in judged]
 
     def _read_by(self, roots: Iterable[Node]) -> frozenset[Node]:
-        """Return the operations that roots need, at all rates of change."""
+        """Return the operations that roots need, however often they change."""
         return frozenset(needed(self.graph, roots, lambda _: False))
 
     def _leaf(self, kind: str, index: int) -> str:
@@ -87,7 +87,7 @@ class Lanes:
         return self.lines(order)
 
     def lines(self, order: Sequence[Node], later: Sequence[Node] = ()) -> list[str]:
-        """Return the statements of nodes; ``later``: further nodes that read them."""
+        """Return the statements of nodes; ``later``: other nodes that read them."""
         return branching_statements(self.graph, order, self.name, "const V ", VECTOR_C, later)
 
     def number(self, node: Node) -> str:
@@ -95,7 +95,7 @@ class Lanes:
         return as_number(self.graph, node, self.name, VECTOR_C)
 
     def once(self) -> list[str]:
-        """Return the statements for values that depend on parameters alone."""
+        """Return the statements for values that depend only on parameters."""
         ticks = [n for task in self.stages.ticks for n in task]
         roots = [*self.pass_roots, *self.coefficients, *ticks, *self.stages.output]
         order = needed(self.graph, roots, lambda _: False)
@@ -109,7 +109,7 @@ class Lanes:
         return self.lines([n for n in order if self.level[n] == 1 and n not in own])
 
     def mode_state(self) -> list[str]:
-        """Return the declarations of values that depend on the mode only, and of the mode."""
+        """Return the declarations of values that depend only on the mode, and of the mode."""
         if not self.mode.atoms:
             return []
         values = [f"V {self.name(n)} = SET(0.0);" for n in self.mode.values]
@@ -150,16 +150,16 @@ class Lanes:
     def finished(self, is_summed: bool = True) -> list[str]:
         """Return the statements of the results that the flag does not need.
 
-        ``is_summed``: whether those of `sums` are already written.
+        ``is_summed``: whether the statements of `sums` are already written.
         """
         there = self._read_by(self.products if is_summed else ())
-        wanted = self._read_by(self.results.values()) - there
-        return self.lines([n for n in self._later if n in wanted])
+        needed_nodes = self._read_by(self.results.values()) - there
+        return self.lines([n for n in self._later if n in needed_nodes])
 
 
-# --- Lanes for whose substep one ordinary pass does not suffice, next to others
-# These lanes raise a flag and are settled one by one. The remaining results and integrands are then
-# computed for all lanes, and those of the settled lanes are replaced.
+# --- Lanes whose substep needs more than one ordinary pass
+# These lanes raise a flag, and the kernel settles them one by one. It then computes the remaining
+# results and integrands for all lanes, and replaces those of the settled lanes.
 
 
 def repeated_lanes(t: Lanes) -> list[str]:
@@ -177,9 +177,9 @@ def repeated_lanes(t: Lanes) -> list[str]:
 
 
 def repeated_results(t: Lanes) -> list[str]:
-    """Return the statements that take over the results of settled lanes.
+    """Return the statements that use the results of settled lanes.
 
-    For these lanes, they subtract the integrands of the pass from the sums again.
+    For these lanes, they subtract the pass's integrands from the sums again.
     """
     new, before, settled = t.marked("new", "before", "settled")
     return [
@@ -192,8 +192,8 @@ def repeated_results(t: Lanes) -> list[str]:
 def settling_function(t: Lanes) -> str:
     """Return the C function that settles the flagged lanes one by one.
 
-    It works on copies: a vector whose lanes are addressed would always stay in memory. For a lane
-    that is not in doubt, the velocities of the ordinary pass are valid.
+    It works on copies, since a vector with addressed lanes would always stay in memory. For a lane
+    that is not in doubt, the ordinary pass's velocities are valid.
     """
     stages, nx = t.stages, t.layout.length["x"]
     targets = {name: k for k, name in enumerate(t.results)}
@@ -250,13 +250,13 @@ def _handed_over(t: Lanes) -> list[str]:
 
 
 def _memory(t: Lanes) -> list[int]:
-    """Return the entries of the memory that a rare pass reads."""
+    """Return the memory entries that a rare pass reads."""
     read = t.graph.read_by(rare_roots(t.stages))
     return [k for k in range(t.layout.length["m"]) if t.graph.leaf("m", k) in read]
 
 
 def _flows(t: Lanes) -> list[str]:
-    """Return the integrals that signals read; the others stay as they are."""
+    """Return the integrals that signals read; the others stay unchanged."""
     read = t.graph.read_by(t.stages.output)
     return [f"q{k}" for k in range(t.layout.length["q"]) if t.graph.leaf("q", k) in read]
 
@@ -273,9 +273,9 @@ int64_t bw_run_lanes(const double *restrict p, double h_, const double *restrict
     double *restrict state, const int64_t *restrict plan, double *restrict rec,
     double *restrict ends)"""
 
-# As `emission.PLAN`; then whether each lane has its own stimulus, the number of recorded lanes, the
+# `stages.PLAN`, then whether each lane has its own stimulus, the number of recorded lanes, the
 # distances between the entries of two lanes, rows and signals, the frames of the first and last
-# rows, and the distance between two signals recorded in these rows only.
+# rows, and the distance between two signals that are recorded only in these rows.
 PLAN = """const int64_t begin = plan[0], end = plan[1], last = plan[2], substeps = plan[3];
   const int64_t stim = plan[4], every = plan[5];
   const int64_t own = plan[{at}], used = plan[{at} + 1], by_lane = plan[{at} + 2];
@@ -283,8 +283,8 @@ PLAN = """const int64_t begin = plan[0], end = plan[1], last = plan[2], substeps
   const int64_t end0 = plan[{at} + 5], end1 = plan[{at} + 6], by_end = plan[{at} + 7];"""
 
 
-# Rows are written eight at a time: a signal of a lane then fills a cache line, on one of a hundred
-# or more pages that are written in turn.
+# Rows are written eight at a time, so a lane's signal fills a cache line. The lines are on a
+# hundred or more pages, which are written in turn.
 _PUT = """#define HELD 8
 
 static __attribute__((noinline)) void put_rows(const V *held, int64_t signals, int64_t rows,
@@ -297,7 +297,7 @@ static __attribute__((noinline)) void put_rows(const V *held, int64_t signals, i
 """
 
 
-# Largest number of operations of a substep with two vectors: more do not fit into registers.
+# Largest number of a substep's operations with two vectors; more do not fit into registers.
 _SHORT = 160
 
 
@@ -311,7 +311,8 @@ def emit_lanes(stages: Stages, in_turn: bool = False, ends: int = 0) -> str:
     """Return the C source of the kernel for one vector of cases, or for two that alternate.
 
     A long call of the kernel ends early and returns the frame at which to continue.
-    ``ends``: number of signals, the last ones, that are recorded in the first and last rows only.
+    ``ends``: number of signals at the end of the list that are recorded only in the first and last
+    rows.
     """
     t = Lanes(stages)
     turns = [Lanes(stages, at, 2) for at in (0, 1)] if in_turn else [t]
@@ -401,10 +402,10 @@ def _ahead(t: Lanes) -> list[str]:
 
 
 def _commit(t: Lanes) -> list[str]:
-    """Return the code that takes over the results.
+    """Return the code that commits the results.
 
-    Results on which no flag depends are computed only here. Nothing reads the previous values any
-    longer, so each result can overwrite its own. Earlier, both would have to be kept.
+    Results on which no flag depends are computed only here. Nothing reads the previous values after
+    this point, so each result can overwrite its own. Earlier, both would have to be kept.
     """
     results = [
         *t.finished(),

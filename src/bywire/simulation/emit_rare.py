@@ -1,9 +1,10 @@
-"""C text of rare substeps, for which one ordinary pass does not suffice.
+"""C code of rare substeps, which need more than one ordinary pass.
 
-Its functions are self-contained. For any step length, they compute all values that do not depend on
-parameters only. A substep in which a velocity with dry friction changes its sign is cut at the
-zero crossing, where friction and acceleration jump. Within each part every velocity keeps its sign.
-In the next part, a velocity that has reached zero rests or moves on, depending on its bounds.
+The functions are self-contained. For any step length, they compute all values except those that
+depend only on parameters. If a velocity with dry friction changes its sign, the substep is cut at
+the zero crossing, where friction and acceleration jump. Every velocity keeps its sign within each
+part. In the next part, a velocity that has reached zero rests or moves on, depending on its
+bounds.
 """
 
 from __future__ import annotations
@@ -17,7 +18,8 @@ from bywire.simulation.schedule import ATTEMPTS, CAP, CLOSE, EDGE, NEAR, STILL, 
 from bywire.simulation.scheme import FITTING, NEVER, NOTHING, RESIDUAL
 from bywire.simulation.stages import STATE, Stages, indented, leaf_namer, statements
 
-# The same as ``scheme.project_exact``, which explains it, but as a loop: a tenth of the code.
+# The same method as ``scheme.project_exact``, which explains it, but as a loop: a tenth of the
+# code.
 PROJECTION = """
 // Solve S w = b for the moving rows, by elimination on the diagonal; nothing if no row moves.
 static inline void with_signs(const double *S, const double *c, const double *low,
@@ -283,7 +285,7 @@ static APART int located(const double *c, double h, const double *m, const doubl
 # --- Code that depends on the model
 
 _TRIES = 200_000
-APART = "__attribute__((noinline))"  # but fast: compilers optimize cold functions for size
+APART = "__attribute__((noinline))"  # not "cold": compilers optimize cold functions for size
 
 
 def rare_substep(stages: Stages) -> str:
@@ -315,7 +317,7 @@ def most_tries(stages: Stages) -> int:
 
 
 def rare_header(stages: Stages) -> str:
-    """Return the definitions of a model for the C text that all models share."""
+    """Return a model's definitions for the C code that all models share."""
     nx, nr, nq = (len(stages.exact[kind]) for kind in ("x", "r", "q"))
     velocities = stages.velocities
     return f"""#define APART {APART}
@@ -334,7 +336,7 @@ static const int velocity[] = {{{", ".join(map(str, velocities or (0,)))}}};"""
 
 
 def rare_results(results: dict[str, list[Node]]) -> list[Node]:
-    """Return the results of a pass in the order of o."""
+    """Return a pass's results in the order of the array o."""
     return [node for kind in (*STATE, "jump", "doubt") for node in results[kind]]
 
 
@@ -344,7 +346,7 @@ def rare_roots(stages: Stages) -> list[Node]:
 
 
 def _constants(stages: Stages) -> dict[Node, int]:
-    """Return the indices of values that depend on parameters only and are read by other nodes."""
+    """Return the indices of values that depend only on parameters and that other nodes read."""
     graph, level = stages.graph, Levels(stages.graph, {"p": 0})
     roots = rare_roots(stages)
     order = needed(graph, roots, lambda _: False)
@@ -372,7 +374,7 @@ def _constants_function(graph: Graph, slots: dict[Node, int]) -> str:
 
 
 def _exact(stages: Stages, slots: dict[Node, int]) -> list[str]:
-    """Return the statements of the exact pass, which solves for the forces between its halves."""
+    """Return the exact pass's statements; it solves for the forces between its two halves."""
     posed = _lines(stages, stages.posed, slots, "posed")
     known = frozenset(needed(stages.graph, stages.posed, slots.__contains__))
     after = _lines(stages, rare_results(stages.exact), slots, "o", known)
@@ -393,7 +395,7 @@ def _lines(
     target: str = "o",
     known: Collection[Node] = frozenset(),
 ) -> list[str]:
-    """Return the statements that compute roots, some of whose operations are already computed."""
+    """Return the statements that compute roots, without operations that are already computed."""
     graph = stages.graph
     other = leaf_namer(graph, _leaf, lambda node: f"v{node}")
 

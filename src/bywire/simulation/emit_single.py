@@ -1,7 +1,7 @@
 """Kernel of a single run: one function with local scalars only.
 
-The code around its statements depends on the caller: a run on the processor, or a graphics
-processor's thread for each of many cases.
+The code around its statements depends on the caller: a run on the processor, or one thread of a
+graphics processor per case.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class Caller:
     begin
         Statements after the plan, which store the parameters in ``p``.
     stimulus, entry
-        Format strings of number ``k`` of a stimulus row ``uk`` and of the state vector.
+        Format strings for number ``k`` of a stimulus row ``uk`` and of the state vector.
     row
         Start of the stimulus row; ``nu``: its length.
     record
@@ -99,8 +99,8 @@ ONE_RUN = replace(
 def emit_single(stages: Stages, caller: Caller = ONE_RUN) -> str:
     """Return the C source of the kernel for one run.
 
-    Values that depend on parameters only are computed once, those that depend on a tick once per
-    frame, the others in every substep.
+    The kernel computes values that depend only on parameters once, values that depend on a tick
+    once per frame, and all others in every substep.
     """
     graph, level, layout = stages.graph, stages.level(), layout_of(stages)
 
@@ -224,7 +224,7 @@ def emit_single(stages: Stages, caller: Caller = ONE_RUN) -> str:
 
 
 def _mode_state(mode: Modes, name: Namer) -> list[str]:
-    """Return the declarations of values that depend on the mode only, and of an unknown mode."""
+    """Return the declarations of values that depend only on the mode, and of an unknown mode."""
     if not mode.atoms:
         return []
     return [*(f"double {name(n)} = 0.0;" for n in mode.values), "uint64_t mode = 0, fresh = 1;"]

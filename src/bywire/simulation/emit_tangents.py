@@ -1,8 +1,8 @@
 """Kernel of a run with exact forward sensitivities: the value once, its tangents in lanes.
 
-The instant at which a substep is cut depends on the differentiated quantity: v(t) = 0 determines t,
-and the parts before and after become longer and shorter with it. In this way derivatives include
-the jump of the acceleration (saltation), with all computations before and after it.
+The instant at which a substep is cut depends on the parameters: v(t) = 0 determines t, and the
+lengths of the parts before and after it change with t. Derivatives therefore include the jump of
+the acceleration (saltation), with all computations before and after it.
 """
 
 from __future__ import annotations
@@ -146,7 +146,7 @@ static APART void exact_tangents(int lanes, const double *restrict p, double h,
 
 
 def located_statements(layout: Layout) -> list[str]:
-    """Return the statements that repeat or cut a substep and take over its result."""
+    """Return the statements that repeat or cut a substep and commit its result."""
     nx, nm, q, m = (layout.length["x"], layout.length["m"], layout.start["q"], layout.start["m"])
     names = [f"{kind}{k}" for kind in STATE for k in range(layout.length[kind])]
     return [
@@ -188,8 +188,8 @@ class _Tangents:
         self.framed = [n for n in framed if self.level[n] == 1]
         hoisted = [n for n in (*self.once, *self.framed) if self.lane[n]]
         self.slot = {node: k for k, node in enumerate(hoisted)}
-        # Compilers do not vectorize nested selections by truth values that all lanes share:
-        # in the substep each lane has its own, as a number.
+        # Compilers do not vectorize nested selections by truth values that all lanes share. In the
+        # substep, each lane therefore has its own copy, as a number.
         operations = (self.graph.nodes[n] for n in self.block(self.pass_roots, 2) if self.lane[n])
         truths = [o.args[0] for o in operations if o.op in ("select", "if_else_zero")]
         self.truths = [n for n in dict.fromkeys(truths) if not self.lane[n]]
@@ -217,7 +217,7 @@ class _Tangents:
         return {"p": f"p[{index}]", "u": f"uk[{index}]"}.get(kind, f"{kind}{index}")
 
     def truth_lines(self) -> list[str]:
-        """Return the statements that keep the truth values of a substep for every lane."""
+        """Return the statements that store a substep's truth values for every lane."""
         if not self.truths:
             return []
         values = [as_number(self.graph, n, self.name) for n in self.truths]

@@ -1,13 +1,13 @@
 """Programs and kernels of models, built once per structure, and the choice of the engine.
 
-To find the compiled kernel of a model, a command would have to build, simplify and emit its whole
-graph again. Each command therefore keeps the data that runs need next to the library: its name and
+To find a model's compiled kernel, a command would have to build, simplify and emit its whole graph
+again. Each command therefore caches the data that runs need next to the library: its name and
 digest, the layout of the state vector, and the Jacobians for checking the contacts. For kernels in
 lanes there is one entry for every selection of outputs. Everything else is built on demand.
 
-A stale entry would silently give wrong numbers. bywire therefore keeps kernels of its own models
-only, whose files are all in `source_state`: a user's model may depend on unknown files, for
-instance on tables. A model that fails a check is never kept.
+A stale entry would silently give wrong numbers. bywire therefore caches only kernels of its own
+models, whose files are all in `source_state`. A user's model may depend on unknown files, such as
+tables. bywire never caches a model that fails a check.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ if TYPE_CHECKING:
 
 
 class Keepable(Protocol):
-    """Kernel, with the data that can be kept."""
+    """Kernel with data that can be cached."""
 
     ENTRY: str
     layout: Layout
@@ -62,7 +62,7 @@ class Keepable(Protocol):
 
 
 class Identity(int):
-    """Address of an object, which identifies it within this process."""
+    """An object's address, which identifies it within this process."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ class KeptKernel:
     Parameters
     ----------
     library
-        None if that command needed no kernel for single runs; the model still passed its checks.
+        None if that command did not need a kernel for single runs; the model passed its checks.
     compiler
         Label of the compiler that compiled it.
     jacobians
@@ -89,13 +89,13 @@ class KeptKernel:
 
     @cached_property
     def contact_jacobians(self) -> Any:
-        """As in ``Program``."""
+        """See ``Program``."""
         return ca.Function.deserialize(self.jacobians)
 
 
 @dataclass(frozen=True)
 class Place:
-    """File of a structure's kept kernel, and the state of the sources for which it is valid.
+    """File of a structure's cached kernel, and the state of the sources for which it is valid.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ class Place:
         return Place(self.file.with_name(f"lanes-{name}.json"), self.state)
 
     def kept(self) -> KeptKernel | None:
-        """Return the kept kernel; None if it is missing, stale or damaged."""
+        """Return the cached kernel, or None if it is missing, stale or damaged."""
         try:
             digest, _, text = self.file.read_text(encoding="utf-8").partition("\n")
             if digest != _digest(text):
@@ -135,7 +135,7 @@ class Place:
             return None
 
     def keep(self, kernel: Keepable, contact_jacobians: Any = None, digest: str = "") -> None:
-        """Keep a kernel with the digest of its C, unless a file has changed since it was loaded."""
+        """Cache a kernel with its C code's digest, unless a file has changed since loading."""
         self._keep(
             contact_jacobians,
             {
@@ -156,13 +156,13 @@ class Place:
     def _keep(self, contact_jacobians: Any, kernel: dict[str, Any]) -> None:
         if _running_state() != self.state:
             return
-        said = "" if contact_jacobians is None else contact_jacobians.serialize()
-        text = json.dumps({"state": self.state, "jacobians": said, **kernel})
+        serialized = "" if contact_jacobians is None else contact_jacobians.serialize()
+        text = json.dumps({"state": self.state, "jacobians": serialized, **kernel})
         keep_text(self.file, f"{_digest(text)}\n{text}")
 
 
 def place_of(model: Model, structure: tuple[object, ...]) -> Place | None:
-    """Return the place of the kernel of a structure; None if it must not be kept.
+    """Return the place of a structure's kernel, or None if it must not be cached.
 
     Parameters
     ----------
@@ -184,13 +184,13 @@ def place_of(model: Model, structure: tuple[object, ...]) -> Place | None:
 
 
 def _running_state() -> str:
-    """Return the digest of the sources if this process certainly runs them; else an empty text."""
+    """Return the sources' digest if this process certainly runs them; otherwise an empty text."""
     state = source_state()
     return state.digest if state.is_running else ""
 
 
 def _is_ours(kind: type) -> bool:
-    """Return whether a class and its bases in bywire are defined in the modules that they name."""
+    """Return whether a class and its bases in bywire are defined in their ``__module__``."""
     for base in kind.__mro__:
         if base.__module__.partition(".")[0] in ("builtins", "typing", "pydantic"):
             continue
@@ -249,7 +249,7 @@ def built_once(build: Callable[_P, _T]) -> Callable[_P, _T]:
 
 
 def engine_names() -> tuple[str, ...]:
-    """Return the names of all engines: those of the simulation, then declared engines."""
+    """Return the names of all engines: the simulation's engines, then declared engines."""
     return ("auto", "compiled", "virtual-machine", CUDA, *declared_engines())
 
 
@@ -272,12 +272,12 @@ class Engine(Protocol):
 
 
 class Prepared:
-    """Program and engines of one structure of a model.
+    """Program and engines for one structure of a model.
 
-    The program is built immediately, so that an invalid model fails here. If an earlier command
-    kept the kernel, the program is built on demand.
+    The program is built immediately, so an invalid model fails here. If an earlier command
+    cached the kernel, the program is built on demand.
 
-    ``place``: place of kept kernels of this structure; None if they must not be kept.
+    ``place``: place of this structure's cached kernels; None if they must not be cached.
     """
 
     def __init__(self, model: Model, par: ParameterSet) -> None:
@@ -314,15 +314,15 @@ class Prepared:
 
     @property
     def contact_jacobians(self) -> Any:
-        """As in ``Program``."""
+        """See ``Program``."""
         kept = self._kept
         return self.program.contact_jacobians if kept is None else kept.contact_jacobians
 
     @property
     def digest(self) -> str:
-        """Digest of the equations of this structure: that of its kernel's C.
+        """Digest of this structure's equations: the digest of its kernel's C code.
 
-        Comments, names and files of the Python source do not affect the C.
+        Comments, names and files of the Python source do not affect the C code.
         """
         with _LOCK:
             if not self._digest:
@@ -333,7 +333,7 @@ class Prepared:
             return self._digest
 
     def keep_model(self) -> None:
-        """Record that the model passed its checks, unless that is or will be kept with a kernel."""
+        """Record that the model passed its checks, unless a cached kernel already implies it."""
         if self.place is not None and self._kept is None and not self._engines:
             self.place.keep_model(self.program.contact_jacobians, self._digest)
 
@@ -343,9 +343,9 @@ class Prepared:
         Parameters
         ----------
         kind
-            ``"compiled"``, ``"virtual-machine"``, or ``"auto"``: compiled if there is a compiler,
-            else the virtual machine, with one warning; ``"cuda"``: a graphics processor; or a
-            declared engine, see `core.engines`.
+            ``"compiled"``; ``"virtual-machine"``; ``"auto"``: compiled if there is a compiler,
+            otherwise the virtual machine, with a single warning; ``"cuda"``: a graphics processor;
+            or a declared engine (see `core.engines`).
 
         Raises
         ------
@@ -404,7 +404,7 @@ _PREPARED: dict[tuple[object, ...], Prepared] = {}
 
 
 def prepare(model: Model, par: ParameterSet) -> Prepared:
-    """Return program and kernels for a model's structure; numbers in ``par`` do not matter."""
+    """Return program and kernels for a model's structure, whatever the numbers in ``par``."""
     key = structure_of(model, par)
     with _LOCK:
         if key not in _PREPARED:
@@ -438,7 +438,7 @@ def _in_order(choices: tuple[tuple[str, Any], ...]) -> tuple[tuple[str, str], ..
 
 
 def _fingerprint(value: object) -> object:
-    """Return the key of a model's own value: its content, else its identity."""
+    """Return the key of a model's own value: its content or, failing that, its identity."""
     if isinstance(value, np.ndarray):
         return (value.shape, value.dtype.str, value.tobytes())
     if isinstance(value, (str, int, float, bool, type(None))):

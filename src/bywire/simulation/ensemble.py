@@ -46,8 +46,8 @@ from bywire.simulation.run import (
 )
 from bywire.simulation.schedule import COUNTERS, Schedule
 
-# Pieces of a run, between which progress and interrupts are handled: largest number of pieces, and
-# least number of substeps per piece. The overhead of a piece equals a hundred substeps.
+# Between the pieces of a run, progress is reported and interrupts are handled: largest number of
+# pieces, and smallest number of substeps per piece. A piece's overhead equals a hundred substeps.
 _CHUNKS, _SUBSTEPS = 20, 20_000
 
 
@@ -68,7 +68,7 @@ def fit_lanes(runs: Sequence[Run], engine: str = "auto") -> bool:
 
 @dataclass(frozen=True)
 class RunGroup(Sequence[Trajectory]):
-    """Trajectories of runs side by side, kept together.
+    """Trajectories of runs that were computed side by side.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ class RunGroup(Sequence[Trajectory]):
     kernel
         Kernel that computed them.
     ends, end_names
-        Signals with recorded first and last rows only, shape (signals, runs, 2), and their names.
+        Signals recorded only in the first and last rows, shape (signals, runs, 2), and their names.
     """
 
     runs: tuple[Run, ...]
@@ -147,23 +147,23 @@ def simulate_group(
     runs
         Runs of one model, of one duration, step, recording interval and set of sample times.
     signals
-        Outputs to record; all by default.
+        Outputs to record. Default: all.
     threads
-        Threads to use, >= 1; all cores by default.
+        Threads to use, >= 1. Default: one per core.
     progress
-        Called with the finished share, 0 to 1, now and then.
+        Called with the finished share, 0 to 1, from time to time.
     first
-        Rows at the beginning that are not recorded, for instance those of a settling time.
+        Number of rows at the beginning that are not recorded, such as those of a settling time.
     engine
         ``auto`` and ``compiled``: in lanes; ``cuda``: on a graphics processor.
     ends
-        Further outputs, for which only the first and last recorded rows are needed. They need runs
-        without changes, in lanes.
+        Additional outputs for which only the first and last recorded rows are needed. They need
+        runs without changes, in lanes.
 
     Raises
     ------
     ParameterError
-        When the runs do not fit, or a stimulus is not finite.
+        When the runs do not match, or a stimulus is not finite.
     UnknownNameError
         When a signal is unknown.
     SolverError
@@ -178,14 +178,15 @@ def simulate_group(
     if not fit_lanes(runs, engine):
         raise ParameterError(
             "these runs cannot be computed side by side: they need a C compiler and the same "
-            "model, structure, duration, step, recording interval and sample times"
+            "model, structure, duration, step, recording interval and sample times",
+            name="runs",
         )
     prepared = prepare(runs[0].model, runs[0].par)
     names = tuple(prepared.outputs)
     wanted = names if signals is None else tuple(signals)
     if ends and (engine == CUDA or any(run.changes for run in runs)):
         raise ParameterError(
-            "runs with changes or on a graphics processor record all rows: leave ends out",
+            "runs with changes or on a graphics processor record all rows: omit ends",
             name="ends",
         )
     selection = tuple(selected(names, (*wanted, *ends)).tolist())
@@ -222,9 +223,9 @@ def simulate_group(
 
 
 def _edges(schedule: Schedule, first: int, runs: Sequence[Run]) -> list[int]:
-    """Return the frames at which pieces of a run begin and end.
+    """Return the frames at which a run's pieces begin and end.
 
-    They include the first recorded row and the changes of the runs.
+    They include the first recorded row and the runs' changes.
     """
     every = schedule.record_frames
     count = min(_CHUNKS, schedule.frames * schedule.substeps // _SUBSTEPS + 1)
@@ -249,7 +250,7 @@ class _Watch:
 
 
 def _stimuli(group: Sequence[Run], schedule: Schedule, width: int) -> Array:
-    """Return the rows of the stimuli of runs, shape (rows, nu, width); (rows, nu) of equal ones."""
+    """Return the runs' stimulus rows, shape (rows, nu, width), or (rows, nu) if all are equal."""
     t = schedule.stimulus_times
     signals = np.zeros((width, len(group[0].model.Stimulus._fields), t.size))  # each contiguous
     for lane, run in enumerate(group):
@@ -261,7 +262,7 @@ def _stimuli(group: Sequence[Run], schedule: Schedule, width: int) -> Array:
     )
     if not is_usual:
         for run in group:
-            sampled_stimulus(run, schedule)  # raises the error that names the signal and the time
+            sampled_stimulus(run, schedule)  # raises the error with the signal and the time
     is_shared = all(np.array_equal(signals[0], other) for other in signals[1:])
     return (signals[0].T if is_shared else signals.transpose(2, 1, 0)).copy()
 
@@ -464,17 +465,17 @@ def simulate_ensemble(
     run
         Model, parameters, initial values, stimulus, steps.
     variations
-        Dotted name of a parameter -> its value in each case, shape (cases,). Other parameters
-        keep their values. Sample times cannot vary. All cases start from the state and memory of
-        ``run``: if a varied parameter moves the equilibrium, let the run settle first.
+        Dotted name of a parameter -> its value in each case, shape (cases,). Other parameters keep
+        their values. Sample times cannot vary. All cases start from the state and memory of
+        ``run``. If a varied parameter moves the equilibrium, let the run settle first.
     signals
         Outputs to record.
     threads
-        Threads to use, >= 1; all cores by default.
+        Threads to use, >= 1. Default: one per core.
     engine
         ``auto`` and ``compiled`` compute cases side by side in lanes, ``cuda`` on a graphics
-        processor with a thread per case. Others, and ``auto`` without a compiler, compute one case
-        after the other.
+        processor with a thread per case. Other engines, and ``auto`` without a compiler, compute
+        the cases one by one.
 
     Returns
     -------
@@ -535,7 +536,7 @@ def simulate_ensemble(
 def _one_by_one(
     run: Run, variations: Variations, signals: tuple[str, ...], engine: str
 ) -> Ensemble:
-    """Compute the cases one after the other, for engines without lanes, or without a compiler."""
+    """Compute the cases one by one, for engines without lanes, or without a compiler."""
     arrays = {name: np.atleast_1d(values) for name, values in variations.items()}
     count = next(iter(arrays.values())).size
     runs = [

@@ -27,8 +27,8 @@ class Dialect:
     select, compare, both, either, negation, extreme, inverse
         Format strings of selections, comparisons, truth values, maxima and reciprocals.
     exp_where, exp_decayed
-        Format strings of "c ? exp(a) : 0" as one operation: in general, and if c implies that a,
-        which is <= 0, is in the function's range.
+        Format strings of "c ? exp(a) : 0" as a single operation: in general, and if c implies that
+        a, which is <= 0, is within the function's range.
     kept
         Condition of a truth value that is stored as a number; empty if it is not.
     """
@@ -93,7 +93,7 @@ VECTOR_C = Dialect(
 def needed(graph: Graph, roots: Iterable[Node], stop: Callable[[Node], bool]) -> list[Node]:
     """Return the operations that the roots need, arguments first, down to given nodes.
 
-    The argument that needs most registers comes first, which keeps the lifetime of values short
+    The argument that needs the most registers comes first, which keeps lifetimes of values short
     (Sethi and Ullman, Journal of the ACM 17, 1970).
     """
     order: list[Node] = []
@@ -115,7 +115,7 @@ def needed(graph: Graph, roots: Iterable[Node], stop: Callable[[Node], bool]) ->
 
 
 def text(graph: Graph, node: Node, name: Namer, dialect: Dialect = PLAIN_C) -> str:
-    """Return the C expression of an operation; ``name`` gives that of its arguments."""
+    """Return an operation's C expression; ``name`` returns an argument's."""
     operation = graph.nodes[node]
     op = operation.op
 
@@ -142,7 +142,7 @@ def text(graph: Graph, node: Node, name: Namer, dialect: Dialect = PLAIN_C) -> s
             b=number(other[0]) if other else dialect.zero,
         )
     if op in dialect.extreme:
-        # Constants second: compilers then use the processor's own maximum.
+        # Constants come second, so compilers use the processor's own maximum.
         ordered = sorted(operation.args, key=lambda x: graph.nodes[x].op == "const")
         a, b = (number(x) for x in ordered)
         return dialect.extreme[op].format(a=a, b=b)

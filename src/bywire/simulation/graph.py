@@ -53,10 +53,10 @@ NOT_NEGATIVE = Interval(0.0)
 
 
 def interval_of(op: str, arguments: list[Interval]) -> Interval:
-    """Return an interval of an operation's result; infinite if nothing is known.
+    """Return an interval for an operation's result; infinite if no bound is known.
 
-    Only the signs of intervals are used, and rounding never changes the sign of a sum whose exact
-    bound is zero.
+    Only the signs of the bounds matter. Rounding never changes the sign of a sum whose exact bound
+    is zero.
     """
     rule = _RULES.get(op)
     return ANYTHING if rule is None else rule(*arguments)
@@ -278,7 +278,8 @@ def _if_else_zero(graph: Graph, c: Node, a: Node) -> Node | None:
         return graph.constant(0.0)
     operation = graph.nodes[a]
     if operation.op == "mul":
-        # c ? k exp(x) : 0 is k (c ? exp(x) : 0): the selection can be shared, and branched on.
+        # c ? k exp(x) : 0 equals k (c ? exp(x) : 0), whose selection can be shared or become a
+        # branch.
         for factor, costly in (operation.args, operation.args[::-1]):
             if graph.nodes[costly].op == "exp":
                 return graph.apply("mul", factor, graph.apply("if_else_zero", c, costly))
@@ -311,7 +312,7 @@ RULES: dict[str, Callable[..., Node | None]] = {
 
 @cache
 def _names() -> dict[int, str]:
-    wanted = [
+    supported = [
         "add",
         "sub",
         "mul",
@@ -347,7 +348,7 @@ def _names() -> dict[int, str]:
         "ceil",
         "copysign",
     ]
-    return {getattr(ca, f"OP_{name.upper()}"): name for name in wanted}
+    return {getattr(ca, f"OP_{name.upper()}"): name for name in supported}
 
 
 _FOLD: dict[str, Callable[..., float]] = {
@@ -375,13 +376,13 @@ class Graph:
     Parameters
     ----------
     ranges
-        Ranges of leaves, by kind and index; the graph drops limits that a value cannot cross.
+        Ranges of leaves, by kind and index. The graph drops limits that a value cannot reach.
     fixed_leaves
-        Kinds of leaves that change rarely. Values that depend on these only are grouped:
-        a + (b + x) becomes (a + b) + x, so that a + b is also computed rarely.
+        Kinds of leaves that change rarely. Values that depend only on these are grouped:
+        a + (b + x) becomes (a + b) + x, so a + b is also computed rarely.
     operands, registers
-        For every node: its arguments, with the one that needs most registers last, and the number
-        of registers if these are computed first.
+        For every node: its arguments, with the one that needs the most registers last, and the
+        number of registers if these are computed first.
     """
 
     ranges: Mapping[tuple[str, int], Interval] = field(default_factory=dict)
@@ -399,7 +400,7 @@ class Graph:
 
     def constant(self, value: float) -> Node:
         """Return the node of a number."""
-        # repr keeps 0.0 and -0.0 apart: dict keys would not.
+        # repr distinguishes 0.0 and -0.0; dict keys would not.
         return self.intern(Operation("const", (repr(float(value)),)))
 
     def add_function(self, function: Any, inputs: Sequence[Sequence[Node]]) -> list[list[Node]]:
@@ -510,16 +511,16 @@ class Graph:
 
 
 # --- Test whether a number that cannot be negative is above zero, without computing it
-# The flag of a pass is the maximum of several violations: gaps, distances beyond the ends of
-# tables, products of speeds before and after. A kernel only tests whether the flag is raised. It
-# uses comparisons, which are independent, in place of differences and maxima.
+# A pass's flag is the maximum of several violations: gaps, distances beyond the ends of tables,
+# products of speeds before and after. A kernel only tests whether the flag is above zero. It uses
+# comparisons, which are independent of each other, in place of differences and maxima.
 
 
 def raised(graph: Graph, node: Node) -> Node:
     """Return the truth value of ``node > 0``, or of ``node != 0`` if it may be negative.
 
-    A difference is above zero exactly if its terms compare so, as tiny differences do not
-    underflow.
+    A difference is above zero exactly if its first term is larger, since tiny differences do not
+    underflow to zero.
     """
     if not graph.intervals[node].positive:
         return graph.apply("ne", node, graph.constant(0.0))

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from bywire.simulation.program import Program
 
 CHUNK = 50_000
-"""substeps in a call of a kernel: tens of milliseconds"""
+"""substeps per call of a kernel, which take tens of milliseconds"""
 
 _COMMENT = re.compile(r"/\*.*?\*/|//[^\n]*", re.S)
 
@@ -49,7 +49,7 @@ class Request:
 
 @dataclass(frozen=True)
 class Ends:
-    """Destination of the signals that are recorded in the first and last rows only.
+    """Destination of the signals that are recorded only in the first and last rows.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ class Ends:
 
 
 def plan_array(schedule: Schedule, begin: int, end: int, selected: int) -> NDArray[np.int64]:
-    """Return the kernel's plan for frames begin..end; the row of the last frame at the end."""
+    """Return the kernel's plan for frames begin..end, with the last row at the run's end."""
     return np.array(
         [
             begin,
@@ -93,8 +93,8 @@ def run_in_calls(
     Parameters
     ----------
     call
-        ``call(first, last, row)``: runs frames, writes rows from ``row`` on, and returns the
-        reached frame, which may be before ``last``.
+        ``call(first, last, row)`` runs frames, writes rows from ``row`` on, and returns the frame
+        that it reached, which may be before ``last``.
     most
         Substeps of a call; a longer frame is a single call.
 
@@ -115,7 +115,7 @@ def run_in_calls(
 def pointer(array: NDArray[Any]) -> ctypes.c_void_p:
     """Return the address of a C-contiguous array."""
     if not array.flags.c_contiguous:
-        raise ValueError("kernels take C-contiguous arrays only")
+        raise ValueError("kernels accept only C-contiguous arrays")
     return ctypes.c_void_p(array.ctypes.data)
 
 
@@ -180,7 +180,7 @@ class SingleKernel:
 
 
 class BufferedCall:
-    """Function for many calls, by one caller at a time.
+    """Function for a large number of calls by one caller at a time.
 
     Parameters
     ----------

@@ -26,7 +26,7 @@ def check_model(model: Model, par: ParameterSet) -> None:
     Raises
     ------
     ModelError
-        When a part is invalid; the message names the model, the part, and the valid shape.
+        When a part is invalid, with the model, the part, and the valid shape.
     """
     for part in ("State", "Memory", "Stimulus", "Flow", "Output"):
         _annotated(model, part)
@@ -36,6 +36,7 @@ def check_model(model: Model, par: ParameterSet) -> None:
             f"{model.name}: tasks returns none, but at least one task must sample the stimulus: "
             "Task('source', period, lambda x, m, u, par: Memory(...))",
             name="tasks",
+            valid="at least one task",
         )
     if isinstance(model, Assembly):
         check_wiring(model, par)
@@ -46,7 +47,7 @@ def _annotated(model: Model, part: str) -> None:
     try:
         signals_of(getattr(model, part))
     except ModelError as error:
-        raise ModelError(f"{model.name}: {error}") from None
+        raise error.at(model.name, ModelError) from None
 
 
 def _check_equations(model: Model, par: ParameterSet) -> None:
@@ -62,8 +63,8 @@ def _check_equations(model: Model, par: ParameterSet) -> None:
     gaps = _evaluated(model, "gap", x, x, symbolic)
     if [len(g) for g in gaps] != sizes:
         raise ModelError(
-            f"{model.name}: gap has groups of {[len(g) for g in gaps]} overlaps, compliance of "
-            f"{sizes}: they must match",
+            f"{model.name}: gap has groups of {[len(g) for g in gaps]} overlaps, but compliance "
+            f"has groups of {sizes}: they must match",
             name="gap",
             value=str([len(g) for g in gaps]),
             valid=str(sizes),
@@ -100,15 +101,15 @@ def _holds_nan(value: Any) -> bool:
     return any(math.isnan(function.instruction_constant(k)) for k in constants)
 
 
-def _sized(model: Model, part: str, value: Any, wanted: int, meaning: str) -> None:
+def _sized(model: Model, part: str, value: Any, count: int, meaning: str) -> None:
     length = value.shape[0] if isinstance(value, ca.SX) else len(value) if value is not None else -1
-    if length != wanted:
+    if length != count:
         raise ModelError(
-            f"{model.name}: {part} returns {max(length, 0)} values: it must return {wanted} "
+            f"{model.name}: {part} returns {max(length, 0)} values: it must return {count} "
             f"({meaning})",
             name=part,
             value=str(max(length, 0)),
-            valid=str(wanted),
+            valid=str(count),
         )
 
 
@@ -117,7 +118,7 @@ def _sized(model: Model, part: str, value: Any, wanted: int, meaning: str) -> No
 
 @dataclass(frozen=True)
 class Sizes:
-    """Lengths of the vectors that a kernel works on."""
+    """Lengths of a kernel's vectors."""
 
     x: int
     memory: int
@@ -130,14 +131,14 @@ class Sizes:
 
 @dataclass(frozen=True, eq=False)
 class Program:
-    """Symbolic functions of a model with a fixed structure.
+    """A model's symbolic functions for a fixed structure.
 
     Parameters
     ----------
     parameter_ranges
         Names in the order of the parameter vector, each with its valid range.
     contact_jacobians
-        ``(x, m, p)`` -> Jacobians of dx/dt, see ``contacts.contact_jacobians``.
+        ``(x, m, p)`` -> Jacobians of dx/dt; see ``contacts.contact_jacobians``.
     fast, exact
         ``(x, d, m, p, h) -> (x, d, reaction, flow, jump, flag, doubt)``, see ``scheme.Pass``; the
         flag is raised if the pass is in doubt or a velocity reverses.
@@ -168,7 +169,7 @@ class Program:
 
     @property
     def velocities(self) -> tuple[int, ...]:
-        """Indices of the states that carry dry friction."""
+        """Indices of the states with dry friction."""
         states = self.model.State._fields
         return tuple(states.index(name) for name in self.model.frictions)
 
@@ -191,7 +192,7 @@ def build_program(model: Model, par: ParameterSet) -> Program:
     model
         The system.
     par
-        Any parameter set of the structure: its numbers become arguments.
+        Any parameter set with the structure; its numbers become arguments.
     """
     check_model(model, par)
     names = tuple(par.leaves())

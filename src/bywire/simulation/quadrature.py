@@ -32,11 +32,11 @@ class Quadrature:
     products: list[Node]
     combinations: list[list[tuple[Node, int]]]
 
-    def of(self, wanted: Sequence[bool]) -> Quadrature:
+    def of(self, needed: Sequence[bool]) -> Quadrature:
         """Return the sums for some integrals; the other integrals stay unchanged."""
         chosen = [
-            pairs if is_wanted else []
-            for pairs, is_wanted in zip(self.combinations, wanted, strict=True)
+            pairs if is_needed else []
+            for pairs, is_needed in zip(self.combinations, needed, strict=True)
         ]
         places = sorted({k for pairs in chosen for _, k in pairs})
         return Quadrature(
@@ -55,7 +55,7 @@ def factored(
     rates
         Nodes of the rates.
     computed
-        Nodes that the substep computes in any case: such sums are not expanded.
+        Nodes that the substep computes anyway; such sums are not expanded.
     level
         How often each node changes, see ``stages.LEVEL``.
     """
@@ -76,7 +76,7 @@ def factored(
 
 
 def collapsed(graph: Graph, roots: Sequence[Node], level: Levels) -> list[Node]:
-    """Return the same values, each as a sum of coefficient times value if that is shorter."""
+    """Return the same values, each as a sum of coefficients times values if that is shorter."""
     new = list(roots)
     needs = [_moving(graph, [root], level) for root in roots]
     users = Counter(node for each in needs for node in each)

@@ -28,8 +28,8 @@ Advance = Callable[[Array, Array, Array, Array, int], None]
 """``advance(parameters, stimulus, vectors, rows, frames)``: all tasks run at the first instant"""
 
 CHUNK = 10_000
-"""substeps between checks for an interrupt: tens of milliseconds compiled, a second without a
-compiler"""
+"""substeps between checks for an interrupt: tens of milliseconds with a compiler, a second
+without"""
 
 
 def advance_window(
@@ -40,9 +40,9 @@ def advance_window(
     vector: Array,
     values: Array,
 ) -> None:
-    """Run one window in parts, which need little memory; update vector and values in place."""
+    """Run one window in parts to save memory; update vector and values in place."""
     every, held = schedule.record_frames, schedule.stimulus_frames
-    # All tasks run at the beginning of a part, like at the beginning of a run.
+    # All tasks run at the beginning of a part, as at the beginning of a run.
     common = math.lcm(every, *schedule.task_frames)
     size = max(CHUNK // (schedule.substeps * common), 1) * common
     for first in range(0, schedule.frames, size):
@@ -82,7 +82,7 @@ def one_by_one(run: Run, schedule: Schedule, selection: NDArray[np.int32]) -> Ad
     return advance
 
 
-# --- Cases that share the lanes: when one has ended, the next one begins in its lane
+# --- Cases that share the lanes: when a case has ended, the next case starts in its lane
 
 
 class Lanes:
@@ -101,12 +101,12 @@ class Lanes:
     Attributes
     ----------
     columns, vector
-        The same for the cases in the lanes, shapes (parameters, lanes) and (entries, lanes).
+        Parameters and state vectors in the lanes, shapes (parameters, lanes) and (entries, lanes).
     case
         Index of the case in each lane, shape (lanes,).
     seen
-        Figures of all windows, by lane with an unfinished case. Other lanes also run, because
-        vectors have a fixed length, but their results are not used.
+        Figures of all windows, by lane with an unfinished case. Other lanes also run, since vectors
+        have a fixed length, but their results are not used.
     """
 
     def __init__(self, queue: deque[int], width: int, matrix: Array, starts: Array) -> None:
@@ -120,7 +120,7 @@ class Lanes:
                 self._load(lane, int(self.case[0]))
 
     def passed(self, figures: Complex, tolerance: float, most: int) -> dict[int, bool]:
-        """Add a window's figures, and return the lanes with ended cases: whether each repeats.
+        """Add a window's figures; return the lanes with ended cases, and whether each repeats.
 
         Parameters
         ----------
@@ -165,7 +165,7 @@ def _same(before: Complex, now: Complex, tolerance: float) -> bool:
 Figures = Callable[[Array], Complex]
 
 KEPT = 8
-"""number of last windows whose figures are kept"""
+"""number of last windows whose figures are stored"""
 
 
 @dataclass(frozen=True)
@@ -177,12 +177,12 @@ class Repeated:
     time, values
         Shapes (rows,) and (cases, rows, signals); the window's end is not among the rows.
     figures
-        Compared figures of the last `KEPT` windows, shape (cases, KEPT, n); NaN first if a case
-        took fewer windows.
+        Compared figures of the last `KEPT` windows, shape (cases, KEPT, n). If a case had fewer
+        windows, the first entries are NaN.
     windows
         Number of windows of each case, shape (cases,).
     repeats
-        Whether the last window repeated the one before, shape (cases,).
+        Whether the last window repeated the previous one, shape (cases,).
     unsettled
         Substeps of each case that hit the cap of the contact iteration, shape (cases,).
     """
@@ -215,7 +215,7 @@ def repeat(
     ----------
     run
         Its duration is one window: a multiple of all sample times and of the recording interval.
-        Its own stimulus is not used.
+        Its stimulus is not used.
     matrix
         Parameter vectors, shape (parameters, cases); see ``variations.case_matrix``.
     stimuli
@@ -225,15 +225,15 @@ def repeat(
     signals
         Outputs to record.
     figures
-        ``figures(window) -> complex``, shapes (lanes, rows, signals) and (lanes, n): figures by
-        which windows are compared.
+        ``figures(window) -> complex``, shapes (lanes, rows, signals) and (lanes, n): the figures
+        that are compared between windows.
     tolerance
         A window repeats the previous one if the norm of the difference of their figures is at
         most this share of the norm of the figures.
     most
         Largest number of windows of a case, >= 2.
     starts
-        Initial state and memory of each case; by default those of the run.
+        Initial state and memory of each case. Default: those of the run.
     lanes
         If False, one case after another on one core, as in a simulator without ensembles.
 
@@ -254,7 +254,7 @@ def repeat(
     prepared = prepare(run.model, run.par)
     selection = selected(tuple(prepared.outputs), signals)
     compiler = find_compiler()
-    # Without the last frame: the end of a window is the start of the next, and ticks only there.
+    # Omit the last frame: a window's end is the start of the next window, where the tasks tick.
     open_end = replace(schedule, frames=schedule.frames + 1)
     if compiler is None or not lanes:
         advance, width = one_by_one(run, open_end, selection), 1

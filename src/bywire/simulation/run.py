@@ -38,7 +38,7 @@ Status = Literal["done", "interrupted", "unsettled"]
 
 @dataclass(frozen=True)
 class Run:
-    """Run of a model to compute.
+    """A run of a model, to be computed.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ class Run:
     duration, step, record
         Length of the run, substep and recording interval [s].
     changes
-        Changes of all parameters at some times, in order of time; see `Change`.
+        Changes of parameters at certain times, in order of time; see `Change`.
     most_work
         Work limit, in substeps, beyond which the run fails; see `Trajectory.work`.
     """
@@ -69,7 +69,7 @@ class Run:
     most_work: float = math.inf
 
     def schedule(self) -> Schedule:
-        """Return the integer plan of the run."""
+        """Return the run's integer plan."""
         return self._schedule
 
     @cached_property
@@ -136,7 +136,7 @@ def initial_vectors(layout: Layout, states: Sequence[Any], memories: Sequence[An
 
 
 def request_for(run: Run, signals: Sequence[str] | None = None) -> Request:
-    """Return the request of a run for a kernel; all outputs by default."""
+    """Return a run's request to a kernel. Default signals: all outputs."""
     names = tuple(prepare(run.model, run.par).outputs)
     schedule = run.schedule()
     return Request(
@@ -161,11 +161,11 @@ def simulate(
     run
         Model, parameters, initial values, stimulus, steps.
     signals
-        Outputs to record; all by default.
+        Outputs to record. Default: all.
     engine
         See ``engine.Prepared.engine``.
     progress
-        Called with the finished share, 0 to 1, now and then.
+        Called with the finished share, 0 to 1, from time to time.
 
     Returns
     -------
@@ -187,14 +187,14 @@ def simulate(
     """
     prepared = prepare(run.model, run.par)
     chosen = prepared.engine(engine)
-    wanted = tuple(prepared.outputs) if signals is None else tuple(signals)
-    request = request_for(run, wanted)
+    names = tuple(prepared.outputs) if signals is None else tuple(signals)
+    request = request_for(run, names)
     schedule = request.schedule
     vector = initial_vector(chosen.layout, run.state, run.memory)
-    values = np.empty((schedule.rows, len(wanted)))
+    values = np.empty((schedule.rows, len(names)))
     if run.changes:
         finished, put_in = _advanced_in_pieces(run, engine, request, vector, values, progress)
-        wanted = (*wanted, *put_in_signals(run.model.Output))
+        names = (*names, *put_in_signals(run.model.Output))
         values = np.column_stack((values, put_in))
     else:
         finished = advance_all(chosen, request, vector, values, progress, most=run.most_work)
@@ -207,7 +207,7 @@ def simulate(
         run=run,
         time=schedule.record_times[:rows],
         values=values[:rows],
-        names=wanted,
+        names=names,
         status=status,
         unsettled=int(counters[0]),
         repeated=int(counters[1]),
@@ -256,9 +256,9 @@ def _advanced_in_pieces(
 
 
 def doubts_of(runs: Sequence[Run]) -> list[str]:
-    """Return why the step may be too long for the contacts, evaluated at the start of each run.
+    """Return reasons why the step may be too long for the contacts, at the start of each run.
 
-    ``runs``: runs of one structure and one step.
+    ``runs``: runs with the same structure and step.
     """
     first = runs[0]
     if not first.model.compliance(first.par):
@@ -285,12 +285,12 @@ def _matrices(pattern: Any, entries: Array) -> Array:
 
 
 def sampled_stimulus(run: Run, schedule: Schedule) -> Array:
-    """Return the rows of the stimulus that a run needs, shape (rows, nu).
+    """Return a run's stimulus rows, shape (rows, nu).
 
     Raises
     ------
     ParameterError
-        When a value is not finite, or outside the range of its signal.
+        When a value is not finite, or outside its signal's range.
     """
     rows = np.ascontiguousarray(run.stimulus(schedule.stimulus_times), dtype=np.float64)
     is_finite = np.isfinite(rows)
@@ -322,7 +322,7 @@ def sampled_stimulus(run: Run, schedule: Schedule) -> Array:
 
 
 def stimulus_ranges(model: Model) -> list[tuple[int, float, float]]:
-    """Return index and range of the stimuli with a declared range of valid values."""
+    """Return index and range of the stimuli with a declared range."""
     fields = model.Stimulus._fields
     return [(fields.index(n), *ends) for n, ends in ranges_of(model.Stimulus).items()]
 
@@ -330,7 +330,7 @@ def stimulus_ranges(model: Model) -> list[tuple[int, float, float]]:
 def put_into(rows: Array, run: Run, t: Array) -> None:
     """Write the stimulus of a run at times [s] into rows of zeros, shape (len(t), nu).
 
-    A stimulus with a method ``put_into(rows, t)`` may leave out signals that are zero.
+    A stimulus with a method ``put_into(rows, t)`` may omit signals that are zero.
     """
     put = getattr(run.stimulus, "put_into", None)
     if put is None:
@@ -345,7 +345,7 @@ def selected(names: Sequence[str], signals: Sequence[str]) -> NDArray[np.int32]:
     Raises
     ------
     UnknownNameError
-        With the nearest known names.
+        With the nearest valid names.
     """
     for signal in signals:
         if signal not in names:

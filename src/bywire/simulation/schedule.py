@@ -27,7 +27,7 @@ class Schedule:
     """Integer plan of a run.
 
     A frame is the longest interval that divides all sample times and the recording interval, or a
-    part of it if it is very long. It has ``substeps`` equal steps.
+    part of that interval if it is very long. A frame has ``substeps`` equal steps.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ class Schedule:
 
     @property
     def stimulus_times(self) -> NDArray[np.float64]:
-        """Times of the stimulus' rows [s]."""
+        """Times of the stimulus rows [s]."""
         interval = self.stimulus_frames * self.frame
         return np.arange(self.stimulus_rows, dtype=np.float64) * interval
 
@@ -135,9 +135,10 @@ def _require_few(name: str, length: float, step: float) -> None:
     if length / step > _MOST:
         raise StepError(
             f"step = {step * 1e6:g} us is too short for the {name} interval of {length:g} s, which "
-            f"would contain more than {_MOST:.2g} steps: take a shorter interval",
+            f"would contain more than {_MOST:.2g} steps: use a shorter interval",
             name="step",
             value=f"{step * 1e6:g} us",
+            valid=f"{_MOST:.2g} steps",
         )
 
 
@@ -149,7 +150,7 @@ def _whole(period: float, step: float, name: str) -> int:
     if count < 1 or rest > min(_TOLERANCE * period, rounding):
         raise StepError(
             f"step = {step * 1e6:g} us does not divide the {name} interval of "
-            f"{period * 1e6:.12g} us: take for instance {_divisor(period, step):.16g} us",
+            f"{period * 1e6:.12g} us: use for instance {_divisor(period, step):.16g} us",
             name="step",
             value=f"{step * 1e6:g} us",
             valid=f"{_divisor(period, step):.16g} us",
@@ -158,7 +159,7 @@ def _whole(period: float, step: float, name: str) -> int:
 
 
 def _divisor(period: float, step: float) -> float:
-    """Return a step [us] with few digits that divides a period and is not longer than a given one.
+    """Return a step [us] with few digits that divides a period and is at most as long as a step.
 
     It is a whole number of nanoseconds if possible, which then divides a period of whole
     nanoseconds.
@@ -180,19 +181,19 @@ def _divisor(period: float, step: float) -> float:
 # --- The state vector
 
 COUNTERS = 3  # at the end of the state vector, see `Layout`
-CAP = 8  # passes through one substep before it is counted as unsettled
+CAP = 8  # passes through one substep before it counts as unsettled
 JUMP, FLAG, DOUBT = 4, 5, 6  # indices among the results of a pass, after x, d, r, q
-# Search for the instant at which a substep is cut: largest number of attempts; shares of the
-# substep's change of velocity within which it is reached, or close enough for linear interpolation;
-# and the least share of a part that is cut off or remains.
+# Search for the instant at which a substep is cut: largest number of attempts; remaining velocity
+# at which the search ends, or is close enough for linear interpolation, as shares of the substep's
+# change of velocity; and the smallest share of a part that is cut off or remains.
 ATTEMPTS, CLOSE, NEAR, EDGE = 12, 1e-12, 1e-9, 1e-9
-STILL = 1e-9  # share of its speed below which another velocity counts as zero at the same instant
+STILL = 1e-9  # share of its initial speed below which another velocity also counts as zero
 
 
 def most_cuts(velocities: int) -> int:
-    """Return the number of parts of a substep after which it counts as unsettled.
+    """Return the number of parts after which a substep counts as unsettled.
 
-    Each velocity with dry friction may reverse, and reverse again after others have.
+    Each velocity with dry friction may reverse, and reverse again after other velocities have.
     """
     return 2 * velocities + 2
 
@@ -201,8 +202,8 @@ def most_cuts(velocities: int) -> int:
 class Layout:
     """Start of each part of the state vector.
 
-    The vector contains x, d, r, q, the memory m, and three counters: substeps that did not settle,
-    repeated substeps, and parts of substeps that were tried for them.
+    The vector contains x, d, r, q, the memory m, and three counters: unsettled substeps, repeated
+    substeps, and the parts that were tried for them.
     """
 
     start: dict[str, int]

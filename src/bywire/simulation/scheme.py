@@ -1,8 +1,8 @@
 """One substep, symbolically: implicit midpoint rule with set-valued forces at velocity level.
 
-The state contains the last increment, which predicts the midpoint. There the scheme evaluates
-bounds of frictions, geometry and contact sets. It solves linear terms exactly, and nonlinear terms
-with one Newton step. The scheme is of second order in smooth phases and through stick-slip.
+The state contains the last increment, which predicts the midpoint. At that midpoint the scheme
+evaluates friction bounds, geometry and contact sets. It solves linear terms exactly, and nonlinear
+terms with one Newton step. The scheme is of second order in smooth phases and through stick-slip.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from bywire.simulation.symbols import SX, column, depends, nonlinear, scalars, s
 # anything in [lo_k, hi_k] where w_k = 0, find the end-of-step velocities w.
 
 
-NEVER = 1e30  # larger than any misfit
+NEVER = 1e30  # exceeds every misfit
 NOTHING = 1e-318  # rounds a misfit below 1e-6 to exactly zero
 FITTING = 1e-12  # share of a row's own scale below which guessed signs are accepted
 RESIDUAL = 1e-9  # share of a row's own scale above which a projection counts as failed
@@ -35,8 +35,8 @@ RESIDUAL = 1e-9  # share of a row's own scale above which a projection counts as
 class Projection:
     """End-of-step velocities and forces, shape (m,) each, and whether they solve the problem.
 
-    ``failed`` is 1.0 if they do not. Forces are within their bounds to the last digit, so that
-    rounding cannot turn a loss into a gain.
+    ``failed`` is 1.0 if they do not. Forces are clipped to their bounds, so rounding cannot turn an
+    energy loss into a gain.
     """
 
     w: Any
@@ -46,14 +46,14 @@ class Projection:
 
 @dataclass(frozen=True)
 class Problem:
-    """Problem of the set-valued forces of an exact pass, and the symbols of its solution.
+    """An exact pass's problem for the set-valued forces, and the symbols of its solution.
 
     Parameters
     ----------
     matrix, start, low, high
         S, c and bounds, shapes (m, m) and (m,).
     solution
-        Velocities and forces, shape (m,) each, and whether they failed.
+        Velocities and forces, shape (m,) each, and whether the solution failed.
     """
 
     matrix: Any
@@ -73,9 +73,9 @@ def soft(z: Any, a: Any, b: Any) -> Any:
 
 
 def sliding(v: Any, low: Any, high: Any) -> Any:
-    """Return the force on moving rows: a velocity keeps the sign from the start of the substep.
+    """Return the force on moving rows, whose velocity keeps its sign from the substep's start.
 
-    If it would change its sign, the substep is cut.
+    If a velocity would change its sign, the substep is cut.
     """
     return ca.if_else(v > 0, low, high)
 
@@ -83,8 +83,8 @@ def sliding(v: Any, low: Any, high: Any) -> Any:
 def project_fast(S: Any, c: Any, low: Any, high: Any, v: list[Any]) -> Projection:
     """Solve with all resting rows at rest, and check that their bounds can hold them.
 
-    One row is exact. Several rows need one linear solve, whose matrix depends only on which rows
-    rest. If a force at rest leaves its bounds, a body breaks away: ``failed``.
+    A single row is exact. Several rows need one linear solve, whose matrix depends only on which
+    rows rest. If a holding force exceeds its bounds, a body breaks away and ``failed`` is set.
 
     Parameters
     ----------
@@ -116,15 +116,15 @@ def project_fast(S: Any, c: Any, low: Any, high: Any, v: list[Any]) -> Projectio
         beyond = ca.fmax(force[k] - high[k], low[k] - force[k])
         wrong = ca.fmax(wrong, ca.if_else(resting[k], beyond, 0))
         force[k] = ca.if_else(resting[k], _within(force[k], low[k], high[k]), slide[k])
-        # Otherwise, a row at rest would be zero only up to rounding.
+        # Without this line, a row at rest would be zero only up to rounding.
         w[k] = ca.if_else(resting[k], 0, w[k])
     return Projection(w, force, wrong > 0)
 
 
 def project_exact(S: Any, c: Any, low: Any, high: Any) -> Projection:
-    """Solve by trying every combination of signs, and take the one that fits best.
+    """Solve by trying every combination of signs, and choose the one that fits best.
 
-    There are 3^m combinations, for the rare substeps in which ``project_fast`` fails.
+    There are 3^m combinations; only the rare substeps in which ``project_fast`` fails need them.
     """
     m = c.shape[0]
     if m == 0:
@@ -136,12 +136,13 @@ def project_exact(S: Any, c: Any, low: Any, high: Any) -> Projection:
 def _exact(m: int) -> Any:
     """Return the projection of m rows as a function of S, c, low, high.
 
-    It is a function of symbols: writing all combinations for every model takes half of its set-up.
+    It is cached as a function of symbols, since building all combinations would take half of a
+    model's set-up time.
     """
     S = ca.SX.sym("S", m, m)
     c, low, high = (ca.SX.sym(name, m) for name in ("c", "low", "high"))
-    # If both bounds are equal, the force is the same at zero: a velocity that happens to end
-    # there does not rest, and its derivatives are those of a moving body.
+    # If both bounds are equal, the force does not jump at zero. A velocity that happens to end at
+    # zero does not rest then, and its derivatives are those of a moving body.
     forced = [ca.if_else(low[k] < high[k], 0, 1) for k in range(m)]
     best, best_misfit = ca.SX.zeros(m), ca.SX(NEVER)
     for signs in product((0, 1, -1), repeat=m):
@@ -152,8 +153,8 @@ def _exact(m: int) -> Any:
         better = misfit < best_misfit
         best = ca.if_else(better, w, best)
         best_misfit = ca.if_else(better, misfit, best_misfit)
-    # NaN forces must not count as rest, but compilers need not compare NaN correctly. The misfit
-    # of the chosen combination shows them; nothing else is added to it.
+    # NaN forces must not count as rest, but compilers need not compare NaN correctly. The chosen
+    # combination's misfit is NaN for them, and otherwise adds exactly zero.
     best = best + _misfit(S, c, low, high, best) * NOTHING
     results = [best, _within(S @ best - c, low, high), best_misfit > RESIDUAL]
     return ca.Function("exact_projection", [S, c, low, high], results)
@@ -176,8 +177,8 @@ def _with_signs(S: Any, c: Any, low: Any, high: Any, signs: tuple[int, ...]) -> 
 
 
 def _misfit(S: Any, c: Any, low: Any, high: Any, w: Any) -> Any:
-    # The scale of a row is that of its largest terms: where forces cancel (a body squeezed from
-    # both sides), the remainder is rounding. It is a sum, because a maximum ignores NaN.
+    # A row's scale follows from its terms: where forces cancel (a body squeezed from both sides),
+    # the remainder is rounding. It is a sum of magnitudes, because a maximum ignores NaN.
     total = ca.SX(0)
     m = c.shape[0]
     for k in range(m):
@@ -211,7 +212,7 @@ def solve_small(M: Any, b: Any) -> Any:
 class Form:
     """``sum_j coefficient_j x_j + rest``.
 
-    The coefficients are constant from substep to substep. The kernel therefore hoists them, and
+    The coefficients stay constant from substep to substep. The kernel therefore hoists them, and
     the sum needs one product per state.
 
     Parameters
@@ -233,7 +234,7 @@ class Form:
         return total
 
     def plus(self, factor: Any, other: Form, x: Any, changing: Any) -> Form:
-        """Return this form plus a factor times another one."""
+        """Return this form plus a factor times another form."""
         if depends(SX(factor), changing):
             return Form(self.coefficients, self.rest + factor * other.value(x))
         coefficients = dict(self.coefficients)
@@ -258,7 +259,7 @@ def forms(f: Any, J: Any, x: Any, changing: Any, curved: list[bool]) -> list[For
     changing
         Symbols that change from substep to substep.
     curved
-        Whether each row is nonlinear in x; such rows stay unchanged.
+        Whether each row is nonlinear in x; nonlinear rows stay unchanged.
     """
     at_zero = ca.substitute(f, x, SX.zeros(x.shape[0]))
     rows = []
@@ -287,7 +288,7 @@ Entries = dict[tuple[int, int], Any]
 class Step:
     """Eliminated row: entries of the pivot row in the remaining columns, and its reciprocal.
 
-    In the columns ``alike`` the right-hand side has the same factors with the opposite sign.
+    In the columns ``alike``, the right-hand side has the same factors with the opposite sign.
     """
 
     pivot: int
@@ -328,7 +329,7 @@ class Reduced:
         return Form(coefficients, form.rest).value(self.x)
 
     def back_substitute(self, known: dict[int, Any], middle: dict[int, Any]) -> None:
-        """Return all unknowns from those of the kept rows, and the states plus the unknowns.
+        """Compute all unknowns from the kept rows' unknowns, and the states plus the unknowns.
 
         If a state and its unknown have the same factor, their sum is multiplied once.
         """
@@ -347,7 +348,7 @@ class Reduced:
 def eliminate(
     A: Any, right: dict[int, Form], keep: tuple[int, ...], x: Any, changing: Any
 ) -> Reduced:
-    """Eliminate all rows but the kept ones, on the diagonal, least fill first.
+    """Eliminate all rows except the kept ones, on the diagonal, in the order of least fill.
 
     Parameters
     ----------
@@ -358,8 +359,8 @@ def eliminate(
     x
         The states.
     changing
-        Symbols that change from substep to substep. Among pivots of equal fill, one that does not
-        depend on them comes first, because its reciprocal can be hoisted.
+        Symbols that change from substep to substep. Among pivots of equal fill, a pivot that does
+        not depend on them comes first, because its reciprocal can be hoisted.
     """
     n = A.shape[0]
     entries: Entries = {(i, j): A[i, j] for i in range(n) for j in range(n) if _present(A[i, j])}
@@ -426,7 +427,7 @@ def _pivot(
 class Symbols:
     """Arguments of a substep: state, predicted half increment, memory, parameters, step.
 
-    All equations use half the increment of the state over the substep: x + d is the midpoint.
+    All equations use d, half the state's increment over the substep, so x + d is the midpoint.
     """
 
     x: Any
@@ -443,7 +444,7 @@ class Pass:
     Parameters
     ----------
     x, d
-        State at the end and half the increment, shape (nx,) each.
+        State at the end of the substep and half its increment, shape (nx,) each.
     reaction
         Forces of the frictions, then of the limits.
     flow
@@ -452,12 +453,12 @@ class Pass:
         Positive if the pass must be repeated: a contact set changed, a velocity crossed a limit, or
         the projection of the frictions failed.
     jump
-        Decrease of half the increment of each velocity with dry friction after a change of its
-        sign, by its mass alone, shape (m,).
+        For each velocity with dry friction: decrease of half its increment after a sign change,
+        due to its own mass, shape (m,).
     turn
         Positive if a velocity with dry friction reverses: if friction jumps, the substep is cut.
     problem
-        Problem to solve outside an exact pass; None in other passes.
+        Problem to solve outside an exact pass; None for other passes.
     """
 
     x: Any
@@ -474,8 +475,8 @@ class Pass:
 class _Linearized:
     """Smooth part of the model and its Jacobian, evaluated for the substep.
 
-    ``rows[i] + J[i, :] d`` is the balance at the midpoint x + d: exact in linear rows, and of
-    second order in the error of the predicted midpoint in the others.
+    ``rows[i] + J[i, :] d`` is the balance at the midpoint x + d. It is exact in linear rows. In
+    other rows, its error is of second order in the error of the predicted midpoint.
     """
 
     rows: list[Form]
@@ -495,8 +496,8 @@ def build_pass(model: Model, par: ParameterSet, s: Symbols, exact: bool) -> Pass
         Arguments of the pass.
     exact
         If False, the pass of nearly every substep, which only checks one-sided limits and keeps
-        resting bodies at rest. If True, the repeated pass, which enforces limits; every combination
-        of signs is tried outside, see `Problem`.
+        resting bodies at rest. If True, the repeated pass, which enforces limits; the caller tries
+        every combination of signs (see `Problem`).
     """
     y = s.x + s.d
     changing = ca.vertcat(s.x, s.d)
@@ -574,8 +575,8 @@ def _linearize(
     slopes = ca.substitute(J, ca.vertcat(x, xe), ca.vertcat(at, y))
     rows = []
     for i, row in enumerate(forms(with_contact, J, x, changing, bent)):
-        # Linear rows start from x. The others were evaluated at the predicted midpoint of states
-        # in which they are nonlinear, so that part of J d is subtracted again.
+        # Linear rows start from x. Other rows were evaluated at the predicted midpoint of the
+        # states in which they are nonlinear, so this part of J d is subtracted again.
         point = at if bent[i] else s.x
         rest = ca.substitute(row.rest, ca.vertcat(x, xe), ca.vertcat(point, y))
         if bent[i]:
@@ -631,7 +632,7 @@ def _project(
         projection = project_fast(half, c, low, high, [s.x[k] for k in reduced.kept])
     reaction = ca.SX(projection.force)
     first = len(model.frictions)
-    for k in range(first, reaction.shape[0]):  # away from its limit, a state is not affected
+    for k in range(first, reaction.shape[0]):  # away from its limit, a state is free
         reaction[k] = ca.if_else(projection.w[k] > 0, 0, ca.fmax(reaction[k], 0))
     if not exact:
         reaction = ca.vertcat(reaction, SX.zeros(len(model.limits)))

@@ -135,14 +135,14 @@ def simulate_with_sensitivities(
     """Compute a run and the derivatives of its signals.
 
     A direction may also be an initial state, ``initial.omega``, or a constant added to a stimulus,
-    ``stimulus.i_set``. Any other direction, ``start.p``, acts only through the given derivatives of
-    the start.
+    ``stimulus.i_set``. Any other direction, ``start.p``, acts only through the derivatives of the
+    initial values.
 
     The derivatives are exact for the computed run: forward differentiation through every substep,
     including friction and contact decisions. With stick-slip, instants of breakaway move with the
     parameters only as finely as sampled inputs change. In this case, let tasks and ideal sources
-    tick as often as the step; the first slips of a ramp are then within 2 % at 20 us. When a body
-    reverses or stops, the substep is cut there, and the instant moves with the parameters.
+    tick at every step. The first slips of a ramp are then within 2 % at 20 us. When a body reverses
+    or stops, the substep is cut at that instant, which moves with the parameters.
 
     Parameters
     ----------
@@ -154,15 +154,15 @@ def simulate_with_sensitivities(
         Outputs to record.
     initial
         Derivatives of the initial state with respect to the parameters, shape
-        (states, parameters); zero by default.
+        (states, parameters). Default: zero.
     memory
         Derivatives of the initial memory, shape (memories, parameters).
 
     Returns
     -------
     Sensitivity
-        The run's signals in SI units, and their derivatives by each direction, in the signal's unit
-        over the direction's.
+        The run's signals in SI units, and their derivatives along each direction, in the signal's
+        unit divided by the direction's unit.
 
     Raises
     ------
@@ -174,7 +174,11 @@ def simulate_with_sensitivities(
         When there is no compiler.
     """
     if not parameters:
-        raise ParameterError("sensitivities need at least one parameter", name="parameters")
+        raise ParameterError(
+            "sensitivities need at least one parameter in parameters",
+            name="parameters",
+            valid="at least one parameter",
+        )
     require_unchanged(run.changes, "sensitivities")
     prepared = prepare(run.model, run.par)
     directions = _directions(run, parameters, prepared.program.parameter_names)
@@ -183,12 +187,15 @@ def simulate_with_sensitivities(
     from_start = directions.initial + (0.0 if initial is None else initial)
     compiler = find_compiler()
     if compiler is None:
-        raise CompilerError("sensitivities need a C compiler: install the extra bywire[compiler]")
+        raise CompilerError(
+            "sensitivities need a C compiler: install the extra bywire[compiler]",
+            valid="bywire[compiler]",
+        )
     kernel = _tangent_kernel(prepared.program, directions.indices, compiler)
     if kernel.rounds:
         warnings.warn(
-            "a sampled value is rounded to whole codes, through which derivatives are zero: "
-            "closed loops look open; choose the law without rounding (adc.law = 'ideal')",
+            "a sampled value is rounded to whole codes, so its derivatives are zero and closed "
+            "loops look open. Choose the law without rounding (adc.law = 'ideal')",
             stacklevel=2,
         )
     schedule = run.schedule()
@@ -230,13 +237,13 @@ def simulate_with_sensitivities(
     return Sensitivity(trajectory, derivatives, tuple(parameters))
 
 
-def _require_shape(name: str, given: Array | None, wanted: tuple[int, int]) -> None:
-    if given is not None and np.shape(given) != wanted:
+def _require_shape(name: str, given: Array | None, shape: tuple[int, int]) -> None:
+    if given is not None and np.shape(given) != shape:
         raise ParameterError(
-            f"{name} has the shape {np.shape(given)}: it must be {wanted}, rows and parameters",
+            f"{name} has the shape {np.shape(given)}: it must be {shape}, rows and parameters",
             name=name,
             value=str(np.shape(given)),
-            valid=str(wanted),
+            valid=str(shape),
         )
 
 
@@ -259,16 +266,16 @@ class _Directions:
     initial: Array
 
 
-def _directions(run: Run, wanted: Sequence[str], known: Sequence[str]) -> _Directions:
+def _directions(run: Run, requested: Sequence[str], known: Sequence[str]) -> _Directions:
     states = [f"initial.{name}" for name in run.model.State._fields]
     stimuli = [f"stimulus.{name}" for name in run.model.Stimulus._fields]
-    for name in wanted:
+    for name in requested:
         if name not in (*known, *states, *stimuli) and not name.startswith("start."):
             raise unknown_name("parameter", name, (*known, *states, *stimuli))
-    own = [name for name in wanted if name in known] or [known[0]]  # a kernel has at least one
+    own = [name for name in requested if name in known] or [known[0]]  # a kernel has at least one
     seeded = [*own, *stimuli]
-    seeds = np.array([[float(row == name) for name in wanted] for row in seeded])
-    initial = np.array([[float(row == name) for name in wanted] for row in states])
+    seeds = np.array([[float(row == name) for name in requested] for row in seeded])
+    initial = np.array([[float(row == name) for name in requested] for row in states])
     return _Directions(tuple(known.index(name) for name in own), seeds, initial)
 
 

@@ -1,4 +1,4 @@
-"""Program as one expression graph: when to compute each node, and its C text.
+"""Program as one expression graph: when to compute each node, and its C code.
 
 A substep is one long chain of dependent operations, whose latency limits the speed. Sums and
 products of three or more operands are therefore reordered so that a late operand passes through as
@@ -66,7 +66,7 @@ class _Balance:
         ]
 
     def _joined(self, parts: list[tuple[int, Node]]) -> list[tuple[int, Node]]:
-        """Return rebuilt summands: equal ones, and those with a common rare factor, merged."""
+        """Return rebuilt summands; equal ones and those with a common rare factor are merged."""
         groups: dict[Node, list[tuple[int, int, Node, Node]]] = {}
         joined: list[tuple[int, Node]] = []
         for (sign, node), times in Counter(parts).items():
@@ -88,9 +88,9 @@ class _Balance:
         return joined
 
     def _split(self, node: Node) -> tuple[int, Node, Node] | None:
-        """Return a rare factor and the rest of a product that nothing else needs.
+        """Return a rarely changing factor and the rest of a product that nothing else needs.
 
-        The factors a - b and b - a count as the same one, with a change of sign.
+        The factors a - b and b - a count as the same factor, with a change of sign.
         """
         nodes, level = self._graph.nodes, self._level
         if nodes[node].op != "mul" or level[node] < 2 or self._uses[node] > 1:
@@ -170,12 +170,12 @@ class Stages:
     output
         Nodes of the recorded signals.
     velocities
-        Indices of the states that carry dry friction.
+        Indices of the states with dry friction.
     quadrature
         Integrals of the fast pass as combinations of running sums.
     fast_t, exact_t, ticks_t, output_t
-        Tangents along one direction; empty lists without sensitivities. Those of the exact pass
-        also along the length of the step, as the instant of a cut may move.
+        Tangents along one direction; empty lists without sensitivities. The exact pass also has
+        tangents with respect to the step's length, since the instant of a cut may move.
     """
 
     graph: Graph
@@ -219,8 +219,7 @@ def build_stages(
     directions
         Indices of the parameters along which tangents are computed; empty for none.
     outputs
-        Indices of the signals to compute; all by default. Integrals that no signal reads stay
-        zero.
+        Indices of the signals to compute. Default: all. Integrals that no signal reads stay zero.
     """
     n = program.sizes
     ranges = {("p", k): Interval(*r) for k, r in enumerate(program.parameter_ranges.values())}
@@ -266,11 +265,13 @@ def build_stages(
     substep = frozenset(needed(graph, _all_but(fast, "q"), lambda _: False))
     quadrature = factored(graph, fast["q"], substep, level)
     fast, quadrature = _balanced(graph, fast, quadrature, level)
-    if outputs is not None:  # only now, so that the order of operations is that of all outputs
+    if outputs is not None:  # at this point, so the order of operations stays that of all outputs
         read = graph.read_by(output)
-        wanted, zero = [leaf in read for leaf in leaves["q"]], graph.constant(0.0)
-        quadrature = quadrature.of(wanted)
-        fast["q"] = [n if is_read else zero for n, is_read in zip(fast["q"], wanted, strict=True)]
+        is_needed, zero = [leaf in read for leaf in leaves["q"]], graph.constant(0.0)
+        quadrature = quadrature.of(is_needed)
+        fast["q"] = [
+            n if is_read else zero for n, is_read in zip(fast["q"], is_needed, strict=True)
+        ]
     fast["flag"] = [raised(graph, fast["flag"][0])]
     fast["doubtful"] = [raised(graph, fast["doubt"][0])]
     return Stages(
@@ -310,8 +311,7 @@ def _balanced(
 def _renewed(graph: Graph, roots: list[Node], known: dict[Node, Node]) -> list[Node]:
     """Return nodes with other arguments.
 
-    Rates of losses cannot be negative as they are written. As sums of products they can, in the
-    last digit.
+    Loss rates as written cannot be negative. As sums of products they can, by rounding.
     """
     new = dict(known)
     for node in needed(graph, roots, known.__contains__):
@@ -323,7 +323,7 @@ def _renewed(graph: Graph, roots: list[Node], known: dict[Node, Node]) -> list[N
 
 
 def _with_tangents(function: Any, kinds: str, directions: Sequence[int], fixed: str) -> Any:
-    """Return the function of the tangents: the same arguments, then seeds of all changing ones."""
+    """Return the tangents' function: the same arguments, then seeds of all changing arguments."""
     arguments = function.sx_in()
     seeds, points, extra = [], [], []
     for kind, argument in zip(kinds, arguments, strict=True):
@@ -359,7 +359,7 @@ PLAN = """const int64_t begin = plan[0], end = plan[1], last = plan[2], substeps
 def unread(stages: Stages) -> frozenset[str]:
     """Return the half increments and reactions that no stage reads.
 
-    They need not be kept. A cut substep reads those of velocities with dry friction.
+    They need not be stored. A cut substep reads those of velocities with dry friction.
     """
     roots = [
         node for pass_ in (stages.fast, stages.exact) for nodes in pass_.values() for node in nodes
@@ -377,8 +377,8 @@ def unread(stages: Stages) -> frozenset[str]:
 def midpoints(graph: Graph, order: Iterable[Node]) -> dict[Node, int]:
     """Return the nodes that are a state plus its half increment, with the index of the state.
 
-    A kernel carries these from substep to substep, as the next one begins with them. Only cut
-    substeps read half increments alone.
+    A kernel passes these from substep to substep, since the next one begins with them. Only cut
+    substeps read half increments on their own.
     """
     chosen = {}
     for node in order:
@@ -453,7 +453,7 @@ def branching_statements(
 ) -> list[str]:
     """Return declarations with costly functions inside the only branch that needs them.
 
-    If the condition fails, the processor skips the function. ``later``: further nodes that read
+    If the condition is false, the processor skips the function. ``later``: other nodes that read
     these declarations.
     """
     uses = Counter(a for node in (*order, *later) for a in graph.arguments(node))

@@ -11,7 +11,7 @@ SX = ca.SX
 
 
 def column(values: Sequence[Any]) -> Any:
-    """Return a column of scalars as one SX, also for no scalars."""
+    """Return scalars as one SX column, which may be empty."""
     return ca.vertcat(*(SX(v) for v in values)) if values else SX(0, 1)
 
 
@@ -41,14 +41,14 @@ def nonlinear(expression: Any, variables: Any) -> list[bool]:
 
 
 def _jumping(expression: Any, variables: Any) -> set[int]:
-    """Return the variables with which an expression jumps, as no derivative shows it."""
+    """Return the variables with which an expression jumps, which no derivative shows."""
     known = {each.element_hash() for each in ca.symvar(variables)}
     others = [each for each in ca.symvar(expression) if each.element_hash() not in known]
     function = ca.Function("jumps", [variables, ca.vertcat(*others)], [ca.densify(expression)])
     codes = range(function.n_instructions())
     if not any(function.instruction_id(k) in _JUMPS for k in codes):
         return set()
-    reads: dict[int, frozenset[int]] = {}  # by number of the register
+    reads: dict[int, frozenset[int]] = {}  # by register number
     found: set[int] = set()
     for k in codes:
         code = function.instruction_id(k)

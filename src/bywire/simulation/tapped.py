@@ -1,9 +1,9 @@
 """Model with falsifiable signals between plant and controllers, and tasks that can miss ticks.
 
-Sensor readings, demands and controller outputs pass a *tap*. A tap returns ``(1 + gain) y +
-offset``, its last value if it is held, or its input some ticks ago. Gains, offsets and the others
-are additional signals of the stimulus. If they are zero, the model equals the inner model, so runs
-with and without a fault have the same structure.
+Sensor readings, demands and controller outputs pass through a *tap*. A tap returns ``(1 + gain) y +
+offset``, its last value if it is stuck, or its input some ticks ago. Gains, offsets and the other
+effects are additional signals of the stimulus. If they are zero, the model equals the inner model,
+so runs with and without a fault have the same structure.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from bywire.core.model import Model, Task, Wrapping
 from bywire.core.signals import Signal, ranges_of, signals_of
 
 DEAD = 2.0
-"""value of the stimulus by which a task fails: the task has lost its memory"""
+"""value of a task's failure stimulus: the task has lost its memory"""
 
 
 class Tap(NamedTuple):
@@ -28,7 +28,7 @@ class Tap(NamedTuple):
     Parameters
     ----------
     name
-        Prefix of its stimuli, see `controls`.
+        Prefix of its stimuli; see `controls`.
     side
         ``"reading"``: a state as the tasks read it. ``"demand"``: a field of the stimulus.
         ``"drive"``: a field of the memory as the plant receives it.
@@ -53,10 +53,10 @@ class Tap(NamedTuple):
 
 
 def rests(task: str) -> str:
-    """Return the name of the stimulus by which a task fails.
+    """Return the name of the stimulus that makes a task fail.
 
     If it is 1, the task misses its tick, and its outputs hold their values. If it is `DEAD`, all
-    values that the task computes are as at rest: it has no memory, and starts again later.
+    values that the task computes are those at rest: the task loses its memory, and restarts later.
     """
     return f"rest_{task.replace('-', '_')}"
 
@@ -149,7 +149,7 @@ class Tapped(Wrapping):
         if name in self.resting:
             fails = getattr(stimulus, rests(name))
             empty = self.inner.rest(par)[1]
-            # Values that a task passes on unchanged are not its own memory.
+            # Values that a task returns unchanged belong to other tasks.
             after = type(after)(
                 *(
                     new if new is old else _failing(fails, old, new, none)
@@ -230,5 +230,5 @@ def _extended(kind: type[NamedTuple], further: tuple[tuple[str, Signal], ...]) -
     hints = typing.get_type_hints(kind, include_extras=True)
     fields = [(name, hints[name]) for name in kind._fields]
     fields += [(name, Annotated[float, signal]) for name, signal in further]
-    made: Any = NamedTuple(kind.__name__, fields)  # type: ignore[misc]
-    return typing.cast("type[NamedTuple]", made)
+    extended: Any = NamedTuple(kind.__name__, fields)  # type: ignore[misc]
+    return typing.cast("type[NamedTuple]", extended)

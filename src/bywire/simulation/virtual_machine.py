@@ -42,10 +42,10 @@ class CutSubstep:
     Parameters
     ----------
     settle
-        Function that computes a step of any length: x, d, r, q, jump, ..., and whether it did not
-        settle.
+        Function that computes a step of any length: x, d, r, q, jump, ..., and whether the step did
+        not settle.
     velocities
-        Indices of the states that carry dry friction.
+        Indices of the states with dry friction.
     m, p
         Memory and parameters.
     h
@@ -84,7 +84,7 @@ class CutSubstep:
             for k, jump in self._jumps(o):
                 if k == turns or abs(x[k]) < STILL * abs(
                     before[k]
-                ):  # equal bodies stop at the same instant
+                ):  # identical bodies stop at the same instant
                     x[k], d[k] = 0.0, _turned_back(float(d[k]), jump * (h / t))
             flow = flow + o[3] * (t / h)
             left -= t
@@ -195,7 +195,7 @@ class VirtualMachine:
         self._exact = BufferedCall(program.exact)
         self._ticks = [BufferedCall(tick) for tick in program.ticks]
         self._output = BufferedCall(program.output)
-        self._lock = threading.Lock()  # the functions' buffers serve one run at a time
+        self._lock = threading.Lock()  # the functions' buffers can serve only one run at a time
 
     def advance(self, request: Request, state: Array, begin: int, end: int, rows: Array) -> None:
         """Run frames begin..end: update ``state`` and fill ``rows`` in place."""
@@ -230,7 +230,7 @@ class VirtualMachine:
             cut = CutSubstep(self._settled, self._velocities, part["m"], p, float(h[0]))
             is_known = int(result[DOUBT][0] == 0.0)
             result, failed = cut.results(part["x"].copy(), part["d"].copy())
-            # The velocities of a settled step are final, so a kernel does not try it again.
+            # A settled step's velocities are final, so the kernel does not try it again.
             part["counters"] += failed, 1.0, cut.tries - is_known
         for kind, value in zip(("x", "d", "r"), result, strict=False):
             part[kind][:] = value

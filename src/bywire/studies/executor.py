@@ -17,7 +17,7 @@ from typing import Any, Generic, Protocol, TypeVar
 from bywire.cases.runner import as_completed
 from bywire.core.arguments import whole_number
 from bywire.core.brake import load_brakes, loaded_files
-from bywire.core.callers import heard_warnings, option
+from bywire.core.callers import collected_warnings, option
 from bywire.core.copies import may_copy, processes_with_brakes
 from bywire.core.errors import ParameterError, RunError
 from bywire.core.libraries import allow_dask
@@ -370,7 +370,7 @@ def _give(plan: StudyPlan) -> None:
 
 def _told(job: Callable[[], T]) -> tuple[T, list[Warning]]:
     """Return the result of a job and its warnings, which its own process would not show."""
-    with heard_warnings() as caught:
+    with collected_warnings() as caught:
         value = job()
     return value, [each.message for each in caught if isinstance(each.message, Warning)]
 

@@ -60,7 +60,7 @@ def share(count: int, cases: int, confidence: float) -> Share:
 
     Examples
     --------
-    >>> round(share(0, 100, 0.95).high, 4)  # nothing seen in a hundred is no proof
+    >>> round(share(0, 100, 0.95).high, 4)  # none in a hundred proves little
     0.0362
     """
     if not cases:

@@ -101,7 +101,7 @@ def _varied_as_measured(
     bench
         The tested bench.
     section
-        ``[measured]`` of a study file: ``file``; ``of``, names, by default all that the bench has;
+        ``[measured]`` of a study file: ``file``; ``of``, names, default: all that the bench has;
         ``truncate``, whether to cut distributions off at the valid range.
     folder
         Base folder of the file's path.

@@ -22,7 +22,7 @@ from scipy.stats import qmc
 from bywire.analysis.loop_figures import LOOP_FIGURES
 from bywire.bench.requirements import Limit
 from bywire.core.errors import ParameterError
-from bywire.core.interrupts import interrupt_heard
+from bywire.core.interrupts import interrupt_handled
 from bywire.core.typing import Array, Progress
 from bywire.synthesis.bench_figures import BenchFigures
 from bywire.synthesis.linear_case import LinearCase, read, room, slack, state_of, values_of
@@ -419,7 +419,7 @@ def design(
     """
     if not tunables:
         raise ParameterError(
-            "there is nothing to tune: set fewer of the loop's parameters", name="parameters"
+            "no parameter is left to tune: set fewer of the loop's parameters", name="parameters"
         )
     floors = linear_floors(requirements, largest_error(cases, start))
     problem = Problem(tunables, (*requirements, *floors), tuple(cases))
@@ -436,7 +436,7 @@ def design(
             search = _by_figures(search, progress)
             conflicts = _conflicts(search, progress)
     except KeyboardInterrupt:
-        interrupt_heard()
+        interrupt_handled()
         status = status if status == "infeasible" else "interrupted"
     z = first if search.best is None else search.best
     outcome = _judged(problem, z, "interrupted" if status == "interrupted" else None, conflicts)

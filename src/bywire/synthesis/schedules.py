@@ -118,9 +118,7 @@ def design_schedule(
     """
     schedule = scheduled(loop)
     if not any(tunables.values()):
-        raise ParameterError(
-            "there is nothing to tune in any region: set fewer gains", name="gains"
-        )
+        raise ParameterError("no gain is left to tune in any region: set fewer gains", name="gains")
     order = [schedule.main, *(name for name in schedule.regions if name != schedule.main)]
     order = [name for name in order if tunables[name]]
     gains: dict[str, float] = {}

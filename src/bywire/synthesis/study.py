@@ -12,7 +12,7 @@ import xarray as xr
 from bywire.bench.kpis.kpi import Kpi
 from bywire.core.arguments import checked
 from bywire.core.errors import ParameterError
-from bywire.core.parameters import ParameterSet
+from bywire.core.parameters import ParameterSet, RuleError
 from bywire.core.registry import Kind, instances
 from bywire.core.typing import Progress
 from bywire.core.units import shown
@@ -184,13 +184,13 @@ def require_ranges(options: ParameterSet, ranges: Iterable[tuple[str, str, str]]
 
     Raises
     ------
-    ValueError
-        In the form that a validator of the options needs.
+    RuleError
+        With the lower end, for a validator of the options.
     """
     for low, high, unit in ranges:
         a, b = getattr(options, low), getattr(options, high)
         if not a < b:
-            raise ValueError(f"{low} = {shown(a, unit)} must be below {high} = {shown(b, unit)}")
+            raise RuleError(low, shown(a, unit), f"below {high} = {shown(b, unit)}")
 
 
 def edge_warnings(

@@ -25,7 +25,7 @@ from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.requirements import Limit
 from bywire.bench.running import run
 from bywire.core.errors import ParameterError
-from bywire.core.interrupts import interrupt_heard
+from bywire.core.interrupts import interrupt_handled
 from bywire.core.parameters import ParameterSet
 from bywire.core.typing import Array, Progress
 from bywire.synthesis.bench_figures import (
@@ -364,7 +364,7 @@ def tune(
             callback=passed,
         )
     except KeyboardInterrupt:
-        interrupt_heard()
+        interrupt_handled()
         interrupted = True
         if not tried:
             raise

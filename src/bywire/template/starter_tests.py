@@ -1,4 +1,4 @@
-"""The brake starter fulfills every contract of a brake, and reaches its clamp force."""
+"""Tests of the brake starter: it fulfills every contract and reaches its clamp force."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ PACKAGE = Path(__file__).parents[1] / "src" / "bywire.template.starter"
 
 @pytest.fixture(autouse=True, scope="module")
 def known() -> None:
-    """Register the brake, installed or not."""
+    """Register the brake, even if it is not installed."""
     if "starter" not in brake.brakes():
         load_system(PACKAGE)
 

@@ -1,4 +1,4 @@
-"""The use cases of bywire, one per module; `declare` derives commands and forms from them.
+"""The use cases of bywire, one module per family; `declare` makes commands and forms of them.
 
 These modules load fast, because every start of the command line reads all of them. A use case
 imports what it computes with when its function is called.

@@ -9,6 +9,7 @@ command's help, the form and the reference. Messages write an argument's name wi
 from __future__ import annotations
 
 import inspect
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -33,6 +34,10 @@ Kind = Literal[
     "things",
 ]
 """kinds of form fields (see `bywire.server.field`)"""
+_EXAMPLE = re.compile(
+    r"(?:e\.g\.|such as|for example|:) '([^']+)'"
+    r"|(?:e\.g\.|such as|for example) (\S+?)(?=[,;.)]*(?:\s|$))"
+)
 NOTHING: Mapping[str, Any] = MappingProxyType({})
 """default of arguments that map names to values"""
 
@@ -105,6 +110,12 @@ class Ask:
     is_last: bool = False
     shown_default: str | bool | None = None
     panel: str | None = None
+
+    @property
+    def example(self) -> str:
+        """The first example in the help, which an empty field of the form shows; may be empty."""
+        found = _EXAMPLE.search(self.help)
+        return (found[1] or found[2]) if found else ""
 
 
 @dataclass(frozen=True)

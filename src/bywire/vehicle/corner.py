@@ -1,7 +1,7 @@
-"""A car's corner around any brake with a disc: body, tyre, road, and the heat of the disc.
+"""A car's corner with any disc brake: body, tyre, road, and the disc's heat.
 
-A corner inherits from `Corner` and from the assembly of its brake, whose disc turns with the wheel.
-Its method ``wheel`` returns the speed of the disc, on which it applies `tyre_torque`.
+A corner inherits from `Corner` and from its brake's assembly, whose disc turns with the wheel. Its
+method ``wheel`` returns the disc's speed. `tyre_torque` is the road's torque on the disc.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from bywire.vehicle.two_wheeler import BOOK, HEAT_BOOK, heat_sink, shown_slip
 
 
 class CornerParameters(ParameterSet):
-    """Body, wheel, tyre and road; the wheel's inertia is that of the brake's disc."""
+    """Body, wheel, tyre and road; the wheel's inertia belongs to the brake's disc."""
 
     body: corner_body.Parameters
     r: Length
@@ -29,7 +29,7 @@ class CornerParameters(ParameterSet):
 
 
 class WheelSpeed(NamedTuple):
-    """Speed of the wheel [rad/s], as it enters the implicit solve and value-only."""
+    """Wheel speed [rad/s], as it enters the implicit solve, and as a value only."""
 
     x: float
     xe: float
@@ -110,11 +110,11 @@ class HotCornerParameters(CornerParameters):
 
 
 class HotCorner(Corner[ParT, MemoryT]):
-    """A corner whose friction heats the disc, so that its pads may fade.
+    """A corner whose friction heats the disc, so its pads may fade.
 
     A corner inherits from it instead of `Corner`, has parameters ``corner.heat``, and multiplies
-    the friction of its pads by `pads_friction`. Its method ``brake_torque`` returns the torque that
-    its brake can hold.
+    its pads' friction by `pads_friction`. Its method ``brake_torque`` returns the torque that its
+    brake can hold.
     """
 
     disc_heat = Part(
@@ -142,11 +142,11 @@ class HotCorner(Corner[ParT, MemoryT]):
         raise NotImplementedError
 
     def pads_friction(self, w: Self) -> float:
-        """Return the friction of the pads over that of cold ones."""
+        """Return the pads' friction relative to cold pads."""
         return disc_heat.friction(w.disc_heat.xe.T_disc, w.disc_heat.par)
 
     def wire(self, w: Self) -> None:
-        """Connect the brake's heat: limit of the friction times speed, 0 where the wheel stands."""
+        """Connect the brake's heat: friction limit times speed, 0 where the wheel does not turn."""
         super().wire(w)
         torque = self.brake_torque(w)
         w.disc_heat.u = disc_heat.Input(
@@ -169,5 +169,5 @@ class HotCorner(Corner[ParT, MemoryT]):
 
 
 def warm_disc(T: float, par: disc_heat.Parameters) -> disc_heat.State:
-    """Return the brake with its disc at a temperature [K], the rest as warm as the air."""
+    """Return the brake's state with its disc at a temperature [K] and the rest at the air's."""
     return disc_heat.State(T, par.T_a, par.T_a)

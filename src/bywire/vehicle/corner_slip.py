@@ -1,7 +1,7 @@
-"""Slip control of a car's corner: it lowers the moment demand of any brake.
+"""Slip control of a car's corner, which lowers the moment demand of any brake.
 
-The laws use pressures. For a brake that follows a moment, its demand is converted to the pressure
-of a brake with ``slip.k_hat``, and the lowered pressure is converted back.
+The laws use pressures. For a brake that follows a moment, the demand is converted to a pressure
+with ``slip.k_hat``, and the lowered pressure is converted back.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ MomentRate = Annotated[float, Unit("N*m/s", 1e4), Field(gt=0, allow_inf_nan=Fals
 class Parameters(ParameterSet):
     """Sensors and laws of one wheel.
 
-    ``abs``: ``"pi"`` holds a slip, ``"rules"`` build, dump and hold by thresholds, ``"off"`` passes
-    the demand unchanged. ``sees``: speed and slip are ``"estimated"`` from pulses and an
+    ``abs``: ``"pi"`` controls the slip; ``"rules"`` build, dump and hold by thresholds; ``"off"``
+    does not change the demand. ``sees``: speed and slip are ``"estimated"`` from pulses and an
     accelerometer, or ``"known"``, for comparison.
     """
 
@@ -38,7 +38,7 @@ class Parameters(ParameterSet):
     M_rate: MomentRate
     """fastest build-up of a demand"""
     M_least: SomeMoment
-    """least moment under slip control, so that the pads stay on the disc"""
+    """lowest moment under slip control, which keeps the pads on the disc"""
     encoder: wheel_encoder.Parameters
     tau_a: TimeConstant
     """time constant of the accelerometer's filter"""
@@ -93,13 +93,13 @@ def awake(v: float, par: Parameters) -> dict[str, float]:
 
 
 def tick(r: Readings, m: Any, M_set: float, par: Parameters) -> Any:
-    """Run slip control once: measure, limit the build-up, then lower it.
+    """Run slip control once: measure, limit the build-up, then lower the demand.
 
-    ``m``: a memory with the fields of `Memory`; ``M_set``: the moment demanded [N m].
+    ``m``: a memory with the fields of `Memory`. ``M_set``: the demanded moment [N m].
     """
     before, m = m, _measured(r, m, par)
     k = par.slip.k_hat
-    # While the pads cross a gap the demand does not build up, and the law's integral waits.
+    # While the pads cross a gap, the demand does not build up and the law's integral is frozen.
     risen = ops.where(r.touches > 0.5, m.M_most + par.M_rate * par.T_s, par.M_least)
     m = m._replace(M_most=ops.fmin(M_set, risen))
     p_most, p_before = m.M_most / k, ops.where(r.touches > 0.5, before.M_most, 0.0) / k
@@ -125,8 +125,8 @@ def tick(r: Readings, m: Any, M_set: float, par: Parameters) -> Any:
         rules, out = abs_rules.output(rules, view, par.T_s, par.rules)  # type: ignore[assignment]
         m = m._replace(**{f"{name}_x": value for name, value in rules._asdict().items()})
     left = ops.fmax(k * out.p, ops.fmin(par.M_least, m.M_most))
-    # Near standstill, slip comes from a car that rocks on its tyre, and the motors would follow it
-    # against the standing disc. The lowered moment stays, unless the demand is lower.
+    # Near standstill, the car rocks on its tyre, and the motors would follow this slip although the
+    # disc is at rest. The lowered moment therefore stays, unless the demand is lower.
     holds = ops.where(m.v_hat < par.vehicle_speed.v_still, before.abs, 0.0)
     kept = ops.fmin(before.M_left, m.M_most)
     left = ops.where(holds > 0.5, kept, left)

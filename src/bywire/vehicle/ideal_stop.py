@@ -15,7 +15,7 @@ RidingSpeed = Annotated[float, Unit("m/s", 28.0), Field(gt=0, allow_inf_nan=Fals
 
 
 def peak_adhesion(par: VehicleParameters) -> tuple[float, float]:
-    """Return the largest adhesion of each wheel on the first stretch of the road."""
+    """Return each wheel's largest adhesion on the first stretch of the road."""
     ground = road.surface(0.0, par.road)
     front, rear = (
         float(adhesion.adhesion(adhesion.peak_slip(ground, rubber), ground, rubber))
@@ -32,8 +32,8 @@ def ideal_deceleration(par: VehicleParameters, *, front_only: bool = False) -> f
 
     .. math:: a = g \frac{\mu_f^* (1 - l_f/L) + \mu_r^* l_f/L}{1 - (\mu_f^* - \mu_r^*) h/L}
 
-    which is :math:`\mu^* g` for tyres of one curve. With :math:`\mu_r^* = 0` it is that of the
-    front wheel alone. On a slope, its share of the weight is added.
+    which is :math:`\mu^* g` for tyres with the same curve. With :math:`\mu_r^* = 0` only the front
+    wheel brakes. On a slope, gravity's share is added.
     """
     body, (mu, rear) = par.body, peak_adhesion(par)
     slope = road.slope(0.0, par.road)
@@ -54,7 +54,7 @@ def ideal_distance(v: float, par: VehicleParameters, *, front_only: bool = False
 
     .. math:: x = \frac{\ln(1 + k v^2/a)}{2 k}, \quad k = \frac{\rho\, C_d A}{2 m}
 
-    Infinite where the road falls more steeply than the tyres hold.
+    The distance is infinite if the tyres cannot hold the vehicle on the slope.
     """
     a, body = ideal_deceleration(par, front_only=front_only), par.body
     if a <= 0:

@@ -1,4 +1,4 @@
-"""Remarks on slip control that holds one slip, on the surfaces of the road."""
+"""Remarks on slip control with a fixed slip set point, on the road's surfaces."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from bywire.plant import adhesion, road
 from bywire.vehicle.surfaces import surface_name
 
 FAR = 2.0
-"""least ratio of the slip of the largest adhesion to the slip held that deserves a remark"""
+"""lowest ratio of the slip at the largest adhesion to the slip set point that causes a remark"""
 
 
 def far_from_peak(
@@ -20,7 +20,7 @@ def far_from_peak(
     curve: adhesion.Parameters,
     ways: road.Parameters,
 ) -> list[str]:
-    """Return remarks on surfaces whose largest adhesion needs far more slip than the slip held.
+    """Return remarks on surfaces whose largest adhesion needs far more slip than the set point.
 
     Parameters
     ----------
@@ -29,17 +29,17 @@ def far_from_peak(
     acts
         Whether slip control acts, above 0.5.
     slip_set
-        Slip that it holds.
+        Slip set point.
     parameter
-        Name of that parameter, for instance ``"ecu.slip.slip_set"``.
+        Name of its parameter, for instance ``"ecu.slip.slip_set"``.
     curve, ways
         Parameters of tyre and road.
 
     Returns
     -------
     list of str
-        A remark for each surface on which it acted and whose peak is beyond `FAR` times the slip
-        that is held.
+        A remark for each surface on which slip control acted and whose peak is beyond `FAR` times
+        the slip set point.
     """
     places = place[acts > 0.5]
     is_further = cast("Array", road.share(cast("Any", places), ways)) > 0.5
@@ -53,8 +53,8 @@ def far_from_peak(
         name = surface_name(float(x), ways)
         surface = "the road" if name == "own" else name
         texts[
-            f"slip control holds a slip of {slip_set:.3g} ({parameter}), but {surface} has its "
-            f"largest adhesion at {peak:.3g}: {100.0 * held / most:.0f} % of it is used; a larger "
-            "set slip, or rules (abs=rules), brake harder there"
+            f"slip control uses a slip set point of {slip_set:.3g} ({parameter}), but {surface} "
+            f"has its largest adhesion at {peak:.3g}: the wheel uses {100.0 * held / most:.0f} % "
+            "of it. A larger set point, or rules (abs=rules), brake harder there"
         ] = None
     return list(texts)

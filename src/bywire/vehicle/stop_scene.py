@@ -18,7 +18,7 @@ from bywire.report.channel import phases
 from bywire.vehicle.surfaces import surface_name
 
 SCALE = 100.0
-"""units of a drawing in a meter"""
+"""drawing units per meter"""
 TINTS = {
     "dry-asphalt": style.GRAY,
     "wet-asphalt": style.BLUE,
@@ -31,9 +31,9 @@ TINTS = {
 }
 """color of each surface"""
 _WIDTH, _HEIGHT, _CONTACT = 720.0, 300.0, (500.0, 225.0)
-_LOADED = 1.0  # N: a wheel off the ground leaves no mark
+_LOADED = 1.0  # N; an unloaded wheel leaves no mark
 _POST = 5.0  # m between posts along the road
-_ARROW = 100.0  # length for a force as large as the weight
+_ARROW = 100.0  # length of an arrow for a force equal to the weight
 _SPOKES = 5
 
 
@@ -75,21 +75,21 @@ def stop_scene(
     Parameters
     ----------
     run
-        Recording, time zero where braking begins.
+        Recording, with time zero at the start of braking.
     ways
         The road.
     wheels
-        The first one is the front contact of the vehicle.
+        The wheels; the first one is at the vehicle's front contact.
     body
         SVG markup of the body, its origin at the first contact, y downward.
     dials
-        Signal, label, unit, factor to that unit, value of a full bar, and color of each bar.
+        Signal, label, unit, factor to that unit, value at a full bar, and color of each bar.
     place
-        Signal of the distance that the first wheel has gone [m].
+        Signal of the first wheel's traveled distance [m].
     weight
         Force whose arrow is a meter long [N].
     pitch
-        Signal of the angle about the first contact [rad], nose down; none where empty.
+        Signal of the angle about the first contact [rad], nose down; empty for none.
     """
     frames = frames_of(run)
     gone = over_frames(run, place, frames)

@@ -7,9 +7,9 @@ from bywire.plant.road import SURFACES, SurfaceName
 
 
 def laid(prefix: str, first: SurfaceName, further: SurfaceName | None = None) -> dict[str, float]:
-    """Return the parameters of a road, below a prefix, of a surface and of a further one.
+    """Return a road's parameters, below a prefix, for a first and a second surface.
 
-    The further one is the first, unless given; ``"own"`` changes none.
+    Default of the second surface: the first. ``"own"`` changes no parameter.
     """
     names = {"first": first, "further": first if further is None else further}
     return {
@@ -21,6 +21,6 @@ def laid(prefix: str, first: SurfaceName, further: SurfaceName | None = None) ->
 
 
 def surface_name(place: float, ways: road.Parameters) -> str:
-    """Return the name of the surface at a place [m], whatever the factor on its adhesion."""
+    """Return the name of the surface at a place [m], without the factor on its adhesion."""
     numbers = adhesion.surface_of(ways.further if road.share(place, ways) > 0.5 else ways.first)
     return next((name for name, known in SURFACES.items() if known == numbers), "own")

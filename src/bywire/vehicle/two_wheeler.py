@@ -1,9 +1,9 @@
-"""A two-wheeler on a straight road, around brakes of any kind, which may warm up and fade.
+"""Two-wheeler on a straight road, with brakes of any kind, which may warm up and fade.
 
-A vehicle with brakes inherits from `TwoWheeler` and from the assemblies of its brakes. Its method
-``brake_torques`` returns the torques that they can hold. Standstill is not a special case: brake
-and rolling resistance are one dry friction on each wheel, the tyre is a spring, and the road acts
-at every speed.
+A vehicle inherits from `TwoWheeler` and from its brakes' assemblies. Its method ``brake_torques``
+returns the torques that the brakes can hold. Standstill needs no special treatment: brake and
+rolling resistance form one dry friction on each wheel, the tyre is a spring, and the road acts at
+every speed.
 """
 
 from __future__ import annotations
@@ -39,12 +39,12 @@ def _sink(label: str) -> Role:
 
 
 def _tyre(label: str) -> Role:
-    """Return the role of a tyre, whose deflection comes back."""
+    """Return the role of a tyre, whose deflection energy returns."""
     return Role("sink", label, book=BOOK, returns="taken")
 
 
 class TwoWheeler(Assembly[ParT, MemoryT]):
-    """Body, two wheels on their tyres, and a road; their parameters are in ``vehicle``."""
+    """Body, two wheels with tyres, and a road; their parameters are in ``vehicle``."""
 
     frictions: ClassVar[tuple[str, ...]] = ("omega_f", "omega_r")
 
@@ -190,14 +190,14 @@ def _felt(w: Any, wheel: Any, rubber: Any, place: float) -> tyre.Input:
 
 
 def shown_slip(u: tyre.Input, par: tyre.Parameters) -> float:
-    """Return the slip as recordings show it: it fades to zero at standstill."""
+    """Return the slip for recordings, which fades to zero at standstill."""
     least = _CRAWL * par.v_low
     faster = ops.fmax(ops.fmax(ops.fabs(u.v), ops.fabs(u.v_wheel)), least)
     return (u.v - u.v_wheel) / faster
 
 
 def _loads(w: Any, cosine: float, front: tyre.Input, rear: tyre.Input) -> two_wheeler_body.Loads:
-    """Return the loads of both wheels, lagged or at once."""
+    """Return the loads of both wheels, lagged or immediate."""
     par = w.body.par
     if par.load == "lagged":
         N_r = two_wheeler_body.carried_load(w.body.x.N_lag, cosine, par)
@@ -227,16 +227,16 @@ _SLOW = disc_heat.State._fields
 
 
 def heat_sink(label: str) -> Role:
-    """Return the role of a body that holds heat."""
+    """Return the role of a body that stores heat."""
     return Role("sink", label, book=HEAT_BOOK, returns="any")
 
 
 class HotBrakes(TwoWheeler[ParT, MemoryT]):
-    """A two-wheeler whose friction heats the discs of both wheels, so that its pads may fade.
+    """A two-wheeler whose friction heats the discs of both wheels, so its pads may fade.
 
     A vehicle inherits from it instead of `TwoWheeler` and has parameters ``front.heat`` and
-    ``rear.heat``. Its method ``cold_torques`` returns the torques that cold brakes hold. A brake
-    may stay cold (``front.heat.law = "off"``): its heat is then not computed.
+    ``rear.heat``. Its method ``cold_torques`` returns the torques that cold brakes hold. With
+    ``front.heat.law = "off"``, a brake stays cold and its heat is not computed.
     """
 
     front_heat = Part(
@@ -258,7 +258,7 @@ class HotBrakes(TwoWheeler[ParT, MemoryT]):
         raise NotImplementedError
 
     def brake_torques(self, w: Self) -> tuple[float, float]:
-        """Return the torques that they can hold at the temperature of their discs."""
+        """Return the torques that the brakes can hold at their discs' temperatures."""
         front, rear = self.cold_torques(w)
         return (
             front * disc_heat.friction(w.front_heat.xe.T_disc, w.front_heat.par),
@@ -266,7 +266,7 @@ class HotBrakes(TwoWheeler[ParT, MemoryT]):
         )
 
     def wire(self, w: Self) -> None:
-        """Connect the brakes' heat: limit of the friction times speed, 0 where a wheel stands."""
+        """Connect the brakes' heat: friction limit times speed, 0 where a wheel does not turn."""
         super().wire(w)
         for heat, wheel, torque in (
             (w.front_heat, w.front, w.T_f),
@@ -292,7 +292,7 @@ class HotBrakes(TwoWheeler[ParT, MemoryT]):
 
 
 def cold_start(front: disc_heat.Parameters, rear: disc_heat.Parameters) -> dict[str, Any]:
-    """Return the states of both brakes as warm as the air, by their parts."""
+    """Return both brakes' states at the temperature of the air, by their parts."""
     return {
         part: disc_heat.State(par.T_a, par.T_a, par.T_a)
         for part, par in (("front_heat", front), ("rear_heat", rear))

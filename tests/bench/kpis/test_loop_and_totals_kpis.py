@@ -99,7 +99,7 @@ def test_occupation_of_modes():
     found = families.evaluate("occupation", recording, occupation.Setting())
     assert found["share_stuck"].value == pytest.approx(1.5 / 4)
     assert "not recorded" in found["share_sat_current"].note
-    assert "other values than 0 and 1" in found["share_sat_duty"].note
+    assert "values other than 0 and 1" in found["share_sat_duty"].note
     recording["t_stuck"] = ("time", [0.0, 1.0, 1.2, 1.2])
     found = families.evaluate("occupation", recording, occupation.Setting())
     assert found["share_stuck"].value == pytest.approx(0.3)

@@ -18,6 +18,7 @@ from bywire.bench.kpis.kpi import Undefined
 from bywire.bench.kpis.loop_family import NO_NUMBER, LoopFamily
 from bywire.core.errors import ModelError
 from bywire.simulation.compiler import find_compiler
+from raising import raises
 
 needs_compiler = pytest.mark.skipif(find_compiler() is None, reason="there is no C compiler")
 
@@ -260,8 +261,12 @@ REFUSED = {
     "try": ("try:\n    return y[0]\nfinally:\n    pass", 0, "valid statements are"),
     "a number as condition": ("if len(y):\n    return 1.0\nreturn 0.0", 0, "must be a bool"),
     "a narrowing": ("k = 0\nk = y[0]\nreturn 1.0 * k", 1, "it is float, but it must be int"),
-    "a counter that moves": ("for k in range(9):\n    k = 3\nreturn 0.0", 1, "a loop's counter"),
-    "a counter after its loop": ("for k in range(9):\n    pass\nreturn 1.0 * k", 2, "no value yet"),
+    "a counter that moves": ("for k in range(9):\n    k = 3\nreturn 0.0", 1, "a loop counter"),
+    "a counter after its loop": (
+        "for k in range(9):\n    pass\nreturn 1.0 * k",
+        2,
+        "it has no value here",
+    ),
     "a list in a loop": ("for k in range(9):\n    z = list(y)\nreturn 0.0", 1, "within a loop"),
     "a signal that is changed": ("y[0] = 1.0\nreturn y[0]", 0, "only a list created in this"),
     "a list that is changed late": (
@@ -272,13 +277,13 @@ REFUSED = {
     "a list that a loop hands on": (
         "z = list(y)\nfor k in range(9):\n    z[k] = 1.0\n    a = integral(t, z)\nreturn 0.0",
         2,
-        "change it before",
+        "or the loop there",
     ),
     "a list of any length": ("z = [0.0] * 999\nreturn z[0]", 0, "one number per sample"),
     "a list of other numbers": ("z = [1.0] * len(y)\nreturn z[0]", 0, "must start as [0.0]"),
     "a text": ("return 1.0 if setting.y == 'y' else 0.0", 0, "'y' is not a field with a C type"),
     "a text of parts": ("return Undefined('a' + WORDS)", 0, "write the text as one"),
-    "a number without format": ("return Undefined(f'{y[0]}')", 0, "numbers in it like"),
+    "a number without format": ("return Undefined(f'{y[0]}')", 0, "numbers such as"),
     "too many numbers": (
         "return Undefined(f'{y[0]:g} {y[0]:g} {y[0]:g} {y[0]:g}')",
         0,
@@ -287,15 +292,15 @@ REFUSED = {
     "a list in a comparison": (
         "return 1.0 if 0.0 < max(moving_average(t, y, 1.0)) < 1.0 else 0.0",
         0,
-        "assign this number to a name",
+        "assign the middle number",
     ),
     "infinity": ("return math.inf", 0, "a constant must be a finite number"),
     "a name in several": ("a = b = 1.0\nreturn a", 0, "valid statements are"),
     "a sum": ("return sum(y)", 0, "`sum(y)` in C: it can call functions"),
     "a starred call": ("return integral(*[t, y])", 0, "without * and **"),
-    "what is never nothing": ("return 1.0 if y is None else 0.0", 0, "this is never None"),
+    "what is never nothing": ("return 1.0 if y is None else 0.0", 0, "this value is never None"),
     "a lambda": ("f = lambda x: x\nreturn 0.0", 0, "may compute this expression"),
-    "an unknown name": ("return unknown", 0, "it has no value yet"),
+    "an unknown name": ("return unknown", 0, "it has no value here"),
 }
 
 
@@ -314,7 +319,7 @@ def test_a_function_that_calls_itself_and_an_unknown_type_are_refused(written):
         written(again, figure("return g(y[0])")).translate()
     with pytest.raises(ModelError, match="the type of 'x' is <class 'str'>"):
         written("def g(x: str) -> float:\n    return 1.0\n", figure("return g('a')")).translate()
-    with pytest.raises(ModelError, match="takes 'z', which must be t, setting, a field"):
+    with raises(ModelError, name="f", value="z", valid="t, setting, a field of Setting"):
         written(figure("return 1.0", "z: Samples"))
 
 

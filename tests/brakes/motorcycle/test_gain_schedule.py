@@ -20,6 +20,7 @@ from bywire.control import gain_schedule, pressure_pid
 from bywire.core.catalog import parameters
 from bywire.core.errors import ParameterError
 from bywire.simulation.run import simulate
+from raising import raises
 
 REGIONS = {
     "ecu.schedule.law": "regions",
@@ -63,7 +64,7 @@ def test_gains_are_continuous_and_constant_within_the_regions() -> None:
 
 @pytest.mark.parametrize("changes", [{"ecu.schedule.p_2": 11e5}, {"ecu.schedule.p_blend": 26e5}])
 def test_blends_that_overlap_are_refused(changes: dict[str, float]) -> None:
-    with pytest.raises(ParameterError, match="blends overlap"):
+    with raises(ParameterError, name="ecu.schedule.p_1", valid="<= p_2 - p_blend"):
         of().replace(changes)
 
 

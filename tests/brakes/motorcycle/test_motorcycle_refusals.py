@@ -46,7 +46,7 @@ def changed(changes: dict[str, Any]) -> None:
             {"port.x_port": 4.7e-3, **DEAD},
             r"port\.x_port = 0\.0047 m must be < .* = 0\.004601 m",
         ),
-        ({"port.x_port": 4.7e-3}, {"port.x_port": 4.7e-3, **DEAD}, "never close"),
+        ({"port.x_port": 4.7e-3}, {"port.x_port": 4.7e-3, **DEAD}, "never closes"),
     ],
 )
 def test_contradiction_is_refused(

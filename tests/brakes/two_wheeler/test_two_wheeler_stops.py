@@ -305,7 +305,7 @@ def test_a_rider_who_asks_for_less_than_the_road_holds_gets_all_of_it():
     )
     # All but what is still under way to the brake.
     assert 98.0 < result.kpi("rider_share_front").value < 100.0
-    assert "demands nothing" in result.kpi("rider_share_rear").note
+    assert "demand is zero" in result.kpi("rider_share_rear").note
     assert result.kpi("rider_share").value == result.kpi("rider_share_front").value
 
 

@@ -125,15 +125,15 @@ def test_every_slope_counts_where_the_step_is_judged(last, doubted):
 
 
 BAD = [
-    ("", "", "law = 'table' needs 2 nodes or more", "n_table [m]", "law = 'linear'"),
-    ("0 mm, 0.1 mm, 0.05 mm", "0 N, 1 kN, 2 kN", "n_table", "5e-05 m follows 0.0001 m"),
-    ("0 mm, 0.1 mm, 0.1 mm", "0 N, 1 kN, 2 kN", "n_table", "0.0001 m follows 0.0001 m"),
-    ("0 mm, 0.1 mm, 0.2 mm", "0 N, 3 kN, 2 kN", "F_table", "2000 N follows 3000 N"),
+    ("", "", "n_table = 0 nodes must be of 2 nodes or more", "law = 'linear'"),
+    ("0 mm, 0.1 mm, 0.05 mm", "0 N, 1 kN, 2 kN", "n_table.2 = 5e-05 m", "> 0.0001 m"),
+    ("0 mm, 0.1 mm, 0.1 mm", "0 N, 1 kN, 2 kN", "n_table.2 = 0.0001 m", "> 0.0001 m"),
+    ("0 mm, 0.1 mm, 0.2 mm", "0 N, 3 kN, 2 kN", "F_table.2 = 2000 N", "> 3000 N"),
     ("0 mm, 0.1 mm, 0.2 mm", "0 N, 3 kN, 3 kN", "F_table", "does not rise"),
-    ("0 mm, 0.1 mm, 0.2 mm", "0 N, 3 kN", "n_table has 3 nodes and F_table 2"),
-    ("0 mm, 0.1 mm", "", "n_table has 2 nodes and F_table 0"),
-    ("0.1 mm, 0.2 mm", "0 N, 3 kN", "from 0 m", "the first is 0.0001 m"),
-    ("0 mm", "0 N", "2 nodes or more", "it holds 1"),
+    ("0 mm, 0.1 mm, 0.2 mm", "0 N, 3 kN", "n_table = 3 nodes", "F_table, 2 nodes"),
+    ("0 mm, 0.1 mm", "", "n_table = 2 nodes", "F_table, 0 nodes"),
+    ("0.1 mm, 0.2 mm", "0 N, 3 kN", "n_table.0 = 0.0001 m", "0 m"),
+    ("0 mm", "0 N", "n_table = 1 nodes", "2 nodes or more"),
     ("0 mm, 0.1 mm", "0 N, -3 kN", "caliper.F_table.1 = -3000.0 N", ">= 0 N"),
 ]
 

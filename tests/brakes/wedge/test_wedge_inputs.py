@@ -23,7 +23,7 @@ BAD = [
     ("wedge.alpha=1600 mrad", "alpha = 1600 mrad is not valid: it must be > 0 mrad"),
     ("wedge.alpha=1", "a pure number cannot be converted to rad"),
     ("motor_1.dT=40 degC", "degC cannot be converted to a temperature difference in K"),
-    ("caliper.n_table=0 mm, 1 mm, 0.5 mm", "as node 3 of 3, 0.0005 m follows 0.001 m"),
+    ("caliper.n_table=0 mm, 1 mm, 0.5 mm", "caliper.n_table.2 = 0.0005 m must be > 0.001 m"),
     ("wedge.alpha=20mm", "mm cannot be converted to rad"),
     ("screw.eta_f=0", "screw.eta_f = 0.0 is not valid: it must be > 0 and <= 1"),
     ("screw.eta_f=1.01", "screw.eta_f = 1.01 is not valid: it must be > 0 and <= 1"),
@@ -85,7 +85,7 @@ def warnings(name, options=None, **overrides):
     """
     changes = {key.replace("__", "."): value for key, value in overrides.items()}
     run = run_once(bywire.Bench(name, "roberts2003", changes, options or {}))
-    left_behind = [text for text in run.warnings if " is derived (" in text]
+    left_behind = [text for text in run.warnings if ": its formula (" in text]
     assert len(left_behind) == ("wedge.mu_B" in changes)
     assert all(text.startswith("control.moment.slope_hat = 304.12 N*m/rad") for text in left_behind)
     return [text for text in run.warnings if text not in left_behind]
@@ -105,7 +105,7 @@ def test_moment_out_of_reach_is_said_with_numbers():
         **slow,
     )
     found = re.fullmatch(
-        r"the motors cannot reach the demanded 950 N\*m: on the current limit of 2\.5 A from "
+        r"the motors cannot reach the demanded 950 N\*m: at the current limit of 2\.5 A from "
         r"t = ([\d.]+) s to ([\d.]+) s, the moment stays at ([\d.]+) N\*m at most",
         text,
     )
@@ -125,7 +125,7 @@ def test_moment_out_of_reach_is_said_with_numbers():
 
 def test_limit_of_the_drive_counts_too():
     (text,) = warnings("moment-pulse-950", {"t_pulse": 0.4}, wedge__mu_B=0.2, drive__i_max=2.5)
-    assert "950 N*m: on the current limit of 2.5 A" in text
+    assert "950 N*m: at the current limit of 2.5 A" in text
 
 
 def test_current_limit_in_passing_is_said():
@@ -148,7 +148,7 @@ def test_screw_that_holds_is_allowed_and_said(eta_b):
     assert texts == (
         [
             "screw.eta_b = 0: no load drives these screws back, so the brake keeps its moment "
-            "when the power goes off"
+            "after power off"
         ]
         if eta_b == 0.0
         else []

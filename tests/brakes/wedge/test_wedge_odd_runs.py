@@ -13,6 +13,7 @@ import bywire
 from bywire.brakes.wedge.model import warnings_of
 from bywire.core.errors import InputError
 from bywire.report.answer import AnswerWarning
+from raising import raises
 from run_once import run_once
 
 
@@ -69,7 +70,7 @@ def test_ramp_is_judged_on_enough_rows_only():
 
 
 def test_ramp_downward_is_refused():
-    with pytest.raises(InputError, match=r"M_low = 300 N\*m must not be above M_high = 200 N\*m"):
+    with raises(InputError, name="M_low", value="300 N*m", valid="<= M_high = 200 N*m"):
         bywire.Bench("moment-ramp", "roberts2003", options={"M_low": 300.0})
 
 
@@ -105,7 +106,7 @@ def test_pads_that_touch_from_the_start():
 
 UNMET = [
     ("moment-pulse-950", {"wedge.mu_B": 0.0}, {}, "950 N*m was not reached: the moment is 0 N*m"),
-    ("moment-pulses", {"flywheel.Omega_0": 0.0}, {}, "0 N*m at most, as the disc is at rest"),
+    ("moment-pulses", {"flywheel.Omega_0": 0.0}, {}, "0 N*m at most, since the disc is at rest"),
     ("moment-pulses", {}, {"M_high": 5.0}, "parked up to control.moment.M_on = "),
 ]
 
@@ -130,7 +131,7 @@ def test_chatter_is_no_lack_of_torque(changes):
     assert np.abs(result.recordings["run"]["M_B"].values).max() > 200.0
     (text,) = result.warnings
     assert text.startswith("the demanded current swings between its limits of -20 A and 20 A, ")
-    assert text.endswith("see 'bywire margins position' and 'bywire margins moment'")
+    assert text.endswith("(see 'bywire margins position' and 'bywire margins moment')")
 
 
 def test_moment_that_comes_late_is_not_out_of_reach():

@@ -11,9 +11,9 @@ import pytest
 from exported_ecu import BRAKES, bench_of, needs_compiler
 
 from bywire.core.signals import signals_of
+from bywire.export.controller.files import CYCLE, FIRST, NOT_AVAILABLE, messages
 from bywire.export.controller.harness import FLAGS, WARNINGS
-from bywire.export.controller.tool_files import CYCLE, FIRST, NOT_AVAILABLE, messages
-from bywire.usecases.export_controller import export_controller
+from bywire.usecases.export import export_controller
 
 formats = pytest.importorskip("canmatrix.formats", reason="canmatrix is not installed")
 

@@ -25,7 +25,7 @@ from bywire.export.controller.target.trial import (
     Trial,
     missing_tools,
 )
-from bywire.usecases.export_controller import export_controller
+from bywire.usecases.export import export_controller
 from raising import raises
 
 needs_targets = pytest.mark.skipif(bool(missing_tools()), reason=missing_tools() or "all there")

@@ -14,7 +14,7 @@ import pytest
 from exported_ecu import BRAKES, bench_of, build, needs_compiler
 
 from bywire.export.controller.harness import FLAGS, SMALL_FLAGS
-from bywire.usecases.export_controller import export_controller
+from bywire.usecases.export import export_controller
 
 MUTANTS = 40
 SOME = 20

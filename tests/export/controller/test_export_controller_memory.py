@@ -15,7 +15,7 @@ from bywire.core.signals import Signal
 from bywire.export.controller.files import files
 from bywire.export.controller.program import program
 from bywire.export.controller.vectors import vectors
-from bywire.usecases.export_controller import export_controller
+from bywire.usecases.export import export_controller
 
 Number = Annotated[float, Signal("1", "a number", 1.0)]
 

@@ -13,7 +13,7 @@ from exported_ecu import needs_compiler
 
 from bywire.core.errors import ParameterError
 from bywire.export.controller.harness import FLAGS, WARNINGS
-from bywire.usecases.export_controller import export_controller
+from bywire.usecases.export import export_controller
 
 ECUS: dict[str, tuple[str, str]] = {
     "front": ("hard-braking", "double"),

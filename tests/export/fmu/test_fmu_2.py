@@ -14,7 +14,7 @@ from bywire.api.exports import ExportedFmu
 from bywire.bench.running import run_of
 from bywire.core.errors import CompilerError, FileError, ParameterError, UnknownNameError
 from bywire.export.fmu import archive
-from bywire.usecases.export_fmu import export_fmu
+from bywire.usecases.export import export_fmu
 from export.fmu.clients import Client
 from raising import raises
 

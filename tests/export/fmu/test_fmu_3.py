@@ -13,7 +13,7 @@ from fmpy.fmi3 import FMU3Slave
 from fmpy.validation import validate_fmu
 
 import bywire
-from bywire.usecases.export_fmu import export_fmu
+from bywire.usecases.export import export_fmu
 
 OPTIONS = {"t_hold": "60 ms", "pulses": 1, "t_low": "20 ms", "t_high": "20 ms", "settle": "20 ms"}
 BENCHES = {

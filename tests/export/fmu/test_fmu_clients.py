@@ -12,7 +12,7 @@ import pytest
 from fmpy import extract, read_model_description
 
 import bywire
-from bywire.usecases.export_fmu import export_fmu
+from bywire.usecases.export import export_fmu
 from export.fmu.test_fmu_exchange import SHORT_STOP, TICK, solved
 from systems.loading import loaded
 

@@ -14,7 +14,7 @@ from fmpy.validation import validate_fmu
 import bywire
 from bywire.api.exports import ExportedFmu
 from bywire.core.errors import ParameterError, UnknownNameError
-from bywire.usecases.export_fmu import export_fmu
+from bywire.usecases.export import export_fmu
 from export.fmu.clients import Client
 from export.fmu.solver_client import SolverClient
 from raising import raises

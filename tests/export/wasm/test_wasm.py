@@ -17,7 +17,7 @@ from bywire.bench.running import run_of
 from bywire.core.errors import CompilerError, ParameterError
 from bywire.export.wasm import module
 from bywire.simulation.run import sampled_stimulus
-from bywire.usecases.export_wasm import export_wasm
+from bywire.usecases.export import export_wasm
 
 NODE = shutil.which("node")
 pytestmark = pytest.mark.skipif(NODE is None, reason="there is no node to run the modules in")

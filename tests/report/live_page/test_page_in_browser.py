@@ -260,6 +260,92 @@ def test_a_figure_that_cannot_be_drawn_is_said(tab):
     tab.noise.clear()
 
 
+RANGES = """() => {
+  window.ranges = [];
+  const rangeNum = uPlot.rangeNum;
+  uPlot.rangeNum = (low, high, ...others) => {
+    ranges.push([low, high]);
+    return rangeNum(low, high, ...others);
+  };
+}"""
+SHOWN = """([from, to]) => {
+  const isIn = (_, k) => run.time[k] >= from && run.time[k] <= to;
+  const values = panels[0].traces.flatMap(({ name }) =>
+    [...converted(run.signals[name], panels[0])].filter(isIn));
+  return [Math.min(...values), Math.max(...values)];
+}"""
+
+
+def test_the_ordinate_fits_a_part_of_the_time_and_new_values_keep_it(tab):
+    tab.open()
+    tab.page.wait_for_function("() => place('loops').textContent.includes('phase margin')")
+    tab.page.wait_for_timeout(400)
+    tab.page.evaluate(RANGES)
+    over = tab.page.locator("#curves .u-over").first.bounding_box()
+    height = over["y"] + 0.5 * over["height"]
+    tab.page.mouse.move(over["x"] + 0.4 * over["width"], height)
+    tab.page.mouse.down()
+    tab.page.mouse.move(over["x"] + 0.6 * over["width"], height, steps=4)
+    tab.page.mouse.up()
+    tab.page.wait_for_function("() => ranges.length")
+    time = tab.page.evaluate(GIVEN)["time"]
+    part = [time[0] + share * (time[-1] - time[0]) for share in (0.4, 0.6)]
+    shown, whole = (tab.page.evaluate(SHOWN, each) for each in (part, [time[0], time[-1]]))
+    ranges = tab.page.evaluate("() => ranges")
+    close = 0.1 * (whole[1] - whole[0])
+    assert any(each == pytest.approx(shown, abs=close) for each in ranges)
+    if tab.file.stem == "motorcycle":  # pulses of the other bench look alike everywhere
+        assert shown[1] - shown[0] < 0.8 * (whole[1] - whole[0])
+    tab.page.evaluate("() => { ranges.length = 0; }")
+    tab.moved({VARIED[tab.file.stem][0]: 480})
+    tab.page.wait_for_function("() => ranges.length")
+    shown, ranges = tab.page.evaluate(SHOWN, part), tab.page.evaluate("() => ranges")
+    assert any(each == pytest.approx(shown, abs=close) for each in ranges)
+    assert not tab.noise
+
+
+def test_the_pointer_reads_values_with_units(tab):
+    tab.open()
+    tab.page.wait_for_timeout(400)
+    over = tab.page.locator("#curves .u-over").first.bounding_box()
+    before = tab.page.locator("#curves .u-legend").first.bounding_box()
+    tab.page.mouse.move(over["x"] + 0.5 * over["width"], over["y"] + 0.5 * over["height"])
+    tab.page.wait_for_timeout(300)
+    legend = tab.page.locator("#curves .u-legend").first
+    values = legend.locator(".u-value").all_inner_texts()
+    unit = tab.page.evaluate("() => panels[0].unit")
+    assert values[0].endswith(" ms") or values[0].endswith(" s")
+    assert values[1].endswith(f" {unit}")
+    assert legend.bounding_box()["height"] == before["height"]
+    assert not tab.noise
+
+
+def test_kept_runs_are_columns_of_the_key_figures(tab):
+    if tab.file.stem != "motorcycle":
+        pytest.skip("the other page judges no key figures")
+    tab.open()
+    heads = (
+        "() => [...document.querySelectorAll('#figures thead th')].map((e) => e.firstChild.data)"
+    )
+    assert tab.page.evaluate(heads)[:3] == ["figure", "value", "limit"]
+    value = tab.page.locator("#figures tbody tr").first.locator("td").first.inner_text()
+    tab.page.click("#keep")
+    tab.moved({"motor.R_m": 650})
+    tab.page.click("#keep")
+    assert tab.page.evaluate(heads)[:5] == ["figure", "this run", "run 1", "run 2", "limit"]
+    cells = tab.page.locator("#figures tbody tr").first.locator("td").all_inner_texts()
+    assert cells[1] == value  # of the bench's values
+    assert cells[0] == cells[2] != value
+    assert tab.page.locator("#kept li").all_inner_texts()[0].startswith("run 1: bench values")
+    judged = tab.page.locator("#figures tr", has_text="overshoot").locator(".met, .missed")
+    assert judged.count() == 3  # kept runs are judged too
+    tab.page.click("#figures [aria-label='drop run 1']")
+    assert tab.page.evaluate(heads)[:4] == ["figure", "this run", "run 2", "limit"]
+    tab.page.click("#kept [aria-label='drop run 2']")
+    assert tab.page.evaluate(heads)[:3] == ["figure", "value", "limit"]
+    assert not tab.noise
+
+
 def test_what_a_page_may_not_do_is_blocked_and_seen(tab):
     tab.open()
     tab.page.evaluate("() => fetch('https://example.org/').catch(() => undefined)")

@@ -1,4 +1,4 @@
-"""Duty: an input is held, or applied periodically, until the motor is warm."""
+"""Duty: apply an input continuously or periodically until the motor is warm."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ Share = Annotated[float, Unit("1", 0.5), Field(gt=0, le=1, allow_inf_nan=False)]
 
 
 class Options(ParameterSet):
-    """The applications, from time zero on."""
+    """Applications of the input, from time zero on."""
 
     input: str
-    """applied stimulus of the model; by default its only one"""
+    """applied stimulus of the model (default: its only stimulus)"""
     output: str
-    """recorded signal that responds; by default the first one with the input's unit"""
+    """recorded signal that responds (default: the first one with the input's unit)"""
     start: InputLevel
     """input between the applications"""
     end: InputLevel
@@ -32,9 +32,9 @@ class Options(ParameterSet):
     period: Duration
     """time from one application to the next"""
     share: Share
-    """share of the period in which the input is applied; 1 holds it"""
+    """share of the period in which the input is applied; 1 applies it continuously"""
     duration: Duration
-    """time recorded"""
+    """length of the recording"""
     record: Duration
     """recording interval"""
     settle: TimeConstant
@@ -42,7 +42,7 @@ class Options(ParameterSet):
 
 
 def build(tested: TestedModel) -> Experiment:
-    """Return the experiment of a model, judged by its temperatures and its output when warm."""
+    """Return the experiment for a model, judged by its temperatures and its output when warm."""
 
     def course(options: Any, _: Mapping[str, Stimulus]) -> Course:
         def applied(t: Any) -> Any:
@@ -57,7 +57,7 @@ def build(tested: TestedModel) -> Experiment:
 
 GENERIC = GenericExperiment(
     name="duty",
-    summary="any input held, or applied again and again: how warm motors get, when they derate",
+    summary="any input, applied continuously or periodically: motor temperatures and derating",
     options=Options,
     signals={"input": "stimulus", "output": "recording"},
     defaults={

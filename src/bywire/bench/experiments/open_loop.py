@@ -14,19 +14,19 @@ class Options(ParameterSet):
     """Driven input and judged output."""
 
     input: str
-    """stimulus of the model that [stimulus] drives; by default its only one"""
+    """stimulus of the model that [stimulus] drives (default: its only stimulus)"""
     output: str
-    """judged signal of the recording; by default the first one with the input's unit"""
+    """judged signal of the recording (default: the first one with the input's unit)"""
     duration: Duration
     """length of the run"""
     record: Duration
     """recording interval"""
     settle: TimeConstant
-    """time before zero, at the stimulus' first value"""
+    """time before zero, at the stimulus's first value"""
 
 
 def build(tested: TestedModel) -> Experiment:
-    """Return the experiment of a model, judged by the extremes of the output."""
+    """Return the experiment for a model, judged by the extremes of the output."""
     return tested.experiment(
         lambda options, stimuli: required_stimulus(stimuli.get(""), "open-loop").sample,
         {"extremes": lambda options: extremes.Setting(tested.output)},

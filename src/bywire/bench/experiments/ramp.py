@@ -1,4 +1,4 @@
-"""Ramp: an input moves slowly up and down, for the loop that friction and backlash cause."""
+"""Ramp: an input moves slowly up and down, to show the hysteresis of friction and backlash."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from bywire.bench.generic_experiment import (
 from bywire.bench.kpis import extremes, hysteresis
 from bywire.bench.stimuli import ramp
 from bywire.bench.stimulus import Stimulus
-from bywire.core.errors import ParameterError
+from bywire.core.errors import not_valid
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, TimeConstant, Unit
 
@@ -28,17 +28,17 @@ class Options(ParameterSet):
     """The ramp, from time zero on."""
 
     input: str
-    """ramped stimulus of the model; by default its only one"""
+    """ramped stimulus of the model (default: its only stimulus)"""
     output: str
-    """recorded signal that responds; by default the first one with the input's unit"""
+    """recorded signal that responds (default: the first one with the input's unit)"""
     drive: str
-    """input or recorded signal that drives the loop, such as a current; by default the input"""
+    """input or recorded signal that drives the loop, such as a current (default: the input)"""
     start: InputLevel
     """input at the beginning and at the end"""
     end: InputLevel
     """input at the turning point"""
     slope: InputRate
-    """magnitude of the slope, there and back"""
+    """magnitude of the slope, in both directions"""
     t_hold: TimeConstant
     """time spent at the turning point"""
     record: Duration
@@ -46,20 +46,17 @@ class Options(ParameterSet):
     settle: TimeConstant
     """time before the ramp, at its first level"""
     smoothing: TimeConstant
-    """moving average for the loop's key figures, 0 for the raw signals"""
+    """averaging time for the loop's key figures, 0 for the raw signals"""
 
 
 def build(tested: TestedModel) -> Experiment:
-    """Return the experiment of a model, judged by its loop and the extremes of the output."""
+    """Return the experiment for a model, judged by its loop and the extremes of the output."""
     drive, unit = tested.units["drive"], tested.units["input"]
 
     def course(options: Any, _: Mapping[str, Stimulus]) -> Course:
         if options.start == options.end:
-            raise ParameterError(
-                f"options.start and options.end are both {options.end:g} {unit}: a ramp needs "
-                "different levels",
-                name="options.end",
-                value=f"{options.end:g} {unit}",
+            raise not_valid(
+                "options.end", f"{options.end:g} {unit}", "different from options.start"
             )
         shape = ramp.Parameters(
             start=options.start,

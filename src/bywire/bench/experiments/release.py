@@ -1,4 +1,4 @@
-"""Release: an input falls from one level to another, and the output with it."""
+"""Release: an input falls from one level to another, and the output follows."""
 
 from __future__ import annotations
 
@@ -27,19 +27,19 @@ class Options(ParameterSet):
     """The release, from time zero on."""
 
     input: str
-    """falling stimulus of the model; by default its only one"""
+    """falling stimulus of the model (default: its only stimulus)"""
     output: str
-    """released signal of the recording; by default the first one with the input's unit"""
+    """released signal of the recording (default: the first one with the input's unit)"""
     start: InputLevel
     """input before the release"""
     end: InputLevel
-    """input after it"""
+    """input after the release"""
     t_ramp: TimeConstant
-    """time in which the input falls, 0 for at once"""
+    """time in which the input falls, 0 for a step"""
     empty: OutputLevel
-    """level of the output below which it counts as released"""
+    """level below which the output counts as released"""
     duration: Duration
-    """time recorded after the release begins"""
+    """length of the recording from the beginning of the release"""
     record: Duration
     """recording interval"""
     settle: TimeConstant
@@ -47,7 +47,7 @@ class Options(ParameterSet):
 
 
 def build(tested: TestedModel) -> Experiment:
-    """Return the experiment of a model, judged by the time to empty and the residual."""
+    """Return the experiment for a model, judged by the time to empty and the residual level."""
 
     def course(options: Any, _: Mapping[str, Stimulus]) -> Course:
         ramp, fall = max(options.t_ramp, 1e-9), options.end - options.start
@@ -60,7 +60,7 @@ def build(tested: TestedModel) -> Experiment:
 
 GENERIC = GenericExperiment(
     name="release",
-    summary="any input falls: time until the output is released, and its residual",
+    summary="fall of any input: time until the output is released, and its residual level",
     options=Options,
     signals={"input": "stimulus", "output": "recording"},
     defaults={

@@ -1,4 +1,4 @@
-"""Sine sweep: sines with increasing frequency at an input, each over whole periods."""
+"""Sine sweep: sines of increasing frequency at an input, each over whole periods."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from bywire.bench.generic_experiment import (
 )
 from bywire.bench.kpis import sine_sweep
 from bywire.bench.stimulus import Stimulus
-from bywire.core.errors import ParameterError, not_valid
+from bywire.core.errors import not_valid
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Frequency, TimeConstant, Unit
 from bywire.core.typing import Array
 
 Count = Annotated[int, Unit("1", 5.0), Field(ge=1, le=1000)]
 
-_LEAST_ROWS = 8  # least rows of the recording in the shortest period
+_LEAST_ROWS = 8  # smallest number of rows in the shortest period
 InputAmplitude = Annotated[float, Unit("input"), Field(gt=0, allow_inf_nan=False)]
 
 
@@ -33,13 +33,13 @@ class Options(ParameterSet):
     """The sines, from time zero on."""
 
     input: str
-    """excited stimulus of the model; by default its only one"""
+    """excited stimulus of the model (default: its only stimulus)"""
     output: str
-    """recorded signal that responds; by default the first one with the input's unit"""
+    """recorded signal that responds (default: the first one with the input's unit)"""
     mean: InputLevel
     """mean of the input"""
     amplitude: InputAmplitude
-    """amplitude: half of peak to peak"""
+    """amplitude: half the peak-to-peak value"""
     f_start: Frequency
     """lowest frequency"""
     f_end: Frequency
@@ -57,7 +57,7 @@ class Options(ParameterSet):
 
 
 def build(tested: TestedModel) -> Experiment:
-    """Return the experiment of a model, judged by gain, bandwidth and lag."""
+    """Return the experiment for a model, judged by gain, bandwidth and lag."""
 
     def driven(options: Any, _: Mapping[str, Stimulus]) -> Course:
         _require_rows(options)
@@ -98,24 +98,19 @@ def course(t: Array, options: Any) -> Array:
 
 
 def _require_rows(options: Any) -> None:
-    """Reject recordings that are too coarse for the highest frequency, and falling frequencies."""
+    """Reject decreasing frequencies, and recordings too coarse for the highest frequency."""
     if options.f_end < options.f_start:
         start = f">= options.f_start = {options.f_start:g} Hz"
         raise not_valid("options.f_end", f"{options.f_end:g} Hz", start)
     longest = 1.0 / (_LEAST_ROWS * options.f_end)
     if options.record > longest:
-        raise ParameterError(
-            f"options.record = {options.record:g} s is too long for sines of {options.f_end:g} Hz: "
-            f"it must be <= {longest:g} s",
-            name="options.record",
-            value=f"{options.record:g} s",
-            valid=f"<= {longest:g} s",
-        )
+        advice = f"to resolve sines of {options.f_end:g} Hz"
+        raise not_valid("options.record", f"{options.record:g} s", f"<= {longest:g} s", advice)
 
 
 GENERIC = GenericExperiment(
     name="sine-sweep",
-    summary="sines of rising frequency at any input: gain, bandwidth and lag of any output",
+    summary="sines of increasing frequency at any input: gain, bandwidth and lag of any output",
     options=Options,
     signals={"input": "stimulus", "output": "recording"},
     defaults={

@@ -18,28 +18,28 @@ class Options(ParameterSet):
     """The step, at time zero."""
 
     input: str
-    """stepped stimulus of the model; by default its only one"""
+    """stepped stimulus of the model (default: its only stimulus)"""
     output: str
-    """recorded signal that responds; by default the first one with the input's unit"""
+    """recorded signal that responds (default: the first one with the input's unit)"""
     start: InputLevel
     """input before the step"""
     end: InputLevel
     """input from the step on"""
     duration: Duration
-    """time recorded after the step"""
+    """length of the recording after the step"""
     record: Duration
     """recording interval"""
     settle: TimeConstant
     """time before the step, at its first level"""
     smoothing: TimeConstant
-    """moving average for the step's key figures, 0 for the raw output"""
+    """averaging time for the step's key figures, 0 for the raw output"""
 
 
 def build(tested: TestedModel) -> Experiment:
-    """Return the experiment of a model, judged by its step response."""
+    """Return the experiment for a model, judged by its step response."""
 
     def step(options: Any) -> step_response.Setting:
-        """Return the step's setting; without a set point, its levels are those of the response."""
+        """Return the step's setting; without a set point, the response determines its levels."""
         if not tested.is_set_point:
             return step_response.Setting(tested.output, 0.0, smoothing=options.smoothing)
         return step_response.Setting(
@@ -61,7 +61,7 @@ def build(tested: TestedModel) -> Experiment:
 
 GENERIC = GenericExperiment(
     name="step",
-    summary="step of any input: rise, settling, overshoot of any output",
+    summary="step of any input: rise time, settling time and overshoot of any output",
     options=Options,
     signals={"input": "stimulus", "output": "recording"},
     defaults={

@@ -1,4 +1,4 @@
-"""Stribeck curve: dry friction of a model over speed, at several values of another state.
+"""Stribeck curve: dry friction of a model against speed, at several values of another state.
 
 Nothing is simulated: the bounds of the friction are evaluated with the model at rest, with contact
 forces from its overlaps.
@@ -37,9 +37,9 @@ class Options(ParameterSet):
     """Speeds and levels of the curves."""
 
     friction: str
-    """velocity with dry friction; by default the model's first one"""
+    """velocity with dry friction (default: the model's first)"""
     along: str
-    """state that affects the friction, with one curve per level; the velocity: a single curve"""
+    """state that affects the friction, with one curve per level; the velocity itself: one curve"""
     levels: Levels
     """levels of that state"""
     speed_max: Speed
@@ -47,24 +47,27 @@ class Options(ParameterSet):
 
 
 def build(tested: TestedModel) -> Experiment:
-    """Return the experiment of a model."""
+    """Return the experiment for a model."""
     velocity, along = tested.names["friction"], tested.names["along"]
     force = _FORCES.get(tested.units["friction"], f"W/({tested.units['friction']})")
 
     figures = Figures(
         breakaway_forward=(
             force,
-            "Largest friction from rest toward positive speeds, over the levels.",
+            "Largest breakaway friction toward positive speeds, over all levels.",
         ),
         breakaway_backward=(
             force,
-            "Largest friction from rest toward negative speeds, over the levels.",
+            "Largest breakaway friction toward negative speeds, over all levels.",
         ),
-        least_friction=(force, "Smallest friction in either direction, over speeds and levels."),
+        least_friction=(
+            force,
+            "Smallest friction in either direction, over all speeds and levels.",
+        ),
     )
 
     def static(par: Any, options: Any) -> dict[str, xr.Dataset]:
-        """Return friction over level and speed; at rest the breakaway force in each direction."""
+        """Return friction by level and speed; at rest the breakaway force in each direction."""
         side = np.linspace(0.0, options.speed_max, _SIDE)
         speeds = np.concatenate((-side[::-1], side))
         values = np.array(
@@ -84,7 +87,7 @@ def build(tested: TestedModel) -> Experiment:
         return {"curve": curve}
 
     def judge(recordings: Recordings, options: Any) -> tuple[Kpi, ...]:
-        """Return the friction from rest in both directions, and the smallest one in motion."""
+        """Return the breakaway friction in both directions, and the smallest friction in motion."""
         friction = recordings["curve"]["friction"].values
         forward, backward = friction[:, _SIDE:], -friction[:, _SIDE - 1 :: -1]
         return figures(
@@ -125,13 +128,13 @@ def _curve(model: Model, par: Any, velocity: str, along: str, level: float, side
 def contact_forces(model: Model, x: Any, par: Any) -> tuple[float, ...]:
     """Return the contact forces of a state that does not move.
 
-    Per group the forces F >= 0 with ``C F - d >= 0`` and ``F (C F - d) = 0``, by projected
-    Gauss-Seidel sweeps, which converge as C is positive definite.
+    The forces F >= 0 of each group satisfy ``C F - d >= 0`` and ``F (C F - d) = 0``. Projected
+    Gauss-Seidel sweeps converge because C is positive definite.
 
     Raises
     ------
     ParameterError
-        When the forces do not settle.
+        When the forces do not converge.
     """
     forces: list[float] = []
     for matrix, overlaps in zip(model.compliance(par), model.gap(x, x, par), strict=True):
@@ -145,7 +148,9 @@ def contact_forces(model: Model, x: Any, par: Any) -> tuple[float, ...]:
                 break
         else:
             raise ParameterError(
-                f"{model.name}: the contacts do not settle at this state", name=model.name
+                f"{model.name}: the contact forces do not converge in this state. Choose other "
+                "levels or another friction",
+                name=model.name,
             )
         forces += F.tolist()
     return tuple(forces)
@@ -153,7 +158,7 @@ def contact_forces(model: Model, x: Any, par: Any) -> tuple[float, ...]:
 
 GENERIC = GenericExperiment(
     name="stribeck",
-    summary="dry friction of a model over speed, at levels of a state that it depends on",
+    summary="dry friction of a model against speed, at levels of a state that affects it",
     options=Options,
     signals={"friction": "friction", "along": "state"},
     defaults={"levels": (0.0,), "speed_max": 1.0},

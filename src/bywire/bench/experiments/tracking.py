@@ -1,4 +1,4 @@
-"""Tracking: an output follows a moving input, for instance a measured pedal."""
+"""Tracking: an output follows a moving input, for instance from a measured pedal."""
 
 from __future__ import annotations
 
@@ -17,31 +17,32 @@ class Options(ParameterSet):
     """Set point and output."""
 
     input: str
-    """stimulus of the model that [stimulus] drives, the set point; by default its only one"""
+    """set point: stimulus of the model that [stimulus] drives (default: its only stimulus)"""
     output: str
-    """recorded signal that follows, in the same unit; by default the first one in that unit"""
+    """recorded signal that follows, in the same unit (default: the first one in that unit)"""
     duration: Duration
     """length of the run"""
     record: Duration
     """recording interval"""
     settle: TimeConstant
-    """time before zero, at the stimulus' first value"""
+    """time before zero, at the stimulus's first value"""
     smoothing: TimeConstant
-    """moving average for the tracking's key figures, 0 for the raw output"""
+    """averaging time for the tracking's key figures, 0 for the raw output"""
 
 
 def build(tested: TestedModel) -> Experiment:
-    """Return the experiment of a model, judged by how well the output follows.
+    """Return the experiment for a model, judged by how well the output follows.
 
     Raises
     ------
     ParameterError
-        When the output has another unit than the input.
+        When the output's unit differs from the input's.
     """
     if not tested.is_set_point:
         raise ParameterError(
-            f"options.output: {tested.output} is in {tested.units['output']}, and the set point "
-            f"{tested.input} in {tested.units['input']}: name an output in that unit",
+            f"options.output = {tested.output} is in {tested.units['output']}, but the set point "
+            f"{tested.input} is in {tested.units['input']}. Choose an output in "
+            f"{tested.units['input']}",
             name="options.output",
             value=tested.output,
             valid=f"an output in {tested.units['input']}",
@@ -61,7 +62,7 @@ def build(tested: TestedModel) -> Experiment:
 
 GENERIC = GenericExperiment(
     name="tracking",
-    summary="any output follows a moving set point, for instance a table out of a file",
+    summary="tracking of a moving set point by any output, for instance of a table from a file",
     options=Options,
     signals={"input": "stimulus", "output": "recording"},
     defaults={"duration": 1.0, "record": 1e-3, "settle": 0.0, "smoothing": 0.0},

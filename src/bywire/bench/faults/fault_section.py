@@ -22,9 +22,9 @@ from bywire.core.values import number, parsed
 
 Instant = Annotated[float, Unit("s", 1.0), Field(ge=-1e6, le=1e6, allow_inf_nan=False)]
 Share = Annotated[float, Unit("1", 0.5), Field(gt=0, le=1, allow_inf_nan=False)]
-STAGES = 50  # number of steps by which a parameter follows a ramp
+STAGES = 50  # number of steps in which a parameter follows a ramp
 MOST = 10_000
-"""largest number of periods of an intermittent fault in a run"""
+"""largest number of an intermittent fault's periods in a run"""
 _EDGE = 1e-9  # s, within which an instant counts as reached
 
 
@@ -36,23 +36,23 @@ class Course(ParameterSet):
     lasts: TimeConstant
     """duration; 0: permanent"""
     ramp: TimeConstant
-    """time in which it grows to its full size, and in which it disappears; 0: immediately"""
+    """time in which the fault grows to its full size, and in which it disappears; 0: immediately"""
     every: TimeConstant
     """period of an intermittent fault; 0: not intermittent"""
     share: Share
-    """share of that period in which the fault is present"""
+    """share of the period ``every`` in which the fault is present"""
 
     @model_validator(mode="after")
     def _comes_and_goes(self) -> Course:
         if self.every > 0 and self.ramp > 0:
-            raise ValueError("a fault either grows (ramp) or is intermittent (every), not both")
+            raise ValueError("ramp and every contradict each other: set only one of them")
         if self.share < 1 and not self.every > 0:
-            raise ValueError("share is that of a period: give every, the period of the fault")
+            raise ValueError("share needs the period of the fault: set every, too")
         return self
 
     @property
     def end(self) -> float:
-        """Time at which it begins to disappear [s]; infinite for a permanent fault."""
+        """Time at which the fault begins to disappear [s]; infinite for a permanent fault."""
         return self.onset + self.lasts if self.lasts > 0 else np.inf
 
     @property
@@ -73,7 +73,7 @@ class Course(ParameterSet):
         there = self.is_there(t)
         if not self.ramp > 0:
             return there
-        with np.errstate(over="ignore"):  # a very short ramp: fully grown
+        with np.errstate(over="ignore"):  # a very short ramp: full size
             grown = np.clip((t - self.onset) / self.ramp, 0.0, 1.0)
             if np.isfinite(self.gone):
                 grown = np.minimum(grown, np.clip((self.gone - t) / self.ramp, 0.0, 1.0))
@@ -85,7 +85,7 @@ class Course(ParameterSet):
         return max(span / self.every, 0.0) if self.every > 0 else 0.0
 
     def instants(self, first: float, last: float) -> list[float]:
-        """Return the times [s] at which parameters change with the fault; ramps have stages."""
+        """Return the times [s] at which parameters change with the fault, or with its ramp."""
         ends = self.end
         if self.every > 0:
             begun = max(math.floor((first - self.onset) / self.every), 0)
@@ -153,8 +153,8 @@ def from_text(text: str) -> dict[str, Any]:
     name, equals, value = (part.strip() for part in what.partition("="))
     if not name or (at and not onset) or (equals and not value):
         raise ParameterError(
-            f"fault {quoted(text)}: write NAME, NAME=VALUE, NAME@ONSET or NAME=VALUE@ONSET, for "
-            "instance 'pressure.stuck=20 bar@1.5 s'",
+            f"fault {quoted(text)} is not valid. Write NAME, NAME=VALUE, NAME@ONSET or "
+            "NAME=VALUE@ONSET, for instance 'pressure.stuck=20 bar@1.5 s'",
             name="fault",
             value=text,
             valid="NAME=VALUE@ONSET",
@@ -196,16 +196,19 @@ def _read(
     keys = (*_OWN, *AT_ZERO.flat())
     for key in section:
         if key not in keys:
-            raise unknown_name(f"key in [[faults]], number {k + 1}", key, keys)
+            raise unknown_name(f"key of {where}", key, keys)
     times = {key: section[key] for key in section if key not in _OWN}
-    course = AT_ZERO.replace(parsed(Course, times, f"key of {where}"))
+    try:
+        course = AT_ZERO.replace(parsed(Course, times, f"key of {where}"))
+    except ParameterError as error:
+        raise error.reworded(f"{where}: {str(error).removeprefix('Course: ')}") from None
     seed = section.get("seed", 0)
     if not isinstance(seed, int) or isinstance(seed, bool) or seed < 0:
         raise not_valid(f"{where}.seed", quoted(seed), "a whole number >= 0")
     name = section.get("fault", "")
     if not isinstance(name, str) or not (name or "set" in section):
         raise ParameterError(
-            f"{where} names no fault: write fault = \"...\" (see 'bywire list faults'), or "
+            f"{where}.fault is missing. Write fault = \"...\" (see 'bywire list faults'), or "
             'set = {"motor.R_m" = "+50%"} for any parameter',
             name=f"{where}.fault",
         )
@@ -216,7 +219,7 @@ def _read(
     mode = modes[name]
     for choice, wanted in mode.lacks(par).items():
         raise ParameterError(
-            f"fault {name} is impossible with {choice} = {par.value(choice)!r}: set it to "
+            f"fault {name} is impossible with {choice} = {par.value(choice)!r}. Set {choice} to "
             f"{wanted!r}, for instance {option('overrides', {choice: str(wanted)})}",
             name=choice,
             value=repr(par.value(choice)),
@@ -230,8 +233,10 @@ def _of_parameters(where: str, section: Mapping[str, Any], par: ParameterSet) ->
     values = section["set"]
     if not isinstance(values, Mapping) or not values or {"value", "fault"} & {*section}:
         raise ParameterError(
-            f'{where}.set: write {{"motor.R_m" = "+50%"}}, and neither fault nor value with it',
+            f'{where}.set is not valid. Write set = {{"motor.R_m" = "+50%"}}, without the keys '
+            "fault and value",
             name=f"{where}.set",
+            valid='{"motor.R_m" = "+50%"}',
         )
     given = parsed(type(par), settled(par, values), f"parameter of {where}")
     par.replace(given)
@@ -242,7 +247,10 @@ def _value(where: str, section: Mapping[str, Any], mode: Mode) -> float:
     if not mode.unit:
         if "value" in section:
             raise ParameterError(
-                f"{where}: {mode.name} takes no value: leave it out", name=f"{where}.value"
+                f"{where}.value = {quoted(section['value'])} is not valid: fault {mode.name} has "
+                "no value. Leave it out",
+                name=f"{where}.value",
+                value=quoted(section["value"]),
             )
         return 0.0
     value = number(section.get("value", mode.value), mode.unit, f"{where}.value")
@@ -256,14 +264,16 @@ def require_admissible(mode: Mode, value: float, where: str) -> None:
     Raises
     ------
     ParameterError
-        With the range. The values of modes that change parameters are checked with these.
+        With the range. The parameters themselves check the values of modes that change them.
     """
     low, high = _RANGES.get(mode.falsified, (-math.inf, math.inf))
     is_whole = mode.falsified in ("late", "dropped")
     if not low <= value <= high or (is_whole and value % 1):
-        kind = "a whole number" if is_whole else "a number"
-        valid = f"{kind} from {low:g} to {high:g}"
-        raise not_valid(where, f"{value:g} of {mode.name}", valid)
+        unit = "" if mode.unit == "1" else f" {mode.unit}"
+        kind = "a whole number " if is_whole else ""
+        limits = f">= {low:g} and <= {high:g}" if math.isfinite(high) else f">= {low:g}"
+        valid = f"{kind}{limits}{unit} for fault {mode.name}"
+        raise not_valid(where, f"{value:g}{unit}", valid)
 
 
 def _unknown(name: str, modes: Mapping[str, Mode]) -> UnknownNameError:

@@ -1,4 +1,4 @@
-"""Faults in a run: taps of its model, falsified signals, and changed parameters."""
+"""Faults in a run: taps in its model, falsified signals, and changed parameters."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ def checked_sections(sections: Any) -> list[dict[str, Any]]:
     Raises
     ------
     ParameterError
-        When they are not a sequence of tables.
+        When ``sections`` is not a sequence of tables.
     """
     is_sequence = isinstance(sections, Sequence) and not isinstance(sections, str)
     if not is_sequence or not all(isinstance(each, Mapping) for each in sections):
         raise ParameterError(
-            "faults must be a sequence of tables, [[faults]] in a bench file",
+            "faults must be a sequence of tables ([[faults]] in a bench file)",
             name="faults",
             valid="a sequence of tables",
         )
@@ -44,15 +44,15 @@ def with_faults(cases: Sequence[Case], sections: Sequence[Mapping[str, Any]]) ->
     ------
     InputError
         When a section is not valid for one of the models, when a fault begins after the end of
-        every run, when two contradict each other, or when the experiment has no run.
+        every run, when two faults contradict each other, or when the experiment has no run.
     """
     if not cases:
         raise ParameterError(
-            "this experiment has no run in which a fault could occur: leave [[faults]] out",
+            "this experiment has no run in which a fault could occur. Leave faults out",
             name="faults",
         )
     read = [injections(sections, case.model, case.par) for case in cases]
-    first, longest = -max(case.settle for case in cases), max(case.duration for case in cases)
+    first, longest = min(0.0 - case.settle for case in cases), max(case.duration for case in cases)
     for k, fault in enumerate(read[0]):
         _require_within(f"faults[{k + 1}]: {fault.mode.name}", fault.course, first, longest)
     return tuple(injected(case, each) for case, each in zip(cases, read, strict=True))
@@ -62,23 +62,23 @@ def _require_within(fault: str, course: Course, first: float, last: float) -> No
     """Reject a fault that is absent, or returns too often, between the ends of the runs [s]."""
     if course.onset >= last:
         raise ParameterError(
-            f"{fault} begins at {course.onset:g} s, but the run ends at {last:g} s: give an "
-            "earlier onset, or a longer run",
+            f"{fault} begins at {course.onset:g} s, but the run ends at {last:g} s. Set an earlier "
+            "onset, or lengthen the run",
             name="onset",
             value=f"{course.onset:g} s",
             valid=f"< {last:g} s",
         )
     if course.gone <= first:
         raise ParameterError(
-            f"{fault} ends at {course.gone:g} s, but the run starts at {first:g} s: give a longer "
+            f"{fault} ends at {course.gone:g} s, but the run starts at {first:g} s. Set a longer "
             "duration (lasts), or a later onset",
             name="lasts",
             value=f"{course.lasts:g} s",
         )
     if course.returns(first, last) > MOST:
         raise ParameterError(
-            f"{fault} returns every {course.every:g} s, more than {MOST} times until {last:g} s: "
-            "give a longer period (every), or a permanent fault",
+            f"{fault} returns every {course.every:g} s, more than {MOST} times before {last:g} s. "
+            "Set a longer period (every), or make the fault permanent",
             name="every",
             value=f"{course.every:g} s",
         )
@@ -99,8 +99,8 @@ def taps_of(faults: Sequence[Injection]) -> tuple[tuple[Tap, ...], tuple[str, ..
             before = taps.get(tap.name, tap)
             if before.late and tap.late and before.late != tap.late:
                 raise ParameterError(
-                    f"fault {fault.mode.name}: {before.late} and {tap.late} ticks in one run; "
-                    "give both the same value",
+                    f"faults {fault.mode.name} have different values, {before.late} and {tap.late} "
+                    "ticks, in one run. Set both to the same value",
                     name=fault.mode.name,
                     value=str(tap.late),
                     valid=str(before.late),
@@ -125,8 +125,8 @@ def injected(
     faults
         Its faults; their times are on the recording's axis.
     taps, tasks
-        Taps, and tasks that can miss ticks, of a model that several runs share; by default those
-        that the faults need.
+        Taps, and tasks that can miss ticks, in a model that several runs share (default: those
+        that the faults need).
 
     Raises
     ------
@@ -155,7 +155,7 @@ def _falsified(
         rows: dict[str, Array] = {}
         for fault in faults:
             mode, size = fault.mode, fault.course.size(t)
-            # One generator for each fault: a second fault does not change the noise of the first.
+            # Each fault has its own generator, so another fault does not change its noise.
             draws = np.random.default_rng((fault.seed, zlib.crc32(mode.name.encode())))
             since = t - fault.course.onset
             given: dict[str, Any] = {}
@@ -205,7 +205,7 @@ def _full(fault: Injection, par: ParameterSet) -> Mapping[str, Any]:
 
 
 def _require_apart(faults: Sequence[Injection], par: ParameterSet) -> None:
-    """Reject two faults of one signal, task or parameter at the same time."""
+    """Reject simultaneous faults of one signal, task or parameter."""
     for one, other in combinations(faults, 2):
         first, second = one.course, other.course
         if first.onset >= second.gone or second.onset >= first.gone:
@@ -214,13 +214,13 @@ def _require_apart(faults: Sequence[Injection], par: ParameterSet) -> None:
         if both:
             raise ParameterError(
                 f"faults {one.mode.name} and {other.mode.name} contradict each other: both change "
-                f"{min(both)} at the same time; let one end before the other begins",
+                f"{min(both)} at the same time. One must end before the other begins",
                 name=min(both),
             )
 
 
 def touched(mode: Mode, value: float, par: ParameterSet) -> set[str]:
-    """Return the objects that a fault changes, in words: simultaneous faults must not share any."""
+    """Return phrases for the objects that a fault changes; no two simultaneous faults share one."""
     signal = set() if mode.channel is None else {f"the signal {mode.channel.name}"}
     task = {f"the task {mode.task}"} if mode.task else set()
     return signal | task | ({*mode.changes(par, value)} if mode.changes is not None else set())

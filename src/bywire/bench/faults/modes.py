@@ -33,17 +33,17 @@ class Mode:
     summary
         The effect, in one line.
     unit, value
-        SI unit and default of its value; an empty unit if the mode takes no value.
+        SI unit and default of its value; an empty unit if the mode has no value.
     changes
         ``changes(par, value)``: changed parameters by dotted name; None for other kinds of modes.
     channel
         Falsified signal.
     falsified
-        Kind of falsification, see `falsify` and `missed`.
+        Kind of falsification (see `falsify` and `missed`).
     task
         Controller that misses its ticks.
     needs
-        Choices of the parameters with which the mode exists.
+        Choices among the parameters without which the mode does not exist.
     """
 
     name: str
@@ -62,11 +62,11 @@ class Mode:
         return self.name.rpartition(".")[0]
 
     def lacks(self, par: ParameterSet) -> dict[str, Any]:
-        """Return the choices that the mode needs and the parameters do not have, by dotted name."""
+        """Return the choices that the mode needs but the parameters lack, by dotted name."""
         return {name: wanted for name, wanted in self.needs.items() if par.value(name) != wanted}
 
     def tap(self, value: float) -> Tap | None:
-        """Return the tap that the mode needs; None if it falsifies no signal."""
+        """Return the tap that the mode needs; None if the mode does not falsify a signal."""
         if self.channel is None:
             return None
         c = self.channel
@@ -75,32 +75,32 @@ class Mode:
 
 
 _READING = {
-    "stuck": ("is stuck at a value", "level"),
-    "stuck-at-last": ("holds its last value", ""),
+    "stuck": ("is stuck at a specified value", "level"),
+    "stuck-at-last": ("is stuck at its last value", ""),
     "offset": ("has an offset", "offset"),
     "gain": ("is scaled by a factor", "factor"),
     "drift": ("drifts at a constant rate", "rate"),
-    "noise": ("has noise of a standard deviation", "offset"),
-    "dropout": ("misses samples, with a probability", "probability"),
+    "noise": ("has additional noise with a specified standard deviation", "offset"),
+    "dropout": ("misses samples with a specified probability", "probability"),
     "swapped": ("has the opposite sign", ""),
 }
 _DRIVE = {
-    "stuck": ("is stuck at a value", "level"),
-    "stuck-at-last": ("holds its last value", ""),
+    "stuck": ("is stuck at a specified value", "level"),
+    "stuck-at-last": ("is stuck at its last value", ""),
     "gain": ("is scaled by a factor", "factor"),
-    "late": ("arrives some ticks late", "ticks"),
+    "late": ("arrives late by a number of ticks", "ticks"),
 }
 _DEMAND = {
     "lost": ("is lost and holds its last value", ""),
-    "stuck": ("is stuck at a value", "level"),
+    "stuck": ("is stuck at a specified value", "level"),
     "offset": ("has an offset", "offset"),
 }
 _TASK = {
     "frozen": ("misses every tick, and its outputs hold their last values", "", 0.0),
-    "dropped": ("runs only once in a number of ticks", "ticks", 2.0),
-    "missed": ("misses ticks, with a probability", "probability", 0.2),
-    "dead": ("stops with its outputs at rest; afterward it restarts with empty memory", "", 0.0),
-    "restarted": ("restarts with empty memory, after a downtime", "duration", 0.05),
+    "dropped": ("runs only at every n-th tick", "ticks", 2.0),
+    "missed": ("misses ticks with a specified probability", "probability", 0.2),
+    "dead": ("stops with its outputs at rest, and later restarts with empty memory", "", 0.0),
+    "restarted": ("restarts with empty memory after a downtime", "duration", 0.05),
 }
 _VALUES = {"factor": 0.5, "probability": 0.2, "ticks": 5.0}
 
@@ -111,13 +111,14 @@ def modes_of(model: Model, par: ParameterSet) -> dict[str, Mode]:
     Raises
     ------
     ModelError
-        When two modes have the same name, or a channel names an unknown signal.
+        When two modes have the same name, or the signal of a channel is unknown.
     """
     modes: dict[str, Mode] = {}
     for mode in _every(model, par):
         if mode.name in modes:
             raise ModelError(
-                f"{model.name}: two faults have the name {mode.name!r}: rename one", name=mode.name
+                f"{model.name}: two faults have the name {mode.name!r}. Rename one of them",
+                name=mode.name,
             )
         modes[mode.name] = mode
     return modes
@@ -127,7 +128,7 @@ def _every(model: Model, par: ParameterSet) -> Iterator[Mode]:
     for place, node in _groups(par):
         element = sys.modules[type(node).__module__]
         if getattr(element, "Parameters", None) is not type(node):
-            continue  # a group of the brake itself, whose module declares the brake's faults
+            continue  # the brake's own group; its module declares the brake's faults
         for fault in getattr(element, "FAULTS", ()):
             yield _of_element(place, fault, par)
     tasks = model.tasks(par)
@@ -249,7 +250,7 @@ def falsify(
 def missed(
     mode: Mode, value: float, size: Array, since: Array, period: float, draws: np.random.Generator
 ) -> Array:
-    """Return at which rows of the stimulus a task misses its tick, or is dead.
+    """Return the rows of the stimulus in which a task misses its tick, or is dead.
 
     ``since``: time since the onset [s], at every row; ``period``: period of the task [s].
     """
@@ -292,7 +293,7 @@ def channels_of(model: Any) -> Iterator[Channel]:
     Raises
     ------
     ModelError
-        When a channel names an unknown signal.
+        When the signal of a channel is unknown.
     """
     yield from _own_channels(model)
     for sub in _subs(model):
@@ -318,8 +319,8 @@ def _own_channels(model: Any) -> tuple[Channel, ...]:
         source = sources[channel.side]
         if channel.signal not in source._fields:
             raise ModelError(
-                f"{model.name}: the channel {channel.name!r} names {channel.signal!r}, which is "
-                f"not a signal: known are {', '.join(source._fields)}",
+                f"{model.name}: the channel {channel.name!r} refers to {channel.signal!r}, which "
+                f"is not a signal. Valid signals are {', '.join(source._fields)}",
                 name=channel.name,
                 value=channel.signal,
                 valid=", ".join(source._fields),

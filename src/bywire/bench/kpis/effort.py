@@ -32,7 +32,7 @@ class Setting:
 def peak_current(current: Samples | None) -> float | Undefined:
     """Largest magnitude of the motor current.
 
-    Over the recorded samples; dither and ripple count.
+    Evaluated at the recorded samples, including dither and ripple.
     """
     if current is None:
         return Undefined("no current is recorded")
@@ -41,9 +41,9 @@ def peak_current(current: Samples | None) -> float | Undefined:
 
 @measure("A")
 def mean_current(t: Samples, current: Samples | None) -> float | Undefined:
-    """Mean over time of the magnitude of the motor current.
+    """Time average of the motor current's magnitude.
 
-    Trapezoidal rule over the samples. Dither that changes the current's sign counts in full.
+    Trapezoidal rule over the samples. Dither counts in full, even where it reverses the current.
     """
     if current is None:
         return Undefined("no current is recorded")
@@ -53,9 +53,10 @@ def mean_current(t: Samples, current: Samples | None) -> float | Undefined:
 
 @measure("W")
 def peak_power(power: Samples | None) -> float | Undefined:
-    """Largest electrical power drawn from battery or source.
+    """Largest electrical power drawn from the battery or source.
 
-    Signed: power fed back is negative. Over the recorded samples; dither and ripple count.
+    Power that is fed back is negative. Evaluated at the recorded samples, including dither and
+    ripple.
     """
     if power is None:
         return Undefined("no electrical power is recorded")
@@ -64,17 +65,17 @@ def peak_power(power: Samples | None) -> float | Undefined:
 
 @measure("W")
 def mean_power(t: Samples, energy: Samples | None, power: Samples | None) -> float | Undefined:
-    """Energy drawn over the duration of the recording."""
+    """Energy drawn, divided by the duration of the recording."""
     joule = _drawn(t, energy, power)
     return joule if isinstance(joule, Undefined) else joule / (t[-1] - t[0])
 
 
 @measure("J")
 def energy(t: Samples, energy: Samples | None, power: Samples | None) -> float | Undefined:
-    """Energy drawn from battery or source during the recording.
+    """Energy drawn from the battery or source during the recording.
 
-    The recorded energy at the end minus that at the start. If no energy is recorded, the integral
-    of the recorded power by the trapezoidal rule.
+    The recorded energy at the end minus that at the start. If no energy is recorded, the recorded
+    power is integrated by the trapezoidal rule.
     """
     return _drawn(t, energy, power)
 

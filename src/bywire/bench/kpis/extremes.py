@@ -17,11 +17,11 @@ class Setting:
 
 @measure("level")
 def output_max(signal: Samples) -> float:
-    """Largest value of the output, over the recorded samples."""
+    """Largest recorded value of the output."""
     return max(signal)
 
 
 @measure("level")
 def output_min(signal: Samples) -> float:
-    """Smallest value of the output, over the recorded samples."""
+    """Smallest recorded value of the output."""
     return min(signal)

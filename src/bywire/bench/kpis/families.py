@@ -58,13 +58,13 @@ def _declared(module: ModuleType) -> Iterator[Family]:
         select = getattr(module, "select", None)
         if not hasattr(module, "Setting"):
             raise ModelError(
-                f"{module.__file__}: key figures need a data class Setting in their file, with the "
-                "names of their signals",
+                f"{module.__file__} declares key figures but no data class Setting. Add one with "
+                "the names of the signals that the figures need",
                 name="Setting",
             )
         loops = None if select else LoopFamily(module)
         if loops is not None and not module.__name__.startswith("bywire.bench."):
-            # A brake's: its author sees a mistake in the first run, and not in the first study.
+            # A brake's author then gets the error in the first run, not in the first study.
             loops.translate()
         yield Family(name, summary, module.Setting, figures, select, loops)
 
@@ -85,7 +85,7 @@ def definitions() -> Mapping[str, Measure]:
 
 
 def units_of(*names: str, resolved: Mapping[str, str] = MappingProxyType({})) -> dict[str, str]:
-    """Return the unit of every figure of some families, by the figure's name.
+    """Return the units of all figures of some families, by the figure's name.
 
     Parameters
     ----------
@@ -146,7 +146,7 @@ def evaluate(name: str, recording: xr.Dataset, setting: Any) -> dict[str, Kpi]:
 
 
 def _by_loops(family: LoopFamily, recording: xr.Dataset, setting: Any) -> dict[str, Kpi]:
-    """Return the figures of one run; for a long run by C, if there is a compiler."""
+    """Return the figures of one run; C computes those of a long run, if there is a compiler."""
     t, _ = signal(recording, "time")
     signals, level = family.signals_of(recording, setting)
     if family.is_worth_c(t.size):
@@ -186,7 +186,7 @@ class FamilyJudge:
         ``levels(run, options)``: values of settings that depend on the parameters of a run, by the
         family's name and the setting's field; None if there are none.
     further
-        ``further(run, options)``: further figures of the experiment, which come first.
+        ``further(run, options)``: additional figures of the experiment, which come first.
     further_signals
         Names of all signals that these figures read.
     """
@@ -211,7 +211,7 @@ class FamilyJudge:
         """Return the key figures of many cases.
 
         ``rows``: signals of shape (cases, time); ``options``, ``pars``: options and parameters of
-        each case, of one structure; parameters are needed for levels and further figures.
+        each case, of one structure; levels and additional figures need the parameters.
         """
         distinct = {id(chosen): chosen for chosen in options}  # mostly one
         known = {number: self.settings(chosen) for number, chosen in distinct.items()}
@@ -227,7 +227,7 @@ class FamilyJudge:
         return (*own, *wanted)
 
     def signals(self, options: Sequence[Any]) -> set[str]:
-        """Return the names of all signals that it may read, for cases with these options."""
+        """Return the names of all signals that the judge may read for cases with these options."""
         distinct = {id(chosen): chosen for chosen in options}.values()
         each = {setting for chosen in distinct for setting in self.settings(chosen).values()}
         named = {name for setting in each for name in signals_of_setting(setting)}
@@ -254,8 +254,8 @@ def signals_of_setting(setting: Any) -> set[str]:
 def evaluate_cases(name: str, rows: Rows, settings: Sequence[Any]) -> dict[str, KpiOfCases]:
     """Return all figures of a family by name, of many cases at once.
 
-    A family that loops over samples is computed in C. Other families, and all without a compiler,
-    are computed case by case.
+    A family that loops over samples runs in C. Other families, and all families on a machine
+    without a compiler, run case by case in Python.
 
     Parameters
     ----------
@@ -294,7 +294,7 @@ def of_cases(each: Sequence[Iterable[Kpi]]) -> Iterator[KpiOfCases]:
 
 
 def _in_c(family: LoopFamily, rows: Rows, settings: Sequence[Any]) -> dict[str, KpiOfCases] | None:
-    """Return the figures of cases with the same signals, by C; None without a compiler."""
+    """Return the figures of cases with the same signals from C; None without a compiler."""
     first = settings[0]
     distinct = {id(setting): setting for setting in settings}.values()
     if not family.is_compiled or any(

@@ -23,8 +23,8 @@ from bywire.bench.kpis.samples import defect, signal, smoothed, treatment
 from bywire.core.typing import Array
 
 _OPEN = 0.05  # of the drive's range: largest distance between both ends of a closed loop
-_LEFT = 0.01  # of the response's range: least residual at the end that is noted
-_LEVELS = 401  # number of levels at which the width is computed, without both extremes
+_LEFT = 0.01  # of the response's range: smallest residual at the end that a note mentions
+_LEVELS = 401  # number of levels at which the width is computed, excluding both extremes
 
 
 @dataclass(frozen=True)
@@ -87,15 +87,17 @@ class Loop:
         span, height = float(np.ptp(self.drive)), float(np.ptp(self.response))
         if span == 0.0 or height == 0.0:
             constant = "the drive" if span == 0.0 else "the response"
-            return f"{constant} is constant, so it has no loop"
+            return f"{constant} is constant, so there is no loop"
         apart = abs(float(self.drive[-1] - self.drive[0]))
         if apart > _OPEN * span:
             return (
                 f"the loop is open: the drive ends {apart:.3g} {self.drive_unit} away from its "
-                "start; record the way back, or smooth out the dither"
+                "start. Record the release as well, or average out the dither"
             )
         loops = _cycles(self.response)
-        return "" if loops == 1 else f"there are {loops} loops: cut the recording to one loop"
+        if loops == 1:
+            return ""
+        return f"the recording contains {loops} loops. Trim it to one loop"
 
     @property
     def is_open(self) -> bool:
@@ -109,7 +111,7 @@ class Loop:
         parts = [self.treatment] if self.treatment else []
         if left > _LEFT * float(np.ptp(self.response)):
             parts.append(
-                f"the response ends {left:.3g} {self.response_unit} away from its start; a "
+                f"the response ends {left:.3g} {self.response_unit} away from its start, so a "
                 "straight line closes the loop"
             )
         return "; ".join(parts)
@@ -142,11 +144,11 @@ def select(recording: xr.Dataset, setting: Setting) -> Loop:
 
 @measure("drive")
 def loop_width_mid(loop: Loop) -> float | Undefined:
-    """Width of the loop, as drive, at mid-height of the response's range.
+    """Width of the loop, in units of the drive, at the middle of the response's range.
 
     Mean drive of the apply branch's crossings of that level minus the mean of the release
     branch's, each interpolated between samples. Ripple makes a branch cross several times. The
-    mean over the crossings keeps its effect small; `smoothed` removes it.
+    mean over the crossings keeps the effect of ripple small; `smoothed` removes it.
     """
     middle = 0.5 * float(np.min(loop.response) + np.max(loop.response))
     width = float(widths(loop, np.array([middle]))[0])
@@ -157,11 +159,11 @@ def loop_width_mid(loop: Loop) -> float | Undefined:
 
 @measure("drive")
 def loop_width_max(loop: Loop) -> float | Undefined:
-    """Width of the loop, as drive, where it is widest.
+    """Largest width of the loop, in units of the drive.
 
     The width of largest magnitude at 401 evenly spaced levels within the response's range, each as
-    in `loop_width_mid`. Levels that the release does not reach are left out. Ripple widens it by
-    up to its peak-to-peak value.
+    in `loop_width_mid`. Levels that the release does not reach are left out. Ripple widens the loop
+    by up to its peak-to-peak value.
     """
     levels = np.linspace(np.min(loop.response), np.max(loop.response), _LEVELS + 2)[1:-1]
     reached = [width for width in widths(loop, levels).tolist() if not math.isnan(width)]
@@ -170,7 +172,7 @@ def loop_width_max(loop: Loop) -> float | Undefined:
 
 @measure("drive*response")
 def loop_area(loop: Loop) -> float | Undefined:
-    r"""Area of the closed loop of drive over response.
+    r"""Area of the closed loop of the drive against the response.
 
     .. math:: W = \oint i \, dp = \sum_k \tfrac12 (i_k + i_{k+1}) (p_{k+1} - p_k)
 
@@ -215,8 +217,8 @@ def closed_above(loop: Loop, width: float, levels: Array) -> float:
     Returns
     -------
     float
-        The lowest level above which the loop is closed: the lowest crossed level if it is closed
-        everywhere, NaN if it is open at its top.
+        The lowest level above which the loop is closed: the lowest crossed level if the loop is
+        closed everywhere, NaN if it is open at its top.
     """
     gaps = widths(loop, levels)
     crossed = np.isfinite(gaps)
@@ -246,7 +248,7 @@ def _mean_crossings(x: Array, y: Array, levels: Array) -> Array:
 
 
 def _cycles(y: Array) -> int:
-    """Return the number of rises of a closed course from its lowest to its highest quarter."""
+    """Return how often a closed curve rises from its lowest to its highest quarter."""
     low, high = np.quantile([np.min(y), np.max(y)], [0.25, 0.75])
     marks = np.where(y <= low, -1, np.where(y >= high, 1, 0))
     marks = marks[marks != 0]

@@ -110,7 +110,7 @@ class Figures:
     def __call__(
         self, ending: str = "", /, **values: SupportsFloat | tuple[float, str] | Undefined
     ) -> tuple[Kpi, ...]:
-        """Return those figures that have a value, in the order of their declaration.
+        """Return the figures that have a value, in the order of their declaration.
 
         Parameters
         ----------
@@ -166,7 +166,11 @@ class KpiOfCases:
 
 
 class Data(Protocol):
-    """Data from which a family computes its figures."""
+    """Data from which a family computes its figures.
+
+    A family's data may also have an attribute ``is_open``: whether figures that ``defect`` leaves
+    undefined are open.
+    """
 
     @property
     def units(self) -> Mapping[str, str]:
@@ -175,10 +179,7 @@ class Data(Protocol):
 
     @property
     def defect(self) -> str:
-        """Reason why all figures are undefined; empty for valid data.
-
-        An attribute ``is_open`` of the data says whether the figures are then open.
-        """
+        """Reason why all figures are undefined; empty for valid data."""
         ...
 
     @property

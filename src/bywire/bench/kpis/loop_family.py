@@ -48,17 +48,17 @@ from bywire.core.errors import CompilerError, ModelError
 from bywire.core.typing import Array
 from bywire.simulation.compiler import find_compiler, load_library
 
-NO_NUMBER = "its computation gives no finite number"
+NO_NUMBER = "its value is not a finite number"
 _NO_FIGURE = Undefined(NO_NUMBER)
-_FLAGS = ("-O3", "-march=native")  # loops over samples: vectors pay, and sums keep their order
-_FEW = 100_000  # rows, for which Python takes a third of the time of a compiler
+_FLAGS = ("-O3", "-march=native")  # vectorizes loops over samples, without reordering sums
+_FEW = 100_000  # rows: Python evaluates so many in a third of the time that compiling takes
 _NEGATIVE_ZERO = re.compile(r"-0(?![.\d])")
 _HEADER = Path(__file__).with_name("loops.h")
 _PACKED = (FLOAT, INT, BOOL, PAIR)
 
 
 class Reason(NamedTuple):
-    """Reason why a figure is undefined: a text with places for numbers."""
+    """Reason why a figure is undefined: a template whose placeholders are numbers."""
 
     text: str
     is_open: bool
@@ -172,11 +172,11 @@ class LoopFamily:
             return undefined
         try:
             return function(*args)
-        except (ZeroDivisionError, OverflowError, ValueError):  # of a division, of a root
+        except (ZeroDivisionError, OverflowError, ValueError):  # ValueError: a root
             return _NO_FIGURE
 
     def _in_floats(self, setting: Any) -> Any:
-        """Return a setting whose numbers are Python's: those of NumPy divide by zero."""
+        """Return a setting with Python's numbers, as NumPy's numbers allow division by zero."""
         plain = {
             name: tuple(map(float, value)) if kind.base is tuple else kind.base(value)
             for name, kind in self._numbers.items()
@@ -223,7 +223,7 @@ void {self.entry}(int64_t cases, int64_t n, const double *times, const bw_signal
 """
 
     def translate(self) -> None:
-        """Translate the functions, to reject those that cannot be translated.
+        """Translate all functions, so that errors in them appear early.
 
         Raises
         ------
@@ -353,7 +353,7 @@ void {self.entry}(int64_t cases, int64_t n, const double *times, const bw_signal
         return self._function is not None
 
     def is_worth_c(self, rows: int) -> bool:
-        """Return whether to compute another run in C: compiling pays after many rows."""
+        """Return whether to compute another run in C, as compiling pays off after many rows."""
         self._looked_at += rows
         return self._looked_at > _FEW and self.is_compiled
 
@@ -427,10 +427,13 @@ void {self.entry}(int64_t cases, int64_t n, const double *times, const bw_signal
                 self.shared[name] = beside
             else:
                 raise ModelError(
-                    f"{self._module.__file__}: the key figure's function {function.__name__} takes "
-                    f"{name!r}, which must be t, setting, a field of Setting that names a signal, "
-                    "or another function of the file",
-                    name=name,
+                    f"{self._module.__file__}: {name!r} is not a valid parameter of the key "
+                    f"figure's function {function.__name__}. Parameters must be t, setting, a "
+                    "field of Setting that names a signal, or another function of the file",
+                    name=function.__name__,
+                    value=name,
+                    valid="t, setting, a field of Setting that names a signal, or another "
+                    "function of the file",
                 )
 
 

@@ -1,7 +1,7 @@
-/* What the C of key figures stands on, which translator.py writes. */
+/* Types and functions for the C code of key figures, which translator.py generates. */
 #include <stdint.h>
 
-/* Numbers over time; a slice is a place in the same ones. */
+/* Samples over time. A slice refers to the same numbers. */
 typedef struct {
   const double *at;
   int64_t n;
@@ -11,14 +11,15 @@ typedef struct {
   double at[2];
 } bw_pair;
 
-/* Why a figure has no value: the number of its text, 0 where it has one, and the numbers in that. */
+/* Reason why a figure is undefined: number of its text (0 if the figure is defined), and the numbers
+ * in that text. */
 typedef struct {
   int32_t reason;
   double numbers[3];
 } bw_undefined;
 
-/* A signal of some cases. A case's samples stand in one piece, and begin `between` numbers after
- * those of the case before. `first` is null where the signal is not recorded. */
+/* A signal in several cases. The samples of a case are contiguous, and begin `between` numbers after
+ * those of the previous case. `first` is null if the signal is not recorded. */
 typedef struct {
   const double *first;
   int64_t between;
@@ -28,7 +29,7 @@ static inline bw_samples bw_case(const bw_signal *signal, int64_t k, int64_t n) 
   return (bw_samples){signal->first + k * signal->between, n};
 }
 
-/* Bits, for compilers take numbers that are none for impossible in what is compiled with a kernel. */
+/* Test the bits: kernels are compiled with flags that let compilers assume finite numbers. */
 static inline int bw_is_finite(double x) {
   uint64_t bits;
   __builtin_memcpy(&bits, &x, sizeof bits);
@@ -85,7 +86,7 @@ static inline int64_t bw_bisect_right(bw_samples y, double x) {
   return low;
 }
 
-/* Return a place in a list as Python's slices take it: from the end where it is below zero. */
+/* Return the bound of a slice as in Python, where negative numbers count from the end. */
 static inline int64_t bw_clipped(int64_t k, int64_t n) {
   k = k < 0 ? k + n : k;
   return k < 0 ? 0 : k > n ? n : k;
@@ -96,7 +97,7 @@ static inline bw_samples bw_slice(bw_samples y, int64_t begin, int64_t end) {
   return (bw_samples){y.at + begin, end > begin ? end - begin : 0};
 }
 
-/* Return room for some numbers, of which a case begins anew. */
+/* Return space for n numbers from the work array, which every case reuses from its beginning. */
 static inline double *bw_take(double **room, int64_t n) {
   double *taken = *room;
   *room += n;
@@ -115,7 +116,7 @@ static inline bw_samples bw_copy(double **room, bw_samples y) {
   return (bw_samples){made, y.n};
 }
 
-/* What comes out: figures of all cases, case after case of each figure, and why one is not defined. */
+/* Results: for each figure its values in all cases, and the reasons for undefined ones. */
 typedef struct {
   double *values;
   int32_t *reasons;
@@ -123,7 +124,7 @@ typedef struct {
   int64_t cases;
 } bw_figures;
 
-/* Give a figure of a case; `no_number`: the reason of one that is not finite. */
+/* Store a figure of a case. `no_number`: reason for a value that is not finite. */
 static inline void bw_give(const bw_figures *to, int64_t figure, int64_t k, double value,
     bw_undefined none, int32_t no_number) {
   const int64_t place = figure * to->cases + k;

@@ -1,4 +1,4 @@
-"""Share of the time that a brake is in a mode: stuck, or at a limit of its controller."""
+"""Share of the time that a brake spends in a mode: stuck, or at a limit of its controller."""
 
 from __future__ import annotations
 
@@ -30,15 +30,15 @@ class Setting:
 def share_stuck(t: Samples, t_stuck: Samples | None, stuck: Samples | None) -> float | Undefined:
     """Share of the time during which the shaft is stuck.
 
-    From the recorded time stuck, which the engine integrates, so that short sticking between two
-    samples counts. Without it, from the samples of the mode, as in `share_sat_current`.
+    The engine integrates the time stuck, so short sticking between two samples counts. Recordings
+    without this time use the samples of the mode, as in `share_sat_current`.
     """
     if t_stuck is not None:
         return (t_stuck[-1] - t_stuck[0]) / (t[-1] - t[0])
     if stuck is None:
         return Undefined("the mode 'stuck' is not recorded")
     if not _is_mode(stuck):
-        return Undefined("the mode 'stuck' holds other values than 0 and 1")
+        return Undefined("the mode 'stuck' has values other than 0 and 1")
     return integral(t, stuck) / (t[-1] - t[0])
 
 
@@ -51,7 +51,7 @@ def share_sat_current(t: Samples, sat_current: Samples | None) -> float | Undefi
     if sat_current is None:
         return Undefined("the mode 'saturated current' is not recorded")
     if not _is_mode(sat_current):
-        return Undefined("the mode 'saturated current' holds other values than 0 and 1")
+        return Undefined("the mode 'saturated current' has values other than 0 and 1")
     return integral(t, sat_current) / (t[-1] - t[0])
 
 
@@ -64,7 +64,7 @@ def share_sat_duty(t: Samples, sat_duty: Samples | None) -> float | Undefined:
     if sat_duty is None:
         return Undefined("the mode 'saturated duty cycle' is not recorded")
     if not _is_mode(sat_duty):
-        return Undefined("the mode 'saturated duty cycle' holds other values than 0 and 1")
+        return Undefined("the mode 'saturated duty cycle' has values other than 0 and 1")
     return integral(t, sat_duty) / (t[-1] - t[0])
 
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from bywire.bench.kpis.kpi import Undefined, measure
 from bywire.bench.kpis.samples import Samples
 
-_ROUNDING = 1e-9  # s, of time zero
+_ROUNDING = 1e-9  # s, rounding error of time zero
 
 
 @dataclass(frozen=True)
@@ -21,7 +21,7 @@ class Setting:
     signal
         Name of the signal in the recording; the release begins at time zero.
     empty
-        Level below which it counts as released, in its SI unit.
+        Level below which the signal counts as released, in its SI unit.
     """
 
     signal: str
@@ -40,7 +40,7 @@ def released(t: Samples, signal: Samples) -> Release | Undefined:
     first = bisect_left(t, -_ROUNDING)
     rows = len(t) - first
     if rows < 2:
-        return Undefined(f"{rows} samples are too few: two at least are needed")
+        return Undefined(f"{rows} samples are too few: at least two are needed")
     return Release(t[first:], signal[first:])
 
 
@@ -56,9 +56,9 @@ def time_to_empty(released: Release, setting: Setting) -> float | Undefined:
     while k >= 0 and not y[k] > setting.empty:
         k -= 1
     if k == len(t) - 1:
-        return Undefined("it does not empty within the recording")
+        return Undefined("the output does not empty within the recording")
     if k < 0:
-        return Undefined("it was already empty at the release", is_open=True)
+        return Undefined("the output was already empty at the release", is_open=True)
     share = (y[k] - setting.empty) / (y[k] - y[k + 1])
     return t[k] + share * (t[k + 1] - t[k])
 

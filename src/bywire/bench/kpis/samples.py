@@ -47,7 +47,7 @@ def value_at(t: Samples, y: Samples, instant: float) -> float:
 
 
 def moving_average(t: Samples, y: Samples, period: float) -> Samples:
-    """Centered moving average over a period, as `bywire.bench.kpis.samples.smoothed` has it."""
+    """Centered moving average over a period, equal to `bywire.bench.kpis.samples.smoothed`."""
     last = len(t) - 1
     width = min(period, t[last] - t[0])
     slope = [(y[k + 1] - y[k]) / (t[k + 1] - t[k]) for k in range(len(t) - 1)]
@@ -74,8 +74,8 @@ def moving_average(t: Samples, y: Samples, period: float) -> Samples:
 def defect_of_times(t: Samples) -> Undefined | None:
     """Reason why no figure is defined over these times; None for valid times."""
     if len(t) < 2:
-        return Undefined(f"{len(t)} samples are too few: two at least are needed")
-    wrong = 0  # counted in vectors, without early exit: there is almost never one
+        return Undefined(f"{len(t)} samples are too few: at least two are needed")
+    wrong = 0  # no early exit, so that the loop vectorizes: almost all times are valid
     for k in range(1, len(t)):
         wrong += not t[k] > t[k - 1]
     if wrong > 0 or not isfinite(t[0]) or not isfinite(t[-1]):
@@ -121,8 +121,8 @@ def signal(recording: xr.Dataset, name: str) -> tuple[Array, str]:
     variable = recording[name]
     if variable.dims != ("time",):
         raise ParameterError(
-            f"signal {name!r} has the dimensions {variable.dims}: key figures need time alone; "
-            "select one case first, for instance recording.isel(case=0)",
+            f"signal {name!r} has the dimensions {variable.dims}, but key figures need the "
+            "dimension time alone. Select one case first, for instance recording.isel(case=0)",
             name=name,
             value=str(variable.dims),
             valid="time",
@@ -144,7 +144,7 @@ def defect(t: Array, *signals: Array) -> str:
     wrong = defect_of_times(times)
     for values in signals:
         if values.shape != t.shape:
-            return f"{values.size} values do not fit {t.size} times"
+            return f"there are {values.size} values but {t.size} times"
         wrong = wrong or defect_of_signal(times, values.tolist())
     return "" if wrong is None else wrong.reason
 
@@ -159,9 +159,9 @@ def smoothed(t: Array, y: Array, period: float) -> Array:
               c = \min(\max(t, t_0 + T/2), t_1 - T/2)
 
     The signal is linear between samples and integrated exactly. A ripple of this period vanishes
-    everywhere. There is no delay, but an edge is spread over half a period to both sides: it
-    shortens a dead time and lengthens a rise time by up to that. Within half a period of either
-    end the nearest full average holds, so a step should not be there.
+    everywhere. There is no delay, but an edge spreads by half a period to both sides. This shortens
+    a dead time and lengthens a rise time by up to half a period. Within half a period of either
+    end, the result is the nearest full average, so a step should not be there.
 
     Parameters
     ----------
@@ -203,4 +203,4 @@ def smoothed(t: Array, y: Array, period: float) -> Array:
 
 def treatment(period: float) -> str:
     """Return the note on figures of a smoothed signal; empty for the raw one."""
-    return f"of the moving average over {period:g} s" if period > 0 else ""
+    return f"moving average over {period:g} s" if period > 0 else ""

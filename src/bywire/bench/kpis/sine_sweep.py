@@ -21,7 +21,7 @@ from bywire.bench.kpis.samples import defect, signal
 from bywire.core.typing import Array
 
 _HALF_POWER = math.sqrt(0.5)
-_ROUNDED = 1e-12  # of the output's largest magnitude: smaller motion is rounding
+_ROUNDED = 1e-12  # of the output's largest magnitude: smaller motion is rounding error
 _STILL = Undefined("the output does not move at the lowest frequency", is_open=True)
 
 
@@ -34,7 +34,7 @@ class Setting:
     drive, response
         Names of the signals in the recording.
     windows
-        Frequency [Hz], beginning and end [s] of whole periods in which the response is settled.
+        Frequency [Hz], and beginning and end [s] of whole periods of the settled response.
     """
 
     drive: str
@@ -63,7 +63,7 @@ class Sweep:
         """Reason why no figure is defined."""
         broken = defect(self.t, self.drive, self.response)
         if not broken and not self.frequencies.size:
-            return "the recording contains no whole period"
+            return "the recording does not contain a whole period"
         return broken
 
     @property
@@ -129,20 +129,20 @@ def select(recording: xr.Dataset, setting: Setting) -> Sweep:
 
 @measure("gain")
 def sweep_gain(data: Sweep) -> float | Undefined:
-    """Gain of the output at the lowest frequency: its amplitude over that of the input."""
+    """Gain at the lowest frequency: amplitude of the output over amplitude of the input."""
     return float(np.abs(data.values[0])) if data.moves[0] else _STILL
 
 
 @measure("1")
 def sweep_peak(data: Sweep) -> float | Undefined:
-    """Largest gain over that at the lowest frequency."""
+    """Largest gain, relative to the gain at the lowest frequency."""
     gains = np.abs(data.values)
     return float(np.max(gains) / gains[0]) if data.moves[0] else _STILL
 
 
 @measure("Hz")
 def sweep_bandwidth(data: Sweep) -> float | Undefined:
-    """Frequency from which the gain is below 0.707 of that at the lowest frequency (-3 dB).
+    """Frequency at which the gain falls below 0.707 of the gain at the lowest frequency (-3 dB).
 
     The first crossing, interpolated in the logarithms of frequency and gain.
     """
@@ -162,7 +162,7 @@ def sweep_bandwidth(data: Sweep) -> float | Undefined:
 
 @measure("deg")
 def sweep_lag(data: Sweep) -> float | Undefined:
-    """Phase by which the output lags behind the input at the highest frequency."""
+    """Phase lag of the output behind the input at the highest frequency."""
     if not data.moves.all():
         f = data.frequencies[np.argmin(data.moves)]
         return Undefined(f"the output does not move at {f:g} Hz", is_open=True)

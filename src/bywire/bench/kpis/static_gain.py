@@ -1,4 +1,4 @@
-"""Static gain of a step: change of the response at rest per height of the step.
+"""Static gain of a step: change of the response at rest, divided by the step height.
 
 Levels are those of `bywire.bench.kpis.step_response` in an open loop: the mean before the step, and
 the mean in the window of the steady state.
@@ -47,7 +47,7 @@ class Setting:
         return treatment(self.smoothing)
 
     def units(self, level: str) -> Mapping[str, str]:
-        """Unit of the gain, by that of the response."""
+        """Unit of the gain, from the unit of the response."""
         return {"gain": f"{level}/{self.unit}"}
 
 
@@ -60,7 +60,7 @@ def response(t: Samples, signal: Samples, setting: Setting) -> Response | Undefi
 
 @measure("gain")
 def static_gain(response: Response, setting: Setting) -> float | Undefined:
-    """Change of the mean level per height of the step."""
+    """Change of the mean level, divided by the step height."""
     if setting.drive == 0.0:
         return Undefined("the step height is zero")
     unseen = why_unseen(response)

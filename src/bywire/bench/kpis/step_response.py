@@ -5,10 +5,10 @@ Crossings are interpolated linearly between samples. Ripple (dither) makes first
 last crossings late, by up to its amplitude over the local slope, and adds to the overshoot. The
 setting's ``smoothing`` averages first, and every note mentions it.
 
-A response that never leaves its first level by more than 5 % of the step height does not respond:
-of these figures it has the steady-state error alone. One that still moves in the window of the
-steady state has no overshoot, error and ripple, because its final level is unknown. Without a set
-point, it has none of the figures.
+A signal that stays within 5 % of the step height of its first level does not respond. Of these
+figures, only its steady-state error is defined. A response that still moves in the steady-state
+window has no overshoot, steady-state error or ripple, because its final level is unknown. Without a
+set point, such a response has none of these figures.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from bywire.bench.kpis.kpi import Undefined, measure
 from bywire.bench.kpis.samples import Samples, integral, moving_average, total, treatment, value_at
 
 _DEAD, _BAND = 0.05, 0.02  # of the step height: end of the dead time; half settling band
-_MOVING = 0.02  # of the step height, between both halves of the window of the steady state
-_LAST = 0.2  # of the time after the step: default window of the steady state
-_SETTLED = 0.1  # of the time after the step: least time in the band that counts as settled
+_MOVING = 0.02  # of the step height, between both halves of the steady-state window
+_LAST = 0.2  # of the time after the step: default steady-state window
+_SETTLED = 0.1  # of the time after the step: shortest time in the band that counts as settled
 
 
 @dataclass(frozen=True)
@@ -66,8 +66,8 @@ class Response(NamedTuple):
     """Response from the step on.
 
     ``t`` and ``z``: times from the instant of the step, and the response with 0 at ``start`` and 1
-    at ``end``; ``most``: its largest distance from its first level. In the window of the steady
-    state, ``low`` to ``high``: its mean, its peak-to-peak value, and its drift.
+    at ``end``; ``most``: its largest distance from its first level. Its mean, its peak-to-peak
+    value, and its drift are those in the steady-state window, ``low`` to ``high``.
     """
 
     t: Samples
@@ -107,13 +107,15 @@ def response_from(
     set_point: float | None,
     window: tuple[float, float] | None,
 ) -> Response | Undefined:
-    """Response from the step on, between two levels; without set point, up to its final mean.
+    """Response from the step on, between two levels; without a set point, up to its final mean.
 
-    The default window of the steady state is the last 20 %.
+    The default steady-state window is the last 20 %.
     """
     last = t[-1]
     if not t[0] <= t_step < last:
-        return Undefined(f"the step at {t_step:g} s is outside {t[0]:g} to {last:g} s")
+        return Undefined(
+            f"the step at {t_step:g} s is outside the recording, {t[0]:g} to {last:g} s"
+        )
     here = bisect_right(t, t_step) - 1
     times = list(t[here:])
     levels = list(y[here:])
@@ -159,14 +161,14 @@ def response_from(
 def dead_time(response: Response) -> float | Undefined:
     """Time from the step until the response first reaches 5 % of the step height.
 
-    A first-order lag without dead time shows 0.051 of its time constant here.
+    For a first-order lag without dead time, this figure is 0.051 of the time constant.
     """
     return _first(response, _DEAD)
 
 
 @measure("s")
 def rise_time(response: Response) -> float | Undefined:
-    """Time between the first crossings of 10 % and of 90 % of the step height."""
+    """Time between the first crossings of 10 % and 90 % of the step height."""
     low = _first(response, 0.1)
     high = _first(response, 0.9)
     if isinstance(low, Undefined):
@@ -178,11 +180,12 @@ def rise_time(response: Response) -> float | Undefined:
 
 @measure("s")
 def settling_time(response: Response) -> float | Undefined:
-    """Time from the step to the last entry into the band of 2 % of the step height around its end.
+    """Time from the step until the response stays within 2 % of the step height of the end level.
 
-    The entry is interpolated. It is not defined in the last tenth of the time after the step,
-    where a longer recording could show a later entry. A response with ripple of more than 4 % peak
-    to peak, or a steady-state error of more than 2 %, never settles.
+    The last entry into this band is interpolated. The figure is undefined if that entry is in the
+    last tenth of the time after the step, where a longer recording could show a later entry. A
+    response with ripple of more than 4 % peak to peak, or a steady-state error of more than 2 %,
+    never settles.
     """
     unseen = why_unseen(response)
     if unseen is not None:
@@ -193,14 +196,14 @@ def settling_time(response: Response) -> float | Undefined:
     while k >= 0 and not abs(z[k] - 1.0) > _BAND:
         k -= 1
     if k == len(z) - 1:
-        return Undefined(f"never settles: {100.0 * z[-1]:.4g} % of the step height at the end")
+        return Undefined(f"never settles: it ends at {100.0 * z[-1]:.4g} % of the step height")
     if k < 0:
         return 0.0
     edge = 1.0 - _BAND if z[k] < 1.0 else 1.0 + _BAND
     entry = t[k] + (edge - z[k]) / (z[k + 1] - z[k]) * (t[k + 1] - t[k])
     if entry > t[-1] - _SETTLED * (t[-1] - t[0]):
         return Undefined(
-            f"enters the band only {t[-1] - entry:.3g} s before the recording ends: record longer",
+            f"enters the band only {t[-1] - entry:.3g} s before the recording ends. Record longer",
             is_open=True,
         )
     return entry - t[0]
@@ -208,10 +211,10 @@ def settling_time(response: Response) -> float | Undefined:
 
 @measure("%")
 def overshoot(response: Response) -> float | Undefined:
-    """Largest excess of the response over the step's end, in % of the step height.
+    """Largest excess of the response over the end level, in % of the step height.
 
-    The largest sample counts. It is 0 if the end is never exceeded. If the response does not
-    settle, it is unknown whether it would overshoot.
+    The largest sample counts. The figure is 0 if the response never exceeds the end level. If the
+    response does not settle, it is unknown whether it would overshoot.
     """
     unseen = why_unseen(response)
     if unseen is not None:
@@ -223,7 +226,7 @@ def overshoot(response: Response) -> float | Undefined:
     last = response.z[-1]
     if abs(last - 1.0) > _BAND and excess <= 0.0:
         return Undefined(
-            f"never exceeds the set point, and ends at {100.0 * last:.4g} % of the step",
+            f"never exceeds the set point, and ends at {100.0 * last:.4g} % of the step height",
             is_open=True,
         )
     return 100.0 * max(0.0, excess)
@@ -231,10 +234,10 @@ def overshoot(response: Response) -> float | Undefined:
 
 @measure("level")
 def steady_state_error(response: Response) -> float | Undefined:
-    """Magnitude of the set point minus the mean response in the window of the steady state.
+    """Magnitude of the set point minus the mean response in the steady-state window.
 
-    Trapezoidal mean over the window's samples, by default the last 20 % of the time after the
-    step. Ripple averages out except for an incomplete period.
+    Trapezoidal mean over the window's samples. The default window is the last 20 % of the time
+    after the step. Ripple averages out except for an incomplete period.
     """
     if not response.is_tracking:
         return Undefined("the experiment has no set point")
@@ -248,10 +251,9 @@ def steady_state_error(response: Response) -> float | Undefined:
 
 @measure("level")
 def ripple(response: Response) -> float | Undefined:
-    """Peak to peak of the response in the window of the steady state.
+    """Peak-to-peak value of the response in the steady-state window.
 
-    Largest minus smallest sample. Smoothing removes the ripple of its own period from this figure
-    too.
+    Largest minus smallest sample. Smoothing also removes ripple of its own period from this figure.
     """
     if not response.has_window:
         return _without_window(response.low, response.high)
@@ -277,7 +279,7 @@ def why_unseen(response: Response) -> Undefined | None:
         return still
     if abs(response.end - response.start) <= response.band:
         return Undefined(
-            "the response changes by less than its ripple, which hides any step", is_open=True
+            "the response changes by less than its ripple, so any step is hidden", is_open=True
         )
     return _why_unsteady(response)
 
@@ -297,33 +299,33 @@ def _why_still(response: Response) -> Undefined | None:
     if not response.most <= _DEAD * height:
         return None
     return Undefined(
-        f"the response does not move: {response.most:.3g} of a step of {height:.3g} {{level}} at "
-        "most",
+        f"the response does not move: it changes by at most {response.most:.3g} in a step of "
+        f"{height:.3g} {{level}}",
         is_open=True,
     )
 
 
 def _why_unsteady(response: Response) -> Undefined | None:
-    """Reason if the response still moves in the window of the steady state; else None.
+    """Reason if the response still moves in the steady-state window; else None.
 
-    The means of both halves of the window, of as many intervals each, differ by more than 2 % of
-    the step height, or the extremes of the later half go beyond those of the earlier one by more
-    than that. Ripple of several periods does neither.
+    It moves if the means of the window's halves differ by more than 2 % of the step height, or if
+    the extremes of the later half exceed those of the earlier half by more than that. Both halves
+    have the same number of intervals. Ripple of several periods does neither.
     """
     height = abs(response.end - response.start)
     if not _has_height(response.start, response.end) or not response.drift > _MOVING * height:
         return None
     return Undefined(
-        "the response still moves at the end: by "
-        f"{100.0 * response.drift / height:.3g} % of the step height in the window of the steady "
-        "state; record longer",
+        "the response still moves at the end, by "
+        f"{100.0 * response.drift / height:.3g} % of the step height in the steady-state window. "
+        "Record longer",
         is_open=True,
     )
 
 
 def _without_window(low: float, high: float) -> Undefined:
     return Undefined(
-        f"the steady state's window, {low:g} to {high:g} s, contains fewer than 2 samples"
+        f"the steady-state window, {low:g} to {high:g} s, contains fewer than 2 samples"
     )
 
 
@@ -357,7 +359,7 @@ def _first(response: Response, level: float) -> float | Undefined:
         k += 1
     if k == len(z):
         return Undefined(
-            f"never reaches {100.0 * level:g} % of the step height: {100.0 * max(z):.4g} % at most"
+            f"never reaches {100.0 * level:g} % of the step height, at most {100.0 * max(z):.4g} %"
         )
     if k == 0:
         return Undefined(f"already at {100.0 * z[0]:.4g} % of the step height at the step")

@@ -13,8 +13,8 @@ from bywire.bench.kpis.kpi import Undefined, measure
 from bywire.bench.kpis.samples import defect, signal, smoothed, treatment
 from bywire.core.typing import Array
 
-_LONGEST_LAG = 0.3  # s: longer delays are not looked for
-_STILL = 0.05  # of the set point's range: least motion of a signal that follows
+_LONGEST_LAG = 0.3  # s: upper limit of the search
+_STILL = 0.05  # of the set point's range: smallest motion of a signal that follows
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class Setting:
     signal, set_point
         Names of the signals in the recording, of one unit.
     smoothing
-        Averaging time [s] of the signal, usually one dither period; 0 for the raw one.
+        Averaging time [s] of the signal, usually one dither period; 0 for the raw signal.
     """
 
     signal: str
@@ -84,18 +84,18 @@ class Tracking:
         bounds = (max(best - delays[1], 0.0), min(best + delays[1], _LONGEST_LAG))
         fine = optimize.minimize_scalar(misfit, bounds=bounds, method="bounded")
         if misfit(0.0) <= fine.fun:
-            return Undefined("no delay fits better than a delay of zero")
+            return Undefined("a delay of zero fits best")
         if misfit(_LONGEST_LAG) <= fine.fun:
-            return Undefined(f"the delay that fits best is not below {_LONGEST_LAG:g} s")
+            return Undefined(f"the best-fitting delay is not below {_LONGEST_LAG:g} s")
         return float(fine.x)
 
     def delayed(self, delay: float) -> Array:
-        """Return the set point as it was a delay [s] earlier."""
+        """Return the set point, shifted by a delay [s]."""
         return np.interp(self.t - delay, self.t, self.demand)
 
 
 def select(recording: xr.Dataset, setting: Setting) -> Tracking:
-    """Return the signal, averaged as the setting says, and its set point.
+    """Return the signal, averaged over the setting's period, and its set point.
 
     Raises
     ------
@@ -124,7 +124,7 @@ def tracking_max(data: Tracking) -> float | Undefined:
 
 @measure("s")
 def tracking_lag(data: Tracking) -> float | Undefined:
-    """Delay of the set point that fits the signal best, in the mean square."""
+    """Delay of the set point that fits the signal best, by least squares."""
     return data.lag
 
 

@@ -1,6 +1,6 @@
 """C from typed Python functions that loop over samples, statement by statement.
 
-A key figure for many cases or for a page is such a function; Python runs it unchanged. The
+Key figures for many cases or for a page are such functions. Python runs them unchanged. The
 translator supports the following:
 
 * int, float and bool, `Samples`, NamedTuples of these, the numbers of a family's ``Setting``,
@@ -11,9 +11,9 @@ translator supports the following:
 
 Any other code in a function raises an error that names its line.
 
-C and Python give the same bits, except for signs of zero: every operation is translated as it is
-written, and compilers may not regroup it. The translator therefore also rejects functions whose
-digits depend on the machine's library (``sin``, ``**``).
+C and Python return the same bits, except for signs of zero. The translator keeps every operation as
+written, and compilers may not regroup operations. The translator therefore also rejects functions
+whose digits depend on the machine's library (``sin``, ``**``).
 """
 
 from __future__ import annotations
@@ -282,7 +282,7 @@ class _Writer:
         return self.made
 
     def unreached(self, returns: Kind) -> str:
-        """Return the end of a function whose last statement is a branch; it is unreached."""
+        """Return the last line of a function that ends in a branch; it is never executed."""
         return f"return ({self.unit.ctype(returns)}){'0' if returns.is_number else '{0}'};"
 
     def annotated(self, node: ast.AST, name: str) -> Kind:
@@ -353,13 +353,13 @@ class _Writer:
     def assigned(self, node: ast.stmt, name: str, value: ast.expr, kind: Kind | None) -> list[str]:
         """Return the lines of an assignment; the first one determines the variable's type."""
         if name in self.counters:
-            self.refuse(node, f"{name!r} is a loop's counter, which the loop must not change")
+            self.refuse(node, f"{name!r} is a loop counter, which the loop must not change")
         lines, given = self.list_made(value)
         if name in self.arrays and not lines:
-            self.refuse(node, f"{name!r} is already a list of this function: choose another name")
+            self.refuse(node, f"{name!r} is already a list of this function. Use another name")
         kind = kind or self.kinds.get(name) or given.kind
         if kind == _NOTHING:
-            self.refuse(node, "annotate the variable: `name: float | None = None`")
+            self.refuse(node, "the variable needs an annotation: `name: float | None = None`")
         if name not in self.kinds:
             self.kinds[name] = self.locals[name] = kind
         if lines:
@@ -453,9 +453,7 @@ class _Writer:
     def loop(self, node: ast.For, name: str, over: ast.expr, body: Sequence[ast.stmt]) -> list[str]:
         """Return the lines of a loop over a range or over samples, whose bounds are fixed first."""
         if name in self.kinds:
-            self.refuse(
-                node, f"{name!r} is already in use: choose another name for the loop's variable"
-            )
+            self.refuse(node, f"{name!r} is already in use. Use another name for the loop variable")
         k = c_name(name)
         if self.calls(over, range):
             head, self.kinds[name] = [f"{{ {self.range_head(over, k)}"], INT
@@ -523,7 +521,7 @@ class _Writer:
         value = self.value(node)
         if value.kind != BOOL:
             self.refuse(
-                node, "a condition must be a bool: compare, for instance with != 0 or `is None`"
+                node, "a condition must be a bool. Add a comparison, such as != 0 or `is None`"
             )
         return value.text
 
@@ -635,7 +633,7 @@ class _Writer:
                 return getattr(builtins, name)
             case ast.Attribute(of, name) if hasattr(owner := self.evaluated(of), name):
                 return getattr(owner, name)
-        self.refuse(node, "it has no value yet, or only within a loop that has ended")
+        self.refuse(node, "it has no value here: it is not assigned yet, or only within a loop")
 
     def attribute(self, node: ast.Attribute) -> Value:
         """Return a field, or a constant of a module."""
@@ -674,14 +672,14 @@ class _Writer:
             case ast.Compare(left, [ast.Is() | ast.IsNot() as op], [ast.Constant(None)]):
                 value = self.value(left)
                 if not value.kind.or_none:
-                    self.refuse(node, "this is never None")
+                    self.refuse(node, "this value is never None")
                 there = "reason" if value.kind.base is Undefined else "is"
                 sign = "==" if isinstance(op, ast.Is) else "!="
                 return Value(f"({value.text}.{there} {sign} 0)", BOOL)
         before = self.made.arrays
         sides = [self.number(each) for each in (node.left, *node.comparators)]
         if len(sides) > 2 and self.made.arrays > before:  # C would compute the middle one twice
-            self.refuse(node, "assign this number to a name first, and compare the name")
+            self.refuse(node, "assign the middle number to a variable first")
         signs = [_OPERATORS.get(type(op)) for op in node.ops]
         if None in signs:
             self.refuse(node, "valid comparisons are < <= > >= == != of numbers, and `is None`")
@@ -746,7 +744,7 @@ class _Writer:
         """Return the arguments of a call by the names of its parameters."""
         keywords = {each.arg: each.value for each in node.keywords}
         if None in keywords or any(isinstance(each, ast.Starred) for each in node.args):
-            self.refuse(node, "list the arguments one by one, without * and **")
+            self.refuse(node, "pass the arguments one by one, without * and **")
         signature = inspect.signature(called)
         try:
             bound = signature.bind(*node.args, **keywords)  # type: ignore[arg-type]
@@ -818,14 +816,14 @@ class _Writer:
                     yield text.replace("{", "{{").replace("}", "}}")
                 case _:
                     self.refuse(
-                        node, "write the text as one literal, with numbers in it like {level:.3g}"
+                        node, "write the text as one literal with numbers such as {level:.3g}"
                     )
 
 
 class _ArraysFinished(ast.NodeVisitor):
-    """Rule that makes slices equivalent: in Python they are copies, in C views of the same list.
+    """Rule that makes slices equivalent: Python copies a slice, C refers to the same list.
 
-    A function may change its own list only before the list is sliced, passed on or renamed.
+    A function may change its own list only before it slices, passes on or renames that list.
     """
 
     def __init__(self, writer: _Writer) -> None:
@@ -842,12 +840,12 @@ class _ArraysFinished(ast.NodeVisitor):
             if line < change.lineno:
                 self.writer.refuse(
                     change,
-                    f"{name!r} is sliced, passed on or renamed, in line "
-                    f"{self.writer.first + line - 1} or the loop there: change it before that",
+                    f"{name!r} must not change after it is sliced, passed on or renamed in line "
+                    f"{self.writer.first + line - 1} or the loop there",
                 )
 
     def visit_For(self, node: ast.For | ast.While) -> None:
-        """Visit a loop, whose reads precede the changes of its next iteration."""
+        """Visit a loop, in which each read precedes the changes in the next iteration."""
         self.loops.append(node.lineno)
         self.generic_visit(node)
         self.loops.pop()

@@ -13,10 +13,10 @@ from bywire.bench.kpis.samples import Samples, moving_average, value_at
 from bywire.core.typing import Array
 
 SLOW = 2.5
-"""speed [m/s] below which a wheel may lock, and no figure counts its slip"""
+"""speed [m/s] below which a wheel may lock, and its slip does not count in any figure"""
 _ROUNDING = 1e-9  # s, rounding error of time zero
-_FILTER, _BUILD_UP = 0.02, 0.3  # s: average of the deceleration; its build-up, without jerk
-_NO_STOP = "the vehicle does not stop within the recording: give a longer options.duration"
+_FILTER, _BUILD_UP = 0.02, 0.3  # s: averaging time; build-up of the deceleration, not counted
+_NO_STOP = "the vehicle does not stop within the recording. Set a longer options.duration"
 _NO_WAY = "the vehicle does not move"
 
 
@@ -29,7 +29,7 @@ class Setting:
     ideal
         Ideal stopping distance [m].
     peak_slip
-        Slip at the largest adhesion.
+        Slip of largest adhesion.
     """
 
     ideal: float = math.nan
@@ -68,7 +68,7 @@ def stop(t: Samples, v: Samples) -> Stop | Undefined:
     begin = bisect_left(t, -_ROUNDING)
     until = bisect_right(t, end) if does_stop else len(t)
     if begin >= until:
-        return Undefined("the recording contains nothing from time zero on")
+        return Undefined("the recording ends before time zero")
     return Stop(t, v, begin, until, end, does_stop)
 
 
@@ -103,14 +103,16 @@ def braking_efficiency(stop: Stop, x: Samples, setting: Setting) -> float | Unde
     if not stop.does_stop:
         return Undefined(_NO_STOP)
     if not isfinite(setting.ideal):
-        return Undefined("the tyres cannot hold the vehicle on this road, so it has no ideal stop")
+        return Undefined(
+            "the tyres cannot hold the vehicle on this road, so there is no ideal stop"
+        )
     distance = _distance(stop, x)
     return 100.0 * setting.ideal / distance if distance > 0.0 else Undefined(_NO_WAY)
 
 
 @measure("m/s**2")
 def mean_deceleration(stop: Stop, x: Samples) -> float | Undefined:
-    """Mean fully developed deceleration: over the distance from 0.8 to 0.1 of the speed."""
+    """Mean fully developed deceleration: from 0.8 to 0.1 of the initial speed, over distance."""
     if not stop.does_stop:
         return Undefined(_NO_STOP)
     start = value_at(stop.t, stop.v, 0.0)
@@ -122,7 +124,7 @@ def mean_deceleration(stop: Stop, x: Samples) -> float | Undefined:
 
 @measure("m/s**3")
 def jerk(stop: Stop, a: Samples) -> float:
-    """Largest rate of the deceleration (0.02 s average), from 0.3 s on, above 2.5 m/s."""
+    """Largest rate of change of the deceleration (0.02 s average), after 0.3 s, above 2.5 m/s."""
     t = stop.t
     mean = moving_average(t, a, _FILTER)
     last = len(t) - 1
@@ -145,7 +147,7 @@ def jerk(stop: Stop, a: Samples) -> float:
 
 @measure("rad")
 def peak_pitch(stop: Stop, phi: Samples) -> float:
-    """Largest nose-down pitch, relative to that at time zero."""
+    """Largest nose-down pitch, relative to the pitch at time zero."""
     return max(phi[stop.begin : stop.until]) - value_at(stop.t, phi, 0.0)
 
 
@@ -249,7 +251,7 @@ def _heat(stop: Stop, energy: Samples) -> float:
 
 def _share(this: float, other: float) -> float | Undefined:
     every = this + other
-    return 100.0 * this / every if every > 0.0 else Undefined("no brake takes up heat")
+    return 100.0 * this / every if every > 0.0 else Undefined("no brake absorbs heat")
 
 
 def _peak_slip(stop: Stop, slip: Samples) -> float:

@@ -25,7 +25,7 @@ class Setting:
     winding
         Prefix of the names of the winding temperatures; the hottest motor counts.
     derated
-        Mode "derated" of the ECU, 0 or 1.
+        The ECU's mode "derated", 0 or 1.
     """
 
     output: str
@@ -42,9 +42,9 @@ class Warming:
     t
         Times [s], increasing, shape ``(n,)``.
     output
-        Output that the motors produce, in SI, shape ``(n,)``.
+        Output that the motors produce [``unit``], shape ``(n,)``.
     unit
-        Its unit.
+        SI unit of the output.
     winding
         Temperature of the hottest winding [K], shape ``(n,)``, or None if no motor warms up.
     derated
@@ -59,7 +59,7 @@ class Warming:
 
     @property
     def units(self) -> Mapping[str, str]:
-        """Unit of the placeholder ``level``: that of the output."""
+        """Unit of the placeholder ``level``, which is the output's unit."""
         return {"level": self.unit}
 
     @cached_property
@@ -104,7 +104,7 @@ def final_winding(data: Warming) -> float | Undefined:
 
 @measure("s", needs=("derated",))
 def time_derated(data: Warming) -> float | Undefined:
-    """Time during which the motor's current is limited because of its temperature.
+    """Time during which the motor's current is limited because of high temperature.
 
     Trapezoidal integral of the mode's samples: a change counts as halfway between two samples.
     """

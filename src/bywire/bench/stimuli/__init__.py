@@ -1,1 +1,1 @@
-"""Stimuli, one per file: what drives an experiment, as a pure function of time."""
+"""Stimuli, one per file: signals that drive an experiment, as pure functions of time."""

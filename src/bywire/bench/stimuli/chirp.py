@@ -19,17 +19,17 @@ class Parameters(ParameterSet):
     mean: Level
     """mean value, and the value before ``t_start``"""
     amplitude: Amplitude
-    """amplitude: half of peak to peak"""
+    """amplitude: half the peak-to-peak value"""
     f_start: Frequency
     """frequency at the beginning"""
     f_end: Frequency
     """frequency at the end, above or below ``f_start``"""
     t_sweep: Duration
-    """duration of the sweep; afterward the sine goes on at ``f_end``"""
+    """duration of the sweep; afterward the sine continues at ``f_end``"""
     t_start: TimeConstant = 0.0
     """instant at which the sweep begins, with phase zero"""
     sweep: Literal["linear", "logarithmic"]
-    """course of the frequency: linear in time, or logarithmic"""
+    """variation of the frequency: linear in time, or logarithmic"""
 
 
 def sample(t: NDArray[np.float64], par: Parameters) -> NDArray[np.float64]:

@@ -1,4 +1,4 @@
-"""A sum of harmonics of one base frequency with Schroeder's phases: flat spectrum, low peak."""
+"""Harmonics of one base frequency with Schroeder phases, for a flat spectrum and a low peak."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ class Parameters(ParameterSet):
     amplitude: Amplitude
     """amplitude of every single harmonic"""
     f_base: Frequency
-    """base frequency: first harmonic and spacing; one period lasts its inverse"""
+    """base frequency: first harmonic and spacing; its inverse is the period"""
     n: Count
-    """number of harmonics: 1, 2, ..., n times the base frequency"""
+    """number n of harmonics: 1, 2, ..., n times the base frequency"""
     t_start: TimeConstant = 0.0
     """instant at which the first period begins; the signal jumps there"""
 
@@ -44,8 +44,8 @@ def sample(t: NDArray[np.float64], par: Parameters) -> NDArray[np.float64]:
 
     .. math:: u = \bar u + \hat u \sum_{k=1}^{n} \cos(2 \pi k f_b (t - t_0) - \pi k (k - 1) / n)
 
-    No random numbers: the same parameters always give the same signal. Its RMS value is
-    :math:`\hat u \sqrt{n / 2}`, its peak about 1.7 times that for many harmonics.
+    The same parameters always give the same signal, as there are no random numbers. The RMS value
+    is :math:`\hat u \sqrt{n / 2}`. For many harmonics, the peak is about 1.7 times the RMS value.
 
     References
     ----------

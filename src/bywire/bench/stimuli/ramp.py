@@ -1,4 +1,4 @@
-"""A ramp from one level to another, a hold there, and optionally the ramp back."""
+"""A ramp from one level to another, a hold there, and optionally a ramp back."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ LevelRate = Annotated[float, Unit("level/s"), Field(gt=0, allow_inf_nan=False)]
 
 
 class Parameters(ParameterSet):
-    """Piecewise linear course, up or down."""
+    """Piecewise linear signal, up or down."""
 
     start: Level
     """value before the ramp"""
@@ -28,9 +28,9 @@ class Parameters(ParameterSet):
     t_start: TimeConstant = 0.0
     """instant at which the ramp begins"""
     t_hold: TimeConstant
-    """time at ``end`` before the ramp back"""
+    """time at ``end`` before the return ramp"""
     after: Literal["stay", "return"]
-    """what follows the hold: ``stay`` at ``end`` or ``return`` to ``start``"""
+    """after the hold: ``stay`` at ``end`` or ``return`` to ``start``"""
 
 
 def sample(t: NDArray[np.float64], par: Parameters) -> NDArray[np.float64]:
@@ -39,7 +39,7 @@ def sample(t: NDArray[np.float64], par: Parameters) -> NDArray[np.float64]:
     .. math:: u = u_0 \pm \left( \mathrm{sat}_0^h(\dot u (t - t_0))
               - \mathrm{sat}_0^h(\dot u (t - t_1)) \right)
 
-    with :math:`h = |u_1 - u_0|` and the way back beginning at :math:`t_1`. Eq. (17) of
+    with :math:`h = |u_1 - u_0|`; the return ramp begins at :math:`t_1`. Eq. (17) of
     Dardanelli, Alli, Savaresi (2010) is ``start = 0 A``, ``end = 5 A``, ``slope = 0.2 A/s``,
     ``t_start = t_hold = 0``, ``after = "return"``.
     """

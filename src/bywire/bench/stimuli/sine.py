@@ -1,4 +1,4 @@
-"""A sine around a mean."""
+"""A sine around a mean value."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ class Parameters(ParameterSet):
     mean: Level
     """mean value, and the value before ``t_start``"""
     amplitude: Amplitude
-    """amplitude: half of peak to peak"""
+    """amplitude: half the peak-to-peak value"""
     f: Frequency
     """frequency"""
     phase: Phase = 0.0
-    """phase at ``t_start``; the signal jumps there unless it is a multiple of pi"""
+    """phase at ``t_start``; the signal jumps there unless the phase is a multiple of pi"""
     t_start: TimeConstant = 0.0
     """instant at which the oscillation begins"""
 

@@ -11,7 +11,7 @@ from bywire.core.quantities import TimeConstant
 
 
 class Parameters(ParameterSet):
-    """Two levels and the instant between them."""
+    """Two levels and the instant of the step."""
 
     start: Level
     """value before the step"""
@@ -22,5 +22,5 @@ class Parameters(ParameterSet):
 
 
 def sample(t: NDArray[np.float64], par: Parameters) -> NDArray[np.float64]:
-    """Return the step; at ``t_step`` itself the value is ``end``."""
+    """Return the step, whose value at ``t_step`` itself is ``end``."""
     return np.where(reached(t, par.t_step), par.end, par.start)

@@ -1,4 +1,4 @@
-"""A table of times and values, for instance a measured pedal."""
+"""A table of times and values, for instance from a measured pedal."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Parameters(ParameterSet):
     values: Annotated[Numbers, Unit("level")]
     """values at these instants"""
     between: Literal["linear", "hold"]
-    """between two nodes: a straight line, or hold the earlier value"""
+    """interpolation between two nodes: a straight line, or hold the earlier value"""
 
     @model_validator(mode="after")
     def _is_a_table(self) -> Parameters:

@@ -1,4 +1,4 @@
-"""The fault campaign of the motorcycle brake: full braking held at 37 bar."""
+"""Fault campaign of the motorcycle brake: full braking, held at 37 bar."""
 
 from __future__ import annotations
 

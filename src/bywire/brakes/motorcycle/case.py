@@ -66,8 +66,8 @@ def smoothing(par: MotorcycleParameters) -> dict[str, float]:
 # --- Settling under dither
 
 _ROUNDS, _TOLERANCE = 12, 2e-3
-_WINDOW = 0.2  # of the settling time: averaging window
-_SUBSTEPS, _LONGEST = 50, 20e-6  # substeps per sample time at least, and their longest length [s]
+_WINDOW = 0.2  # averaging window, as a share of the settling time
+_SUBSTEPS, _LONGEST = 50, 20e-6  # smallest number of substeps per sample time; longest substep [s]
 
 
 def settled_start(p: float, par: MotorcycleParameters, settle: float) -> float:
@@ -93,8 +93,8 @@ def settled_start(p: float, par: MotorcycleParameters, settle: float) -> float:
             break
         start *= p / settled
     raise SolverError(
-        f"no current makes the dithered pressure settle at p_start = {p / 1e5:g} bar (last: "
-        f"{settled / 1e5:.4g} bar): change p_start, lengthen settle, or set start = 'frictionless'",
+        f"no current lets the dithered pressure settle at p_start = {p / 1e5:g} bar (last: "
+        f"{settled / 1e5:.4g} bar): change p_start, increase settle, or set start = 'frictionless'",
         name="p_start",
         value=f"{p / 1e5:g} bar",
     )

@@ -1,4 +1,4 @@
-"""Dithers of the motorcycle brake: trials on the nonlinear model, comparison and choice."""
+"""Dithers for the motorcycle brake: trials on the nonlinear model, comparison and choice."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ from bywire.synthesis.study import Cut, variable
 
 Par = MotorcycleParameters
 
-_LEAST = 4  # samples per period, the fewest that show a triangle
+_LEAST = 4  # smallest number of samples per period, enough for a triangle
 
 
 def admissible_frequencies(par: Par, low: float, high: float, count: int) -> list[float]:
@@ -62,6 +62,7 @@ def admissible_frequencies(par: Par, low: float, high: float, count: int) -> lis
             f"no dither of {low:g} to {high:g} Hz has a period of an even number of sample times "
             f"of {T * 1e3:g} ms: widen the range (f_min, f_max), or sample faster (ecu.T_s)",
             name="f_min",
+            value=f"{low:g}",
         )
     return inside
 
@@ -80,8 +81,9 @@ def dead_band(par: Par, p: float) -> float:
 def attenuation(par: Par, frequencies: Array, p: float) -> Complex:
     """Return motor current over dither current at a stuck shaft, shape (n,).
 
-    Current loop, and the demand's low-pass where it comes after the dither. A shaft that sticks
-    has neither back-EMF nor inertia: all of the current's torque acts against the friction.
+    The ratio includes the current loop, and the demand's low-pass if it follows the dither. A stuck
+    shaft has neither back-EMF nor acceleration, so all of the current's torque acts against
+    friction.
     """
     loop = current_loop(par, p, "locked").response(frequencies)[:, 0, 0]
     if par.ecu.filter.place == "before-dither":
@@ -171,16 +173,16 @@ def tried(
 ) -> Mapping[str, Array]:
     """Return the figures of every dither at a pressure, pressure loop closed.
 
-    The pressure controller takes the brake to the pressure from below, and from above. If dither
-    overcomes the friction, both need the same mean current. Their difference over the friction's
-    dead band is the remaining hysteresis.
+    The pressure controller approaches the pressure from below and from above. If dither overcomes
+    friction, both approaches need the same mean current. The difference of the currents over the
+    friction's dead band is the remaining hysteresis.
 
     Parameters
     ----------
     p
         Pressure [Pa], > ``trial.approach``.
     gains, frequencies
-        Of the dither's law; frequencies [Hz] with whole sample times in a period.
+        Gains of the dither's law; frequencies [Hz] with whole sample times in a period.
 
     Returns
     -------
@@ -308,7 +310,7 @@ NAMES = {
 
 @dataclass(frozen=True)
 class Least:
-    """The weakest dither of one frequency that overcomes the friction.
+    """The weakest dither at a frequency that overcomes friction.
 
     Parameters
     ----------
@@ -329,7 +331,7 @@ class Least:
 
 
 def least(gains: Array, figures: Figures, limits: Mapping[str, float]) -> Least:
-    """Return the weakest dither that overcomes the friction at its gain and all higher ones.
+    """Return the weakest dither that overcomes friction at its gain and at all higher gains.
 
     ``gains``: shape (n,), ascending; ``figures``: name -> values at these gains, shape (n,);
     ``limits``: largest value of each of `OVERCOMES` and `COSTS`.
@@ -389,9 +391,9 @@ class Candidate:
 
     @property
     def verdict(self) -> str:
-        """Reason to reject the candidate; empty if it is admissible."""
+        """Reason to reject the candidate; empty if it is within all limits."""
         if math.isnan(self.gain):
-            return f"{NAMES[self.binding]}: no gain is enough"
+            return f"{NAMES[self.binding]}: every gain is too low"
         return ", ".join(NAMES[name] for name in self.exceeded)
 
 
@@ -418,7 +420,7 @@ def _column(figures: Figures, k: int) -> Figures:
 
 
 def best_of(candidates: Sequence[Candidate]) -> int | None:
-    """Return the index of the cheapest admissible candidate; None if there is none."""
+    """Return the index of the cheapest candidate within all limits, or None."""
     admissible = [k for k, candidate in enumerate(candidates) if not candidate.verdict]
     return min(admissible, key=lambda k: candidates[k].price, default=None)
 
@@ -503,16 +505,16 @@ def mapped(
             [[c.gain for c in row] for row in enough],
             both,
             "1",
-            "least gain that overcomes the friction",
+            "lowest gain that overcomes friction",
         ),
         "least_copper": variable(
             [[c.figures["copper"] for c in row] for row in enough],
             both,
             "W",
-            "dither's copper power at the least gain",
+            "dither's copper power at the lowest gain",
         ),
         "predicted_gain": variable(
-            predicted, both, "1", "gain that breaks a stuck shaft away, from linear models"
+            predicted, both, "1", "gain at which a stuck shaft breaks away, from linear models"
         ),
         "reach": variable(
             [reach(par, f, middle) for f in grid.frequencies],
@@ -544,7 +546,7 @@ def by_frequency(grid: Grid, each: list[Candidate]) -> Cut:
         {"frequency": (list(grid.frequencies), "Hz", "dither frequency")},
         {name: (column, units.get(name, "1"), name) for name, column in (numbers | words).items()},
     )
-    return Cut("least gain for all pressures together", table, ("frequency", *names, *words))
+    return Cut("lowest gain for all pressures together", table, ("frequency", *names, *words))
 
 
 def by_pressure(par: Par, data: xr.Dataset) -> Cut:
@@ -584,7 +586,7 @@ def by_pressure(par: Par, data: xr.Dataset) -> Cut:
         {"pressure": (data["pressure"].values, "Pa", "pressure")},
         {name: (values, units.get(name, "1"), name) for name, values in rows.items()},
     )
-    title = "least dither of each pressure on its own; torque at the shaft, predicted gain linear"
+    title = "weakest dither for each pressure; torque at the shaft, gain predicted by linear models"
     return Cut(title, table, ("pressure", *rows))
 
 
@@ -599,21 +601,21 @@ def law(par: Par, data: xr.Dataset, best: int, grid: Grid) -> list[Kpi]:
             "optimum_reach",
             reach(par, f, float(np.median(p))),
             "1",
-            "Motor current over dither at the optimum's frequency, shaft stuck.",
+            "Motor current over dither at the optimum's frequency, with a stuck shaft.",
         ),
         Kpi(
             "optimum_predicted_gain",
             float(data["predicted_gain"].values[:, best].max()),
             "1",
-            "Gain that breaks the stuck shaft away both ways, from linear models alone.",
+            "Gain at which the stuck shaft breaks away in both directions, from linear models.",
         ),
     ]
     if p.size > 1:
         slope, offset = np.polyfit(p, needed, 1)
         offset += float(np.max(needed - (offset + slope * p)))  # enough at every pressure
-        text = "Friction that the ECU must assume for a gain of 1 to be just enough:"
+        text = "Friction that the ECU must assume so that a gain of 1 is just enough:"
         kpis += [
-            Kpi("law_T_pr", offset, "N*m", f"{text} preload's friction torque."),
+            Kpi("law_T_pr", offset, "N*m", f"{text} friction torque of the preload."),
             Kpi("law_f_cfr_p", slope, "N*m/Pa", f"{text} growth with pressure."),
         ]
     return kpis
@@ -651,8 +653,8 @@ class DitheredPlant:
 def dithered_plant(par: Par, p: float, step: float | None = None) -> DitheredPlant:
     """Return the linear model from current demand to pressure at a mean pressure under dither.
 
-    Seals that rub more while applying than while releasing shift the mean pressure. A Newton
-    iteration with the model's own gain finds the current that holds it.
+    Seal friction that is higher while applying than while releasing shifts the mean pressure. A
+    Newton iteration with the model's gain finds the current that holds it.
 
     Parameters
     ----------
@@ -666,7 +668,7 @@ def dithered_plant(par: Par, p: float, step: float | None = None) -> DitheredPla
     Raises
     ------
     SolverError
-        When no motion is periodic, or none has this mean pressure: if the piston stays stuck under
+        When no motion is periodic, or none has this mean pressure. If the piston stays stuck under
         dither, pressure does not follow the current.
     """
     driven = par.replace({"drive.mode": "current", "adc.law": "ideal"})
@@ -686,7 +688,8 @@ def dithered_plant(par: Par, p: float, step: float | None = None) -> DitheredPla
             return DitheredPlant(i, model)
         i += (p - model.mean) / gain
     raise SolverError(
-        f"no current demand near {i:.4g} A holds a mean pressure of {p / 1e5:g} bar under dither: "
-        "the piston sticks there; raise ecu.dither.gain",
+        f"no current demand near {i:.4g} A holds a mean pressure of {p / 1e5:g} bar under dither, "
+        "since the piston sticks: increase ecu.dither.gain",
         name="ecu.dither.gain",
+        value=f"{i:.4g} A",
     )

@@ -1,4 +1,4 @@
-"""Faults of the motorcycle brake that none of its elements declares."""
+"""Faults of the motorcycle brake in addition to those of its elements."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ CHANNELS = Channels(
 
 
 def _source(mode: str) -> Any:
-    """Return the changes that replace the ECU by an ideal source at zero.
+    """Return the changes that replace the ECU with an ideal source at zero.
 
-    The source is sampled like the ECU, so that the ticks of the run do not move.
+    The source is sampled like the ECU, so the run's ticks stay the same.
     """
 
     def changes(par: Any, value: float) -> Mapping[str, Any]:
@@ -61,7 +61,7 @@ def _boiling(par: Any, T: float) -> Mapping[str, Any]:
     if not 0.0 < T <= par.vapor.T_most:
         limits = f"> {shown(0.0, 'K')} and <= {shown(par.vapor.T_most, 'K')} (vapor.T_most)"
         raise not_valid(
-            "temperature of fluid.vapor", shown(T, "K"), limits, "the range of the law of vapor"
+            "temperature of fluid.vapor", shown(T, "K"), limits, "the range of the vapor law"
         )
     return {"fluid.air": "caliper", "fluid.V_air": fluid_vapor.volume(T, par.vapor)}
 
@@ -69,7 +69,7 @@ def _boiling(par: Any, T: float) -> Mapping[str, Any]:
 FAULTS = (
     Fault(
         "fluid.vapor",
-        "the fluid in the caliper boils, by its temperature",
+        "the fluid in the caliper boils (value: temperature)",
         _boiling,
         NAME,
         "K",
@@ -77,25 +77,25 @@ FAULTS = (
     ),
     Fault(
         "battery.lost",
-        "loss of battery, the bridge opens: no current",
+        "battery loss with an open bridge: no current",
         _source("current-source"),
         NAME,
     ),
     Fault(
         "battery.shorted",
-        "loss of battery, the bridge shorts the motor",
+        "battery loss with a bridge that shorts the motor",
         _source("voltage-source"),
         NAME,
     ),
     Fault(
         "bridge.open-phase",
-        "a phase of the motor is open: no current",
+        "open motor phase: no current",
         _source("current-source"),
         NAME,
     ),
     Fault(
         "gear.jammed",
-        "the screw jams at its position",
+        "the screw jams in its position",
         lambda par, value: {"seal.T_pr": value},
         NAME,
         "N*m",
@@ -103,7 +103,7 @@ FAULTS = (
     ),
     Fault(
         "caliper.knocked-back",
-        "the disc has pushed the pads back by a gap",
+        "the disc has pushed the pads back (value: gap)",
         _knocked_back,
         NAME,
         "m",

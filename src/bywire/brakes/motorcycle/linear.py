@@ -175,7 +175,7 @@ def coefficients(par: Par, p: float = 20e5, x: float | None = None) -> Coefficie
     p
         Pressure [Pa]; matters only with air or a nonlinear caliper.
     x
-        Piston travel [m]; ``x_nominal`` by default.
+        Piston travel [m]. Default: ``x_nominal``.
 
     Notes
     -----
@@ -187,8 +187,8 @@ def coefficients(par: Par, p: float = 20e5, x: float | None = None) -> Coefficie
     """
     if par.caliper.leak == "leaking" or par.port.law == "leaking":
         raise ParameterError(
-            "eq. (14) has no leak, because a leak has no equilibrium: set caliper.leak = "
-            "'tight' and port.law = 'makeup', or simulate",
+            "eq. (14) does not include a leak, which has no equilibrium: set caliper.leak = "
+            "'tight' and port.law = 'makeup', or use a simulation",
             name="caliper.leak" if par.caliper.leak == "leaking" else "port.law",
             value="'leaking'",
         )
@@ -214,7 +214,7 @@ def coefficients(par: Par, p: float = 20e5, x: float | None = None) -> Coefficie
 def linear_model(par: Par, p: float = 20e5, x: float | None = None) -> LinearModel:
     """Return eq. (14) with the motor current as input and the pressure p_mc as output.
 
-    ``par``, ``p``, ``x``: as in `coefficients`.
+    ``par``, ``p``, ``x``: see `coefficients`.
     """
     c = coefficients(par, p, x)
     return LinearModel(
@@ -249,7 +249,7 @@ def theoretical(par: Par, p: float = 20e5, x: float | None = None) -> Rational:
 
     (the paper's mu is m here).
 
-    ``par``, ``p``, ``x``: as in `coefficients`.
+    ``par``, ``p``, ``x``: see `coefficients`.
 
     References
     ----------
@@ -277,7 +277,7 @@ def two_pole(par: Par, p: float = 20e5, x: float | None = None) -> Rational:
 
     .. math:: G = \frac{K}{(1 + s T_1)(1 + s T_2)}
 
-    ``par``, ``p``, ``x``: as in `coefficients`.
+    ``par``, ``p``, ``x``: see `coefficients`.
 
     Notes
     -----

@@ -27,10 +27,10 @@ CAUSES: Mapping[str, Mapping[str, Any]] = {
 
 
 def _require_pressed(p: float) -> None:
-    """Reject a released brake: a piston that just touches its stop has no linear model."""
+    """Reject a released brake, since a piston that just touches its stop has no linear model."""
     if p == 0.0:
         raise not_valid(
-            "pressure", "0 bar", "> 0 bar", "because the piston just touches its stop at 0 bar"
+            "pressure", "0 bar", "> 0 bar", "since the piston just touches its stop at 0 bar"
         )
 
 
@@ -86,8 +86,8 @@ def in_ecu(par: ParameterSet) -> Mapping[str, tuple[float, float]]:
     """Return the limits of a pressure PID that an ECU can run.
 
     A filter faster than the sampling has no effect: backward differences then pass every step of
-    the converter at full size. The derivative of a set point that jumps demands more current than
-    the limit allows, for one sample.
+    the converter undamped. The derivative of a stepped set point exceeds the current limit for one
+    sample.
     """
     T_s = cast(MotorcycleParameters, par).ecu.T_s
     return {"ecu.pressure.tau_d": (T_s, max(_SLOWEST, 10.0 * T_s)), "ecu.pressure.c": (0.0, 0.0)}
@@ -96,7 +96,7 @@ def in_ecu(par: ParameterSet) -> Mapping[str, tuple[float, float]]:
 CURRENT = Loop(
     name="current",
     assembly="motorcycle-brake",
-    summary="current control, 1 kHz, rotor free",
+    summary="current control with a free rotor, 1 kHz",
     at=Quantity("pressure", "Pa", 20e5),
     inputs=("i_set",),
     output="i",

@@ -59,7 +59,7 @@ class MotorcycleBrake(Assembly[MotorcycleParameters, ecu.Memory]):
     supply = Part(battery_supply, loss="E_supply")
     motor = Part(dc_motor, loss="E_copper")
     gear = Part(ball_screw_gear, output={"x": "x_mc"})
-    # Eq. (8) returns energy when the load drives the gear, at most the energy taken before.
+    # Eq. (8) returns energy when the load drives the gear, at most the energy absorbed before.
     E_gear = Integral(
         "J",
         "loss of gear and screw, signed",
@@ -197,7 +197,7 @@ class MotorcycleBrake(Assembly[MotorcycleParameters, ecu.Memory]):
         w.load = force + end_stop.load(w.stop.f)
         w.gear.u = ball_screw_gear.Input(w.torque, w.load, 0.0)
         w.seal.u = seal_friction.Input(w.gear.x.omega, w.chamber.x.p)
-        # Value-only: the sensors do not act on the brake.
+        # Values only, since the sensors do not act on the brake.
         w.pressure_sensor.u = pressure_sensor.Input(_gauge(w) + w.par.fluid.p_atm)
         seen = pressure_sensor.reading(w.pressure_sensor.u.p, w.pressure_sensor.par)
         w.filter_p.u = anti_alias_filter.Input(seen)
@@ -220,7 +220,7 @@ class MotorcycleBrake(Assembly[MotorcycleParameters, ecu.Memory]):
         return ((low, high),)
 
     def power(self, w: Self) -> dict[str, float]:
-        """Return the powers that split a loss, cross the border or depend on the drive mode."""
+        """Return the powers that split a loss, cross the boundary or depend on the drive mode."""
         friction, makeup = w.reaction
         gear, seal = _dry_losses(w, friction)
         loss = ball_screw_gear.transmission_loss(w.gear.x, w.torque, w.rate.omega, w.gear.par)
@@ -290,7 +290,7 @@ class MotorcycleBrake(Assembly[MotorcycleParameters, ecu.Memory]):
         return watch.stop_warnings(recording, par) + super().watch(seen, par)
 
     def may_warn(self, rows: Any, pars: Sequence[Any]) -> Sequence[int]:
-        """Return the cases in which ``watch`` may warn."""
+        """Return the cases for which ``watch`` may warn."""
         is_known = pars[0].drive.mode != "current-source" and self.are_silent(rows)
         return watch.cases_at_stops(rows) if is_known else range(len(pars))
 
@@ -322,14 +322,14 @@ def _electrics(w: MotorcycleBrake) -> tuple[float, float, float]:
 
 
 def _port_conductance(w: MotorcycleBrake) -> float:
-    """Return the port's conductance [m^3/(s Pa)], value-only: it follows slow geometry."""
+    """Return the port's conductance [m^3/(s Pa)] as a value only, since it changes slowly."""
     travel = ball_screw_gear.output(w.gear.xe, w.gear.par).x
     place = reservoir_port.Input(travel - w.chamber.par.x_rest, w.chamber.xe.p)
     return reservoir_port.output(place, w.port.par).G
 
 
 def _gauge(w: MotorcycleBrake) -> float:
-    """Return the pressure [Pa] where the sensor sits."""
+    """Return the pressure [Pa] at the sensor's position."""
     if w.pressure_sensor.par.place == "mid-pipeline":
         ends = piston_friction.Input(w.chamber.xe.p, w.pads.xe.p)
         far = piston_friction.fluid_pressure(ends, w.piston.par, w.par.caliper)

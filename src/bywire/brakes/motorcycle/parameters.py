@@ -16,7 +16,7 @@ from bywire.control import (
     pressure_pid,
 )
 from bywire.control.dither import Believed
-from bywire.core.parameters import ParameterSet
+from bywire.core.parameters import ParameterSet, RuleError
 from bywire.core.quantities import Duration, Pressure
 from bywire.plant import (
     adc,
@@ -78,24 +78,23 @@ class EcuParameters(ParameterSet):
     @model_validator(mode="after")
     def _fits_sampling(self) -> EcuParameters:
         if self.filter.f_c * self.T_s >= 0.5:
-            raise ValueError(
-                f"ecu.filter.f_c = {self.filter.f_c:g} Hz must be < half the sample rate, "
-                f"{0.5 / self.T_s:g} Hz"
-            )
+            valid = f"< half the sample rate, {0.5 / self.T_s:g} Hz"
+            raise RuleError("filter.f_c", f"{self.filter.f_c:g} Hz", valid)
         if self.dither.waveform != "off" and self.dither.f_dit * self.T_s >= 0.5:
-            raise ValueError(
-                f"ecu.dither.f_dit = {self.dither.f_dit:g} Hz must be < half the sample "
-                f"rate, {0.5 / self.T_s:g} Hz: lower it, sample faster (ecu.T_s), or set "
-                "ecu.dither.waveform = 'off'"
+            raise RuleError(
+                "dither.f_dit",
+                f"{self.dither.f_dit:g} Hz",
+                f"< half the sample rate, {0.5 / self.T_s:g} Hz",
+                "lower it, sample faster (ecu.T_s), or set ecu.dither.waveform = 'off'",
             )
         return self
 
     def pressure_at(self, p: float) -> pressure_pid.Parameters:
-        """Return the pressure PID with the gains that its schedule gives at a pressure [Pa]."""
+        """Return the pressure PID with its scheduled gains at a pressure [Pa]."""
         if self.schedule.law == "off":
             return self.pressure
         gains = gain_schedule.output(p, self.pressure, self.schedule)
-        # Between valid gains; symbols could not be validated.
+        # Not validated: the gains may be symbols, and they are between valid gains.
         return pressure_pid.Parameters.model_construct(**{**dict(self.pressure), **gains._asdict()})
 
 
@@ -129,23 +128,23 @@ class MotorcycleParameters(ParameterSet):
         cylinder = self.master_cylinder
         stroke, closed = cylinder.x_end - cylinder.x_rest, reservoir_port.closed_at(self.port)
         if not closed < stroke:
-            raise ValueError(
-                f"port.x_port = {self.port.x_port:g} m must be < the piston's stroke "
-                f"x_end - x_rest = {stroke:g} m: the port would never close"
+            raise RuleError(
+                "port.x_port",
+                f"{self.port.x_port:g} m",
+                f"< the piston's stroke x_end - x_rest = {stroke:g} m",
+                "otherwise the port never closes",
             )
         room = cylinder.A_mc * (cylinder.s_mc - cylinder.x_rest - closed)
         if self.fluid.air == "entrained" and not self.fluid.V_air < room:
-            raise ValueError(
-                f"fluid.V_air = {self.fluid.V_air:g} m**3 must be < the chamber's volume "
-                f"where pressure begins to build up, {room:g} m**3"
-            )
+            valid = f"< the chamber's volume where pressure begins to build up, {room:g} m**3"
+            raise RuleError("fluid.V_air", f"{self.fluid.V_air:g} m**3", valid)
         return self
 
     @model_validator(mode="after")
     def _sticks_on_fluid_alone(self) -> MotorcycleParameters:
         """Reject a sticking piston together with laws of the caliper's fluid.
 
-        These laws need the pressure of the fluid, but the state is the pressure of the pads.
+        These laws need the fluid pressure, but the state is the pads' pressure.
         """
         fluid_laws = {
             "caliper.leak": self.caliper.leak == "leaking",
@@ -155,9 +154,11 @@ class MotorcycleParameters(ParameterSet):
         clashing = [name for name, is_on in fluid_laws.items() if is_on]
         if self.piston.law == "sticking" and clashing:
             value = self.value(clashing[0])
-            raise ValueError(
-                f"piston.law = 'sticking' excludes {clashing[0]} = {value!r}: the fluid's "
-                "pressure then differs from that of the pads and is not a state; change one of "
-                "them"
+            raise RuleError(
+                "piston.law",
+                "'sticking'",
+                f"another law with {clashing[0]} = {value!r}",
+                "the fluid's pressure then differs from the pads' and is not a state. Change one "
+                "of them",
             )
         return self

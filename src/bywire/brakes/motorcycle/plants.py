@@ -56,7 +56,7 @@ def by_current(par: ParameterSet, at: PlantPoint) -> LinearModel:
 
 
 def by_voltage(par: ParameterSet, at: PlantPoint) -> LinearModel:
-    """Return the plant from the motor voltage, winding and back-EMF included."""
+    """Return the plant from the motor voltage, including winding and back-EMF."""
     return linear(par, at, "voltage-source", ("v_source",), ("i", "p_mc", "p_pd", "x_mc"))
 
 

@@ -1,8 +1,8 @@
 """Residuals that the motorcycle's ECU can compute from its sensors and demands.
 
-Source of the relations: Dardanelli et al. (2010), eqs. (1), (4) and (8). The paper's rear brake has
-no sensor of angle or stroke. Residuals count only while the demand is steady. During a step all of
-them are large even in a healthy brake, and higher thresholds would detect nothing.
+The relations come from Dardanelli et al. (2010), eqs. (1), (4) and (8). The paper's rear brake has
+no angle or stroke sensor. Residuals count only while the demand is steady. During a step, all
+residuals are large even without a fault, and thresholds above them would not detect any fault.
 """
 
 from __future__ import annotations
@@ -94,7 +94,7 @@ RESIDUALS = (
     ),
     Residual(
         "winding",
-        "voltage of the bridge and that of the resistance",
+        "bridge voltage and resistive voltage",
         NAME,
         "V",
         ("duty", "i_meas", "p_ref"),
@@ -103,7 +103,7 @@ RESIDUALS = (
     ),
     Residual(
         "torque-balance",
-        "torque of the motor and load of the pressure",
+        "motor torque and load torque of the pressure",
         NAME,
         "N*m",
         ("i_meas", "p_meas", "p_ref"),
@@ -112,7 +112,7 @@ RESIDUALS = (
     ),
     Residual(
         "still-pressure",
-        "ripple of the dither in the measured pressure",
+        "dither ripple in the measured pressure",
         NAME,
         "Pa",
         ("p_meas", "p_ref"),

@@ -112,7 +112,7 @@ def state_at(p: float, par: Par, current: float | None = None) -> Any:
     Parameters
     ----------
     current
-        Motor current [A]; by default the one that balances the pressure without friction.
+        Motor current [A]. Default: the current that balances the pressure without friction.
 
     Raises
     ------
@@ -126,7 +126,7 @@ def state_at(p: float, par: Par, current: float | None = None) -> Any:
             "pressure of the start at rest",
             f"{p / 1e5:g} bar",
             f">= 0 bar and <= {limit:g} bar",
-            "where the piston meets its end stop: start lower, or move the stop "
+            "where the piston meets its end stop. Start lower, or move the stop "
             "(master_cylinder.x_end)",
         )
     return _resting_at(p, x, par, current)
@@ -140,7 +140,7 @@ def resting_at(p: float, par: Par, current: float | None = None) -> Any:
     Parameters
     ----------
     current
-        Motor current [A]; by default the one that balances the pressure without friction.
+        Motor current [A]. Default: the current that balances the pressure without friction.
     """
     x = par.master_cylinder.x_rest if p == 0 else travel_at(p, par)
     return _resting_at(p, x, par, current)
@@ -162,7 +162,7 @@ def _resting_at(p: float, x: float, par: Par, current: float | None) -> Any:
 
 
 def memory_at(p: float, par: Par, current: float | None = None) -> Memory:
-    """Return the memory with which every controller, or the ideal source, holds that state."""
+    """Return the memory with which each controller or the ideal source holds that state."""
     i = holding_current(p, par) if current is None else current
     measured = _NOTHING._replace(p_meas=p, i_meas=i)
     if par.drive.mode == "voltage-source":

@@ -1,4 +1,4 @@
-"""Warnings of the whole motorcycle brake, which no element can give: its stops."""
+"""Warnings about the whole motorcycle brake, in addition to its elements' warnings: its stops."""
 
 from __future__ import annotations
 
@@ -39,10 +39,10 @@ def _pulled_back(recording: xr.Dataset, choices: Mapping[str, Any]) -> list[str]
     F, i, p = (float(recording[name].values[-1]) for name in ("F_stop", "i", "p_pd"))
     if not (F < 0.0 and i < 0.0):
         return []
-    text = f"at the end {i:.3g} A pull the piston against its retracted stop"
+    text = f"at the end, {i:.3g} A pull the piston against its retracted stop"
     if choices["port.law"] == "makeup":
         text += (
-            f", with {p / 1e5:.2g} bar remaining in the caliper: port.law = 'makeup' does not "
-            "model the compensation port, port.law = 'dead-stroke' lets the fluid out"
+            f", with {p / 1e5:.2g} bar remaining in the caliper. port.law = 'makeup' does not "
+            "model the compensation port; use port.law = 'dead-stroke' to let the fluid out"
         )
     return [text]

@@ -1,7 +1,7 @@
-"""A two-wheeler with brakes by wire, each modeled by its pressure loop alone."""
+"""A two-wheeler with brakes by wire, each modeled only by its pressure loop."""
 
 from bywire.core.brake import Brake
 
 BRAKE = Brake(
-    "two-wheeler", "motorcycle with two brakes by wire, on any surface, slip control", __name__
+    "two-wheeler", "motorcycle with two brakes by wire and slip control, on any surface", __name__
 )

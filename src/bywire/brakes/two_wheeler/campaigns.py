@@ -1,4 +1,4 @@
-"""The fault campaign of the two-wheeler: an emergency stop on wet asphalt with slip control."""
+"""Fault campaign of the two-wheeler: an emergency stop on wet asphalt with slip control."""
 
 from __future__ import annotations
 

@@ -47,7 +47,7 @@ def rolling_case(
     changes
         Parameters that the experiment sets.
     heat
-        Temperatures of the brakes at the start, by their parts; cold by default.
+        Initial temperatures of the brakes, by their parts. Default: cold.
     vehicle
         Vehicle model, and its ``at_speed(v, par, heat)``.
     """
@@ -74,7 +74,7 @@ def rolling_case(
 
 
 def on_surface(first: SurfaceName, further: SurfaceName | None = None) -> dict[str, float]:
-    """Return the parameters of a road with one or two surfaces; "own" changes none."""
+    """Return the parameters of a road with one or two surfaces; "own" changes no parameter."""
     return laid("vehicle.road", first, further)
 
 

@@ -45,8 +45,8 @@ class Memory(NamedTuple):
     p_f_most: Annotated[float, Signal("Pa", "front demand, build-up limited", 2e6)]
     p_r_most: Annotated[float, Signal("Pa", "rear demand, build-up limited", 2e6)]
     v_hat: Annotated[float, Signal("m/s", "reference speed", 20.0, set_point_of="v")]
-    slip_f_hat: Annotated[float, Signal("1", "front slip as the ECU sees it", 0.1)]
-    slip_r_hat: Annotated[float, Signal("1", "rear slip as the ECU sees it", 0.1)]
+    slip_f_hat: Annotated[float, Signal("1", "front slip estimated by the ECU", 0.1)]
+    slip_r_hat: Annotated[float, Signal("1", "rear slip estimated by the ECU", 0.1)]
     a_hat: Annotated[float, Signal("m/s**2", "measured deceleration", 10.0)]
     abs_f: Annotated[float, Signal("1", "slip control of the front wheel acts")]
     abs_r: Annotated[float, Signal("1", "slip control of the rear wheel acts")]
@@ -69,12 +69,16 @@ class Memory(NamedTuple):
     phase_r: Annotated[float, Signal("1", "phase of the rear rules", 3.0)]
     since_f: Annotated[float, Signal("s", "time since the front rules' last phase or step", 0.1)]
     since_r: Annotated[float, Signal("s", "time since the rear rules' last phase or step", 0.1)]
-    p_left_f: Annotated[float, Signal("Pa", "front demand that rules left", 2e6)]
-    p_left_r: Annotated[float, Signal("Pa", "rear demand that rules left", 2e6)]
-    p_hat_f: Annotated[float, Signal("Pa", "front pressure as rules estimate it", 2e6)]
-    p_hat_r: Annotated[float, Signal("Pa", "rear pressure as rules estimate it", 2e6)]
-    p_held_f: Annotated[float, Signal("Pa", "pressure that the front wheel's road held", 2e6)]
-    p_held_r: Annotated[float, Signal("Pa", "pressure that the rear wheel's road held", 2e6)]
+    p_left_f: Annotated[float, Signal("Pa", "remaining front demand after the rules", 2e6)]
+    p_left_r: Annotated[float, Signal("Pa", "remaining rear demand after the rules", 2e6)]
+    p_hat_f: Annotated[float, Signal("Pa", "front pressure estimated by the rules", 2e6)]
+    p_hat_r: Annotated[float, Signal("Pa", "rear pressure estimated by the rules", 2e6)]
+    p_held_f: Annotated[
+        float, Signal("Pa", "last pressure that the front wheel's road could hold", 2e6)
+    ]
+    p_held_r: Annotated[
+        float, Signal("Pa", "last pressure that the rear wheel's road could hold", 2e6)
+    ]
     rise_f: Annotated[float, Signal("Pa", "next step of the front pressure", 1e5)]
     rise_r: Annotated[float, Signal("Pa", "next step of the rear pressure", 1e5)]
     slowing_f: Annotated[float, Signal("m/s**2", "front wheel's deceleration, filtered", 10.0)]
@@ -95,7 +99,7 @@ class Readings(NamedTuple):
 
 
 def tick(r: Readings, m: Memory, u: Stimulus, par: Par) -> Memory:
-    """Run the ECU once: measure, limit the build-up, then let the controllers lower it."""
+    """Run the ECU once: measure, limit the build-up, then let the controllers lower the demand."""
     before, m = m, _measured(r, m, par)
     rise = par.ecu.p_rate * par.ecu.T_s
     m = m._replace(
@@ -198,7 +202,7 @@ def _by_rules(
 
 
 def _measured(r: Readings, m: Memory, par: Par) -> Memory:
-    """Return the memory with speeds, slips and deceleration as the ECU estimates them."""
+    """Return the memory with the ECU's estimates of speeds, slips and deceleration."""
     T, ecu, vehicle = par.ecu.T_s, par.ecu, par.vehicle
     front = wheel_speed.output(
         wheel_speed.State(m.edge_f, m.age_f, m.omega_f_hat),

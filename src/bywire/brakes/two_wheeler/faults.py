@@ -1,6 +1,6 @@
-"""Failures of the two-wheeler other than those that its elements declare.
+"""Failures of the two-wheeler in addition to those of its elements.
 
-A whole brake at the rear adds its declared failures, under its path.
+A whole rear brake adds its declared failures, with its path as a prefix.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ CHANNELS = (
 FAULTS = (
     Fault(
         "accelerometer.offset",
-        "the accelerometer shows too much deceleration",
+        "the accelerometer measures too much deceleration",
         lambda par, value: {"sensors.a_offset": value},
         (NAME, WHOLE_REAR),
         "m/s**2",

@@ -1,4 +1,4 @@
-"""Figure: speeds over the road, its surfaces, and the marks of the tyres."""
+"""Figure: speeds along the road, its surfaces, and tyre marks."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ _STROKES: dict[str, tuple[str, style.Dash]] = {
     "v_r": (style.GREEN, (0, (4, 2))),
 }
 _TINT, _LANE = 0.3, 0.5  # opacity of a surface, width of a lane's mark
-_LOADED = 1.0  # N: a wheel off the ground leaves no mark
+_LOADED = 1.0  # N; an unloaded wheel leaves no mark
 
 
 def road_marks(run: xr.Dataset, par: VehicleParameters) -> Figure:
     """Draw the speeds of a two-wheeler and of its treads over the road, and the marks on it.
 
-    Surfaces are bands with their names. A tyre leaves a mark at its contact where it slides, black
-    where its wheel is locked. The abscissa of the speeds is the place of the front wheel, which is
-    zero at t = 0. On a single surface, the figure also shows the end of the ideal stop.
+    Surfaces are bands with their names. A sliding tyre leaves a mark at its contact, black for a
+    locked wheel. The x axis is the front wheel's position, which is zero at t = 0. On a single
+    surface, the figure also shows the end of the ideal stop.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def road_marks(run: xr.Dataset, par: VehicleParameters) -> Figure:
     lower.set_yticks(range(len(lanes)), list(lanes))
     lower.set_ylim(-0.6, len(lanes) - 0.4)
     lower.set_ylabel("wheel")
-    lower.set_xlabel("place on the road [m]")
+    lower.set_xlabel("position along the road [m]")
     lower.set_xlim(*span)
     style.legend_above(upper)
     style.legend_above(lower)

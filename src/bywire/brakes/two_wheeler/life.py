@@ -1,7 +1,7 @@
-"""Life of the front brake's pads: they wear, and fluid from the reservoir fills their place.
+"""Pad life of the front brake: pads wear, and fluid from the reservoir replaces their volume.
 
-The seals retract the pistons by the same travel after every stop: the clearance is constant, and
-wear draws fluid through the compensating port instead. See `bywire.life`.
+The seals retract the pistons by the same travel after every stop. The clearance is therefore
+constant, and wear draws fluid through the compensating port. See `bywire.life`.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class WearParameters(ParameterSet):
     V_new: Volume
     """fluid in the reservoir with new pads"""
     V_min: Volume
-    """fluid below which the vehicle warns"""
+    """fluid volume below which the vehicle warns"""
 
 
 def begin(par: TwoWheelerParameters, wear: WearParameters) -> Values:
@@ -39,7 +39,7 @@ def begin(par: TwoWheelerParameters, wear: WearParameters) -> Values:
 
 
 def follows(z: Values, par: TwoWheelerParameters, wear: WearParameters) -> Mapping[str, float]:
-    """Return no changes: a loop that holds its pressure does not depend on its pads."""
+    """Return no changes, since a controlled pressure does not depend on the pads."""
     return {}
 
 
@@ -65,19 +65,19 @@ def left(z: Values, par: TwoWheelerParameters, wear: WearParameters) -> Values:
 
 TWO_WHEELER_PADS = Life(
     name="two-wheeler-pads",
-    summary="front pads of a motorcycle, and the fluid that follows them",
+    summary="front pads of a motorcycle, and the fluid that replaces their volume",
     experiment="straight-stop",
     wear=WearParameters,
     values={
         **{f"pads.{name}": value for name, value in warm_stops.ORGANIC_LINING.items()},
         "pads.n_pads": chosen(4.0, "two discs"),
         "pads.A_pad": chosen(20e-4, "front pads of a sport motorcycle"),
-        "disc.C_d": derived(1.36e3, "60 K by a stop from 100 km/h, 80 % of it in front"),
+        "disc.C_d": derived(1.36e3, "60 K per stop from 100 km/h, 80 % of the energy in front"),
         "disc.tau_d": chosen(60.0, "from 80 to 57 degC in 30 s of driving"),
         "h_new": chosen(4.5e-3, "lining of a sport motorcycle's pad"),
         "h_min": chosen(0.5e-3, "4 mm to wear"),
         "V_new": chosen(35e-6, "reservoir of a radial master cylinder"),
-        "V_min": chosen(10e-6, "mark of its sight glass"),
+        "V_min": chosen(10e-6, "mark on the sight glass"),
     },
     states={
         "h_pad": Slow("m", "pad thickness"),

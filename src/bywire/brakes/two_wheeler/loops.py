@@ -25,8 +25,8 @@ def point(par: ParameterSet, value: float) -> Point:
     Raises
     ------
     ParameterError
-        When the speed is not positive, or the slip is beyond the peak, where slip is unstable
-        without control.
+        When the speed is not positive, or the slip is beyond the peak, where it is unstable without
+        control.
     """
     SPEED.require_positive(value)
     at = cast(WheelOnDrumParameters, par.replace({"drum.v": value}))

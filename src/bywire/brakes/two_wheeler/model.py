@@ -1,4 +1,4 @@
-"""The two-wheeler with two pressure loops as brakes."""
+"""The two-wheeler with a pressure loop for each brake."""
 
 from __future__ import annotations
 
@@ -138,7 +138,7 @@ class TwoWheelerByWire(HotBrakes[TwoWheelerParameters, ecu.Memory]):
         ]
 
     def rest(self, par: Par) -> tuple[Any, ecu.Memory]:
-        """Return the vehicle standing on its wheels, brakes open."""
+        """Return the vehicle at rest on its wheels, with released brakes."""
         return at_speed(0.0, par)
 
 

@@ -18,7 +18,7 @@ Acceleration = Annotated[float, Unit("m/s**2", 0.1), Field(allow_inf_nan=False)]
 
 
 class BrakeParameters(ParameterSet):
-    """One brake: the loop of its pressure, and its discs."""
+    """One brake: its pressure loop and its discs."""
 
     circuit: pressure_loop.Parameters
     disc: brake_disc.Parameters
@@ -37,17 +37,17 @@ class SensorParameters(ParameterSet):
     a_offset: Acceleration
     """offset of the accelerometer, positive for too much deceleration"""
     tau_a: TimeConstant
-    """time constant of its filter"""
+    """time constant of the accelerometer's filter"""
 
 
 class EcuParameters(ParameterSet):
     """The ECU: sample time and controllers.
 
     ``abs``: ``"pi"`` controls the slip of both wheels; ``"rules"`` build, dump and hold their
-    pressures by thresholds; with ``"off"`` the rider controls them.
+    pressures by thresholds; with ``"off"``, the rider controls the pressures.
     ``lift``: ``"pi"`` keeps the rear wheel on the ground.
-    ``sees``: the speed and slip of the controllers are ``"estimated"`` from the sensors, or
-    ``"known"``, for comparison.
+    ``sees``: the controllers use speed and slip ``"estimated"`` from the sensors, or ``"known"``
+    exactly, for comparison.
     """
 
     T_s: Duration

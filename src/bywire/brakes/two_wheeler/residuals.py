@@ -1,7 +1,7 @@
-"""Residuals by which the two-wheeler's ECU can detect failures of encoders and accelerometer.
+"""Residuals with which the two-wheeler's ECU can detect failures of encoders and accelerometer.
 
-A locked wheel, or a speed that is impossible for the vehicle, is either a short-lived slip that
-control ends, or a wrong reading.
+A locked wheel, or a speed that is impossible for the vehicle, is either a short slip that the
+controller ends, or a wrong reading.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def _speed(signals: Signals, par: Any, dt: float) -> Array:
 RESIDUALS = (
     Residual(
         "slip-front",
-        "slip of the front wheel, which control keeps small",
+        "front wheel slip, which the controller keeps small",
         VEHICLES,
         "1",
         ("slip_f_hat", "v_hat"),
@@ -55,7 +55,7 @@ RESIDUALS = (
     ),
     Residual(
         "slip-rear",
-        "slip of the rear wheel, which control keeps small",
+        "rear wheel slip, which the controller keeps small",
         VEHICLES,
         "1",
         ("slip_r_hat", "v_hat"),
@@ -64,7 +64,7 @@ RESIDUALS = (
     ),
     Residual(
         "speed",
-        "speed of the wheels and reading of the accelerometer",
+        "wheel speeds and accelerometer reading",
         VEHICLES,
         "m/s",
         ("v_hat", "a_hat"),

@@ -1,4 +1,4 @@
-"""The fault campaign of the wedge brake: a moment held, then a reduction, then a ramp."""
+"""Fault campaign of the wedge brake: hold a moment, reduce it, then ramp it up."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from bywire.campaigns.residual import DeclaredCampaign
 
 CAMPAIGN = DeclaredCampaign(
     "wedge",
-    "every failure of the wedge brake while a moment is held, at four onsets",
+    "every failure of the wedge brake while it holds a moment, at four onsets",
     {
         "bench": "moment-ramp",
         "vary": {

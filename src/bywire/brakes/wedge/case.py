@@ -1,9 +1,10 @@
-"""Shared parts of the wedge brake's experiments: parked starts, readings, figures of braking."""
+"""Shared parts of the wedge brake's experiments: starts, readings, figures, on brake and rigs."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Annotated, Any
 
 import numpy as np
@@ -15,8 +16,13 @@ from bywire.bench.kpis.kpi import Kpi
 from bywire.brakes.wedge.laws.moment_control import PARKED
 from bywire.brakes.wedge.model import WedgeBrake, memory_at, state_at
 from bywire.brakes.wedge.parameters import WedgeParameters
+from bywire.brakes.wedge.rigs.screw_rig import ScrewRig
+from bywire.brakes.wedge.rigs.shaft_rig import ShaftRig
+from bywire.core.errors import not_valid
 from bywire.core.quantities import Unit
+from bywire.core.signals import zeros
 from bywire.core.typing import Array
+from bywire.plant import roller_screw
 
 Signals = Mapping[str, Array]
 
@@ -34,7 +40,7 @@ def case_from_parked(
     Parameters
     ----------
     changes
-        Parameters that the experiment sets; the command mode is "moment" by default.
+        Parameters that the experiment sets. Default command mode: "moment".
     timing
         ``settle``, ``keep`` and ``record`` of the case [s].
     """
@@ -62,7 +68,7 @@ def steps(t: Array, levels: Mapping[float, float]) -> Array:
 
 def parameters_of(run: xr.Dataset) -> WedgeParameters:
     """Return the parameters of a recording."""
-    par = getattr(run, "par", None)  # plain rows carry them
+    par = getattr(run, "par", None)  # an attribute of plain rows
     if isinstance(par, WedgeParameters):
         return par
     return WedgeParameters.model_validate_json(run.attrs["parameters"])
@@ -76,12 +82,12 @@ def release_time(run: xr.Dataset, begin: float, name: str = "release_time") -> K
     if not after.sizes["time"]:
         note = "the recording has no row after the demand"
     elif not pressing.size:
-        note = "the pads do not press when the demand falls"
+        note = "the pads are not applied when the demand falls"
     elif pressing[-1] + 1 == after.sizes["time"]:
-        note = "the pads press until the end of the recording"
+        note = "the pads stay applied until the end of the recording"
     else:
         value = float(after["time"].values[pressing[-1]]) - begin
-    text = "Time from the end of the demand until the pads have left the disc."
+    text = "Time from the end of the demand until the pads leave the disc."
     return Kpi(name, value, "s", text, note)
 
 
@@ -89,7 +95,7 @@ def parking_time(run: xr.Dataset, begin: float, name: str = "parking_time") -> K
     """Return the time from the end of the demand [s] until the brake is parked."""
     after = run.sel(time=slice(begin - 1e-9, None))
     parked = np.flatnonzero(after["mode"].values == PARKED)
-    value, note = math.nan, "the brake is not parked when the recording ends"
+    value, note = math.nan, "the brake is not parked at the end of the recording"
     if parked.size:
         value, note = float(after["time"].values[parked[0]]) - begin, ""
     return Kpi(name, value, "s", "Time from the end of the demand until the brake is parked.", note)
@@ -119,14 +125,14 @@ def swing(run: xr.Dataset, name: str, begin: float, end: float) -> float:
     return float(np.ptp(values)) if values.size else math.nan
 
 
-# --- Reading recordings: the disc's direction, its revolutions, their rows
+# --- Reading recordings: the disc's direction, its revolutions, and their rows
 
 
 def along_disc(run: xr.Dataset) -> xr.Dataset:
-    """Return a recording whose moments and speed count positive in the disc's first direction."""
+    """Return a recording with moments and speed positive in the disc's first direction."""
     if not float(run["Omega"].values[0]) < 0:
         return run
-    # Subtraction, because negation would give negative zeros.
+    # Subtraction instead of negation, which would give negative zeros.
     return run.assign({name: 0.0 - run[name] for name in ("M_B", "y_M", "Omega")})
 
 
@@ -144,7 +150,7 @@ FRICTIONLESS = {
     "wedge_friction.mu_R": 0.0,
     "encoder.law": "ideal",
 }
-"""changes that remove all dry friction except the pads' on the disc; the encoder is ideal, because
+"""changes that remove all dry friction except between pads and disc; the encoder is ideal, since
 without friction its counts would keep the shafts moving"""
 
 
@@ -157,7 +163,7 @@ def distinct(
         names = [name(value) for value in values]
         for k, value in enumerate(values):
             if names[k] in names[:k]:
-                raise ValueError(f"{value:g}{unit} appears twice: remove one of them")
+                raise ValueError(f"{value:g}{unit} is listed twice: remove one of them")
         return values
 
     return check
@@ -180,19 +186,133 @@ Coefficients = Annotated[
     Field(min_length=1, max_length=100),
     AfterValidator(distinct(tag)),
 ]
-"""friction coefficients of the pads, in any order, each once"""
+"""friction coefficients of the pads, in any order, without repetition"""
 
 
 def with_friction(par: WedgeParameters, mu_B: float, known: bool) -> dict[str, Any]:
-    """Return the changes that give the pads a friction coefficient.
+    """Return the changes that set the pads' friction coefficient.
 
     Parameters
     ----------
     known
-        Whether the moment controller knows the coefficient and assumes the corresponding slope.
-        That slope keeps its ratio to the brake's slope, so an existing mismatch remains.
+        Whether the moment controller uses the slope that corresponds to the coefficient. That slope
+        keeps its ratio to the brake's slope, so an existing mismatch remains.
     """
     slope = par.control.moment.slope_hat
     if known and par.wedge.mu_B > 0:
         slope *= mu_B / par.wedge.mu_B
     return {"wedge.mu_B": mu_B, "control.moment.slope_hat": slope}
+
+
+# --- On the rigs of the drive train
+
+Stimuli = Callable[[Array], Mapping[str, Array]]
+
+
+def shaft_case(
+    label: str,
+    par: WedgeParameters,
+    stimulus: Stimuli,
+    duration: float,
+    changes: Mapping[str, Any],
+    **timing: float,
+) -> Case:
+    """Return a run of the single motor's rig, from rest at the angle zero.
+
+    ``changes``: parameters that the experiment sets, the rig's modes among them; ``timing``:
+    ``settle``, ``keep`` and ``record`` of the case [s].
+    """
+    return _case(label, ShaftRig(), par.replace(changes), stimulus, duration, timing)
+
+
+def screw_case(
+    label: str,
+    par: WedgeParameters,
+    stimulus: Stimuli,
+    duration: float,
+    changes: Mapping[str, Any],
+    **timing: float,
+) -> Case:
+    """Return a run of the two motors' rig, from rest without force; see :func:`shaft_case`."""
+    return _case(label, ScrewRig(), par.replace(changes), stimulus, duration, timing)
+
+
+def _case(
+    label: str,
+    model: ShaftRig | ScrewRig,
+    par: WedgeParameters,
+    stimulus: Stimuli,
+    duration: float,
+    timing: Mapping[str, float],
+) -> Case:
+    state, memory = zeros(model.State), zeros(model.Memory)
+    return Case(
+        label,
+        model,
+        par,
+        state,
+        memory,
+        stimulus,
+        duration,
+        start=lambda _: (state, memory),
+        **timing,
+    )
+
+
+def check_current(name: str, i: float, par: WedgeParameters) -> None:
+    """Require a current that the drives can give.
+
+    ``name``: option with the current; ``i``: its value [A].
+
+    Raises
+    ------
+    ParameterError
+        When it is above the drives' limit.
+    """
+    limit = par.drive.i_max
+    if i > limit:
+        valid, advice = f"<= {limit:g} A", "the largest current of the drives (drive.i_max)"
+        raise not_valid(f"options.{name}", f"{i:g} A", valid, advice)
+
+
+def slope_of(par: WedgeParameters) -> float:
+    """Return the travel per angle [m/rad] by the screw's lead."""
+    return roller_screw.slope(par.screw)
+
+
+def torque_constant_of(par: WedgeParameters) -> float:
+    """Return the torque constant [N m/A] assumed by the rig's control."""
+    return par.control.position.K_hat
+
+
+def peak(run: xr.Dataset, name: str) -> float:
+    """Return the largest magnitude of a signal after t = 0."""
+    return float(np.abs(run[name].sel(time=slice(-1e-9, None)).values).max())
+
+
+# --- Runs of the rigs and the brake from another angle of the shafts
+
+_ANGLES = ("theta_", "last_")
+
+
+def turned(case: Case, angle: float) -> Case:
+    """Return a rig's run from another angle of the shafts that is otherwise equal.
+
+    Encoder counts and cogging then have other phases, as on a bench from day to day.
+
+    ``case``: of a rig, or of the wedge brake, whose wedge moves along; ``angle``: added to every
+    shaft's angle [rad].
+    """
+
+    def shifted(row: Any) -> Any:
+        names = [n for n in row._fields if n.startswith(_ANGLES)]
+        row = row._replace(**{n: getattr(row, n) + angle for n in names})
+        if "x" in row._fields and isinstance(case.par, WedgeParameters):
+            row = row._replace(x=row.x + slope_of(case.par) * angle)
+        return row
+
+    def stimulus(t: Array) -> dict[str, Array]:
+        given = dict(case.stimulus(t))
+        return given | {n: v + angle for n, v in given.items() if n.startswith(_ANGLES)}
+
+    return replace(case, state=shifted(case.state), memory=shifted(case.memory), stimulus=stimulus)

@@ -57,13 +57,13 @@ class Memory(NamedTuple):
     i_most: Annotated[float, Signal("A", "limit of both current demands", 20.0)]
     derated: Annotated[float, Signal("1", "motors derated")]
     adjusting: Annotated[float, Signal("1", "adjuster: 0 waits, 1 brake applied, 2 turns", 2.0)]
-    click_rate: Annotated[float, Signal("1/s", "teeth that the adjuster turns in a second", 50.0)]
-    meant_rate: Annotated[float, Signal("1/s", "teeth that it means to turn in a second", 50.0)]
-    clicks: Annotated[float, Signal("1", "teeth that the adjuster has turned", 3.0)]
-    gap_hat: Annotated[float, Signal("m", "clearance as the adjuster believes it", 2e-4)]
-    applied: Annotated[float, Signal("1", "the brake was applied since it was parked last")]
+    click_rate: Annotated[float, Signal("1/s", "teeth that the adjuster turns per second", 50.0)]
+    meant_rate: Annotated[float, Signal("1/s", "teeth that it intends to turn per second", 50.0)]
+    clicks: Annotated[float, Signal("1", "teeth turned by the adjuster", 3.0)]
+    gap_hat: Annotated[float, Signal("m", "clearance estimated by the adjuster", 2e-4)]
+    applied: Annotated[float, Signal("1", "the brake was applied since it was last parked")]
     wide: Annotated[float, Signal("1", "applications in a row with too much gap; < 0: too little")]
-    teeth: Annotated[float, Signal("1", "teeth turned, as the adjuster counts them", 3.0)]
+    teeth: Annotated[float, Signal("1", "teeth turned, by the adjuster's count", 3.0)]
 
 
 class Readings(NamedTuple):
@@ -168,8 +168,8 @@ def current_tick(m: Memory, u: Stimulus, par: WedgeParameters) -> Memory:
 def _derated(m: Memory, par: WedgeParameters) -> Memory:
     """Return the memory with the limit of both currents, from the hotter motor.
 
-    The controllers do not measure the currents. The drives follow their demands, which serve
-    instead.
+    The controllers do not measure the currents. They use the demands instead, which the drives
+    follow.
     """
     control, T = par.control.derating, par.control.T_fast
     if control.law == "off":
@@ -226,7 +226,7 @@ def _references(m: Memory, r: Readings, u: Stimulus, par: WedgeParameters) -> Me
 def _allowed(m: Memory, par: WedgeParameters) -> float:
     """Return the speed of the common reference [rad/s]: 0 if both motors are at their limit.
 
-    Anti-windup: a reference that moved on would have to return all the way at a release.
+    This is an anti-windup: a reference that moved on would have to return first at a release.
     """
     limit, speed = _position(m, par).i_max, m.direction * m.rate
     push = ops.where(speed < 0, -1.0, 1.0)

@@ -52,7 +52,7 @@ def power(motor: Motor) -> float:
 
 
 def measured_power(drive: Drive, motor: Motor, i_ref: float, on: float) -> float:
-    """Return the electrical power into a motor [W], value-only: measuring it has no reaction."""
+    """Return the electrical power into a motor [W] as a value only, for measurements."""
     emf = servo_motor.torque_constant(motor.par) * motor.xe.omega
     u = current_drive.Input(i_ref=i_ref, i=motor.xe.i, emf=emf, on=on)
     return current_drive.output(drive.xe, u, drive.par).v * motor.xe.i

@@ -1,4 +1,4 @@
-"""Failures of the wedge brake other than those that its elements declare."""
+"""Failures of the wedge brake in addition to those of its elements."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _SIGNALS = (
     Channel("power", "switch of the power stages", "1", "power_off", "demand", stuck=1.0),
 )
 
-_NOTHING = 1e-6  # of a torque constant, which is positive
+_NOTHING = 1e-6  # share of a torque constant, which must be positive
 
 BRAKE_CHANNELS = Channels(WedgeBrake.name, _SIGNALS)
 CORNER_CHANNELS = Channels(WedgeCorner.name, _SIGNALS)
@@ -48,7 +48,7 @@ FAULTS = (
     *(
         Fault(
             f"screw_{number}.jammed",
-            f"screw {number} jams in its position, modeled by damping",
+            f"screw {number} jams in its position, modeled as damping",
             _jammed(f"motor_{number}"),
             WedgeBrake.name,
             "N*m*s/rad",
@@ -59,7 +59,7 @@ FAULTS = (
     *(
         Fault(
             f"motor_{number}.shorted",
-            f"winding of motor {number} shorted: no torque, but a drag",
+            f"shorted winding of motor {number}: no torque, but drag",
             _shorted(f"motor_{number}"),
             WedgeBrake.name,
         )

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FARTHEST = 60.0
-"""largest brake factor on the ordinate: it is unbounded at the neutral point"""
+"""largest brake factor on the y axis; the factor is unbounded at the neutral point"""
 
 
 @dataclass(frozen=True)
@@ -43,8 +43,10 @@ class WedgeForces:
         if sizes == {0} or len(sizes) != 1:
             raise ParameterError(
                 "WedgeForces: mu_B, free, rising and falling have "
-                f"{', '.join(str(len(column)) for column in columns)} entries: they need equal "
-                "lengths, at least one"
+                f"{', '.join(str(len(column)) for column in columns)} entries: they need the same "
+                "number of entries, at least one",
+                name="WedgeForces",
+                value=", ".join(str(len(column)) for column in columns),
             )
 
 
@@ -66,10 +68,10 @@ def brake_factor(forces: WedgeForces, tan_alpha: float) -> Figure:
             linestyle=look.linestyle,
             linewidth=look.linewidth,
             zorder=look.zorder,
-            label="closed form, no friction",
+            label="closed form, without friction",
         )
         for label, color, marker, ratio in (
-            ("simulated, no friction", style.BLUE, "o", forces.free),
+            ("simulated, without friction", style.BLUE, "o", forces.free),
             ("with friction, moment rises", style.VERMILLION, "^", forces.rising),
             ("with friction, moment falls", style.GREEN, "v", forces.falling),
         ):
@@ -113,7 +115,7 @@ def _of_static_test(result: Result) -> list[Shown]:
         for name in ("F_M", "F_M_rising", "F_M_falling")
     )
     figure = brake_factor(WedgeForces(tried, free, rising, falling), kpis["neutral_mu_closed"])
-    caption = "Actuation force over normal force, and brake factor, over the pads' friction."
+    caption = "Actuation force over normal force, and brake factor, against pad friction."
     return [Shown("brake-factor", figure, caption)]
 
 

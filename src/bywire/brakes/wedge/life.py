@@ -1,4 +1,4 @@
-"""Life of the wedge brake's pads: they wear, the clearance grows, the caliper gets stiffer.
+"""Pad life of the wedge brake: pads wear, the clearance grows, and the caliper becomes stiffer.
 
 Stops of a car's corner supply the friction work; see `bywire.life`.
 """
@@ -25,9 +25,9 @@ from bywire.plant import pad_wear, roller_screw
 
 
 class WearParameters(ParameterSet):
-    """Pads, heating of the disc, adjuster, and limits of wear.
+    """Pads, disc heating, adjuster, and wear limits.
 
-    ``mechanism``: ``"teeth"`` is an adjuster; with ``"none"`` the clearance grows.
+    ``mechanism``: ``"teeth"`` is an adjuster; with ``"none"``, the clearance grows.
     """
 
     pads: pad_wear.Parameters
@@ -40,11 +40,11 @@ class WearParameters(ParameterSet):
     h_min: Length
     """thickness at which pads are replaced"""
     M_full: SomeMoment
-    """moment that must be possible within the wedge's travel"""
+    """moment that the brake must reach within the wedge's travel"""
 
 
 def begin(par: WedgeCornerParameters, wear: WearParameters) -> Values:
-    """Return the slow states of the brake with new pads."""
+    """Return the brake's slow states with new pads."""
     return {
         "h_pad": wear.h_new,
         "clearance": par.caliper.clearance,
@@ -70,8 +70,8 @@ def effects(
 ) -> Effects:
     """Return the wear of each stop: both pads wear equally, and the clearance grows by both.
 
-    The readings between stops are the travel to contact, estimated by the moment control, minus
-    the clearance, and the temperature of the disc at the start of a stop.
+    The readings between stops are the travel to contact that the moment control estimates, minus
+    the clearance, and the disc temperature at the start of a stop.
     """
     work = figures["energy_braked"]
     before, after = warm_stops.temperatures(work, stops["pause"], stops["T_air"], wear.disc)
@@ -125,7 +125,7 @@ def left(z: Values, par: WedgeCornerParameters, wear: WearParameters) -> Values:
 
 WEDGE_PADS = Life(
     name="wedge-pads",
-    summary="pads of the wedge brake on a car's corner, until lining or wedge travel is used up",
+    summary="wedge brake pads on a car's corner, until lining or wedge travel is used up",
     experiment="corner-stop",
     wear=WearParameters,
     values={
@@ -133,13 +133,15 @@ WEDGE_PADS = Life(
         "pads.n_pads": chosen(2.0, "a floating caliper"),
         "pads.A_pad": chosen(50e-4, "front pads of a mid-size car"),
         "disc.C_d": chosen(3.4e3, "7 kg of cast iron"),
-        "disc.tau_d": chosen(300.0, "minutes, in the wind of driving"),
-        "mechanism": chosen("teeth", "without one the travel ends after some 280 stops"),
+        "disc.tau_d": chosen(300.0, "a few minutes in the air stream"),
+        "mechanism": chosen(
+            "teeth", "without an adjuster, the travel is used up after about 280 stops"
+        ),
         **{f"adjuster.{name}": value for name, value in ADJUSTER.items()},
-        "adjuster.ways": chosen("closing", "wear alone moves the clearance"),
+        "adjuster.ways": chosen("closing", "only wear changes the clearance"),
         "h_new": chosen(10e-3, "front pads of a mid-size car"),
-        "h_min": chosen(2e-3, "usual limit of wear"),
-        "M_full": chosen(950.0, "the largest moment that the paper shows"),
+        "h_min": chosen(2e-3, "usual wear limit"),
+        "M_full": chosen(950.0, "the largest moment in the paper"),
     },
     states={
         "h_pad": Slow("m", "pad thickness"),

@@ -20,7 +20,7 @@ from bywire.core.signals import zeros
 from bywire.plant import current_drive, force_sensor, roller_screw, servo_motor
 
 Causes = Mapping[str, Mapping[str, Any]]
-"""causes of nonlinearity: name -> parameters without it"""
+"""causes of nonlinearity: name -> parameters that remove it"""
 
 _SCREWS: Causes = {
     "bearing friction": {
@@ -50,7 +50,7 @@ _CAUSES: Causes = {
 _DRIVE_LIMITS = (
     Saturation("sat_current", ("i_1_ref", "i_2_ref"), ("control.position.i_max", "drive.i_max")),
 )
-"""current demand of a drive at the controller's or the drive's limit"""
+"""a drive's current demand at the controller's or the drive's limit"""
 
 
 def beyond(name: str, value: str, need: str, limit: str) -> InputError:
@@ -71,15 +71,15 @@ def beyond(name: str, value: str, need: str, limit: str) -> InputError:
 # --- Moment loop, around position and current loops
 
 MOMENT = Quantity("moment", "N*m", 200.0)
-COUNTED = ", counted against the disc's rotation whatever its direction"
+COUNTED = ", positive against the disc's rotation in either direction"
 """remark on a moment that is not positive"""
 
 
 def moment_point(par: ParameterSet, value: float) -> Point:
     """Return the brake that holds a moment [N m].
 
-    Screws and references are where the wedge is in equilibrium: the actuation force presses on both
-    contacts of the brake heart, and the currents hold it.
+    Screws and references are at the wedge's equilibrium: the actuation force loads both contacts of
+    the brake heart, and the currents hold it.
 
     Raises
     ------
@@ -89,7 +89,7 @@ def moment_point(par: ParameterSet, value: float) -> Point:
 
     Notes
     -----
-    The wedge is on the side to which the disc turns; the moment counts in that direction.
+    The wedge is on the side in the disc's direction, in which the moment is positive.
     """
     closed = cast(WedgeParameters, par.replace({"command.mode": "moment"}))
     _require_braking(value, closed)
@@ -107,7 +107,7 @@ def moment_point(par: ParameterSet, value: float) -> Point:
 def _require_braking(value: float, par: WedgeParameters) -> None:
     MOMENT.require_positive(value, COUNTED)
     if not ops.is_symbol(par.flywheel.Omega_0) and par.flywheel.Omega_0 == 0.0:
-        speed, advice = "the speed at which the loop works", "as a disc at rest gives no moment"
+        speed, advice = "the speed at which the loop works", "since a disc at rest has no moment"
         raise not_valid("flywheel.Omega_0", "0 rad/s", speed, advice)
 
 
@@ -137,7 +137,7 @@ MOMENT_LOOP = Loop(
     causes=_CAUSES,
     band=(0.5, 100.0),
     amplitudes=(0.5, 20.0),
-    # The law depends only on f_c/slope_hat: varying one of them is enough.
+    # The law depends only on f_c/slope_hat, so only one of the two is varied.
     tunables={"control.moment.f_c": (0.3, 60.0)},
     sustained=_CAUSES["run-out, disc slowing"],
     proof="moment-pulses",
@@ -168,7 +168,7 @@ def _two_motor_loop(
 ) -> Loop:
     """Return the position loop of two motors that follow one reference and share a load.
 
-    ``name``, ``summary``, ``at``, ``position_point``, ``causes``, ``proof``: as those of a `Loop`.
+    ``name``, ``summary``, ``at``, ``position_point``, ``causes``, ``proof``: see `Loop`.
     """
     return Loop(
         name=name,
@@ -259,8 +259,8 @@ SCREW_POSITION_LOOP = Loop(
 def force_point(par: ParameterSet, value: float) -> Point:
     """Return both motors in position control, at rest with a force [N] between their screws.
 
-    Each is half the compression away from the middle. The controllers have no integral part, so
-    the references are further away, by the angle errors that produce the holding currents.
+    Each nut is half the compression away from the middle. The controllers have no integral part, so
+    the references are farther away, by the angle errors that produce the holding currents.
 
     Raises
     ------
@@ -317,7 +317,7 @@ _FORCE = Quantity("force", "N", 0.0)
 
 FORCE_FIGHT = _two_motor_loop(
     name="force-fight",
-    summary="position control of two motors on one reference, a force sensor between, 5 kHz",
+    summary="position control of two motors on one reference, with a force sensor between, 5 kHz",
     at=_FORCE,
     point=force_point,
     causes=_DRIVE_TRAIN,
@@ -401,7 +401,7 @@ def _require_current(value: float, par: WedgeParameters) -> None:
 DRIVE_CURRENT_LOOP = Loop(
     name="drive-current",
     assembly="wedge-brake",
-    summary="current control in the drive, analog, shaft clamped",
+    summary="analog current control in the drive, with a clamped shaft",
     at=Quantity("current", "A", 0.0),
     inputs=("i_1_set",),
     output="i_1",

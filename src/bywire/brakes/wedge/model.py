@@ -61,7 +61,7 @@ class WedgeBrake(Assembly[WedgeParameters, control.Memory]):
     Stimulus: ClassVar = control.Stimulus
     frictions: ClassVar[tuple[str, ...]] = ("omega_1", "omega_2", "v", "Omega")
 
-    W_supply = Integral("J", "energy at the drives' input, standby included", role=_SUPPLY)
+    W_supply = Integral("J", "energy at the drives' input, including standby", role=_SUPPLY)
     W_electric = Integral(
         "J", "electrical energy into the motors", role=Role("source", "electrical")
     )
@@ -84,7 +84,7 @@ class WedgeBrake(Assembly[WedgeParameters, control.Memory]):
     caliper = Part(wedge_caliper, output=("F_N",), work="W_caliper", loss="E_caliper")
     adjuster = Part(clearance_adjuster)
     stop = Part(end_stop, work="W_stop", loss="E_stop", rarely=True)
-    t_stuck = Integral("s", "time in which shafts and wedge stick", role=Role("standstill"))
+    t_stuck = Integral("s", "time during which shafts and wedge stick", role=Role("standstill"))
     disc = Part(flywheel, par="flywheel", outside=True)
     moment_sensor = Part(moment_sensor, state={"M": "y_M"})
     supply = Part(drive_supply, state={"P": "y_P"})
@@ -106,13 +106,13 @@ class WedgeBrake(Assembly[WedgeParameters, control.Memory]):
     T_fr_1 = Shown("N*m", "friction torque 1", 0.1)
     T_fr_2 = Shown("N*m", "friction torque 2", 0.1)
     F_fr = Shown("N", "friction on the wedge", 50.0)
-    contacts = Shown("1", "contacts of the heart: 1, 2, 4 added", 4.0)
+    contacts = Shown("1", "closed contacts of the heart: sum of 1, 2, 4", 4.0)
     stuck = Shown("1", "shafts and wedge stuck")
     P_in = Shown("W", "power at the drives' input", 50.0)
     P_meas = Shown("W", "power at the drives' input, filtered", 50.0)
     E_source = Shown("J", "energy in: electrical, disc on wedge, run-out")
     U_caliper = Shown("J", "energy of the caliper")
-    clearance = Shown("m", "clearance, both pads, the wedge centered", 2e-4)
+    clearance = Shown("m", "clearance of both pads, wedge centered", 2e-4)
     E_warming = Shown("J", "copper loss of the motors that warm up", role=motor_heat.COPPER)
     E_winding = Shown("J", "heat in the motors' windings", role=motor_heat.WINDING)
     E_housing = Shown("J", "heat in the motors' housings", role=motor_heat.HOUSING)

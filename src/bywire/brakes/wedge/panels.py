@@ -33,7 +33,7 @@ BRAKING = Panels(
             "motor speed",
             (Trace("omega_1"), Trace("omega_2", Role.SECOND)),
             saturation="sat_rate",
-            saturated="on the software rate limit",
+            saturated="at the software rate limit",
         ),
         Panel("current", (Trace("i_1"), Trace("i_2", Role.SECOND)), limit="drive.i_max"),
         # The rig measures the filtered power; peaks of the raw power would hide it.

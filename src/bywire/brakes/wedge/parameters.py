@@ -9,7 +9,7 @@ from pydantic import model_validator
 from bywire.brakes.wedge.elements import brake_heart, wedge, wedge_caliper, wedge_friction
 from bywire.brakes.wedge.laws import gap_adjusting, moment_control, screw_offset
 from bywire.control import derating, position_pd
-from bywire.core.parameters import ParameterSet
+from bywire.core.parameters import ParameterSet, RuleError
 from bywire.core.quantities import Duration, Force, Inertia, Torque
 from bywire.plant import (
     axial_bearing,
@@ -102,8 +102,10 @@ class WedgeParameters(ParameterSet):
     def _follows_the_adjuster(self) -> WedgeParameters:
         T, slow = self.control.adjuster.T_adjust, self.control.T_slow
         if self.adjuster.law != "none" and abs(T / slow - round(T / slow)) > 1e-6:
-            raise ValueError(
-                f"control.adjuster.T_adjust = {T:g} s must be a whole number of "
-                f"control.T_slow = {slow:g} s: the moment control follows the adjuster's turns"
+            raise RuleError(
+                "control.adjuster.T_adjust",
+                f"{T:g} s",
+                f"a whole multiple of control.T_slow = {slow:g} s",
+                "the moment control follows the adjuster's turns",
             )
         return self

@@ -103,7 +103,7 @@ def force_for_current(i: float, par: Par) -> float:
     per = 2.0 * par.motor_1.K_ref / roller_screw.slope(par.screw)
     if need == 0.0 or not i / need > 0.0:
         valid = "0 A at every force" if need == 0.0 else f"{'>' if need > 0 else '<'} 0 A"
-        advice = f"as tan(alpha) - mu_B = {need:.3g}; give the normal force or the moment"
+        advice = f"since tan(alpha) - mu_B = {need:.3g}. Specify the normal force or the moment"
         raise not_valid("current", f"{i:g} A", valid, advice)
     return per * i / need
 
@@ -278,7 +278,7 @@ WHOLE = Plant(
 MECHANICAL = Plant(
     name="wedge-mechanical",
     assembly="wedge-brake",
-    summary="rotors and wedge alone: quasi-static drives with their apparent inertia",
+    summary="only rotors and wedge: quasi-static drives with their apparent inertia",
     at=_AT,
     model=mechanical_model,
     band=150.0,
@@ -287,7 +287,7 @@ MECHANICAL = Plant(
 RIGID = Plant(
     name="wedge-rigid",
     assembly="wedge-brake",
-    summary="rotors and wedge as one body: drives ideal, screws and interfaces stiff",
+    summary="rotors and wedge as one body: ideal drives, rigid screws and interfaces",
     at=_AT,
     model=rigid_model,
     band=150.0,

@@ -1,6 +1,6 @@
-"""Residuals by which the wedge brake's real-time computer can detect a failure.
+"""Residuals with which the wedge brake's real-time computer can detect a failure.
 
-They count only while the demanded moment is steady. Even in a healthy brake, all of them are large
+They count only while the demanded moment is steady. Even without a fault, all residuals are large
 during gap crossing and ramps.
 """
 

@@ -1,4 +1,4 @@
-"""Relations of the wedge brake that are linear in parameters that drift: friction, clearance."""
+"""Relations of the wedge brake that are linear in drifting parameters: friction, clearance."""
 
 from __future__ import annotations
 
@@ -97,8 +97,8 @@ RELATIONS: tuple[Relation, ...] = (
         {"y_M": "N*m", "F_M": "N"},
         _from_actuation_force,
         lambda par: np.array([par.wedge.mu_B]),
-        "wedge at rest without internal friction. Such friction biases the estimate by up to its "
-        "ratio to the normal force, in opposite directions while applying and releasing",
+        "wedge at rest without internal friction, which biases the estimate by up to its ratio to "
+        "the normal force, in opposite directions while applying and releasing",
     ),
     Relation(
         "clearance from the travel",

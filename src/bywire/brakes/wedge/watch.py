@@ -14,13 +14,13 @@ from bywire.core.parameters import ParameterSet
 
 Rows = NDArray[np.bool_]
 
-_REACHED = 0.95  # of the demanded moment
+_REACHED = 0.95  # share of the demanded moment
 _LONG = 0.05  # time [s] at the current limit after which a moment counts as out of reach
-_SWINGS = 10  # reversals between current limits, at most _LONG apart; a step never has so many
+_SWINGS = 10  # reversals between current limits, at most _LONG apart; a step has fewer
 
 
 def warnings_of(recording: xr.Dataset, par: ParameterSet) -> list[str]:
-    """Return the warnings of a recording of at least one row; none without the brake's signals."""
+    """Return the warnings about a recording with rows; none without the brake's signals."""
     values = par.flat()
     if not {"F_end", "M_set", "i_1_ref", "i_2_ref"} <= set(recording):
         return []
@@ -39,7 +39,7 @@ def _end_stop(recording: xr.Dataset) -> list[str]:
     when, x = _when(recording, k), 1e3 * float(recording["x"].values[k])
     return [
         f"the wedge reached its end stop {when}, x = {x:.3g} mm, and pressed on it with "
-        f"up to {force.max():.3g} N: the stop ends the braking moment"
+        f"up to {force.max():.3g} N: the stop limits the braking moment"
     ]
 
 
@@ -69,7 +69,7 @@ def _out_of_reach(recording: xr.Dataset, values: Mapping[str, Any]) -> list[str]
     if t[end] - t[begin] < _LONG or most >= _REACHED * demanded or _swings(recording, values):
         return []
     return [
-        f"the motors cannot reach the demanded {demanded:.4g} N*m: on the current limit of "
+        f"the motors cannot reach the demanded {demanded:.4g} N*m: at the current limit of "
         f"{_limit(values):.4g} A from t = {t[begin]:.4g} s to {t[end]:.4g} s, the moment stays at "
         f"{most:.4g} N*m at most"
     ]
@@ -85,9 +85,9 @@ def _not_reached(recording: xr.Dataset, values: Mapping[str, Any]) -> list[str]:
     text = f"the demand of {demanded:.4g} N*m was not reached: the moment is {most:.4g} N*m at most"
     M_on, speed = values["control.moment.M_on"], np.abs(recording["Omega"].values).max()
     if demanded <= M_on:
-        text += f", as the brake stays parked up to control.moment.M_on = {M_on:.4g} N*m"
+        text += f", since the brake stays parked up to control.moment.M_on = {M_on:.4g} N*m"
     elif speed < values["control.moment.Omega_still"]:
-        text += ", as the disc is at rest"
+        text += ", since the disc is at rest"
     return [text]
 
 
@@ -101,8 +101,8 @@ def _limits(recording: xr.Dataset, values: Mapping[str, Any]) -> list[str]:
         begin, end, number = swings
         return [
             f"the demanded current swings between its limits of -{limit:.4g} A and {limit:.4g} A, "
-            f"{number} times from t = {begin:.4g} s to {end:.4g} s: a loop is likely unstable, "
-            "see 'bywire margins position' and 'bywire margins moment'"
+            f"{number} times from t = {begin:.4g} s to {end:.4g} s: a loop is likely unstable "
+            "(see 'bywire margins position' and 'bywire margins moment')"
         ]
     k = int(np.argmax(limited))
     return [f"the current limit of {limit:.4g} A was reached {_when(recording, k)}"]
@@ -144,5 +144,5 @@ def _holding_screw(values: Mapping[str, Any]) -> list[str]:
         return []
     return [
         "screw.eta_b = 0: no load drives these screws back, so the brake keeps its moment "
-        "when the power goes off"
+        "after power off"
     ]

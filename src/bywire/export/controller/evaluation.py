@@ -14,9 +14,9 @@ from typing import Any, Protocol
 from bywire.core import ops
 from bywire.core.errors import ModelError
 from bywire.core.parameters import ParameterSet
-from bywire.export.controller.body import Body
 from bywire.export.controller.c_text import c_name
 from bywire.export.controller.elementary import MAGNITUDE
+from bywire.export.controller.functions import Body
 from bywire.export.controller.structs import is_number, literal
 from bywire.export.controller.values import (
     BOTH,
@@ -318,7 +318,7 @@ def called(at: Context, node: ast.Call, function: Any, given: list[Any], named: 
         return _method(at, node, function, given, named)
     if isinstance(function, Closure):
         return at.translation.inlined(at, node, function, given, named)
-    target = at.known(node, function, "it is no function that export knows")
+    target = at.known(node, function, "it is not a function that export can translate")
     if isinstance(target, partial):
         held = {**{n: Known(v) for n, v in target.keywords.items()}, **named}
         return called(at, node, Known(target.func), [*map(Known, target.args), *given], held)

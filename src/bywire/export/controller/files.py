@@ -1,28 +1,383 @@
-"""All files of an ECU in C, by name, with the ``README.txt`` that explains them."""
+"""All files of an ECU in C, by name: with those of tools (A2L, DBC), and ``README.txt``."""
 
 from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from bywire.core.catalog import Cited
+from bywire.core.parameters import Leaf, leaf_fields
+from bywire.core.signals import signals_of
 from bywire.export.controller import render
-from bywire.export.controller.c_text import c_name
+from bywire.export.controller.c_text import BEGIN_C, END_C, c_name, comment, wrapped
 from bywire.export.controller.contract import INPUT, LARGEST, RESULT, CheckedInput
 from bywire.export.controller.harness import FLAGS, harness, makefile, vector_header
 from bywire.export.controller.program import Program
-from bywire.export.controller.render import parameter_file
-from bywire.export.controller.tool_files import (
-    a2l,
-    can_header,
-    can_source,
-    dbc,
-    instance_header,
-    instance_source,
-)
+from bywire.export.controller.render import c_path, parameter_file
 from bywire.export.controller.vectors import Vectors
+
+_FAR = 1e32
+"""limit where there is none: some tools reject infinity"""
+
+
+def a2l(program: Program) -> str:
+    """Return the A2L description; symbol links replace addresses, which are zero.
+
+    The links lead to the memory and the parameters of ``NAME_instance.c``, which are in RAM.
+    """
+    name = program.name
+    kind = "FLOAT32_IEEE" if program.precision.name == "single" else "FLOAT64_IEEE"
+    blocks: list[str] = []
+    units: dict[str, str] = {}
+    leaves = leaf_fields(type(program.par))
+    for dotted, member in program.parameters():
+        leaf = leaves[dotted]
+        low, high = (max(min(v, _FAR), -_FAR) for v in (leaf.low, leaf.high))
+        unit = units.setdefault(leaf.unit.symbol, f"CM_{len(units)}")
+        shape = f"{'VAL_BLK' if member.length else 'VALUE'} 0x0 RL_VALUE 0 {unit}"
+        size = f"\n      NUMBER {member.length}" if member.length else ""
+        place = ".".join(c_name(part) for part in dotted.split("."))
+        blocks.append(
+            f'    /begin CHARACTERISTIC {place} "{_a2l_text(member.note)}"\n'
+            f"      {shape} {low:.9g} {high:.9g}{size}\n"
+            f'      SYMBOL_LINK "{name}_calibration.{place}" 0\n    /end CHARACTERISTIC'
+        )
+    signals = signals_of(program.model.Memory)
+    for member in program.members(program.model.Memory):
+        signal = signals[member.name]
+        unit = units.setdefault(signal.unit, f"CM_{len(units)}")
+        field = c_name(member.name)
+        blocks.append(
+            f'    /begin MEASUREMENT memory.{field} "{_a2l_text(signal.label)}"\n'
+            f"      {kind} {unit} 0 0 {-_FAR:.9g} {_FAR:.9g}\n      ECU_ADDRESS 0x0\n"
+            f'      SYMBOL_LINK "{name}_memory.{field}" 0\n    /end MEASUREMENT'
+        )
+    for step in program.steps:
+        unit = units.setdefault("1", f"CM_{len(units)}")
+        label = f"status of task {_a2l_text(step.task.name)}"
+        blocks.append(
+            f'    /begin MEASUREMENT memory.{step.status} "{label}"\n'
+            f"      ULONG {unit} 0 0 0 {INPUT | RESULT}\n      ECU_ADDRESS 0x0\n"
+            f'      SYMBOL_LINK "{name}_memory.{step.status}" 0\n    /end MEASUREMENT'
+        )
+    methods = [
+        f'    /begin COMPU_METHOD {method} "{text}" IDENTICAL "%12.6" "{text}"\n'
+        "    /end COMPU_METHOD"
+        for unit, method in units.items()
+        for text in (_a2l_text(unit),)
+    ]
+    body = "\n".join([*methods, *blocks])
+    return (
+        f'ASAP2_VERSION 1 60\n/begin PROJECT {name} "ECU of {_a2l_text(program.model.name)}"\n'
+        f'  /begin MODULE {name}_ecu ""\n'
+        '    /begin MOD_COMMON ""\n      BYTE_ORDER MSB_LAST\n    /end MOD_COMMON\n'
+        f"    /begin RECORD_LAYOUT RL_VALUE\n      FNC_VALUES 1 {kind} ROW_DIR DIRECT\n"
+        f"    /end RECORD_LAYOUT\n{body}\n  /end MODULE\n/end PROJECT\n"
+    )
+
+
+def _a2l_text(text: str) -> str:
+    return text.replace("\\", "\\\\").replace('"', '\\"')
+
+
+# --- ``NAME_instance.c``: memory and parameters in RAM, under the names that the A2L links to
+
+
+def instance_header(program: Program) -> str:
+    """Return ``NAME_instance.h``."""
+    name = program.name
+    parts = [
+        comment([f"An instance of the ECU of {program.model.name}: memory and parameters in RAM."]),
+        f"#ifndef {name.upper()}_INSTANCE_H\n#define {name.upper()}_INSTANCE_H",
+        f'#include <stdint.h>\n#include "{name}_ecu.h"',
+        BEGIN_C,
+        f"{comment(['Memory for the steps.'])}\nextern {name}_Memory {name}_memory;",
+    ]
+    if program.parameters():
+        parts += [
+            f"{comment(['Parameters that a calibration tool changes.'])}\n"
+            f"extern {name}_Parameters {name}_calibration;",
+            f"{comment(['Parameters for the steps, copied from the calibration.'])}\n"
+            f"extern {name}_Parameters {name}_active;",
+        ]
+    parts.append(
+        f"{comment(['Set memory and parameters to the values of the bench.'])}\n"
+        f"void {name}_instance_init(void);"
+    )
+    if program.parameters():
+        said = [
+            "Apply the calibration, and return how many of its numbers are out of range or NaN.",
+            "If there is one, the steps keep their parameters.",
+        ]
+        parts.append(f"{comment(said)}\nuint32_t {name}_instance_apply(void);")
+    return "\n\n".join([*parts, END_C, "#endif"]) + "\n"
+
+
+def instance_source(program: Program) -> str:
+    """Return ``NAME_instance.c``."""
+    name = program.name
+    parts = [
+        comment(
+            [
+                f"An instance of the ECU of {program.model.name}; leave this file out if memory",
+                "and parameters are elsewhere in your program.",
+            ]
+        ),
+        f'#include "{name}_instance.h"',
+        f"{name}_Memory {name}_memory;",
+    ]
+    init = [f"    {name}_ecu_init(&{name}_memory);"]
+    if program.parameters():
+        parts[-1] += f"\n{name}_Parameters {name}_calibration;\n{name}_Parameters {name}_active;"
+        parts.append(_outside(program))
+        init += [
+            f"    {name}_calibration = {name}_parameters;",
+            f"    {name}_active = {name}_parameters;",
+        ]
+    parts.append("\n".join([f"void {name}_instance_init(void)", "{", *init, "}"]))
+    if program.parameters():
+        derive = f"        {name}_ecu_derive(&{name}_active);\n" if program.derived else ""
+        parts.append(
+            f"uint32_t {name}_instance_apply(void)\n{{\n"
+            f"    const uint32_t count = outside(&{name}_calibration);\n\n"
+            "    if (count == 0u) {\n"
+            f"        {name}_active = {name}_calibration;\n{derive}    }}\n"
+            "    return count;\n}"
+        )
+    return "\n\n".join(parts) + "\n"
+
+
+def _outside(program: Program) -> str:
+    """Return the function that counts the parameters outside their ranges."""
+    leaves = leaf_fields(type(program.par))
+    lines = []
+    for dotted, member in program.parameters():
+        for k in range(member.length or 1):
+            place = f"par->{c_path(dotted)}{f'[{k}]' if member.length else ''}"
+            checks = " && ".join(_within(program, place, leaves[dotted]))
+            lines.append(wrapped(f"count += ({checks}) ? 0u : 1u;", "    "))
+    said = "Return how many parameters are out of range or NaN."
+    return "\n".join(
+        [
+            comment([said]),
+            f"static uint32_t outside(const {program.name}_Parameters *par)",
+            "{",
+            "    uint32_t count = 0u;",
+            "",
+            *lines,
+            "    return count;",
+            "}",
+        ]
+    )
+
+
+def _within(program: Program, place: str, leaf: Leaf) -> list[str]:
+    """Return the conditions of a parameter's range; a distant end is the last number."""
+    kind = np.float32 if program.precision.name == "single" else np.float64
+    last = float(np.finfo(kind).max)
+    low = f">{'' if leaf.low_open else '='}", leaf.low
+    high = f"<{'' if leaf.high_open else '='}", leaf.high
+    found = []
+    for (sign, end), far in ((low, -last), (high, last)):
+        is_far = not math.isfinite(end) or abs(end) >= last
+        number = program.precision.literal(far if is_far else end)
+        found.append(f"({place} {sign[0] + '=' if is_far else sign} {number})")
+    return found
+
+
+# --- CAN
+# Every field of the memory is a signed signal of 16 bits, four per message of 8 bytes, and so is
+# the status of every step. The lowest count means "not available".
+
+FIRST = 0x100
+"""identifier of the first message"""
+CYCLE = 10
+"""interval between messages [ms]"""
+NOT_AVAILABLE = -32768
+"""count of a NaN or infinite value: outside the range of every signal"""
+_MOST, _IN_A_MESSAGE, _LONGEST = 32767, 4, 32
+_ROOM = 10.0  # least ratio of full scale to the usual magnitude of a signal
+
+
+@dataclass(frozen=True)
+class CanSignal:
+    """A measurement on the bus: its field of the memory, unit, meaning, and value of one count."""
+
+    field: str
+    unit: str
+    label: str
+    factor: float
+
+    @property
+    def name(self) -> str:
+        """Name on the bus."""
+        return c_name(self.field)[:_LONGEST]
+
+
+def messages(program: Program) -> list[list[CanSignal]]:
+    """Return the signals of every message, in the order of the memory; then the statuses."""
+    signals = signals_of(program.model.Memory)
+    each = [
+        CanSignal(member.name, found.unit, found.label, _factor(found.nominal))
+        for member in program.members(program.model.Memory)
+        for found in (signals[member.name],)
+    ]
+    each += [
+        CanSignal(step.status, "1", f"status of task {step.task.name}", 1.0)
+        for step in program.steps
+    ]
+    return [each[k : k + _IN_A_MESSAGE] for k in range(0, len(each), _IN_A_MESSAGE)]
+
+
+def _factor(nominal: float) -> float:
+    """Return the value of a count: 1, 2 or 5 times a power of ten."""
+    least = _ROOM * abs(nominal) / _MOST
+    power = math.floor(math.log10(least))
+    return next(f for f in (float(f"{k}e{power}") for k in (1, 2, 5, 10)) if f >= least)
+
+
+def dbc(program: Program) -> str:
+    """Return the DBC description of the messages."""
+    name = c_name(program.name)
+    every = list(enumerate(messages(program), FIRST))
+    lines = ['VERSION ""', "", "NS_ :", "", "BS_:", "", "BU_: ECU"]
+    for number, signals in every:
+        lines += ["", f"BO_ {number} {_message(name, number)}: 8 ECU", *_signals(signals)]
+    lines += ["", f'CM_ "ECU of {_dbc_text(program.model.name)}: its memory behind a tick";']
+    lines += [
+        f'CM_ SG_ {number} {each.name} "{_dbc_text(each.label)}";'
+        for number, signals in every
+        for each in signals
+    ]
+    lines += [
+        f'VAL_ {number} {each.name} {NOT_AVAILABLE} "not available" ;'
+        for number, signals in every
+        for each in signals
+    ]
+    cycle = '"GenMsgCycleTime"'
+    lines += [f"BA_DEF_ BO_ {cycle} INT 0 65535;", f"BA_DEF_DEF_ {cycle} 0;"]
+    lines += [f"BA_ {cycle} BO_ {number} {CYCLE};" for number, _ in every]
+    return "\n".join(lines) + "\n"
+
+
+def _signals(signals: Sequence[CanSignal]) -> Iterator[str]:
+    for k, each in enumerate(signals):
+        low, high = (f"{count * each.factor:.9g}" for count in (-_MOST, _MOST))
+        yield (
+            f" SG_ {each.name} : {16 * k}|16@1- ({each.factor:.9g},0) [{low}|{high}] "
+            f'"{_dbc_text(each.unit)}" Vector__XXX'
+        )
+
+
+def _message(name: str, number: int) -> str:
+    ending = f"_{number - FIRST + 1}"
+    return name[: _LONGEST - len(ending)] + ending
+
+
+def _dbc_text(text: str) -> str:
+    """Return a text for quotation marks, in characters that every DBC reader accepts."""
+    plain = text.encode("ascii", "replace").decode()
+    return plain.replace("\\", "/").replace('"', "'")
+
+
+def can_header(program: Program) -> str:
+    """Return ``NAME_can.h``."""
+    name, count = program.name, len(messages(program))
+    guard = f"{name.upper()}_CAN_H"
+    fill = [
+        "Fill a message, counted from 0. A value beyond full scale saturates; one that",
+        f"is NaN or infinite becomes the count {NOT_AVAILABLE}: not available.",
+    ]
+    return (
+        "\n\n".join(
+            [
+                comment(
+                    [f"Messages of {name}.dbc: their first identifier and number, and their bytes."]
+                ),
+                f"#ifndef {guard}\n#define {guard}",
+                f'#include <stdint.h>\n#include "{name}_ecu.h"',
+                BEGIN_C,
+                f"#define {name.upper()}_CAN_FIRST {FIRST}u\n"
+                f"#define {name.upper()}_CAN_COUNT {count}u",
+                comment(fill)
+                + f"\nvoid {name}_can_fill(uint32_t message, const {name}_Memory *memory,\n"
+                "        uint8_t data[8]);",
+                END_C,
+                "#endif",
+            ]
+        )
+        + "\n"
+    )
+
+
+def can_source(program: Program) -> str:
+    """Return ``NAME_can.c``."""
+    name, real, literal = program.name, program.precision.real, program.precision.literal
+    most, half = literal(float(_MOST)), literal(0.5)
+    kind = np.float32 if program.precision.name == "single" else np.float64
+    largest = literal(float(np.finfo(kind).max))
+    statuses = {step.status for step in program.steps}
+    cases = []
+    for number, signals in enumerate(messages(program)):
+        lines = [f"    case {number}u:"]
+        for k, each in enumerate(signals):
+            cast = f"({real})" if each.field in statuses else ""
+            value = f"{cast}memory->{c_name(each.field)}, {literal(each.factor)}"
+            lines.append(f"        put(counts({value}), &data[{2 * k}]);")
+        cases.append("\n".join([*lines, "        break;"]))
+    return f"""{comment([f"Bytes of the messages of {name}.dbc."])}
+
+#include "{name}_can.h"
+
+/* Return the counts of a value, rounded; of NaN, the count for \"not available\". */
+static int32_t counts({real} value, {real} factor)
+{{
+    const {real} wanted = value / factor;
+    int32_t result;
+
+    if (!((value >= -{largest}) && (value <= {largest}))) {{
+        result = {NOT_AVAILABLE};
+    }} else if (wanted >= {most}) {{
+        result = {_MOST};
+    }} else if (wanted <= -{most}) {{
+        result = -{_MOST};
+    }} else if (wanted >= {literal(0.0)}) {{
+        result = (int32_t)(wanted + {half});
+    }} else {{
+        result = (int32_t)(wanted - {half});
+    }}
+    return result;
+}}
+
+/* Put 16 bits into a message, the lower ones first. */
+static void put(int32_t count, uint8_t *bytes)
+{{
+    const uint32_t word = (uint32_t)count;
+
+    bytes[0] = (uint8_t)(word & 0xFFu);
+    bytes[1] = (uint8_t)((word >> 8) & 0xFFu);
+}}
+
+void {name}_can_fill(uint32_t message, const {name}_Memory *memory, uint8_t data[8])
+{{
+    for (uint32_t k = 0u; k < 8u; ++k) {{
+        data[k] = 0u;
+    }}
+    switch (message) {{
+{chr(10).join(cases)}
+    default:
+        break;
+    }}
+}}
+"""
+
+
+# --- All files
 
 
 def files(

@@ -12,7 +12,6 @@ from typing import Any
 from bywire.core.errors import ModelError
 from bywire.core.model import Model, Task
 from bywire.core.parameters import ParameterSet
-from bywire.export.controller.body import Body, Statement, live
 from bywire.export.controller.c_text import PRECISIONS, Precision, c_name, checked_name, unique
 from bywire.export.controller.contract import (
     CheckedInput,
@@ -22,10 +21,9 @@ from bywire.export.controller.contract import (
     commands,
     held_by,
 )
-from bywire.export.controller.derived import Derivations, Derived
 from bywire.export.controller.evaluation import called
-from bywire.export.controller.functions import CFunction
-from bywire.export.controller.structs import Member, Struct, Structs
+from bywire.export.controller.functions import Body, CFunction, Statement, live
+from bywire.export.controller.structs import Derivations, Derived, Member, Struct, Structs
 from bywire.export.controller.translation import Executor, Translation
 from bywire.export.controller.values import (
     Expr,

@@ -9,14 +9,12 @@ from typing import Any
 import numpy as np
 
 from bywire.core.catalog import PARAMETER_SETS, Cited
-from bywire.export.controller.body import Statement
 from bywire.export.controller.c_text import BEGIN_C, END_C, c_name, comment, wrapped
 from bywire.export.controller.contract import INPUT, RESULT, CheckedInput
-from bywire.export.controller.derived import values
 from bywire.export.controller.elementary import contract_functions, elementary
-from bywire.export.controller.functions import CFunction
+from bywire.export.controller.functions import CFunction, Statement
 from bywire.export.controller.program import OPS, Program, Step
-from bywire.export.controller.structs import Struct
+from bywire.export.controller.structs import Struct, values
 from bywire.export.controller.values import Nodes, Shape
 
 

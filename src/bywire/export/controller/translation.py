@@ -15,10 +15,10 @@ from typing import Any
 
 from bywire.core import ops
 from bywire.core.errors import ModelError, place_of
-from bywire.export.controller.body import Body
 from bywire.export.controller.c_text import c_name, unique
 from bywire.export.controller.evaluation import Context, Evaluator, attribute
 from bywire.export.controller.functions import (
+    Body,
     CFunction,
     as_value,
     finish,

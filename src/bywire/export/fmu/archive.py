@@ -33,11 +33,11 @@ from bywire.export.exported import (
     Part,
     identifier_of,
     interface,
+    model_header,
     start_source,
 )
 from bywire.export.fmu.description import build_description, description_2, description_3
 from bywire.export.fmu.model_exchange import Equations, exchange_interface
-from bywire.export.model_header import model_header
 from bywire.simulation.compiler import (
     KERNEL_MATH,
     PLAIN,

@@ -12,14 +12,15 @@ from bywire.export.exported import (
     Exported,
     Interface,
     Variable,
+    braced,
     leaves_read,
     memory_variable,
+    number,
     parameter_variables,
     readings,
     row_variable,
     state_variable,
 )
-from bywire.export.model_header import braced, number
 from bywire.simulation.c_runtime import SCALAR
 from bywire.simulation.continuous import Continuous, build_continuous
 from bywire.simulation.expressions import as_number, needed

@@ -28,12 +28,13 @@ from bywire.core.signals import Signal, ranges_of, signals_of
 from bywire.export.exported import (
     Exported,
     Interface,
+    braced,
     finite_range,
     interface,
+    number,
     parameter_variables,
     start_nodes,
 )
-from bywire.export.model_header import braced, number
 from bywire.simulation.c_runtime import SCALAR
 from bywire.simulation.compiler import KERNEL_MATH, TIMEOUT, bundled_compiler
 from bywire.simulation.emit_rare import CUT, PROJECTION, rare_header, rare_results

@@ -61,30 +61,44 @@ function address() {
   history.replaceState(null, "", isChanged ? `#${linkOf(digest, made)}` : location.pathname + location.search);
 }
 
-/* Key figures of the run, judged by their limits. */
+/** Return a run's key figure; without a value where the changes would change an option of it. */
+function figureOf({ figures, followed }, { name }) {
+  const isFollowing = judged.families.some((each) => each.name === "step_response" && each.figures.includes(name));
+  if (!followed.length || !isFollowing) return figures[name];
+  return { value: NaN, reason: `an option depends on ${followed}: save the bench file and run it`, open: true };
+}
+
+/** Return the cells of a run's key figure: its value, and with a limit the verdict. */
+function cellsOf(computed, figure) {
+  const { value, reason, open } = computed, met = figure.limit && isMet(computed, figure.limit);
+  const outcome = open ? "undecided" : met ? "met" : "missed";
+  const mark = { undecided: "?", met: "✓", missed: "✗" }[outcome];
+  const text = reason ? "–" : readable(shownOf(value, figure), figure.unit);
+  return { value: element("td", { class: "number", title: reason }, text), outcome, mark, reason };
+}
+
+/* Key figures of the run, judged by their limits, beside those of kept runs. */
 function judge() {
   place("figures").hidden = !judged;
   place("unjudged").hidden = Boolean(judged);
   if (!judged) return;
-  const following = judged.families.find(({ name }) => name === "step_response")?.figures ?? [];
-  const followed = judged.followed.filter((name) => name in changes());
   const isStated = judged.figures.some(({ stated }) => stated);
-  place("stated").hidden = !isStated;
+  const heading = (text) => element("th", { scope: "col" }, text);
+  const others = kept.map((each) => element("th", { scope: "col", class: "kept", title: each.told }, each.name, dropOf(each)));
+  place("figures").tHead.replaceChildren(element("tr", {}, heading("figure"), heading(kept.length ? "this run" : "value"), ...others,
+    heading("limit"), ...(isStated ? [heading("stated")] : [])));
   place("figures").tBodies[0].replaceChildren(...judged.figures.map((figure) => {
-    const computed = followed.length && following.includes(figure.name)
-      ? { value: NaN, reason: `an option depends on ${followed}: save the bench file and run it`, open: true }
-      : run.figures[figure.name];
-    const value = computed.reason ? element("td", { class: "number", title: computed.reason }, "–")
-      : element("td", { class: "number" }, readable(shownOf(computed.value, figure), figure.unit));
-    const met = figure.limit && isMet(computed, figure.limit);
-    const outcome = computed.open ? "undecided" : met ? "met" : "missed";
-    const mark = { undecided: "?", met: "✓", missed: "✗" }[outcome];
-    const verdict = figure.limit
-      ? element("td", { class: outcome, title: computed.reason }, `${mark} ${figure.text}`)
-      : element("td", {}, computed.reason);
+    const { value, outcome, mark, reason } = cellsOf(figureOf(run, figure), figure);
+    const beside = kept.map((each) => {
+      const cells = cellsOf(figureOf(each, figure), figure);
+      if (figure.limit) cells.value.append(element("span", { class: cells.outcome }, ` ${cells.mark}`));
+      return cells.value;
+    });
+    const verdict = figure.limit ? element("td", { class: outcome, title: reason }, `${mark} ${figure.text}`)
+      : element("td", {}, reason);
     const { text, where } = figure.stated ?? { text: "", where: "" };
     const stated = isStated ? [element("td", { title: where }, text)] : [];
-    return element("tr", {}, element("th", { scope: "row", title: figure.definition }, figure.name), value, verdict, ...stated);
+    return element("tr", {}, element("th", { scope: "row", title: figure.definition }, figure.name), value, ...beside, verdict, ...stated);
   }));
 }
 
@@ -121,7 +135,8 @@ function answered({ data: { error, time, table, figures, settled, loops: compute
 function show({ time, table, figures, settled }) {
   complain("", "run");
   place("shown").hidden = false;
-  run = { time, signals: columnsOf(table, time, description.signals.map(({ name }) => name)), figures };
+  const followed = judged ? judged.followed.filter((name) => name in changes()) : [];
+  run = { time, signals: columnsOf(table, time, description.signals.map(({ name }) => name)), figures, followed };
   place("work").textContent = settled ? "" : "contacts or friction did not converge in some steps";
   place("keep").disabled = place("csv").disabled = false;
   judge();
@@ -169,23 +184,27 @@ function save(name, kind, text) {
   setTimeout(() => URL.revokeObjectURL(link.href), 1000);
 }
 
+/** Return a button that drops a kept run. */
+function dropOf(each) {
+  const drop = element("button", { type: "button", "aria-label": `drop ${each.name}`, title: `drop ${each.name}` }, "×");
+  drop.addEventListener("click", () => {
+    kept.splice(kept.indexOf(each), 1);
+    showKept();
+  });
+  return drop;
+}
+
 function showKept() {
-  place("kept").replaceChildren(...kept.map((each, k) => {
-    const drop = element("button", { type: "button", "aria-label": `drop ${each.name}` }, "×");
-    drop.addEventListener("click", () => {
-      kept.splice(k, 1);
-      showKept();
-      if (run) plots.draw(run, kept, values);
-    });
-    return element("li", { title: each.told }, each.name, drop);
-  }));
+  place("kept").replaceChildren(...kept.map((each) => element("li", {}, `${each.name}: ${each.told}`, dropOf(each))));
+  if (!run) return;
+  judge();
+  plots.draw(run, kept, values);
 }
 
 place("keep").addEventListener("click", () => {
   const count = 1 + Math.max(0, ...kept.map(({ name }) => Number(name.split(" ")[1])));
-  kept.push({ ...run, name: `run ${count}`, told: place("changes").textContent });
+  kept.push({ ...run, name: `run ${count}`, told: place("changes").textContent.replace("changed: ", "") });
   showKept();
-  plots.draw(run, kept, values);
 });
 place("reset").addEventListener("click", () => {
   for (const { name, start } of parameters) rows.get(name).show((values[name] = start)); // invalid fields too

@@ -4,6 +4,7 @@ const HEIGHT = 150; // px of a panel of height 1
 const NEAR = 0.5; // share of a limit from which its lines are drawn
 const OFF = 0.25; // px by which a drawn line may be off a point
 const DENSE = 4; // points in a column of pixels from which their extremes are drawn
+const KEPT_DASHES = [[8, 3, 2, 3], [2, 3], [12, 4], [6, 3, 2, 3, 2, 3]]; // of kept runs, in their order
 const DASHES = { "set point": [6, 4], limit: [2, 4], stated: [7, 3] };
 
 /** Return the colors of the page as they are: they change with its theme. */
@@ -53,15 +54,16 @@ function lineOf(plot, series, from, to) {
 
 /** Return the lines of a panel: traces of the run, and first traces of kept runs. */
 function linesOf(panel, kept, colors) {
+  const value = (_, number) => reading(number, panel.unit, panel.levels);
   const lines = panel.traces.map(({ label, role }) => ({
-    label, stroke: colors[role] ?? colors.third, width: role === "main" ? 2 : 1.5,
+    label, value, stroke: colors[role] ?? colors.third, width: role === "main" ? 2 : 1.5,
     dash: DASHES[role], points: { show: false },
     paths: panel.levels.length ? uPlot.paths.stepped({ align: 1 }) : lineOf,
   }));
-  const others = kept.map(({ name }) => ({
-    label: name, stroke: colors.kept, width: 1.5, dash: [8, 3, 2, 3], points: { show: false }, paths: lineOf,
+  const others = kept.map(({ name }, k) => ({
+    label: name, value, stroke: colors.kept, width: 1.5, dash: KEPT_DASHES[k % KEPT_DASHES.length], points: { show: false }, paths: lineOf,
   }));
-  return [{ label: "time" }, ...lines, ...others];
+  return [{ label: "time", value: (_, time) => reading(time, "s") }, ...lines, ...others];
 }
 
 /** Return the numbers of a panel's lines, in their order. */
@@ -129,9 +131,15 @@ function named(plot, marks, color) {
   }
 }
 
+/** Return the range of time that a plot shows; null if it shows all of it. */
+function zoomOf(plot) {
+  const time = plot?.data[0] ?? [], { min, max } = plot?.scales.x ?? {};
+  return time.length && (min > time[0] || max < time.at(-1)) ? { min, max } : null;
+}
+
 /** Make the plots of all panels; `draw(run, kept, values)` shows a run. */
 function curves(place, panels) {
-  let plots = [], shape = "", current = null, waiting = new Map(), later = 0;
+  let plots = [], shape = "", current = null, zoom = null, waiting = new Map(), later = 0;
   const marks = panels.map(() => []), inSight = new Set();
   const observer = new IntersectionObserver((entries) => {
     for (const { target, isIntersecting } of entries) inSight[isIntersecting ? "add" : "delete"](target);
@@ -162,9 +170,13 @@ function curves(place, panels) {
       const names = panel.levels, ends = () => marks[k].flatMap(({ low, high }) => [low, high]);
       const plot = new uPlot({
         width: width(), height: HEIGHT * panel.height + (last ? 50 : 30),
-        scales: { x: { time: false }, y: { range: (_, low, high) => (low === null ? [null, null]
-          : uPlot.rangeNum(Math.min(low, ...ends()), Math.max(high, ...ends()), 0.1, true)) } },
-        legend: { live: true },
+        scales: { x: { time: false }, y: { range: ({ series, data }, low, high) => {
+          if (low === null) return [null, null];
+          const [first, last] = series[0].idxs, isWhole = first === 0 && last === data[0].length - 1;
+          const shown = isWhole ? ends() : []; // in a part of the time, the curves alone
+          return uPlot.rangeNum(Math.min(low, ...shown), Math.max(high, ...shown), 0.1, true);
+        } } },
+        legend: { live: true, markers: { dash: ({ series }, k) => (series[k].dash ? "dashed" : "solid") } },
         cursor: { sync: { key: "time" }, drag: { x: true, y: false } },
         series: linesOf(panel, kept, colors),
         hooks: { drawAxes: [drawMarks(() => marks[k], color)], draw: [drawBar(panel, () => current, colors)] },
@@ -179,17 +191,22 @@ function curves(place, panels) {
       named(plot, [...panel.stated.map(({ label }) => ({ label, role: "stated" })), ...limit], color);
       return plot;
     });
+    place.append(element("p", { class: "meaning zoom" }, "Drag over a plot to zoom in time. Double-click shows the whole run."));
   }
   function draw(run, kept, values) {
     current = run;
     const now = `${width()} ${kept.map(({ name }) => name)}`;
+    if (plots[0]?.data[0]?.length) zoom = zoomOf(plots[0]);
     if (now !== shape) make(kept);
     shape = now;
     waiting = new Map(plots.map((plot, k) => [plot.root.parentElement, () => {
       const numbers = numbersOf(panels[k], run, kept);
       const largest = numbers[1].reduce((most, value) => Math.max(most, Math.abs(value)), 0);
       marks[k] = marksOf(panels[k], largest, values);
-      plot.setData(numbers);
+      plot.batch(() => {
+        plot.setData(numbers);
+        if (zoom) plot.setScale("x", zoom); // new values keep the zoom
+      });
     }]));
     show(inSight); // the others when sliders rest, or they come into sight
     clearTimeout(later);

@@ -14,6 +14,12 @@ function readable(value, unit) {
   return `${written} ${isShort ? "ms" : unit}`.trim();
 }
 
+/** Return a value at the pointer with its unit, or the name of a level. */
+function reading(value, unit, levels = []) {
+  if (value === null || value === undefined || Number.isNaN(value)) return "–";
+  return levels.length ? levels[value] ?? String(value) : readable(value, unit);
+}
+
 /** Return the ends of a slider [SI], and whether it goes by factors; null where it makes no sense. */
 function sliderOf({ start, low, high }) {
   if (start === 0 && (low === null || high === null)) return null;

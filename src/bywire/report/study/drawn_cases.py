@@ -67,9 +67,9 @@ def drawn_cases(
     met
         Whether each case meets the requirements, shape (cases,).
     most_met, most_missed
-        Largest numbers of drawn cases; by default all that miss.
+        Largest numbers of drawn cases; default: all that miss.
     known
-        Whether each case has the drawn figure, shape (cases,); by default all. Others are drawn at
+        Whether each case has the drawn figure, shape (cases,); default: all. Others are drawn at
         an edge.
     """
     shown = np.ones(met.size, dtype=bool) if known is None else known

@@ -110,6 +110,7 @@ async function take(drop, file) {
   try {
     const name = await sent(file, bar), select = drop.querySelector("select");
     select.append(element("option", name, { value: name, selected: true }));
+    select.dispatchEvent(new Event("change", { bubbles: true }));
     complain("");
     place("spoken").textContent = `${name} is uploaded`;
   } catch (error) {
@@ -282,6 +283,7 @@ async function refresh() {
 
 document.querySelectorAll("form.task").forEach(armForm);
 document.querySelectorAll(".drop").forEach(arm);
+document.querySelectorAll("form.task").forEach(armColumns);
 // A file dropped elsewhere must not replace the page.
 for (const kind of ["dragover", "drop"]) addEventListener(kind, (event) => event.preventDefault());
 place("live-case")?.addEventListener("change", ({ target }) => {

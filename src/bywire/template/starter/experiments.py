@@ -25,7 +25,7 @@ from bywire.template.starter.parameters import Parameters
 
 
 class Options(ParameterSet):
-    """The braking."""
+    """Options of the braking."""
 
     F_set: Annotated[float, Unit("N", 1e4), Field(gt=0, allow_inf_nan=False)]
     """demanded clamp force"""

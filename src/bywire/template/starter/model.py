@@ -1,4 +1,4 @@
-"""The brake starter by parts and wires: the inputs of each element.
+"""Model of the brake starter: parts, wires, and the inputs of each element.
 
 States, masses, balances, stored energy and simple losses follow from the elements.
 """
@@ -55,7 +55,7 @@ class StarterActuator(Assembly[Parameters, Memory]):
         w.spindle.u = spindle.Input(torque, w.F)
 
     def friction(self, w: Self) -> tuple[Bounds, ...]:
-        """Return the limits of the dry friction; at rest it is anywhere between them."""
+        """Return the limits of the dry friction; at rest it has any value between them."""
         T = spindle.dry_friction(w.spindle.u, w.spindle.par)
         return ((-T, T),)
 

@@ -1,4 +1,4 @@
-"""Equilibria of the brake starter: a clamp force that the motor alone holds."""
+"""Equilibria of the brake starter: clamp forces that the motor holds without friction."""
 
 from __future__ import annotations
 

@@ -3,7 +3,7 @@
 import numpy as np
 import xarray as xr
 
-from bywire.brakes.motorcycle.paper.fig5 import _jump_levels
+from bywire.brakes.motorcycle.paper.friction import _jump_levels
 
 
 def test_jumps_are_listed_with_their_levels_and_creeping_is_not() -> None:

@@ -14,11 +14,13 @@ from bywire.brakes.motorcycle.paper.dardanelli2010_measured import (
     _best,
     reproduce,
 )
-from bywire.brakes.motorcycle.paper.measured.estimation import (
+from bywire.brakes.motorcycle.paper.measured import (
     FREE,
     HELD,
     LOSS,
+    STATEMENTS,
     TIED,
+    allowances,
     brake,
     estimated,
     misfit,
@@ -29,7 +31,6 @@ from bywire.brakes.motorcycle.paper.measured.estimation import (
     slopes,
     unknowns,
 )
-from bywire.brakes.motorcycle.paper.measured.statements import STATEMENTS, allowances
 from bywire.brakes.motorcycle.paper.runs import parameters
 from bywire.brakes.motorcycle.sets.dardanelli2010 import ESTIMATED, UNDETERMINED
 from bywire.brakes.motorcycle.trim import travel_at
@@ -230,12 +231,12 @@ def test_holding_and_searching_agree_at_the_stored_set(best):
 
 
 @pytest.mark.trust
-def test_other_starts_lead_no_lower(best):
-    """They end at other minima, higher ones, as those of seed 1 did; what they tell is near by."""
+def test_other_starts_end_at_a_higher_misfit_and_within_the_intervals_except_for_the_rotor(best):
+    """The misfit is rough: from seed 7 the search ends 11 % above the stored set."""
     again = estimated(starts=4, seed=7)
-    assert misfit(again.residuals) > 0.99 * best.misfit
+    assert misfit(again.residuals) > 1.05 * best.misfit
     ends = dict(zip(best.estimate.names, best.estimate.intervals(), strict=True))
-    assert len(set(again.names) & set(ends)) > 8
-    for name in set(again.names) & set(ends):
-        low, high = ends[name]
-        assert abs(again[name] - best.estimate[name]) < 0.25 * (high - low)
+    both = set(again.names) & set(ends)
+    assert len(both) > 8
+    outside = {name for name in both if not ends[name][0] < again[name] < ends[name][1]}
+    assert outside <= {"gear.J_mot"}

@@ -75,7 +75,7 @@ def test_brake_factor_is_drawn_only_where_it_has_room() -> None:
     free = tuple(0.364 - m for m in mu)
     figure = brake_factor(WedgeForces(mu, free, free, free), 0.364)
     shown = {str(line.get_label()): line for line in figure.axes[1].lines}
-    values = np.asarray(shown["simulated, no friction"].get_ydata(), dtype=float)
+    values = np.asarray(shown["simulated, without friction"].get_ydata(), dtype=float)
     np.testing.assert_allclose(values[:2], [0.4 / 0.164, 0.7 / 0.014])
     assert np.isnan(values[2])  # 180, beyond the end of the axis
     assert FARTHEST < 180.0

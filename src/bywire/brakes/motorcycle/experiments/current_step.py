@@ -1,4 +1,4 @@
-"""Current step: the current loop alone (Dardanelli 2010, Fig. 3)."""
+"""Current step: only the current loop (Dardanelli 2010, Fig. 3)."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ class Options(ParameterSet):
     i_step: Current
     """current demand after the step"""
     duration: Duration
-    """time recorded after the step"""
+    """recorded time after the step"""
     record: Duration
     """recording interval, finer than the ECU's sample time"""
 
 
 def cases(par: MotorcycleParameters, options: Options, _: object = None) -> tuple[Case, ...]:
-    """Return the single run: it starts at the retracted piston and bypasses dither and filter."""
+    """Return the single run, which starts at the retracted piston without dither and filter."""
     stimulus = step_at_zero("i_set", 0.0, options.i_step)
     return (
         case_from_rest(

@@ -22,7 +22,7 @@ WITHOUT, WITH = "without-dither", "with-dither"
 
 PEAK = Figures(p_max=("Pa", "Largest master-cylinder pressure."))
 RATIO = Figures(
-    loop_area_ratio=("1", "Area of the loop with dither, relative to the loop without dither.")
+    loop_area_ratio=("1", "Loop area with dither, relative to the area without dither.")
 )
 
 
@@ -34,7 +34,7 @@ class Options(ParameterSet):
     slope: CurrentRate
     """slope of the demand"""
     f_filter: Frequency
-    """cut-off of the first-order low-pass on the measured current"""
+    """cut-off frequency of the first-order low-pass for the measured current"""
     smoothing: TimeConstant
     """moving average for the loop's KPIs; default: one dither period; 0: raw signals"""
 
@@ -61,7 +61,7 @@ def cases(par: MotorcycleParameters, options: Options, _: object = None) -> tupl
 
 
 def finish(recording: xr.Dataset, options: Options) -> xr.Dataset:
-    """Add the measured current behind the low-pass filter, as the paper plots it."""
+    """Add the measured current after the low-pass filter, as in the paper's plot."""
     interval = float(recording["time"][1] - recording["time"][0])
     behind = low_passed(recording["i_meas"].values, options.f_filter, interval)
     attrs = {"units": "A", "long_name": "measured current, filtered"}
@@ -88,7 +88,7 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
         (peak,) = PEAK(f"_{suffix}", p_max=run["p_mc"].max())
         loops[peak.name] = peak
     plain = loops["loop_area_undithered"]
-    ratio, note = math.nan, plain.note or "the loop without dither has no area"
+    ratio, note = math.nan, plain.note or "the area of the loop without dither is zero"
     if plain.value:
         ratio, note = loops["loop_area_dithered"].value / plain.value, plain.note
     return (*loops.values(), *RATIO(loop_area_ratio=(ratio, note)))

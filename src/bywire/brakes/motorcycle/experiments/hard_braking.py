@@ -21,9 +21,9 @@ class Options(ParameterSet):
     p_to: Pressure
     """pressure demand after the step"""
     duration: Duration
-    """time recorded after the step"""
+    """recorded time after the step"""
     settle: TimeConstant
-    """time before the step in which dither and loop settle"""
+    """time before the step during which dither and loop settle"""
     smoothing: TimeConstant
     """moving average for the step's KPIs; default: one dither period; 0: raw pressure"""
 
@@ -58,7 +58,7 @@ def step(options: Options) -> step_response.Setting:
 
 
 def judged(options: Options) -> dict[str, Any]:
-    """Return the families of key figures: the step of the pressure p_mc, effort, occupation."""
+    """Return the families of key figures: step of the pressure p_mc, effort, utilization."""
     return {
         "step_response": step(options),
         "effort": effort.Setting(),

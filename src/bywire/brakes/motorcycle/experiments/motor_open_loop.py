@@ -39,7 +39,7 @@ class Options(ParameterSet):
     source: Literal["current", "voltage", "current-loop", "current-direct", "pressure"]
     """driven quantity: an ideal source, or a demand to the ECU; -direct bypasses the dither"""
     add_holding: bool
-    """add the current, voltage or pressure that holds p_start to the stimulus"""
+    """whether to add the current, voltage or pressure that holds p_start to the stimulus"""
     p_start: Annotated[float, Unit("Pa", 2e6), Field(ge=0, allow_inf_nan=False)]
     """pressure of the equilibrium at which the run starts"""
     duration: Duration
@@ -47,7 +47,7 @@ class Options(ParameterSet):
     record: Duration
     """recording interval"""
     settle: TimeConstant
-    """time before t = 0, at the stimulus' first value"""
+    """time before t = 0, at the first value of the stimulus"""
 
 
 def cases(
@@ -59,6 +59,7 @@ def cases(
             "motor-open-loop needs a [stimulus] section: kind = step, ramp, sine, chirp, multisine "
             "or table, with its parameters",
             name="stimulus",
+            valid="kind = step, ramp, sine, chirp, multisine or table",
         )
     mode, name, unit = _SOURCES[options.source]
     i = holding_current(options.p_start, par)
@@ -89,7 +90,7 @@ def without(options: Options) -> tuple[str, ...]:
 
 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
-    """Return effort and occupation."""
+    """Return effort and utilization."""
     run = recordings["run"]
     kpis = evaluate("effort", run, effort.Setting())
     kpis |= evaluate("occupation", run, occupation.Setting())
@@ -101,7 +102,7 @@ EXPERIMENT = Experiment(
     name="motor-open-loop",
     formerly="open-loop",
     assembly="motorcycle-brake",
-    summary="any stimulus, as ideal current or voltage, or as a demand to the ECU",
+    summary="any stimulus as an ideal current or voltage, or as a demand to the ECU",
     options=Options,
     defaults=Options(
         source="current", add_holding=False, p_start=0.0, duration=1.0, record=1e-3, settle=0.0

@@ -35,7 +35,7 @@ class Options(ParameterSet):
     trace: str
     """measurement file with time and pedal, force or pressure; empty: built-in ride"""
     trace_map: str
-    """mapping file that names pedal, force or pressure; empty if the columns have these names"""
+    """mapping file for pedal, force or pressure; empty if the columns have these names"""
     max_gap: TimeConstant
     """longest gap in the file that bywire interpolates linearly"""
     smoothing: TimeConstant
@@ -63,7 +63,7 @@ def followed(options: Options) -> tracking.Setting:
 
 
 def judged(options: Options) -> dict[str, Any]:
-    """Return the families of key figures: how well the pressure follows, effort, occupation."""
+    """Return the families of key figures: tracking of the pressure, effort, utilization."""
     return {
         "tracking": followed(options),
         "effort": effort.Setting(),
@@ -87,7 +87,7 @@ def _ride(par: MotorcycleParameters, options: Options) -> xr.Dataset:
             raise FileError(
                 f"{options.trace}: none of its columns {quoted(', '.join(names))} is pedal [mm], "
                 "force [N] or pressure [bar]: rename the column that the brake should follow, or "
-                "name it in a mapping file, options.trace_map",
+                "add it to a mapping file, options.trace_map",
                 name="options.trace",
                 value=quoted(", ".join(names)),
                 valid="pedal [mm], force [N] or pressure [bar]",
@@ -110,8 +110,8 @@ def _require_within_stop(ride: xr.Dataset, par: MotorcycleParameters, source: st
         largest = float(ride[name].max()) if name in ride else 0.0
         if largest > limit * (1.0 + 1e-9):
             raise ParameterError(
-                f"{source}: {name} goes up to {shown(largest, unit)}, but the pedal meets its stop "
-                f"at {shown(limit, unit)} (pedal.x_max = {shown(x_max, 'm')}): change one of them",
+                f"{source}: {name} reaches {shown(largest, unit)}, but the pedal stop is at "
+                f"{shown(limit, unit)} (pedal.x_max = {shown(x_max, 'm')}): change one of them",
                 name=name,
                 value=shown(largest, unit),
                 valid=shown(limit, unit),
@@ -126,7 +126,7 @@ def _set_point(force: float, par: MotorcycleParameters) -> float:
 EXPERIMENT = Experiment(
     name="pedal-tracking",
     assembly="motorcycle-brake",
-    summary="pressure follows the rider's pedal, built in or from a measurement file (Fig. 7b)",
+    summary="pressure follows a built-in or measured trace of the rider's pedal (Fig. 7b)",
     options=Options,
     defaults=Options(trace="", trace_map="", max_gap=0.1, smoothing=0.02),
     cases=cases,

@@ -18,9 +18,9 @@ from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Pressure, TimeConstant
 
 ENERGIES = Figures(
-    energy_stored=("J", "Stored energy released."),
+    energy_stored=("J", "Released stored energy."),
     energy_returned=("J", "Net work that the gear returns to the motor shaft."),
-    energy_fed_back=("J", "Electrical energy fed back into the battery, from recorded samples."),
+    energy_fed_back=("J", "Electrical energy returned to the battery, from recorded samples."),
     energy_gear=("J", "Loss of gear and screw; negative if the paper's law creates energy."),
 )
 
@@ -31,22 +31,22 @@ class Options(ParameterSet):
     p_from: Pressure
     """pressure at the start of the release"""
     how: Literal["controlled", "current-off"]
-    """pressure demand ramped to zero in closed loop, or current demand cut to zero"""
+    """ramp of the pressure demand to zero in closed loop, or step of the current demand to zero"""
     t_ramp: TimeConstant
     """time for the pressure demand to fall to zero (how = "controlled")"""
     p_empty: Pressure
     """caliper pressure below which the brake counts as empty"""
     duration: Duration
-    """time recorded after the release begins"""
+    """recorded time after the release begins"""
     settle: TimeConstant
-    """time before the release in which dither and loop settle"""
+    """time before the release during which dither and loop settle"""
 
 
 def cases(par: MotorcycleParameters, options: Options, _: object = None) -> tuple[Case, ...]:
     """Return the single run."""
     keep = min(options.settle, 0.1)
     if options.how == "current-off":
-        # No dither: an ECU that has switched its current off does not shake the piston.
+        # Without dither, since an ECU with its current off does not dither the piston.
         return (
             case_from_rest(
                 "run",
@@ -102,7 +102,7 @@ EXPERIMENT = Experiment(
     name="pressure-release",
     formerly="release",
     assembly="motorcycle-brake",
-    summary="release from {p_from}: time to empty, residual pressure, energy returned",
+    summary="release from {p_from}: time to empty, residual pressure, returned energy",
     options=Options,
     defaults=Options(
         p_from=37e5, how="controlled", t_ramp=0.2, p_empty=0.5e5, duration=1.5, settle=1.0

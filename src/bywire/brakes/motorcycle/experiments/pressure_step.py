@@ -20,13 +20,13 @@ class Options(ParameterSet):
     p_start: Pressure
     """pressure before the step"""
     start: Literal["settled", "frictionless"]
-    """what p_start is: the settled pressure under dither, or the frictionless equilibrium"""
+    """meaning of p_start: settled pressure under dither, or frictionless equilibrium"""
     i_step: Current
     """height of the step of the current demand"""
     duration: Duration
-    """time recorded after the step"""
+    """recorded time after the step"""
     settle: TimeConstant
-    """time before the step in which the dithered pressure settles"""
+    """time before the step during which the dithered pressure settles"""
     smoothing: TimeConstant
     """moving average for the step's KPIs; default: one dither period; 0: raw pressure"""
 
@@ -81,7 +81,7 @@ def settings(options: Options) -> dict[str, Any]:
 EXPERIMENT = Experiment(
     name="pressure-step",
     assembly="motorcycle-brake",
-    summary="current step of {i_step} at {p_start} from equilibrium, as in Fig. 6",
+    summary="current step of {i_step} from equilibrium at {p_start}, as in Fig. 6",
     options=Options,
     defaults=Options(
         p_start=25e5, start="settled", i_step=0.35, duration=4.0, settle=3.0, smoothing=0.02

@@ -287,15 +287,15 @@ class Options(ParameterSet):
     """Regions, the two steps of the fit, and the synthetic experiment."""
 
     p_1: Pressure
-    """border between low and medium pressure"""
+    """boundary between low and medium pressure"""
     p_2: Pressure
-    """border between medium and high pressure"""
+    """boundary between medium and high pressure"""
     model: Literal["eq-22", "eq-21"]
     """with (eq-22) or without (eq-21) a slow pair of a zero and a pole, in either order"""
     fit: Literal["two-step", "joint"]
     """alternate K, tau_L, T_L from steps and T1, T2 from sines, or fit all to all records"""
     turns: Annotated[int, Unit("1", 20), Field(ge=1, le=200)]
-    """largest number of turns of the two steps; the paper takes 1"""
+    """largest number of turns of the two steps; the paper uses 1"""
     plant: Literal["brake", "eq-22"]
     """synthetic: the whole brake with friction, or a linear one, exactly eq. (22)"""
     p_low: Pressure

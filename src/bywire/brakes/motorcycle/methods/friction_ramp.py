@@ -285,7 +285,7 @@ class Options(ParameterSet):
 def identify(
     data: xr.Dataset, par: MotorcycleParameters, options: Options, effort: Effort
 ) -> Identified:
-    """Return the friction parameters, T_pr included.
+    """Return the friction parameters, including T_pr.
 
     Parameters
     ----------
@@ -383,7 +383,7 @@ def _fitted(
     if not any(name.startswith("seal.") for name in best.names):
         raise ParameterError(
             "the slips do not determine the seal friction with this current: check the units of "
-            "i and p_mc, and the parameters taken as known: motor.K_e, gear and cylinder",
+            "i and p_mc, and the known parameters motor.K_e, gear and cylinder",
             name="i",
         )
     return led, best

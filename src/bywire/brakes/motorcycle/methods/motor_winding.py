@@ -164,6 +164,6 @@ METHOD = Method(
     unknowns=_NAMES,
     several=True,
     simulated=tuple(Options.model_fields),
-    bench_note="the record is from a voltage source, with the rotor locked or at a set speed; "
-    "the bench's shaft is free and cannot replay it: use only the values",
+    bench_note="the record comes from a voltage source, with the rotor locked or at a set speed. "
+    "The bench's shaft is free and cannot replay it: use only the values",
 )

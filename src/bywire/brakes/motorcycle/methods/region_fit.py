@@ -345,7 +345,7 @@ def _sines(label: str, i: Array, p: Array, interval: float, f_dit: float | None)
     if not spectrum.size:
         raise ParameterError(
             f"the current of record {label} has neither a step nor a sine from {BAND[0]:g} to "
-            f"{BAND[1]:g} Hz, so it cannot determine anything: apply a step or a sine to the "
+            f"{BAND[1]:g} Hz, so it does not determine any unknown: apply a step or a sine to the "
             "current demand",
             name="i",
         )
@@ -813,7 +813,7 @@ def fit(
     joint
         Fit all unknowns to all data; otherwise K, tau_L and T_L to steps, T1 and T2 to sines.
     turns
-        Largest number of turns of the two steps; the paper takes one.
+        Largest number of turns of the two steps; the paper uses one.
     pair
         With a slow pair, eq. (22); otherwise tau_L = T_L, eq. (21).
 
@@ -864,7 +864,7 @@ def _require(region: Region, joint: bool) -> None:
     if not region.steps:
         raise ParameterError(
             f"no step response at {where}, so K, tau_L and T_L cannot be estimated: apply a step "
-            "of the current demand from rest there, and record 4 s or more",
+            "of the current demand from rest at that pressure, and record 4 s or more",
             name=where,
         )
     for step in region.steps:
@@ -873,7 +873,7 @@ def _require(region: Region, joint: bool) -> None:
             raise ParameterError(
                 f"the pressure hardly responds to the step at {where} (it changes by "
                 f"{change / 1e5:.2g} bar, its noise is {step.sigma / 1e5:.2g} bar), so none "
-                f"of {', '.join(NAMES)} can be estimated: take a larger step, with dither",
+                f"of {', '.join(NAMES)} can be estimated: use a larger step, with dither",
                 name=where,
                 value=f"{change / 1e5:.2g} bar",
             )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from bywire.brakes.motorcycle.paper import fig3, fig5, fig6, fig7, gear, table3, table4, tables_1_2
+from bywire.brakes.motorcycle.paper import control, friction, gear, transfer_functions
 from bywire.brakes.motorcycle.paper.facts import ALLOWANCES, CITATION, FACTS
 from bywire.brakes.motorcycle.paper.runs import MAIN, Runs
 from bywire.reproduction.item import Item, Quoted, RootCause, causes_of
@@ -28,6 +28,7 @@ def _tables(q: Quoted) -> RootCause:
         f"current loop's bandwidth falls from {q.stated('fig3.bandwidth.free')} to "
         f"{q('fig3.bandwidth.free@table1')}.",
         ("table2.*@table1", "fig3.bandwidth.free@table1"),
+        is_within_source=True,
     )
 
 
@@ -39,6 +40,7 @@ def _gear(q: Quoted) -> RootCause:
         f"({q.share(paper)}; with Table 1 {q.share(f'{paper}@table1')}), where a loss "
         f"that depends on direction returns {q(ours)} ({q.share(ours)}).",
         ("gear.returned.paper*",),
+        is_within_source=True,
     )
 
 
@@ -52,6 +54,7 @@ def _gain(q: Quoted) -> RootCause:
         f"Fig. 5's ramp would reach {q('table4.medium.p_ramp')}, but its axis "
         f"ends at {q.stated('table4.medium.p_ramp')}.",
         ("table4.*.K", "table4.*.K@table1"),
+        is_within_source=True,
     )
 
 
@@ -86,6 +89,7 @@ def _slow_pair(q: Quoted) -> RootCause:
         f"{q('table4.medium.identified.zero')} and "
         f"{q('table4.medium.identified.T_L')}.",
         ("table4.air", "table4.*.identified.zero", "table4.*.identified.T_L"),
+        is_within_source=True,
     )
 
 
@@ -110,23 +114,24 @@ def _single(q: Quoted) -> RootCause:
         f"of Figs. 4 and 5 are too short for Table 3's friction and dither ({q(top)} of "
         f"{q.stated(top)}, {q(end)} of {q.stated(end)}, {q(ripple)} of {q.stated(ripple)}).",
         ("laminar.*", "section3.mu", "eq19.*", "fig4.*", "fig5.p_max.dither", "fig5.i_max.*"),
+        is_within_source=True,
     )
 
 
 # --- The reproduction
 
 PARTS = {
-    "Table 1": tables_1_2.table1,
-    "Table 2": tables_1_2.table2,
-    "repair of Table 1": tables_1_2.repair,
-    "Table 3, Fig. 4": table3.part,
-    "Fig. 3": fig3.part,
-    "Fig. 5": fig5.part,
-    "waveforms": fig5.waveforms,
-    "Table 4": table4.part,
-    "Fig. 6": fig6.part,
-    "Fig. 7": fig7.part,
-    "requirements": fig7.requirements,
+    "Table 1": transfer_functions.table1,
+    "Table 2": transfer_functions.table2,
+    "repair of Table 1": transfer_functions.repair,
+    "Table 3, Fig. 4": friction.table3,
+    "Fig. 3": control.fig3,
+    "Fig. 5": friction.fig5,
+    "waveforms": friction.waveforms,
+    "Table 4": transfer_functions.table4,
+    "Fig. 6": transfer_functions.fig6,
+    "Fig. 7": control.fig7,
+    "requirements": control.requirements,
     "gear": gear.part,
 }
 NAMES = {

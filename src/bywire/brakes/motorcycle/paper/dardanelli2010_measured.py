@@ -6,19 +6,17 @@ from collections.abc import Mapping
 from functools import cache
 
 from bywire.brakes.motorcycle.paper.facts import CITATION, FACTS
-from bywire.brakes.motorcycle.paper.measured.estimation import (
+from bywire.brakes.motorcycle.paper.measured import (
     FREE,
     HELD,
     PRIOR,
-    Appraisal,
-    appraised,
-    predicted,
-)
-from bywire.brakes.motorcycle.paper.measured.statements import (
     STATEMENTS,
+    Appraisal,
     Statement,
     allowances,
+    appraised,
     overshoots,
+    predicted,
     stuck_at,
 )
 from bywire.brakes.motorcycle.paper.runs import MAIN, PRINTED, Runs, parameters
@@ -232,6 +230,7 @@ def _slow_pair(q: Quoted) -> RootCause:
         f"{q('step.small.overshoot')} of a step of {_SMALL:g} A from 25 bar, and "
         f"{q('step.overshoot')} of a step seven times as high.",
         ("table4.*.overshoot*",),
+        is_within_source=True,
     )
 
 
@@ -243,6 +242,7 @@ def _break_away(q: Quoted) -> RootCause:
         "with Table 3's value the step of Fig. 6 overshoots by "
         f"{q('step.overshoot_by_table3')} instead of {q('step.overshoot')}.",
         (name,),
+        is_within_source=True,
     )
 
 
@@ -262,6 +262,7 @@ def _ramp(q: Quoted) -> RootCause:
         f"{q('fig5.p_max')}, where the figure's axis allows {q.stated('fig5.p_max')} "
         "within half a label.",
         ("fig5.p_max*",),
+        is_within_source=True,
     )
 
 
@@ -271,6 +272,7 @@ def _ripple(q: Quoted) -> RootCause:
         f"low-pass the measured current reaches {q('fig5.i_max')} instead of "
         f"{q.stated('fig5.i_max')}.",
         ("fig5.i_max*",),
+        is_within_source=True,
     )
 
 

@@ -2,10 +2,10 @@
 
 ``dardanelli2010-measured`` is the brake that best explains the paper's measurements. Its free
 parameters are estimated together from Table 4, Figs. 5 to 7 and the friction of Table 3, by
-``paper.measured.estimation``: six starts, then random steps from the best one, then ``settled``.
+``paper.measured``: six starts, then random steps from the best one, then ``settled``.
 ``docs/identification.md`` describes the procedure and the misfits, and
-``bywire reproduce dardanelli2010-measured`` lists which statements the set explains. A gear without
-losses and a piston without damping lie at their bounds. The other parameters are those of Table 1.
+``bywire reproduce dardanelli2010-measured`` lists which statements the set explains. The gear's
+loss and the piston's damping are at their bound zero. The other parameters come from Table 1.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _TABLE1 = next(entry for entry in _PUBLISHED if entry.name == "dardanelli2010-ta
 # --- The set estimated from the paper's measurements
 
 ESTIMATED = SourceFile(Path(__file__).with_name("dardanelli2010_measured.toml")).values()
-UNDETERMINED = ("master_cylinder.s_mc", "fluid.V_air", "seal.T_pr", "seal.mu_T", "pipeline.d_pl")
+UNDETERMINED = ("master_cylinder.s_mc", "fluid.V_air", "seal.T_pr")
 _AS_TABLE1 = "as in dardanelli2010-table1: free in the estimation, but no statement determines it"
 _ASSUMED = "the ECU assumes the estimated friction"
 _SEAL: dict[str, Formula] = {

@@ -1,7 +1,7 @@
 """Sizing of the motorcycle actuator: gear ratio and motor power for a bandwidth and a pressure.
 
-The pressure is a given function of time. Flow, travel, torque, current and voltage follow from the
-equations of the plant without simulation.
+The pressure is a specified function of time. Flow, travel, torque, current and voltage follow from
+the plant's equations without simulation.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from bywire.brakes.motorcycle.experiments import hard_braking
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.trim import highest_pressure, travel_at
 from bywire.core.errors import not_valid
-from bywire.core.parameters import ParameterSet
+from bywire.core.parameters import ParameterSet, RuleError
 from bywire.core.quantities import Frequency, GearRatio, Pressure, Unit
 from bywire.core.typing import Array, Progress
 from bywire.data.labeled import labeled
@@ -248,7 +248,7 @@ def sine_figures(label: str, par: Par, top: float, amplitude: float, f: float) -
     note = "" if abs(reached / amplitude - 1.0) < 3 * _CLOSE else "the amplitude is not reached"
     text = "on the bench with dither off, relative to the calculation"
     return [
-        Kpi(f"{label}_bench_amplitude", reached, "Pa", "Amplitude of the pressure reached.", note),
+        Kpi(f"{label}_bench_amplitude", reached, "Pa", "Reached amplitude of the pressure.", note),
         Kpi(
             f"{label}_bench_current",
             float(run["i"].max()) / float(calculated.current.max()),
@@ -334,15 +334,17 @@ def _recorded(case: Case) -> xr.Dataset:
 Count = Annotated[int, Unit("1", 41.0), Field(ge=3, le=401)]
 
 ASSUMPTIONS = (
-    "The gear ratio varies; motor, rotor inertia, battery, pistons, fluid and efficiency do not.",
-    "The seals' friction is a force at the piston: at the shaft it grows with the gear ratio.",
+    "The gear ratio varies; motor, rotor inertia, battery, pistons, fluid and efficiency are "
+    "constant.",
+    "The seals' friction is a force at the piston, so at the shaft it grows with the gear ratio.",
     "The pressure follows its demand exactly: flow through the pressure-volume curves of chamber, "
     "pipeline and caliper gives the speed; pressure, friction, efficiency and inertia the torque.",
-    "Compliances are those at the middle of the course; the winding's inductance is neglected.",
+    "Compliances are evaluated at the middle of the pressure range. The calculation neglects the "
+    "winding's inductance.",
     "The seals slide; the current that breaks them away at the peak pressure is also required.",
-    "The calculation neglects dither; its current at the peak pressure is listed.",
+    "The calculation neglects dither, but lists its current at the peak pressure.",
     "Limits: the pressure controller's current limit, and the bridge's voltage at that current.",
-    "On the bench the pressure controller's gains grow with the gear ratio; they are not tuned.",
+    "On the bench, the pressure controller's gains grow with the gear ratio without other tuning.",
 )
 
 
@@ -377,9 +379,11 @@ class Options(ParameterSet):
         ratios, bandwidths = ("k_g_min", "k_g_max", "m/rad"), ("f_min", "f_max", "Hz")
         require_ranges(self, (ratios, bandwidths, ("p_from", "p_peak", "Pa")))
         if not 2.0 * self.amplitude <= self.p_peak:
-            raise ValueError(
-                f"amplitude = {self.amplitude / 1e5:g} bar must be <= half of p_peak = "
-                f"{self.p_peak / 1e5:g} bar: pressures cannot fall below zero"
+            raise RuleError(
+                "amplitude",
+                f"{self.amplitude / 1e5:g} bar",
+                f"<= half of p_peak = {self.p_peak / 1e5:g} bar",
+                "pressures cannot fall below zero",
             )
         return self
 
@@ -424,7 +428,7 @@ def compute(par: Par, options: Options, progress: Progress) -> Findings:
             "p_peak",
             f"{options.p_peak / 1e5:g} bar",
             f"< {highest / 1e5:.4g} bar",
-            "where the piston meets its end stop: reduce it, or move the stop "
+            "where the piston meets its end stop. Reduce it, or move the stop "
             "(master_cylinder.x_end)",
         )
     data = _mapped(
@@ -437,7 +441,7 @@ def compute(par: Par, options: Options, progress: Progress) -> Findings:
     chosen = geared(par, k_best)
     f, power = options.bandwidth, float(_electrical(chosen, options).max())
     kpis = [
-        Kpi("optimum_k_g", k_best, "m/rad", "Gear ratio that needs the least electrical power."),
+        Kpi("optimum_k_g", k_best, "m/rad", "Gear ratio with the lowest electrical power."),
         *_figures("optimum", chosen, options),
         Kpi("given_k_g", par.gear.k_g, "m/rad", "Gear ratio of the parameter set."),
         *_figures("given", par, options),
@@ -450,7 +454,7 @@ def compute(par: Par, options: Options, progress: Progress) -> Findings:
     progress("bench", 1.0)
     marks = (Mark("optimum", k_best, f), Mark("given gear ratio", par.gear.k_g, f))
     limits = {"current limit": ("current_share", 1.0), "voltage limit": ("voltage_share", 1.0)}
-    caption = f"Electrical power of the motor for a {options.demand}: {power:.3g} W at the optimum."
+    caption = f"Electrical motor power for a {options.demand}: {power:.3g} W at the optimum."
     maps = {"power": Map("electrical", "k_g", "frequency", caption, marks, limits)}
     return Findings(data, tuple(kpis), ASSUMPTIONS, maps, (_cut(par, options),), warnings)
 
@@ -485,7 +489,7 @@ def _electrical(par: Par, options: Options) -> Array:
 
 
 def _best_ratio(par: Par, options: Options) -> float:
-    """Return the gear ratio [m/rad] of least electrical power."""
+    """Return the gear ratio [m/rad] with the lowest electrical power."""
     from scipy.optimize import minimize_scalar
 
     def power(z: float) -> float:
@@ -515,11 +519,11 @@ def fastest(par: Par, options: Options, demand: str) -> float:
 def _figures(label: str, par: Par, options: Options) -> list[Kpi]:
     sizes = _at(par, options, options.bandwidth)
     texts = {
-        "electrical": "Largest electrical power of the motor, copper loss included.",
-        "mechanical": "Largest mechanical power: the motor's rating.",
-        "torque": "Largest torque, breakaway at the peak pressure included.",
+        "electrical": "Largest electrical motor power, including copper loss.",
+        "mechanical": "Largest mechanical power, which rates the motor.",
+        "torque": "Largest torque, including breakaway at the peak pressure.",
         "speed": "Largest speed.",
-        "current": "Largest current, breakaway at the peak pressure included.",
+        "current": "Largest current, including breakaway at the peak pressure.",
         "inertia_share": "Largest torque of rotor and piston inertia over the largest torque.",
         "voltage_share": "Largest voltage over the bridge's voltage at that current.",
     }
@@ -533,7 +537,12 @@ def _figures(label: str, par: Par, options: Options) -> list[Kpi]:
             Kpi(f"{label}_{name}", sizes[name], SIZES[name][0], text)
             for name, text in texts.items()
         ),
-        Kpi(f"{label}_copper", float(copper), "W", "Mean copper loss over the course."),
+        Kpi(
+            f"{label}_copper",
+            float(copper),
+            "W",
+            "Mean copper loss over the demanded pressure's course.",
+        ),
         Kpi(
             f"{label}_dither_current",
             A_dit * par.ecu.dither.gain,
@@ -612,6 +621,6 @@ STUDY = Study(
     compute=compute,
     ruled={
         "drive.mode": "the study demands pressures",
-        "pedal": "the study demands pressures without it",
+        "pedal": "the study demands pressures without the pedal",
     },
 )

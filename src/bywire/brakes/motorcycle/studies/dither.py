@@ -1,4 +1,4 @@
-"""Dither of the motorcycle brake: the cheapest amplitude and frequency that overcome friction."""
+"""Dither for the motorcycle brake: cheapest amplitude and frequency that overcome friction."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from bywire.brakes.motorcycle.dither import (
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.trim import highest_pressure
 from bywire.core.errors import InputError, RunError, not_valid
-from bywire.core.parameters import ParameterSet
+from bywire.core.parameters import ParameterSet, RuleError
 from bywire.core.quantities import Duration, Factor, Fraction, Frequency, Pressure, Unit
 from bywire.core.typing import Progress
 from bywire.synthesis.study import Cut, Findings, Map, Mark, Study, require_ranges, variable
@@ -46,14 +46,14 @@ Node = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Pressures = Annotated[tuple[Node, ...], Unit("Pa", 2e6), Field(min_length=1, max_length=20)]
 
 ASSUMPTIONS = (
-    "Each dither has a trial on the nonlinear brake with the pressure loop closed, which takes the "
-    "pressure to the set point from below and from above.",
+    "Each dither has a trial on the nonlinear brake with a closed pressure loop, which approaches "
+    "the set point from below and from above.",
     "The amplitude is the gain times the ECU's eqs. (18) and (19), so it follows the pressure.",
     "Friction counts as overcome when the share of the time stuck and the remaining dead band "
     "(mean current from above minus mean current from below, over the band in which the piston may "
     "rest) stay within their limits, at this gain and at all higher ones.",
-    "The price is the copper power in excess of that of the mean current, averaged over the "
-    "pressures. Figures between two gains of the grid are interpolated.",
+    "The cost is the copper power in excess of the mean current's, averaged over the pressures. "
+    "Figures between two gains of the grid are interpolated.",
     "Periods are even numbers of the ECU's sample times.",
     "Wear, noise and heat of motor and seals are neglected.",
 )
@@ -87,18 +87,21 @@ class Options(ParameterSet):
     settle: Duration
     """time for the pressure loop to settle"""
     compare: Literal["waveforms", "none"]
-    """compare waveforms and places of the low-pass filter"""
+    """whether to compare waveforms and places of the low-pass filter"""
 
     @model_validator(mode="after")
     def _ordered(self) -> Options:
         require_ranges(self, (("gain_min", "gain_max", "1"), ("f_min", "f_max", "Hz")))
         if any(not a < b for a, b in pairwise(self.pressures)):
-            raise ValueError("pressures must increase, without repetition")
+            shown = ", ".join(f"{p / 1e5:g} bar" for p in self.pressures)
+            raise RuleError("pressures", shown, "increasing, without repetition")
         lowest = min(self.pressures)
         if not self.approach < lowest:
-            raise ValueError(
-                f"approach = {self.approach / 1e5:g} bar must be below the lowest of the pressures,"
-                f" {lowest / 1e5:g} bar: the approach from below starts there"
+            raise RuleError(
+                "approach",
+                f"{self.approach / 1e5:g} bar",
+                f"below the lowest of the pressures, {lowest / 1e5:g} bar",
+                "the approach from below starts there",
             )
         return self
 
@@ -255,7 +258,7 @@ def _require_reachable(par: Par, options: Options) -> None:
             "pressures",
             f"{largest / 1e5:g} bar",
             f"< {(highest - options.approach) / 1e5:.4g} bar",
-            f"because the piston meets its end stop at {highest / 1e5:.4g} bar and must be free "
+            f"since the piston meets its end stop at {highest / 1e5:.4g} bar and must be free "
             f"when it approaches from {options.approach / 1e5:g} bar above",
         )
 
@@ -293,7 +296,7 @@ def _kpis(
                 f"{label}_area_ratio",
                 ratio,
                 "1",
-                "Loop area on the ramp of eq. (17) over the area without dither, delay included.",
+                "Loop area on the ramp of eq. (17) over the area without dither, including delay.",
             )
         )
         kpis += _plant(par, label, gain, f, grid.pressures[len(grid.pressures) // 2])
@@ -354,7 +357,7 @@ def _maps(
 
 
 def _limits(grid: Grid, each: list[Candidate], best: int | None) -> tuple[str, ...]:
-    """Return the limits that decide."""
+    """Return the decisive limits."""
     if best is None:
         return ()
     chosen = each[best]
@@ -383,14 +386,14 @@ def _warnings(
     if best in (0, len(each) - 1):
         texts.append(f"the optimum is at the edge of the frequencies, {f:g} Hz: widen the range")
     if math.isclose(each[best].gain, options.gain_min):
-        texts.append(f"the smallest gain, {options.gain_min:g}, is enough: widen the range")
+        texts.append(f"the smallest gain, {options.gain_min:g}, is sufficient: widen the range")
     return tuple(texts)
 
 
 STUDY = Study(
     name="dither",
     assembly="motorcycle-brake",
-    summary="amplitude and frequency of the cheapest dither that overcomes the friction",
+    summary="amplitude and frequency of the cheapest dither that overcomes friction",
     options=Options,
     defaults=DEFAULTS,
     compute=compute,

@@ -1,4 +1,4 @@
-"""Drag of the released rear brake while the vehicle rolls on: a caliper that sticks."""
+"""Drag of the released rear brake on a rolling vehicle, due to a sticking caliper."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ _LEFT = 0.1  # share of the torque below which the brake counts as released
 _END = 0.1  # s: averaging window at the end
 
 FIGURES = Figures(
-    drag=("N*m", f"Mean torque that the rear brake holds in the last {_END:g} s."),
-    residual_pressure=("Pa", "Mean pressure at its pads in that time."),
+    drag=("N*m", f"Mean torque of the rear brake in the last {_END:g} s."),
+    residual_pressure=("Pa", "Mean pressure at its pads in the same time."),
     release_time=(
         "s",
-        f"Time from the release until the torque stays below {_LEFT:g} of its start.",
+        f"Time from the release until the torque stays below {_LEFT:g} of its initial value.",
     ),
 )
 _SIGNALS = ("T_r", "p_r")
@@ -34,15 +34,15 @@ class Options(ParameterSet):
     """The ride."""
 
     v_0: RidingSpeed
-    """speed at the start"""
+    """initial speed"""
     p_rear: Demand
-    """rear pressure that the rider demands from the start until the release"""
+    """rear pressure demand from the start until the release"""
     hold: Duration
     """time of the release"""
     surface: SurfaceName
     """surface of the road"""
     duration: Duration
-    """time recorded"""
+    """recorded time"""
 
 
 def cases(par: WholeRearParameters, options: Options, _: object = None) -> tuple[Case, ...]:
@@ -78,7 +78,7 @@ def left(run: xr.Dataset, options: Options) -> dict[str, float | tuple[float, st
     go = int(np.searchsorted(t, options.hold))
     above = np.flatnonzero(torque > _LEFT * torque[min(go, t.size - 1)])
     if not go or go >= t.size or not torque[go] > 0.0:
-        figures["release_time"] = (np.nan, "the brake was not applied, or never released")
+        figures["release_time"] = (np.nan, "the brake was not applied, or was not released")
     elif above[-1] + 1 == t.size:
         figures["release_time"] = (np.nan, "the brake is not released within the recorded time")
     else:
@@ -95,7 +95,7 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
 EXPERIMENT = Experiment(
     name="rear-drag",
     assembly="two-wheeler-whole-rear",
-    summary="the rider releases the whole rear brake at {v_0}: residual drag",
+    summary="residual drag after the rider releases the whole rear brake at {v_0}",
     options=Options,
     defaults=Options(v_0=20.0, p_rear=20e5, hold=0.5, surface="dry-asphalt", duration=2.0),
     cases=cases,

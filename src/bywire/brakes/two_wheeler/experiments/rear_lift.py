@@ -1,4 +1,4 @@
-"""Rear lift: the front brake alone lifts the rear wheel, with or without lift control."""
+"""Rear lift: the front brake lifts the rear wheel, with or without lift control."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from bywire.vehicle.ideal_stop import RidingSpeed
 
 FIGURES = Figures(
     undefined="the rear wheel stays on the ground",
-    lift_time=("s", "Time from zero until the rear wheel leaves the ground."),
+    lift_time=("s", "Time until the rear wheel leaves the ground."),
     lift_deceleration=("m/s**2", "Deceleration at the lift."),
     flat_limit=("m/s**2", "Static lift limit of the level body, g l_f/h."),
-    time_to_5_deg=("s", "Time from lift to a pitch of 5 degrees."),
+    time_to_5_deg=("s", "Time from lift to 5 degrees of pitch."),
     peak_pitch=("rad", "Largest pitch, nose down."),
-    air_time=("s", "Time in which the rear wheel is off the ground."),
+    air_time=("s", "Time during which the rear wheel is off the ground."),
 )
 _FIVE = math.radians(5.0)
 
@@ -31,15 +31,15 @@ class Options(ParameterSet):
     """The stop; slip control stays off, lift control is a parameter."""
 
     v_0: RidingSpeed
-    """speed at the start"""
+    """initial speed"""
     p_front: Demand
-    """front pressure that the rider demands"""
+    """front pressure demand"""
     p_rate: PressureRate
-    """build-up rate of the front pressure; too fast, the wheel locks before it is loaded"""
+    """build-up rate of the front pressure; if too fast, the wheel locks before it is loaded"""
     grip: Factor
-    """factor on the road's adhesion: sport tyres hold more than the car tyres of the surfaces"""
+    """factor on the road's adhesion: sport tyres have more than the surfaces' car tyres"""
     duration: Duration
-    """time recorded"""
+    """recorded time"""
 
 
 def cases(par: TwoWheelerParameters, options: Options, _: object = None) -> tuple[Case, ...]:
@@ -65,7 +65,9 @@ def _lift(run: xr.Dataset, off: np.ndarray) -> dict[str, float | tuple[float, st
     t, a, phi = (run[name].values for name in ("time", "a", "phi"))
     k = int(np.argmax(off))
     far = np.flatnonzero(phi > _FIVE)
-    reached = float(t[far[0]] - t[k]) if far.size else (math.nan, "5 degrees are not reached")
+    reached = (
+        float(t[far[0]] - t[k]) if far.size else (math.nan, "the pitch does not reach 5 degrees")
+    )
     return {
         "lift_time": float(t[k]),
         "lift_deceleration": float(a[k]),
@@ -78,7 +80,7 @@ def _lift(run: xr.Dataset, off: np.ndarray) -> dict[str, float | tuple[float, st
 EXPERIMENT = Experiment(
     name="rear-lift",
     assembly="two-wheeler-by-wire",
-    summary="front brake alone from {v_0}, {p_front}; lift control is a parameter",
+    summary="only the front brake, {p_front}, from {v_0}; lift control is a parameter",
     options=Options,
     defaults=Options(v_0=30.0, p_front=27e5, p_rate=60e5, grip=1.2, duration=1.5),
     cases=cases,

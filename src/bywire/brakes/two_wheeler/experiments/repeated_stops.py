@@ -1,9 +1,9 @@
 """Repeated stops: brakes that warm up from stop to stop, fade, and heat their fluid once parked.
 
-The stops run one after the other, each from the final temperatures of the previous one. Between
-them no brake acts and only the heat changes: three temperatures per wheel, over minutes. These
-stretches use the equations of the same element at the driven speed. A high-order method with error
-control integrates them without substeps of 20 us; the vehicle regains its speed instantly.
+Each stop starts from the final temperatures of the previous stop. Between the stops, no brake acts
+and only heat flows: three temperatures per wheel, over minutes. These stretches use the equations
+of the same element at the driven speed. A high-order method with error control integrates them
+without substeps of 20 us. The vehicle regains its speed instantly.
 """
 
 from __future__ import annotations
@@ -63,9 +63,9 @@ def braked(case: Case) -> dict[str, Array]:
     end = vehicle_stop.standstill(stop.time, stop["v"])
     if math.isnan(end):
         raise ParameterError(
-            f"{case.label} does not come to a standstill within {case.duration:g} s: its brakes "
-            "have faded, or the road is too slippery; set fewer options.stops, a longer "
-            "options.pause or a smaller options.deceleration",
+            f"{case.label} does not come to a standstill within {case.duration:g} s, since its "
+            "brakes have faded or the road is too slippery. Reduce options.stops or "
+            "options.deceleration, or increase options.pause",
             name=case.label,
             valid=f"{case.duration:g} s",
         )
@@ -112,10 +112,10 @@ def heat_of(rows: Any, end: str, k: int) -> disc_heat.State:
 
 
 def peak_time(t: Array, T: Array) -> float | tuple[float, str]:
-    """Return when a temperature is highest [s], by a parabola through its highest rows."""
+    """Return the time of the highest temperature [s], from a parabola through its highest rows."""
     k = int(T.argmax())
     if k + 1 == t.size:
-        return math.nan, "the fluid still warms up at the end: set a longer options.parked"
+        return math.nan, "the fluid is still warming up at the end: increase options.parked"
     if k == 0:
         return 0.0
     bend, slope, _ = np.polyfit(t[k - 1 : k + 2] - t[k], T[k - 1 : k + 2] - T[k], 2)
@@ -128,19 +128,19 @@ _USUAL, _LONGEST, _AFTER = 1.3, 3.0, 1.0  # times the length of a cold stop; s b
 _STOP = Signal("1", "number of the stop, 0 between stops")
 
 EACH = Figures(
-    disc_before=("K", "Temperature of the front discs when the stop begins."),
-    disc_after=("K", "Temperature of the front discs at standstill."),
+    disc_before=("K", "Front disc temperature at the start of the stop."),
+    disc_after=("K", "Front disc temperature at standstill."),
 )
 ALL = Figures(
     distance_first=("m", "Distance of the first stop."),
     distance_last=("m", "Distance of the last stop."),
     longer=("%", "Extra distance of the last stop, relative to the first."),
-    pads_last=("K", "Temperature of the front pads after the last stop."),
-    fluid_last=("K", "Temperature of the front fluid after the last stop."),
-    rear_disc_last=("K", "Temperature of the rear disc after the last stop."),
+    pads_last=("K", "Front pad temperature after the last stop."),
+    fluid_last=("K", "Front fluid temperature after the last stop."),
+    rear_disc_last=("K", "Rear disc temperature after the last stop."),
     pressure_cold=("Pa", "Front pressure needed for the deceleration with cold pads."),
-    pressure_hot=("Pa", "The same with the pad temperature after the last stop."),
-    fluid_peak=("K", "Highest temperature of the front fluid, parked time included."),
+    pressure_hot=("Pa", "Front pressure needed at the pad temperature after the last stop."),
+    fluid_peak=("K", "Highest front fluid temperature, including parked time."),
     fluid_peak_time=("s", "Time of this peak after the last standstill."),
 )
 
@@ -153,9 +153,9 @@ class Options(ParameterSet):
     """
 
     v_0: RidingSpeed
-    """speed at the start of each stop"""
+    """initial speed of each stop"""
     deceleration: Annotated[float, Unit("m/s**2", 8.0), Field(gt=0, allow_inf_nan=False)]
-    """deceleration from cold brakes alone, without drag and rolling resistance"""
+    """deceleration due to cold brakes, without drag and rolling resistance"""
     share: Weight
     """share of the braking force from the front brake"""
     hold: Literal["pressure", "deceleration"]
@@ -167,7 +167,7 @@ class Options(ParameterSet):
     v_pause: Annotated[float, Unit("m/s", 28.0), Field(ge=0, allow_inf_nan=False)]
     """speed during the driving time"""
     parked: Duration
-    """time parked after the last stop"""
+    """parked time after the last stop"""
 
 
 class _Stop(NamedTuple):

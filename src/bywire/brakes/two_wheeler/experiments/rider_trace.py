@@ -29,10 +29,10 @@ _REAR = (0.0, 3e5, 6e5, 6e5, 8e5, 20e5, 20e5)  # Pa
 _DRIVEN = {"p_f_set": _FRONT, "p_r_set": _REAR}
 
 FIGURES = Figures(
-    undefined="the rider demands nothing",
-    rider_share_front=("%", "Impulse of the front pressure over the impulse of the demand."),
-    rider_share_rear=("%", "The same for the rear brake."),
-    rider_share=("%", "The same for the torques of both brakes, until standstill."),
+    undefined="the rider's demand is zero",
+    rider_share_front=("%", "Time integral of the front pressure over that of its demand."),
+    rider_share_rear=("%", "Time integral of the rear pressure over that of its demand."),
+    rider_share=("%", "The same ratio for the torques of both brakes, until standstill."),
 )
 
 
@@ -40,11 +40,11 @@ class Options(ParameterSet):
     """The ride; demands are [stimulus.p_f_set] and [stimulus.p_r_set], or the built-in trace."""
 
     v_0: RidingSpeed
-    """speed at the start"""
+    """initial speed"""
     surface: SurfaceName
     """surface of the road"""
     duration: Duration
-    """time recorded"""
+    """recorded time"""
 
 
 def driven(_: Options) -> Mapping[str, str]:
@@ -70,7 +70,7 @@ def _course(values: tuple[float, ...]) -> Course:
 
 def _parameters_of(run: xr.Dataset) -> TwoWheelerParameters:
     """Return the parameters of a recording."""
-    par = getattr(run, "par", None)  # plain rows carry them
+    par = getattr(run, "par", None)  # an attribute of plain rows
     if isinstance(par, TwoWheelerParameters):
         return par
     return TwoWheelerParameters.model_validate_json(run.attrs["parameters"])
@@ -102,7 +102,7 @@ def _shares(run: xr.Dataset) -> dict[str, float]:
 EXPERIMENT = Experiment(
     name="rider-trace",
     assembly="two-wheeler-by-wire",
-    summary="stop from {v_0} on {surface} by a rider's trace, built in or given by stimuli",
+    summary="stop from {v_0} on {surface} with a rider's trace, built in or from stimuli",
     options=Options,
     defaults=Options(v_0=30.0, surface="wet-asphalt", duration=8.0),
     cases=cases,

@@ -28,17 +28,17 @@ class WalkingPaceOptions(ParameterSet):
     """Speed, demands and slope of both stops."""
 
     v_0: RidingSpeed
-    """speed at the start"""
+    """initial speed"""
     p_front: Demand
-    """front pressure that the rider demands"""
+    """front pressure demand"""
     p_rear: Demand
-    """rear pressure that the rider demands"""
+    """rear pressure demand"""
     gradient: Gradient
     """rise over run, uphill positive"""
 
 
 def _uncontrolled(gradient: float) -> dict[str, float | str]:
-    """Return the parameters of a road of a slope, and of an ECU without slip and lift control."""
+    """Return the parameters of a sloped road, and of an ECU without slip and lift control."""
     return {
         "vehicle.road.gradient": gradient,
         "vehicle.road.gradient_further": gradient,
@@ -55,14 +55,14 @@ _QUIET = 1e-3  # m/s
 SLOW_FIGURES = Figures(
     undefined="the vehicle does not stop in the recorded time",
     stopping_distance=("m", "Distance from time zero to the first standstill."),
-    stopping_time=("s", "Time from zero to the first standstill."),
+    stopping_time=("s", "Time until the first standstill."),
     rebound_speed=(
         "m/s",
-        "Largest speed backward after the standstill: the final jerk, from the tyres' elasticity.",
+        "Largest backward speed after the standstill, from the tyres' elasticity.",
     ),
-    rollback=("m", "Distance from the farthest place to the place at the end."),
+    rollback=("m", "Distance from the farthest position to the final position."),
     ringing_time=("s", f"Time from the standstill until the speed stays below {_QUIET:g} m/s."),
-    creep_speed=("m/s", f"Largest speed from {_CALM:g} s after the first standstill on."),
+    creep_speed=("m/s", f"Largest speed later than {_CALM:g} s after the first standstill."),
     creep=("m", "Distance in that time."),
 )
 
@@ -71,7 +71,7 @@ class SlowStopOptions(WalkingPaceOptions):
     """The stop, and the slope; slip and lift control are off."""
 
     duration: Duration
-    """time recorded"""
+    """recorded time"""
 
 
 def slow_stop(
@@ -96,9 +96,13 @@ def _rest(run: xr.Dataset, end: float) -> dict[str, float | tuple[float, str]]:
     t, x, v = (run[name].values for name in ("time", "x", "v"))
     after = t >= end
     loud = np.flatnonzero(np.abs(v) > _QUIET)[-1]
-    rings = float(t[loud]) - end if loud + 1 < t.size else (math.nan, "it does not come to rest")
+    rings = (
+        float(t[loud]) - end
+        if loud + 1 < t.size
+        else (math.nan, "the vehicle does not come to rest")
+    )
     late = t >= end + _CALM
-    short = (math.nan, f"less than {_CALM:g} s are recorded after the stop")
+    short = (math.nan, f"the recording ends less than {_CALM:g} s after the stop")
     return {
         "stopping_distance": float(np.interp(end, t, x)),
         "stopping_time": end,
@@ -129,17 +133,17 @@ _OPENED, _ROLLS = 0.5, 1.5  # s from the release to free rolling, and its longes
 
 HOLD_FIGURES = Figures(
     undefined="the vehicle does not stop before the release",
-    stopping_time=("s", "Time from zero to the first standstill."),
-    creep_speed=("m/s", f"Largest speed from {_CALM:g} s after it until the release."),
+    stopping_time=("s", "Time until the first standstill."),
+    creep_speed=("m/s", f"Largest speed from {_CALM:g} s after the standstill to the release."),
     creep=("m", "Distance in that time."),
-    held_time=("s", "That time."),
+    held_time=("s", "Length of that time."),
     roll_off=(
         "m/s**2",
-        f"Mean acceleration downhill, from {_OPENED:g} s after the release on.",
+        f"Mean downhill acceleration, later than {_OPENED:g} s after the release.",
     ),
     free_roll_off=(
         "m/s**2",
-        "The same in closed form: slope minus rolling resistance, with the inertia of the wheels.",
+        "Closed form of that acceleration: slope minus rolling resistance, with wheel inertia.",
     ),
 )
 
@@ -150,7 +154,7 @@ class SlopeHoldOptions(WalkingPaceOptions):
     t_release: Duration
     """time of the release"""
     duration: Duration
-    """time recorded"""
+    """recorded time"""
 
 
 def slope_hold(
@@ -160,7 +164,7 @@ def slope_hold(
     if not options.t_release < options.duration:
         release, end = f"{options.t_release:g} s", f"< options.duration = {options.duration:g} s"
         raise not_valid(
-            "options.t_release", release, end, "or nothing is recorded after the release"
+            "options.t_release", release, end, "so that the recording contains the release"
         )
 
     def held(p: float) -> Course:
@@ -176,8 +180,8 @@ def free_roll_off(par: VehicleParameters) -> float:
 
     .. math:: a = g (|\sin\gamma| - C_{rr} \cos\gamma) \frac{m}{m + \sum J/r^2},
 
-    at least zero: below the slope of the rolling resistance the vehicle stays. Both wheels carry
-    their share of the weight, and air drag is neglected.
+    at least zero: on a slope below the rolling resistance, the vehicle stays at rest. Both wheels
+    support their share of the weight. The formula neglects air drag.
     """
     body, front, rear = par.body, par.front_wheel, par.rear_wheel
     slope = road.slope(0.0, par.road)
@@ -200,7 +204,7 @@ def judge_slope_hold(recordings: Recordings, options: SlopeHoldOptions) -> tuple
         math.nan,
         f"the brakes hold for less than {_CALM:g} s" if stays else "the vehicle does not stop",
     )
-    brief = (math.nan, f"less than {_OPENED:g} s are recorded after the release")
+    brief = (math.nan, f"the recording ends less than {_OPENED:g} s after the release")
     return HOLD_FIGURES(
         stopping_time=end if stays else math.nan,
         creep_speed=float(np.max(np.abs(v[held]))) if held.any() else short,

@@ -1,7 +1,7 @@
 """Panic stops: the rider demands more than the road's adhesion, with or without slip control.
 
-The same demand on one surface, with a whole brake by wire at the rear wheel, with increasingly fast
-brakes, and across a change of the surface.
+The same demand applies on one surface, with a whole brake by wire at the rear wheel, with
+increasingly fast brakes, and across a surface change.
 """
 
 from __future__ import annotations
@@ -34,11 +34,11 @@ class PanicOptions(ParameterSet):
     """Speed and demands, the same in every panic stop."""
 
     v_0: RidingSpeed
-    """speed at the start"""
+    """initial speed"""
     p_front: Demand
-    """front pressure that the rider demands"""
+    """front pressure demand"""
     p_rear: Demand
-    """rear pressure that the rider demands"""
+    """rear pressure demand"""
 
 
 def _demands(options: PanicOptions) -> dict[str, float]:
@@ -46,13 +46,13 @@ def _demands(options: PanicOptions) -> dict[str, float]:
 
 
 def _locked_stop(v_0: float, par: VehicleParameters) -> float:
-    """Return a time [s] within which locked wheels, on most roads even one, stop a vehicle."""
+    """Return a time [s] in which locked wheels, on most roads even one wheel, stop a vehicle."""
     road_ahead, body = par.road, par.body
     slope = road.slope(0.0, road_ahead)
     locked = adhesion.adhesion(1.0, road.surface(0.0, road_ahead), par.front_tyre)
     held = locked * slope.cosine + slope.sine
     if not held > 0.0:
-        advice = "the time to record, as locked wheels do not stop on this slope"
+        advice = "the time to record, since locked wheels do not stop on this slope"
         raise not_valid("options.duration", "0 s", "> 0 s", advice)
     return round(v_0 / (0.7 * held * body.g) + 1.0, 1)
 
@@ -66,7 +66,7 @@ class StraightStopOptions(PanicOptions):
     surface: SurfaceName
     """surface of the road"""
     duration: TimeConstant
-    """time recorded; 0 for the stopping time of locked wheels on this surface, with a margin"""
+    """recorded time; 0: the stopping time of locked wheels on this surface, with a margin"""
 
 
 def straight_stop(
@@ -81,7 +81,7 @@ def straight_stop(
 STRAIGHT_STOP = Experiment(
     name="straight-stop",
     assembly="two-wheeler-by-wire",
-    summary="panic stop from {v_0:km/h} with {p_front} in front and {p_rear} behind, on {surface}",
+    summary="panic stop from {v_0:km/h} with {p_front} front and {p_rear} rear, on {surface}",
     options=StraightStopOptions,
     defaults=StraightStopOptions(
         v_0=100.0 / 3.6, p_front=40e5, p_rear=40e5, surface="dry-asphalt", duration=0.0
@@ -96,8 +96,8 @@ STRAIGHT_STOP = Experiment(
 # --- With a whole brake by wire at the rear wheel
 
 ACTUATOR_FIGURES = Figures(
-    rear_energy=("J", "Energy that the rear brake draws until standstill."),
-    rear_current=("A", "Largest magnitude of its motor current until standstill."),
+    rear_energy=("J", "Energy drawn by the rear brake until standstill."),
+    rear_current=("A", "Largest magnitude of the rear motor current until standstill."),
     rear_pressure_error=(
         "Pa",
         "Root mean square of the rear demand minus the pressure at the pads.",
@@ -163,7 +163,7 @@ class BandwidthsOptions(PanicOptions):
     f_n: Annotated[Nodes, Unit("Hz", 10.0), Field(min_length=1)]
     """natural frequencies of the pressure loops, one run each"""
     duration: Duration
-    """time recorded"""
+    """recorded time"""
 
 
 def _label(f: float) -> str:
@@ -237,15 +237,15 @@ BANDWIDTHS = Experiment(
 
 # --- Across a change of the surface
 
-_CALM = 1.2  # of the peak's slip
+_CALM = 1.2  # relative to the peak slip
 
 JUMP_FIGURES = Figures(
     recovery_time=(
         "s",
-        "Time from the front wheel's step onto the further surface until its slip stays below "
-        f"{_CALM:g} of the slip of the peak there, above {vehicle_stop.SLOW:g} m/s.",
+        "Time from the front wheel's entry onto the second surface until its slip stays below "
+        f"{_CALM:g} of that surface's peak slip, above {vehicle_stop.SLOW:g} m/s.",
     ),
-    jump_speed=("m/s", "Speed at the change of the surface."),
+    jump_speed=("m/s", "Speed at the surface change."),
 )
 
 
@@ -255,11 +255,11 @@ class SurfaceJumpOptions(PanicOptions):
     first: SurfaceName
     """surface at the start"""
     further: SurfaceName
-    """surface from x_change on"""
+    """surface after x_change"""
     x_change: Distance
-    """place where the further surface begins"""
+    """position at which the second surface begins"""
     duration: Duration
-    """time recorded"""
+    """recorded time"""
 
 
 def surface_jump(
@@ -275,10 +275,10 @@ def surface_jump(
 
 
 def recovery(run: xr.Dataset, options: SurfaceJumpOptions) -> tuple[Kpi, ...]:
-    """Return the front wheel's recovery on the further surface."""
+    """Return the front wheel's recovery on the second surface."""
     t, x, v = (run[name].values for name in ("time", "x", "v"))
     if not np.any(x > options.x_change):
-        undefined = (math.nan, "the vehicle stops before the further surface")
+        undefined = (math.nan, "the vehicle stops before the second surface")
         return JUMP_FIGURES(recovery_time=undefined, jump_speed=undefined)
     k = int(np.argmax(x > options.x_change))
     begin = float(np.interp(options.x_change, x[: k + 1], t[: k + 1]))
@@ -293,7 +293,7 @@ def recovery(run: xr.Dataset, options: SurfaceJumpOptions) -> tuple[Kpi, ...]:
 SURFACE_JUMP = Experiment(
     name="surface-jump",
     assembly="two-wheeler-by-wire",
-    summary="panic stop from {v_0}, {first} turns {further} after {x_change:m}",
+    summary="panic stop from {v_0}, with a change from {first} to {further} after {x_change:m}",
     options=SurfaceJumpOptions,
     defaults=SurfaceJumpOptions(
         v_0=30.0,

@@ -1,4 +1,4 @@
-"""A wheel with its brake on a drum of constant speed, for the design of slip control."""
+"""A wheel with its brake on a drum at constant speed, for the design of slip control."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ class Memory(NamedTuple):
 
 
 class WheelOnDrum(Assembly[WheelOnDrumParameters, Memory]):
-    """A turning wheel, so that brake and rolling resistance are a torque in linear models.
+    """A turning wheel, whose brake and rolling resistance are a torque in linear models.
 
     The rig is not valid if the wheel locks; bywire then warns.
     """
@@ -120,7 +120,7 @@ class WheelOnDrum(Assembly[WheelOnDrumParameters, Memory]):
         warnings = super().watch(recording, par)
         if "omega" in recording and bool((recording["omega"] <= 0).any()):
             warnings.append(
-                "the wheel locked: the rig is not valid then, it lets the wheel turn backward"
+                "the wheel locked, so the rig is invalid: it would let the wheel turn backward"
             )
         return warnings
 

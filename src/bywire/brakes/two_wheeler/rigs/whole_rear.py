@@ -1,8 +1,8 @@
 """The two-wheeler with the whole brake by wire of Dardanelli et al. (2010) at its rear wheel.
 
-The front brake is modeled by its pressure loop alone. The rear brake is complete: battery, motor,
-screw, cylinder, line, caliper, and an ECU with dither that follows the rider's demand, lowered by
-slip control.
+The front brake is modeled only by its pressure loop. The rear brake is complete: battery, motor,
+screw, cylinder, line, caliper, and an ECU with dither that follows the rider's demand, which slip
+control lowers.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ Par = WholeRearParameters
 class TwoWheelerWholeRear(HotBrakes[WholeRearParameters, Any]):
     """A vehicle whose ECU lowers the demand on the rear brake's ECU.
 
-    The pads press with the caliper's force: a sticking caliper drags.
+    The pads' force is the caliper's, so a sticking caliper drags.
     """
 
     name: ClassVar[str] = "two-wheeler-whole-rear"

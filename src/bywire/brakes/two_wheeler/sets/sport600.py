@@ -67,7 +67,7 @@ FRONT600 = CitedSet(
             if name.startswith(f"{there}.")
         },
         "drum.v": chosen(20.0, "the middle of a stop"),
-        "drum.N": chosen(2200.0, "the front wheel's load in a full stop on wet asphalt"),
+        "drum.N": chosen(2200.0, "the front wheel's load during a full stop on wet asphalt"),
         **{
             f"drum.surface.{name}": derived(value, "wet asphalt for car tyres, as circulated")
             for name, value in SURFACES["wet-asphalt"]._asdict().items()

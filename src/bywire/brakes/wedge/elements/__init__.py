@@ -1,1 +1,1 @@
-"""Elements of this brake alone."""
+"""Elements that only this brake uses."""

@@ -47,7 +47,7 @@ class Parameters(ParameterSet):
     """damping over stiffness"""
 
 
-FAULTS = (ParameterFault("worn", "more free-play on both sides", ("g_1", "g_2"), 5.0),)
+FAULTS = (ParameterFault("worn", "larger free-play on both sides", ("g_1", "g_2"), 5.0),)
 
 
 class Input(NamedTuple):
@@ -161,7 +161,7 @@ def solve(d: Overlaps, par: Parameters) -> Forces:
     -----
     The two wedge contacts do not share a compliance, so they follow from the tips' force:
     f_k = max(0, d_k + c_s f_12) / c_w. This leaves one increasing, piecewise linear equation
-    in f_12, solved on the piece that holds its root: none, one or both of the contacts pressing.
+    in f_12, solved on the piece that contains its root: no, one or both contacts closed.
     """
     c = compliances(par)
     w, t, s = c.wedge, c.tips, c.screw
@@ -179,7 +179,7 @@ def solve(d: Overlaps, par: Parameters) -> Forces:
 
 
 def forces(u: Input, par: Parameters) -> Forces:
-    """Return the contact forces, damping included."""
+    """Return the contact forces, including damping."""
     return solve(overlaps(u, par), par)
 
 

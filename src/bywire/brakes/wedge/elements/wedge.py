@@ -27,13 +27,13 @@ class Parameters(ParameterSet):
     mu_B: Gain
     """coefficient of friction between pads and disc"""
     k_return: SpringRate
-    """return spring toward the middle; 0 for none"""
+    """stiffness of the return spring toward the middle; 0 for none"""
     x_stop: Length
     """travel of the end stops, on either side"""
 
 
 FAULTS = (
-    ParameterFault("friction", "another friction of the pads: wet, hot, glazed", ("mu_B",), 1.5),
+    ParameterFault("friction", "different pad friction: wet, hot, glazed", ("mu_B",), 1.5),
     ParameterFault("spring-broken", "return spring broken", ("k_return",), 0.0),
 )
 
@@ -76,7 +76,7 @@ def slope(par: Parameters) -> Annotated[float, Signal("1", "slope of the wedge",
 
 
 def side(x: State) -> Annotated[float, Signal("1", "side of the wedge")]:
-    """Return +1 for travel from zero up, -1 below."""
+    """Return +1 for travel >= 0, otherwise -1."""
     return ops.where(x.x < 0, -1.0, 1.0)
 
 
@@ -112,6 +112,6 @@ def energy(x: State, par: Parameters) -> Energy:
 
 
 def power_in(x: State, u: Input, par: Parameters) -> Power:
-    """Return the power of all forces on the wedge but the return spring's."""
+    """Return the power of all forces on the wedge except the return spring."""
     against = u.side * slope(par) * u.F_N + u.F_stop
     return (u.F_M + u.friction - against) * x.v + pad_power(x, u, par)

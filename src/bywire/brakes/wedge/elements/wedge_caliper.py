@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 
 from bywire.core import ops
 from bywire.core.faults import ParameterFault
-from bywire.core.parameters import ParameterSet
+from bywire.core.parameters import ParameterSet, RuleError
 from bywire.core.quantities import Length, Nodes, Stiffness, TimeConstant, Unit
 from bywire.core.signals import ContactCompliance, Energy, Overlap, Role, Signal
 
@@ -35,15 +35,15 @@ class Parameters(ParameterSet):
     law: Literal["linear", "table"]
     """relation of travel and force"""
     K_cal: Stiffness
-    """stiffness of caliper and pads; used by law "linear" only"""
+    """stiffness of caliper and pads (law "linear")"""
     n_table: Annotated[Nodes, Unit("m", 1e-4)]
-    """travels of the pads after contact, from 0, increasing; used by law "table" only"""
+    """travels of the pads after contact, increasing from 0 (law "table")"""
     F_table: Annotated[Nodes, Unit("N", 3e3)]
-    """normal forces of the table, from 0, increasing; used by law "table" only"""
+    """normal forces of the table, increasing from 0 (law "table")"""
     tau_cal: TimeConstant
     """damping over stiffness"""
     clearance: Clearance
-    """running clearance, both sides of the disc together"""
+    """running clearance, sum of both sides of the disc"""
     r_B: Length
     """effective radius of the pads"""
 
@@ -53,20 +53,21 @@ class Parameters(ParameterSet):
         for name, unit, nodes in (("n_table", "m", n), ("F_table", "N", F)):
             _require_rising(name, unit, nodes)
         if len(n) != len(F):
-            raise ValueError(
-                f"n_table has {len(n)} nodes and F_table {len(F)}: give one force for each travel"
-            )
+            valid = f"of the same length as F_table, {len(F)} nodes"
+            raise RuleError("n_table", f"{len(n)} nodes", valid, "set one force for each travel")
         if self.law == "table" and not n:
-            raise ValueError(
-                "law = 'table' needs 2 nodes or more in n_table [m] and F_table [N], which are "
-                "empty: set both, or law = 'linear'"
-            )
+            reason = "law = 'table' interpolates n_table and F_table. Set both, or law = 'linear'"
+            raise RuleError("n_table", "0 nodes", "of 2 nodes or more", reason)
         return self
 
 
 FAULTS = (
-    ParameterFault("gap-grown", "more clearance: worn pads, failed adjuster", ("clearance",), 2.0),
-    ParameterFault("pad-lost", "a pad is lost: clearance", replaced="clearance", value=10e-3),
+    ParameterFault(
+        "gap-grown", "larger clearance: worn pads, failed adjuster", ("clearance",), 2.0
+    ),
+    ParameterFault(
+        "pad-lost", "a pad is lost (value: clearance)", replaced="clearance", value=10e-3
+    ),
     ParameterFault("soft", "softer caliper or pads", ("K_cal",), 0.5),
 )
 
@@ -74,14 +75,15 @@ FAULTS = (
 def _require_rising(name: str, unit: str, nodes: Nodes) -> None:
     if not nodes:
         return
-    rule = f"{name} must hold 2 nodes or more, from 0 {unit} and increasing"
-    if len(nodes) < 2 or nodes[0] != 0.0:
-        raise ValueError(f"{rule}: it holds {len(nodes)}, the first is {nodes[0]:g} {unit}")
-    for k, (a, b) in enumerate(pairwise(nodes), 2):
+    if len(nodes) < 2:
+        raise RuleError(name, f"{len(nodes)} nodes", "of 2 nodes or more")
+    if nodes[0] != 0.0:
+        raise RuleError(f"{name}.0", f"{nodes[0]:g} {unit}", f"0 {unit}, the start of the curve")
+    for k, (a, b) in enumerate(pairwise(nodes), 1):
         if b <= a:
-            raise ValueError(
-                f"{rule}, but as node {k} of {len(nodes)}, {b:g} {unit} follows {a:g} {unit}: "
-                "sort the nodes, and leave out those where the curve does not rise"
+            reason = "sort the nodes, and omit those where the curve does not rise"
+            raise RuleError(
+                f"{name}.{k}", f"{b:g} {unit}", f"> {a:g} {unit}, the previous node", reason
             )
 
 
@@ -94,7 +96,7 @@ class Input(NamedTuple):
     tan_alpha: Annotated[float, Signal("1", "slope of the wedge", 0.4)]
     runout: Annotated[float, Signal("m", "run-out", 4e-6)]
     runout_rate: Annotated[float, Signal("m/s", "rate of the run-out", 2e-4)]
-    taken: Annotated[float, Signal("m", "clearance that an adjuster took away", 1e-4)]
+    taken: Annotated[float, Signal("m", "clearance removed by an adjuster", 1e-4)]
     taking: Annotated[float, Signal("m/s", "speed of the adjuster", 2e-4)]
 
 
@@ -133,7 +135,7 @@ def overlaps(u: Input, par: Parameters) -> Overlap:
 
 
 def compliance(par: Parameters) -> ContactCompliance:
-    """Return the compliance of caliper and pads; of the first piece of a table."""
+    """Return the compliance of caliper and pads, for a table that of its first piece."""
     if par.law == "table":
         return par.n_table[1] / par.F_table[1]
     return 1.0 / par.K_cal
@@ -142,7 +144,7 @@ def compliance(par: Parameters) -> ContactCompliance:
 def normal_force(
     f: Annotated[float, Signal("N", "contact force", 3e3)], par: Parameters
 ) -> NormalForce:
-    r"""Return the normal force that belongs to a contact force of constant compliance.
+    r"""Return the normal force for a contact force with constant compliance.
 
     .. math:: F_N = f + \sum_k (K_k - K_{k-1}) \max(0, C f - n_k)
 
@@ -150,9 +152,9 @@ def normal_force(
 
     Notes
     -----
-    Contacts have constant compliances, which determine whether they touch. The table bends their
-    forces: C f is the damped overlap. So the damping is tau times the slope of the curve at small
-    rates. It never pulls and never adds energy, because the curve rises.
+    Contacts have constant compliances, which determine whether they are closed. The table maps
+    their forces, with the damped overlap C f. At low rates, the damping is therefore tau times the
+    curve's slope. The contact never pulls and never adds energy, since the curve rises.
     """
     if par.law == "linear":
         return f
@@ -160,12 +162,12 @@ def normal_force(
 
 
 def bent(f: Forces, par: Parameters) -> Forces:
-    """Return the contact forces that belong to those of constant compliance; `normal_force`."""
+    """Return the contact forces for those with constant compliance; see `normal_force`."""
     return Forces(F_N=normal_force(f.F_N, par))
 
 
 def forces(u: Input, par: Parameters) -> Forces:
-    r"""Return the normal force, :math:`F_N = K_{CAL} \max(0, n + \tau \dot n)`, or by the table.
+    r"""Return the normal force, :math:`F_N = K_{CAL} \max(0, n + \tau \dot n)`, or from the table.
 
     References
     ----------
@@ -175,7 +177,7 @@ def forces(u: Input, par: Parameters) -> Forces:
 
 
 def travel(F_N: NormalForce, par: Parameters) -> Overlap:
-    """Return the overlap at rest that gives a normal force >= 0."""
+    """Return the overlap at rest for a normal force >= 0."""
     if par.law == "linear":
         return F_N / par.K_cal
     n = F_N * compliance(par)

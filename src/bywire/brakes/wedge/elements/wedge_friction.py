@@ -14,8 +14,8 @@ from bywire.core.signals import Power, Signal
 class Parameters(ParameterSet):
     """Coulomb friction, set-valued at rest.
 
-    ``stopped_disc``: ``"drop"`` drops the pad's friction once the disc is at rest, as in the paper
-    (worst case for the actuator); ``"stick"`` lets the resting disc hold the wedge.
+    ``stopped_disc``: with ``"drop"``, the pad's friction vanishes once the disc is at rest, as in
+    the paper (worst case for the actuator). With ``"stick"``, the resting disc holds the wedge.
     """
 
     mu_int: Gain
@@ -27,7 +27,7 @@ class Parameters(ParameterSet):
 
 
 FAULTS = (
-    ParameterFault("worn", "rollers and interfaces with more friction", ("mu_R", "mu_int"), 5.0),
+    ParameterFault("worn", "higher friction of rollers and interfaces", ("mu_R", "mu_int"), 5.0),
 )
 
 
@@ -48,8 +48,8 @@ def friction(u: Input, par: Parameters) -> Annotated[float, Signal("N", "wedge f
 
     Notes
     -----
-    The wedge slides across the interfaces by tan(alpha) times its travel: virtual work gives the
-    factor exactly.
+    The wedge slides across the interfaces by tan(alpha) times its travel, so the factor follows
+    from virtual work.
 
     References
     ----------

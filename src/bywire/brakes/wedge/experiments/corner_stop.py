@@ -28,7 +28,7 @@ class StopOptions(ParameterSet):
     v_0: RidingSpeed
     """speed at the start"""
     M_brake: SomeMoment
-    """moment demanded from time zero on"""
+    """demanded moment from time zero on"""
     surface: SurfaceName
     """surface of the road"""
     T_disc: Temperature
@@ -58,7 +58,7 @@ def _stop_case(
     )
 
 
-# --- Stop, hold and release: the tyre rocks back, and the wheel as far as the pads allow
+# --- Stop, hold and release: the tyre rocks back, and so does the wheel as far as the pads allow
 
 _CALM = 1.0  # s after the stop, for tyre and brake to come to rest
 
@@ -66,16 +66,16 @@ STOP_FIGURES = Figures(
     undefined="the vehicle does not stop before the release",
     stopping_distance=("m", "Distance from the demand to the first standstill."),
     stopping_time=("s", "Time from the demand to the first standstill."),
-    moment_before_stop=("N*m", "Mean moment of the sensor in the last half second of braking."),
-    peak_slip=("1", "Largest slip above a tenth of the speed at the start."),
-    rebound_speed=("m/s", "Largest speed backward after the stop."),
-    wheel_reversal=("rad", "Angle by which the wheel turns back after the stop."),
+    moment_before_stop=("N*m", "Mean measured moment in the last half second of braking."),
+    peak_slip=("1", "Largest slip at speeds above a tenth of the initial speed."),
+    rebound_speed=("m/s", "Largest backward speed after the stop."),
+    wheel_reversal=("rad", "Angle by which the wheel turns backward after the stop."),
     force_held=("N", f"Mean normal force from {_CALM:g} s after the stop to the release."),
-    force_change=("N", "Normal force peak to peak in that time."),
+    force_change=("N", "Peak-to-peak normal force in that time."),
     creep_speed=("m/s", "Largest speed of the vehicle in that time."),
     energy_braked=("J", "Energy taken from the wheel until the stop."),
-    disc_temperature=("K", "Temperature of the disc at the stop."),
-    contact_angle=("rad", "Estimated motor angle at which the pads touch, from parking."),
+    disc_temperature=("K", "Disc temperature at the stop."),
+    contact_angle=("rad", "Estimated motor angle from parking to pad contact."),
 )
 
 
@@ -85,7 +85,7 @@ class CornerStopOptions(StopOptions):
     t_hold: Duration
     """time until the demand falls to zero"""
     t_end: Duration
-    """time recorded after it"""
+    """recorded time after the release"""
 
 
 def corner_stop(
@@ -113,7 +113,7 @@ def _stop(
     begin, last = end + _CALM, options.t_hold
     late = t >= begin
     fast = v > 0.1 * options.v_0
-    short = (math.nan, f"the brake holds for less than {_CALM:g} s after the stop")
+    short = (math.nan, f"the hold after the stop is shorter than {_CALM:g} s")
     return {
         "stopping_distance": float(np.interp(end, t, held["s"].values)),
         "stopping_time": end,
@@ -133,7 +133,7 @@ def _stop(
 CORNER_STOP = Experiment(
     name="corner-stop",
     assembly="wedge-corner",
-    summary="the wedge brake stops a quarter of a car from {v_0:km/h} with {M_brake}, and holds it",
+    summary="the wedge brake stops a car's corner from {v_0:km/h} with {M_brake}, and holds it",
     options=CornerStopOptions,
     defaults=CornerStopOptions(
         v_0=50.0 / 3.6, M_brake=600.0, surface="dry-asphalt", T_disc=293.15, t_hold=5.5, t_end=0.5
@@ -148,17 +148,17 @@ CORNER_STOP = Experiment(
 # --- Panic stop: the demand exceeds the road's adhesion
 
 PANIC_FIGURES = Figures(
-    undefined="the vehicle does not stop in the recorded time: set a longer options.duration",
+    undefined="the vehicle does not stop in the recorded time: increase options.duration",
     stopping_distance=("m", "Distance from the demand to the first standstill."),
     stopping_time=("s", "Time from the demand to the first standstill."),
-    braking_efficiency=("%", "Ideal stopping distance on this road over the actual one."),
+    braking_efficiency=("%", "Ideal stopping distance on this road over the actual distance."),
     first_bite=("s", "Time from the demand until the pads touch."),
-    peak_slip=("1", f"Largest slip above {SLOW:g} m/s."),
-    locked_time=("s", f"Time in which the wheel is locked, above {SLOW:g} m/s."),
-    peak_moment=("N*m", "Largest moment of the brake."),
-    supply_energy=("J", "Energy that the drives take until the stop."),
+    peak_slip=("1", f"Largest slip at speeds above {SLOW:g} m/s."),
+    locked_time=("s", f"Time with a locked wheel at speeds above {SLOW:g} m/s."),
+    peak_moment=("N*m", "Largest brake moment."),
+    supply_energy=("J", "Energy drawn by the drives until the stop."),
     disc_energy=("J", "Energy taken from the wheel until the stop."),
-    disc_temperature=("K", "Highest temperature of the disc until the stop."),
+    disc_temperature=("K", "Highest disc temperature until the stop."),
 )
 
 
@@ -166,7 +166,7 @@ class CornerPanicOptions(StopOptions):
     """The stop; slip control is a parameter, ``ecu.abs``."""
 
     duration: Duration
-    """time recorded"""
+    """recorded time"""
 
 
 def corner_panic(
@@ -228,7 +228,7 @@ def _ideal(v_0: float, par: WedgeCornerParameters) -> float:
 CORNER_PANIC = Experiment(
     name="corner-panic",
     assembly="wedge-corner",
-    summary="the wedge brake stops a quarter of a car from {v_0:km/h} on {surface} by slip control",
+    summary="the wedge brake stops a car's corner from {v_0:km/h} on {surface} with slip control",
     options=CornerPanicOptions,
     defaults=CornerPanicOptions(
         v_0=100.0 / 3.6, M_brake=1500.0, surface="wet-asphalt", T_disc=293.15, duration=5.0

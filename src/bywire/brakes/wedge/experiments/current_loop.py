@@ -13,9 +13,8 @@ from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis import step_response
 from bywire.bench.kpis.families import evaluate, units_of
 from bywire.bench.kpis.kpi import Figures, Kpi
-from bywire.brakes.wedge.case import steps
+from bywire.brakes.wedge.case import check_current, shaft_case, steps
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.rigs.rig_case import check_current, shaft_case
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Current, Duration, Unit
 
@@ -25,24 +24,24 @@ ThreeFactors = Annotated[_Shares, Unit("1", 2.0), Field(min_length=3, max_length
 _WINDINGS, _GAINS = ("parallel", "single", "series"), ("soft", "usual", "sharp")
 _FIGURES = ("rise_time", "overshoot", "settling_time")  # of the step response
 _LABELS = tuple(f"{winding}_{gain}" for winding in _WINDINGS for gain in _GAINS)
-LAG = Figures(bandwidth=("Hz", "Corner of the first-order lag with this rise time."))
+LAG = Figures(bandwidth=("Hz", "Corner frequency of a first-order lag with this rise time."))
 _UNITS = {name: units_of("step_response")[name] for name in _FIGURES} | LAG.units
 
 
 class Options(ParameterSet):
-    """The step, and the windings and gains with which it is repeated.
+    """The step, and the windings and gains for which it is repeated.
 
-    A motor unit has two stators: both in parallel, one alone, or both in series.
+    A motor unit has two stators, used in parallel, one alone, or in series.
     """
 
     i_step: Current
     """current demand after the step"""
     windings: ThreeFactors
-    """resistance and inductance over those of the parameter set: parallel, single, series"""
+    """resistance and inductance relative to the parameter set: parallel, single, series"""
     gains: ThreeFactors
-    """gains of the current controller over those of the parameter set: soft, usual, sharp"""
+    """current controller gains relative to the parameter set: soft, usual, sharp"""
     duration: Duration
-    """time recorded after the step"""
+    """recorded time after the step"""
     record: Duration
     """recording interval"""
 

@@ -1,4 +1,4 @@
-"""Disc stop: the brake stops a disc of little energy, holds it, and releases it.
+"""Disc stop: the brake stops a disc with little energy, holds it, and releases it.
 
 Roberts et al. (2003), section "Wedge and calliper", drop the pad's friction on the wedge once the
 disc is at rest. In the other reading the pad then sticks to the disc. The experiment runs both.
@@ -33,16 +33,16 @@ _CALM = 0.05  # time after the stop [s] in which wedge and current may still mov
 
 FIGURES = Figures(
     stopping_time=("s", "Time from the demand until the disc is at rest."),
-    stopping_angle=("rad", "Angle that the disc turns until then."),
-    moment_before_stop=("N*m", "Mean moment in the last tenth of braking, run-out included."),
+    stopping_angle=("rad", "Angle that the disc turns in that time."),
+    moment_before_stop=("N*m", "Mean moment in the last tenth of braking, including run-out."),
     force_before_stop=("N", "Mean normal force in the last tenth of braking."),
     force_held=("N", f"Mean normal force from {_CALM:g} s after the stop to the release."),
-    force_change=("N", "Normal force peak to peak in that time."),
+    force_change=("N", "Peak-to-peak normal force in that time."),
     reference_change=(
         "rad",
         "Windup: travel of the common reference toward clamping while the disc is at rest.",
     ),
-    hold_power=("W", "Mean input power in that time, standby included."),
+    hold_power=("W", "Mean input power in that time, including standby."),
 )
 _UNITS = {**FIGURES.units, "release_time": "s", "parking_time": "s"}
 
@@ -51,15 +51,15 @@ class Options(ParameterSet):
     """The maneuver."""
 
     M_brake: SomeMoment
-    """moment demanded"""
+    """demanded moment"""
     Omega_0: DiscSpeed
-    """speed of the disc at the start; with the flywheel's inertia it sets the energy to absorb"""
+    """initial disc speed; with the flywheel's inertia, it determines the energy to absorb"""
     t_hold: Duration
     """time from the start of braking until the demand falls to zero"""
     t_end: Duration
-    """time recorded after it"""
+    """recorded time after the release"""
     settle: Duration
-    """time parked before braking"""
+    """parked time before braking"""
 
 
 def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Case, ...]:
@@ -90,7 +90,7 @@ def stop_figures(run: xr.Dataset, options: Options) -> dict[str, float] | str:
     if not turns[:1].any():
         return "the disc is at rest from the start"
     if turns[-1]:
-        return "the disc still turns when the demand falls to zero"
+        return "the disc is still turning when the demand falls to zero"
     k = int(np.flatnonzero(turns)[-1]) + 1
     turning, standing = braked.isel(time=slice(None, k)), braked.isel(time=slice(k, None))
     stop = float(standing["time"].values[0])
@@ -134,7 +134,7 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
 EXPERIMENT = Experiment(
     name="disc-stop",
     assembly="wedge-brake",
-    summary="{M_brake} until the disc stops, hold, release; both readings of a stopped disc",
+    summary="{M_brake} until the disc stops, hold, release; two models of a stopped disc",
     options=Options,
     defaults=Options(M_brake=300.0, Omega_0=5.0, t_hold=1.5, t_end=0.3, settle=0.05),
     cases=cases,

@@ -1,4 +1,4 @@
-"""Force fight: two unequal motors follow one reference, a force sensor between their screws."""
+"""Force fight: two unequal motors on one reference, with a force sensor between their screws."""
 
 from __future__ import annotations
 
@@ -10,10 +10,9 @@ from pydantic import Field
 
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis.kpi import Figures, Kpi
-from bywire.brakes.wedge.case import mean
+from bywire.brakes.wedge.case import mean, peak, screw_case
 from bywire.brakes.wedge.experiments.screw_position import SomeAngle
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.rigs.rig_case import peak, screw_case
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Frequency, Unit
 from bywire.core.typing import Array
@@ -24,11 +23,11 @@ SomeSpeed = Annotated[float, Unit("rad/s", 50.0), Field(gt=0, allow_inf_nan=Fals
 _MOTIONS = ("step", "ramp", "sine")
 _LABELS = tuple(f"{motion}_{pair}" for motion in _MOTIONS for pair in ("equal", "unequal"))
 _PAIRS = tuple(f"_{pair}" for pair in ("equal", "unequal"))
-PEAK = Figures(peak_force=("N", "Largest magnitude that the force sensor shows."))
+PEAK = Figures(peak_force=("N", "Largest magnitude of the measured force."))
 HELD = Figures(
     static_force=("N", "Magnitude of the mean force in the last tenth of the time after the step."),
 )
-APART = Figures(peak_difference=("rad", "Largest difference of the encoders."))
+APART = Figures(peak_difference=("rad", "Largest difference between the encoders."))
 
 
 class Options(ParameterSet):
@@ -43,15 +42,15 @@ class Options(ParameterSet):
     f_sine: Frequency
     """frequency of the sine"""
     more_K: Share
-    """torque constant of motor 2 over that of the parameter set, minus one"""
+    """torque constant of motor 2 relative to the parameter set, minus one"""
     more_J: Share
-    """inertia of motor 2 over that of the parameter set, minus one"""
+    """inertia of motor 2 relative to the parameter set, minus one"""
     more_R: Share
-    """resistance of motor 2 over that of the parameter set, minus one"""
+    """resistance of motor 2 relative to the parameter set, minus one"""
     more_D: Share
-    """viscous damping of motor 2 over that of the parameter set, minus one"""
+    """viscous damping of motor 2 relative to the parameter set, minus one"""
     duration: Duration
-    """time recorded of each motion"""
+    """recorded time of each motion"""
     record: Duration
     """recording interval"""
 
@@ -113,7 +112,7 @@ def _reference(motion: str, options: Options) -> Any:
 EXPERIMENT = Experiment(
     name="force-fight",
     assembly="wedge-brake",
-    summary="force between two motors that follow one reference, equal and unequal",
+    summary="force between two equal or unequal motors that follow one reference",
     options=Options,
     defaults=Options(
         a_step=1.0,

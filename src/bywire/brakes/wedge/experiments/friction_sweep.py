@@ -32,8 +32,8 @@ from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration
 
-_BAND = 0.05  # of the step: half width of the final band of a stable loop
-_LAST = 0.2  # of the hold
+_BAND = 0.05  # share of the step: half width of a stable loop's final band
+_LAST = 0.2  # share of the hold
 _NO_ROW = "the recording has no row in this time: record more often"
 
 EACH = Figures(
@@ -41,7 +41,7 @@ EACH = Figures(
         "1",
         "1 if the last fifth of the hold stays within 5 % of the step, without an end stop.",
     ),
-    hold_power=("W", "Mean input power in the last fifth of the hold, standby included."),
+    hold_power=("W", "Mean input power in the last fifth of the hold, including standby."),
     undefined=_NO_ROW,
 )
 ALL = Figures(
@@ -57,23 +57,23 @@ ALL = Figures(
 class Options(ParameterSet):
     """The step, and the variations.
 
-    ``slope``: with ``"known"`` the controller assumes the correct slope of moment over angle for
-    each coefficient; with ``"fixed"`` it keeps the slope of the parameter set.
-    ``friction``: ``"none"`` removes the brake's dry friction, which helps to hold.
+    ``slope``: with ``"known"``, the controller uses the correct slope of moment over angle for each
+    coefficient; with ``"fixed"``, it uses the parameter set's slope.
+    ``friction``: ``"none"`` removes the brake's dry friction, which helps to hold the moment.
     """
 
     M_step: SomeMoment
-    """moment demanded"""
+    """demanded moment"""
     t_hold: Duration
-    """time recorded after the step"""
+    """recorded time after the step"""
     mu_B: Coefficients
     """friction coefficients of the pads"""
     slope: Literal["known", "fixed"]
-    """whether the controller knows the friction coefficient"""
+    """whether the controller uses the correct friction coefficient"""
     friction: Literal["kept", "none"]
-    """whether the brake has its own dry friction"""
+    """whether the brake has dry friction"""
     settle: Duration
-    """time parked before the step"""
+    """parked time before the step"""
 
 
 def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Case, ...]:
@@ -102,7 +102,7 @@ def _stable(run: xr.Dataset, options: Options) -> tuple[float, str]:
     if not last.sizes["time"]:
         return math.nan, _NO_ROW
     if not last["F_N"].values.any():
-        return math.nan, "the pads do not press: the moment loop is open"
+        return math.nan, "the pads are not applied: the moment loop is open"
     away = np.abs(np.abs(last["M_B"].values) - options.M_step).max()
     return float(away <= _BAND * options.M_step and not run["F_end"].values.any()), ""
 

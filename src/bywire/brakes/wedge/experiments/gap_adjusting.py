@@ -1,6 +1,7 @@
 """Gap adjusting: several applications with excess clearance, which an adjuster removes.
 
-Roberts et al. (2003) plan an adjustment mechanism for their next prototype; the maneuver is ours.
+Roberts et al. (2003) plan an adjustment mechanism for their next prototype. We defined the
+maneuver.
 """
 
 from __future__ import annotations
@@ -22,16 +23,16 @@ Count = Annotated[int, Unit("1", 5.0), Field(ge=1, le=100)]
 Growth = Annotated[float, Unit("m", 2e-4), Field(ge=-1e-2, le=1e-2, allow_inf_nan=False)]
 
 FIGURES = Figures(
-    clicks=("1", "Teeth that the adjuster has turned."),
-    teeth_counted=("1", "Teeth that it counted: its log of the wear."),
-    turned_after=("1", "Applications before its first turn."),
+    clicks=("1", "Teeth turned by the adjuster."),
+    teeth_counted=("1", "Teeth counted by the adjuster, its measure of wear."),
+    turned_after=("1", "Applications before the adjuster's first turn."),
     clearance_start=("m", "Clearance at the start."),
     clearance_end=("m", "Clearance at the end."),
-    gap_error=("m", "Clearance estimated by the adjuster at the end, minus the true one."),
-    contact_first=("s", "Time until the pads press, first application."),
-    contact_last=("s", "Time until the pads press, last application."),
+    gap_error=("m", "Clearance estimated by the adjuster at the end, minus the true clearance."),
+    contact_first=("s", "Time to pad contact, first application."),
+    contact_last=("s", "Time to pad contact, last application."),
     adjuster_work=("J", "Work of the adjuster on the caliper: 0 if it turns within the gap."),
-    undefined="the pads do not press, or the adjuster does not turn",
+    undefined="the pads do not touch the disc, or the adjuster does not turn",
 )
 
 
@@ -41,15 +42,15 @@ class Options(ParameterSet):
     M_brake: SomeMoment
     """moment of every application"""
     more: Growth
-    """excess clearance from wear; the brake knows its contact angle"""
+    """excess clearance from wear; the brake has the correct contact angle"""
     applications: Count
     """number of applications"""
     t_hold: Duration
-    """length of each"""
+    """length of each application"""
     t_pause: Duration
     """time between applications, and after the last one"""
     settle: Duration
-    """time parked before the first"""
+    """parked time before the first application"""
 
 
 def _begins(options: Options) -> list[float]:
@@ -106,7 +107,7 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
 EXPERIMENT = Experiment(
     name="gap-adjusting",
     assembly="wedge-brake",
-    summary="applications with {more} of excess clearance, which the adjuster removes",
+    summary="applications with {more} excess clearance, which the adjuster removes",
     options=Options,
     defaults=Options(
         M_brake=200.0, more=0.25e-3, applications=5, t_hold=0.25, t_pause=0.25, settle=0.05

@@ -1,6 +1,6 @@
-"""Endings of a braking: the demand falls to zero, or the power stages go off under load.
+"""End of braking: the demand falls to zero, or the power stages switch off under load.
 
-Roberts et al. (2003) show the end of a pulse in Fig. 9; the release and its figures are ours.
+Roberts et al. (2003) show the end of a pulse in Fig. 9. We defined the release and its figures.
 Without power, dry friction holds the brake.
 """
 
@@ -45,20 +45,20 @@ def _braked_case(
 _LOW = 0.05  # of the moment at the release
 
 FALL = Figures(
-    moment_start=("N*m", "Moment when the demand falls."),
-    time_to_5=("s", "Time until the moment has fallen permanently below 5 % of its start."),
+    moment_start=("N*m", "Moment at the instant the demand falls."),
+    time_to_5=("s", "Time until the moment stays below 5 % of its initial value."),
 )
 FREEDOM = Figures(
-    drag_moment=("N*m", "Residual drag: largest moment from parking on."),
-    travel_left=("m", "Distance of the wedge from its middle at the end."),
+    drag_moment=("N*m", "Residual drag: largest moment after parking."),
+    travel_left=("m", "Distance of the wedge from the middle at the end."),
     clearance_regained=(
         "m",
-        "Clearance at the end, both pads together, no run-out; negative if they press.",
+        "Clearance at the end, sum of both pads, without run-out; negative if they are applied.",
     ),
-    clearance_nominal=("m", "The same with the wedge centered."),
-    travel_beyond=("m", "Largest travel of the wedge past its middle, toward the other side."),
-    peak_current=("A", "Largest current of a motor during the release."),
-    energy_in=("J", "Energy at the drives' input until the brake is parked, standby included."),
+    clearance_nominal=("m", "The same clearance with the wedge centered."),
+    travel_beyond=("m", "Largest travel of the wedge past the middle, toward the other side."),
+    peak_current=("A", "Largest motor current during the release."),
+    energy_in=("J", "Energy at the drives' input until the brake is parked, including standby."),
 )
 
 
@@ -70,11 +70,11 @@ class ReleaseOptions(ParameterSet):
     settle: Duration
     """time of controlled braking before"""
     duration: Duration
-    """time recorded after the demand fell to zero"""
+    """recorded time after the demand falls to zero"""
 
 
 def release(par: WedgeParameters, options: ReleaseOptions, _: object = None) -> tuple[Case, ...]:
-    """Return the single run: braking during the settling time, no demand from zero on."""
+    """Return the single run: braking during the settling time, no demand after time zero."""
     levels = {-options.settle: options.M_hold, 0.0: 0.0}
     return (
         _braked_case(par, lambda t: {"M_set": steps(t, levels)}, options.settle, options.duration),
@@ -124,7 +124,7 @@ def _fall(run: xr.Dataset) -> tuple[float, str]:
     level = _LOW * M[0]
     above = np.flatnonzero(level < M)
     if not above.size:
-        return math.nan, "there is no moment at the release"
+        return math.nan, "the moment at the release is zero"
     k = int(above[-1])
     if k + 1 == t.size:
         return math.nan, "the moment does not fall to 5 % in the recorded time"
@@ -134,7 +134,7 @@ def _fall(run: xr.Dataset) -> tuple[float, str]:
 MOMENT_RELEASE = Experiment(
     name="moment-release",
     assembly="wedge-brake",
-    summary="release from {M_hold}: times, residual drag, clearance regained, energy",
+    summary="release from {M_hold}: times, residual drag, regained clearance, energy",
     options=ReleaseOptions,
     defaults=ReleaseOptions(M_hold=500.0, settle=0.6, duration=0.4),
     cases=release,
@@ -148,11 +148,11 @@ MOMENT_RELEASE = Experiment(
 
 POWER_OFF_FIGURES = Figures(
     time_to_rest=("s", "Time from power off until shafts and wedge stick permanently."),
-    drift=("m", "Largest change of the wedge's travel after that."),
-    relaxation=("m", "Change of the wedge's travel before that."),
+    drift=("m", "Largest change of the wedge's travel after that instant."),
+    relaxation=("m", "Change of the wedge's travel before that instant."),
     moment_start=("N*m", "Moment at power off."),
-    moment_end=("N*m", "Moment at the end, run-out included."),
-    preload_end=("N", "Preload of the wedge at the end."),
+    moment_end=("N*m", "Moment at the end, including run-out."),
+    preload_end=("N", "Wedge preload at the end."),
     end_stop_force=("N", "Largest force of an end stop."),
     undefined="the brake does not come to rest in the recorded time",
 )
@@ -162,11 +162,11 @@ class PowerOffOptions(ParameterSet):
     """The maneuver."""
 
     M_hold: SomeMoment
-    """moment at which the power goes off"""
+    """moment at power off"""
     settle: Duration
     """time of controlled braking before"""
     duration: Duration
-    """time recorded without power"""
+    """recorded time without power"""
 
 
 def power_off(par: WedgeParameters, options: PowerOffOptions, _: object = None) -> tuple[Case, ...]:
@@ -204,7 +204,7 @@ def judge_power_off(recordings: Recordings, options: PowerOffOptions) -> tuple[K
 POWER_OFF_HOLD = Experiment(
     name="power-off-hold",
     assembly="wedge-brake",
-    summary="power off at {M_hold}: moment held by dry friction, and its duration",
+    summary="power off at {M_hold}: moment held by dry friction, and how long",
     options=PowerOffOptions,
     defaults=PowerOffOptions(M_hold=500.0, settle=0.6, duration=2.0),
     cases=power_off,

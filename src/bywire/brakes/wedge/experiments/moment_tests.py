@@ -1,6 +1,6 @@
 """Moment tests of Roberts et al. (2003): pulses (Fig. 7), a ramp (Fig. 8), a large pulse (Fig. 9).
 
-The times of the maneuvers are ours: the text of the figures gives none.
+We chose the times of the maneuvers, since the figures' text does not contain any.
 """
 
 from __future__ import annotations
@@ -28,37 +28,37 @@ from bywire.brakes.wedge.case import (
 )
 from bywire.brakes.wedge.laws.moment_control import SomeMoment, SpeedLimit
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.core.parameters import ParameterSet
+from bywire.core.parameters import ParameterSet, RuleError
 from bywire.core.quantities import Duration, Fraction, Unit
 from bywire.core.typing import Array
 
 Count = Annotated[int, Unit("1", 3.0), Field(ge=1, le=100)]
 
-# --- Common figures of a braking
+# --- Key figures that all maneuvers share
 
 BRAKING_FIGURES = Figures(
-    contact_time=("s", "Time until the pads press on the disc."),
-    time_to_90=("s", "Time until the moment sensor first shows 90 % of the demand."),
+    contact_time=("s", "Time to pad contact."),
+    time_to_90=("s", "Time until the measured moment first reaches 90 % of the demand."),
     peak_power=("W", "Largest power at the drives' input."),
-    peak_power_filtered=("W", "Largest power at the drives' input, as the rig measures it."),
+    peak_power_filtered=("W", "Largest power at the drives' input, with the rig's filter."),
     peak_normal_force=("N", "Largest normal force."),
-    caliper_energy=("J", "Largest energy of the caliper before the demand changes."),
+    caliper_energy=("J", "Largest energy stored in the caliper before the demand changes."),
     disc_share=("%", "Share of that energy supplied by the disc (self-reinforcement)."),
-    rate_limited=("%", "Share of the time on the software rate limit, until the demand changes."),
+    rate_limited=("%", "Share of the time at the software rate limit, until the demand changes."),
     peak_speed=("rad/s", "Largest speed of motor 1."),
-    energy_in=("J", "Energy at the drives' input, standby included."),
+    energy_in=("J", "Energy at the drives' input, including standby."),
     energy_braked=("J", "Energy taken from the disc."),
     energy_left=("J", "Largest residual of the energy balance: the numerical error."),
     undefined="the signal does not reach the level in this time",
 )
-"""key figures of a braking"""
+"""key figures of braking"""
 
 
 def _braking(run: xr.Dataset, target: float, end: float) -> tuple[Kpi, ...]:
-    """Return the key figures of a braking that begins at time zero.
+    """Return the key figures of braking that begins at time zero.
 
-    ``run``: along the disc's direction; ``target``: demanded moment [N m]; ``end``: time of the
-    first change of the demand [s].
+    ``run``: recording, positive in the disc's direction; ``target``: demanded moment [N m];
+    ``end``: time of the first change of the demand [s].
     """
     after = run.sel(time=slice(-1e-9, None))
     held = run.sel(time=slice(-1e-9, end + 1e-9))
@@ -99,8 +99,8 @@ def _too_coarse(run: xr.Dataset, begin: float, end: float, rows: int = 1) -> str
     Parameters
     ----------
     rows
-        Least number of rows in that time. A revolution of the disc takes five: fewer would
-        alias the run-out's oscillation.
+        Smallest number of rows in that time. A revolution of the disc needs five rows; with fewer,
+        the run-out's oscillation would alias.
     """
     t = run["time"].values
     apart = float(np.diff(t).max()) if t.size > 1 else math.inf
@@ -118,20 +118,20 @@ def _too_coarse(run: xr.Dataset, begin: float, end: float, rows: int = 1) -> str
 
 # --- A step, then pulses to 80 % (Fig. 7)
 
-_OVER = "over the disc's last revolution of the hold; over its second half where that is shorter"
+_OVER = "over the hold's last disc revolution, or over its second half if that is shorter"
 PULSES_FIGURES = Figures(
     hold_moment=("N*m", f"Mean moment {_OVER}."),
     hold_error=(
         "%",
-        "Relative error of that moment: far below 0 if the demand exceeds the brake's capability.",
+        "Relative error of that moment; far below 0 if the demand exceeds the brake's capability.",
     ),
-    hold_ripple=("N*m", f"Moment peak to peak {_OVER}: the disc's run-out."),
-    hold_power=("W", f"Mean input power {_OVER}, standby included."),
+    hold_ripple=("N*m", f"Peak-to-peak moment {_OVER}, due to the disc's run-out."),
+    hold_power=("W", f"Mean input power {_OVER}, including standby."),
     brake_power=("W", f"Mean braking power {_OVER}."),
     pulse_moment=(
         "N*m",
-        "Mean moment over the disc's last revolution of the first pulse; over the pulse's "
-        "last fifth where it is shorter.",
+        "Mean moment over the first pulse's last disc revolution, or over the pulse's last fifth "
+        "if the pulse is shorter.",
     ),
 )
 
@@ -142,7 +142,7 @@ class PulsesOptions(ParameterSet):
     M_high: SomeMoment
     """moment demanded"""
     low: Fraction
-    """share of it to which the pulses fall"""
+    """share of the moment to which the pulses fall"""
     t_hold: Duration
     """time from the step to the first pulse"""
     t_low: Duration
@@ -193,10 +193,10 @@ def judge_pulses(recordings: Recordings, options: PulsesOptions) -> tuple[Kpi, .
 
 
 def _turn(run: xr.Dataset, begin: float, end: float, last: float) -> tuple[float, float]:
-    """Return the part of a time [s] that counts, without the rows at its ends.
+    """Return the evaluated part of an interval [s], without the rows at its ends.
 
-    It is the disc's last revolution, over which the run-out averages out. Without a whole
-    revolution it is the ``last`` share of the time.
+    It is the disc's last revolution, over which the run-out averages out. If the interval is
+    shorter than a revolution, it is the ``last`` share of the interval.
     """
     nearest = int(np.abs(run["time"].values - end).argmin())
     speed = abs(float(run["Omega"].values[nearest]))
@@ -206,7 +206,7 @@ def _turn(run: xr.Dataset, begin: float, end: float, last: float) -> tuple[float
 
 
 def _pulse(run: xr.Dataset, options: PulsesOptions) -> tuple[float, str]:
-    """Return the moment in the first pulse; over less than a revolution the run-out would show."""
+    """Return the first pulse's moment, averaged over a revolution to remove the run-out."""
     begin, end = _turn(run, options.t_hold, options.t_hold + options.t_low, 0.2)
     problem = _too_coarse(run, begin, end)
     return math.nan if problem else mean(run, "M_B", begin, end), problem
@@ -229,13 +229,13 @@ MOMENT_PULSES = Experiment(
 
 # --- A step, a reduction, and a slow ramp back (Fig. 8)
 
-_ROWS = 10  # fewest on the ramp
+_ROWS = 10  # smallest number of rows on the ramp
 
 RAMP_FIGURES = Figures(
     ramp_error_mean=("N*m", "Mean of demand minus moment on the ramp."),
     ramp_error_rms=(
         "N*m",
-        "Root mean square of demand minus moment on the ramp, run-out included.",
+        "Root mean square of demand minus moment on the ramp, including run-out.",
     ),
     ramp_slope=("N*m/s", "Slope of a line through the moment on the ramp."),
 )
@@ -245,7 +245,7 @@ class RampOptions(ParameterSet):
     """The braking maneuver."""
 
     M_high: SomeMoment
-    """moment demanded at first, and at the end of the ramp"""
+    """demanded moment at the start, and at the end of the ramp"""
     M_low: SomeMoment
     """moment from which the ramp starts"""
     t_hold: Duration
@@ -262,10 +262,9 @@ class RampOptions(ParameterSet):
     @model_validator(mode="after")
     def _rises(self) -> RampOptions:
         if self.M_low > self.M_high:
-            raise ValueError(
-                f"M_low = {self.M_low:g} N*m must not be above M_high = {self.M_high:g} N*m: "
-                "the ramp rises from M_low to M_high"
-            )
+            reason = "the ramp rises from M_low to M_high"
+            valid = f"<= M_high = {self.M_high:g} N*m"
+            raise RuleError("M_low", f"{self.M_low:g} N*m", valid, reason)
         return self
 
 
@@ -317,7 +316,7 @@ def _followed(run: xr.Dataset, begin: float, end: float) -> tuple[float, float, 
 MOMENT_RAMP = Experiment(
     name="moment-ramp",
     assembly="wedge-brake",
-    summary="moment step to {M_high}, down to {M_low}, slow ramp back (Fig. 8)",
+    summary="moment step to {M_high}, reduction to {M_low}, slow ramp back (Fig. 8)",
     options=RampOptions,
     defaults=RampOptions(
         M_high=200.0, M_low=160.0, t_hold=0.5, t_low=0.3, t_ramp=1.0, t_end=0.3, settle=0.05
@@ -347,7 +346,7 @@ class LargePulseOptions(ParameterSet):
     t_end: Duration
     """time recorded after it"""
     omega_gap: SpeedLimit
-    """largest speed while crossing the gap, lower here than in Figs. 7 and 8"""
+    """largest speed during gap crossing, lower than in Figs. 7 and 8"""
     settle: Duration
     """time parked before the pulse"""
 
@@ -385,7 +384,7 @@ def judge_large_pulse(recordings: Recordings, options: LargePulseOptions) -> tup
 MOMENT_PULSE_950 = Experiment(
     name="moment-pulse-950",
     assembly="wedge-brake",
-    summary="moment pulse of {M_high} on the software rate limit (Fig. 9)",
+    summary="moment pulse of {M_high} at the software rate limit (Fig. 9)",
     options=LargePulseOptions,
     defaults=LargePulseOptions(M_high=950.0, t_pulse=0.2, t_end=0.3, omega_gap=60.0, settle=0.05),
     cases=large_pulse,

@@ -1,7 +1,7 @@
 """Position step: both motors of the assembled brake follow a step within the clearance.
 
-Roberts et al. (2003), section "Position control of wedge": very little difference to the motors
-with their screws alone, because of the large reduction. The experiment runs both for comparison.
+Roberts et al. (2003), section "Position control of wedge", state very little difference from the
+motors with only their screws, due to the high gear ratio. The experiment runs both for comparison.
 """
 
 from __future__ import annotations
@@ -33,18 +33,18 @@ _AWAY = 1.0  # free-play [m] that no motor crosses
 
 STEP = ("rise_time", "overshoot", "settling_time", "steady_state_error")
 CURRENT = Figures(
-    peak_current=("A", "Largest current of a motor."),
-    current_limited=("%", "Share of the time after the step on the current limit."),
+    peak_current=("A", "Largest motor current."),
+    current_limited=("%", "Share of the time after the step at the current limit."),
 )
-_REST = "largest over time and amplitudes, in % of the step."
+_REST = "largest value over time and amplitudes, in % of the step."
 OVERALL = Figures(
     difference_screws=(
         "%",
-        f"Difference of the mean angle to screws that preload each other, no wedge; {_REST}",
+        f"Difference of the mean angle from screws that preload each other without wedge; {_REST}",
     ),
     difference_motors=(
         "%",
-        f"Difference of the mean angle to motors whose screws touch nothing; {_REST}",
+        f"Difference of the mean angle from motors with free screws; {_REST}",
     ),
     normal_force=("N", "Largest normal force: 0 while the steps stay within the clearance."),
 )
@@ -73,11 +73,11 @@ class Options(ParameterSet):
     f_high: Frequency
     """natural frequency of the position loop of high bandwidth"""
     delta: Position
-    """offset of each screw, which preloads the wedge; default: the parameters' value"""
+    """offset of each screw, which preloads the wedge; default: the parameter set's value"""
     duration: Duration
-    """time recorded after each step"""
+    """recorded time after each step"""
     settle: Duration
-    """time at rest before it"""
+    """time at rest before each step"""
 
 
 def following(par: WedgeParameters) -> Mapping[str, Any]:
@@ -88,7 +88,7 @@ def following(par: WedgeParameters) -> Mapping[str, Any]:
 def _arrangements(par: WedgeParameters, delta: float) -> dict[str, dict[str, float]]:
     """Return the changes that remove the wedge, and then also the other motor's screw.
 
-    The screws alone push on each other, tip to tip, with the force that they had on the wedge.
+    Without the wedge, the screws push on each other, tip to tip, with the same force.
     """
     heart = par.heart
     c = brake_heart.compliances(heart)
@@ -213,7 +213,7 @@ _DEFAULTS = Options(
 EXPERIMENT = Experiment(
     name="position-step",
     assembly="wedge-brake",
-    summary="steps of both motors within the clearance, two bandwidths, with and without the wedge",
+    summary="steps of both motors within the clearance, at two bandwidths, with and without wedge",
     options=Options,
     defaults=_DEFAULTS,
     cases=cases,

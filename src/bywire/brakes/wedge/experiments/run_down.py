@@ -1,6 +1,6 @@
-"""Run-down: a motor coasts to rest, alone, with a known inertia added, and with a known torque.
+"""Run-down: a motor coasts to rest alone, with an added known inertia, and with a known torque.
 
-A run-down alone determines friction and damping per inertia only. A known inertia on the shaft, or
+A plain run-down determines only friction and damping per inertia. A known inertia on the shaft, or
 the torque of a known current, sets the scale.
 """
 
@@ -14,32 +14,32 @@ import xarray as xr
 
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis.kpi import Figures, Kpi
-from bywire.brakes.wedge.case import parameters_of
-from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.rigs.rig_case import (
+from bywire.brakes.wedge.case import (
     Stimuli,
     check_current,
+    parameters_of,
     shaft_case,
     torque_constant_of,
 )
+from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Current, Duration, Inertia
 from bywire.core.typing import Array
 
 LABELS = ("free", "added", "braked")
-_HALF = 0.5  # of the initial speed: end of the range for decelerations
+_HALF = 0.5  # share of the initial speed at which the range for decelerations ends
 STOPPING = Figures(
     stopping_time=("s", "Time from the end of the spin-up until the shaft rests."),
-    undefined="the shaft does not turn long enough, or does not come to rest",
+    undefined="the shaft turns for too short a time, or does not come to rest",
 )
 FIGURES = Figures(
     speed=("rad/s", "Speed at the end of the spin-up."),
     inertia_by_added=(
         "kg*m**2",
-        "Inertia of shaft and motor, from mean decelerations over equal speeds with and without "
-        "the added inertia.",
+        "Inertia of shaft and motor, from mean decelerations in the same speed range with and "
+        "without the added inertia.",
     ),
-    inertia_by_torque=("kg*m**2", "The same from the known current's torque."),
+    inertia_by_torque=("kg*m**2", "The same inertia, from the known current's torque."),
     inertia_true=("kg*m**2", "True value."),
     undefined=STOPPING.undefined,
 )
@@ -51,13 +51,13 @@ class Options(ParameterSet):
     i_spin: Current
     """current of the spin-up"""
     t_spin: Duration
-    """time of the spin-up; with the added inertia longer in proportion"""
+    """time of the spin-up; proportionally longer with the added inertia"""
     J_added: Inertia
     """inertia added to the shaft in the second run"""
     i_brake: Current
-    """current against the motion in the third run; less than friction holds at rest"""
+    """current against the motion in the third run; friction must hold its torque at rest"""
     duration: Duration
-    """time recorded from the end of the spin-up"""
+    """recorded time after the end of the spin-up"""
     record: Duration
     """recording interval"""
 
@@ -99,7 +99,7 @@ def _spun(options: Options, i_after: float) -> Stimuli:
 
 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
-    """Return how long the shaft turns, and its inertia by the added inertia and by the torque."""
+    """Return the stopping times, and the inertia from the added inertia and from the torque."""
     par = parameters_of(recordings["free"])
     rate = {label: _deceleration(recordings, label) for label in LABELS}
     J = par.motor_1.J_M + par.rig.J_dummy
@@ -150,7 +150,7 @@ def _over(above: float, below: float) -> float:
 EXPERIMENT = Experiment(
     name="run-down",
     assembly="wedge-brake",
-    summary="a motor coasts to rest: alone, with an added inertia, against a known torque",
+    summary="a motor coasts to rest: alone, with an added inertia, and against a known torque",
     options=Options,
     defaults=Options(i_spin=4.0, t_spin=0.1, J_added=1e-4, i_brake=0.5, duration=0.5, record=2e-4),
     cases=cases,

@@ -1,8 +1,8 @@
-"""Efficiency of the roller screw: two motors against each other, a force sensor between.
+"""Roller screw efficiency: two motors against each other, with a force sensor between them.
 
-Two such motors cannot back-drive each other at full current: 0.65 x 0.46 of the torque of one
-arrives at the other. So a motor in position control moves, and one in current control follows or
-is pushed back.
+Two such motors cannot back-drive each other at full current, since only 0.65 x 0.46 of a motor's
+torque reaches the other. So the motor in position control moves, and the motor in current control
+follows or is driven back.
 """
 
 from __future__ import annotations
@@ -16,15 +16,16 @@ from pydantic import Field
 
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis.kpi import Figures, Kpi
-from bywire.brakes.wedge.case import mean, parameters_of
-from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.rigs.rig_case import (
+from bywire.brakes.wedge.case import (
     check_current,
+    mean,
+    parameters_of,
     screw_case,
     shaft_case,
     slope_of,
     torque_constant_of,
 )
+from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Current, Duration, Unit
 from bywire.core.signals import Signal
@@ -34,26 +35,26 @@ from bywire.core.typing import Array
 
 SlowSpeed = Annotated[float, Unit("rad/s", 10.0), Field(gt=0, allow_inf_nan=False)]
 
-_SETTLED = 0.3  # share of the time in motion that the means omit
-_LESS = 0.5  # share of the currents in the motions under less force
+_SETTLED = 0.3  # share of the time in motion that means omit
+_LESS = 0.5  # ratio of currents in the motions under lower force
 _SPEED = 0.05  # largest relative error of mean speeds in steady motion
 EFFICIENCY_FIGURES = Figures(
-    eta_f=("1", "Torque by the force over motor torque minus the bearings', motor 1 driving."),
-    eta_f_no_load=("1", "The same, with only the bearing torque without load subtracted."),
-    eta_f_raw=("1", "Torque by the force over motor torque, motor 1 driving."),
-    eta_f_reverse=("1", "As eta_f, motor 2 driving."),
+    eta_f=("1", "Force torque over motor torque minus bearing torque, motor 1 driving."),
+    eta_f_no_load=("1", "The same, subtracting only the no-load bearing torque."),
+    eta_f_raw=("1", "Force torque over motor torque, motor 1 driving."),
+    eta_f_reverse=("1", "Like eta_f, motor 2 driving."),
     eta_f_true=("1", "True value."),
-    eta_b=("1", "Holding torque and the bearings' over torque by the force, motor 2 driven."),
-    eta_b_no_load=("1", "The same, with only the bearing torque without load added."),
-    eta_b_raw=("1", "Holding torque over torque by the force, motor 2 driven."),
-    eta_b_reverse=("1", "As eta_b, motor 1 driven."),
+    eta_b=("1", "Holding torque plus bearing torque over force torque, motor 2 driven."),
+    eta_b_no_load=("1", "The same, adding only the no-load bearing torque."),
+    eta_b_raw=("1", "Holding torque over force torque, motor 2 driven."),
+    eta_b_reverse=("1", "Like eta_b, motor 1 driven."),
     eta_b_true=("1", "True value."),
     force=("N", "Mean force while motor 1 drives."),
     force_reverse=("N", "Mean force while motor 1 is driven back."),
-    bearing_torque=("N*m", "Motor torque without load at the same speed."),
+    bearing_torque=("N*m", "No-load motor torque at the same speed."),
     bearing_growth=(
         "N*m/N**2",
-        "Growth of that torque with the square of the force, motor 1 driving.",
+        "Growth of the bearing torque with the square of the force, motor 1 driving.",
     ),
     bearing_growth_true=("N*m/N**2", "True value."),
     undefined="no steady motion under compression: a motor cannot hold its speed or force",
@@ -61,10 +62,10 @@ EFFICIENCY_FIGURES = Figures(
 
 
 class EfficiencyOptions(ParameterSet):
-    """Currents and slow motion, beyond the speed range in which friction falls with speed."""
+    """Currents and slow motion, above the speed range in which friction falls with speed."""
 
     i_drive: Current
-    """current of motor 1 while it drives and motor 2 gives way"""
+    """current of motor 1 while it drives and motor 2 yields"""
     i_back: Current
     """current of motor 1 while motor 2 pushes it back; must be small enough for motor 2"""
     omega_slow: SlowSpeed
@@ -91,10 +92,10 @@ def efficiency(
 
     Notes
     -----
-    The bearings' friction grows with the square of the force. The torque without load does not
-    contain that growth: subtracting it alone leaves an efficiency too low by F C_2 / k, a percent
-    or more. So each motion runs under two forces. A torque per force, extrapolated to zero force,
-    is the screw's alone.
+    The bearings' friction grows with the square of the force. The no-load torque does not contain
+    that growth, so subtracting only the no-load torque gives an efficiency that is too low by
+    F C_2 / k, a percent or more. Each motion therefore runs under two forces. Torque per force,
+    extrapolated to zero force, belongs only to the screw.
     """
     for name in ("i_drive", "i_back"):
         check_current(name, getattr(options, name), par)
@@ -205,7 +206,7 @@ def _ratio(above: float, below: float) -> float:
 SCREW_EFFICIENCY = Experiment(
     name="screw-efficiency",
     assembly="wedge-brake",
-    summary="efficiency of the roller screw, from motor currents and the force between two screws",
+    summary="roller screw efficiency, from motor currents and the force between two screws",
     options=EfficiencyOptions,
     defaults=EfficiencyOptions(i_drive=12.0, i_back=3.0, omega_slow=10.0, settle=0.4, duration=1.0),
     cases=efficiency,
@@ -215,26 +216,26 @@ SCREW_EFFICIENCY = Experiment(
 )
 
 
-# --- Load sweep: many forces separate load-dependent friction from the rest
+# --- Load sweep: several forces separate load-dependent friction from other friction
 
 Levels = Annotated[int, Unit("1", 3.0), Field(ge=1, le=100)]
 
-_TURN = 0.2  # of a stroke's time, at rest after it, while the current changes
-_RAMP = 0.2  # of a stroke's time, in which the speed rises, and falls again
-_SWEEP_SETTLED = 0.4  # of a stroke, left out of the means
+_TURN = 0.2  # share of a stroke's time at rest after it, while the current changes
+_RAMP = 0.2  # share of a stroke's time in which the speed rises, and in which it falls
+_SWEEP_SETTLED = 0.4  # share of a stroke that means omit
 LOAD_SWEEP_FIGURES = Figures(
     force_max=("N", "Largest mean force of a stroke."),
     force_min=("N", "Smallest mean force of a stroke."),
-    eta_f_slope=("1", "Torque by the force over motor torque, by their growth; motor 1 driving."),
+    eta_f_slope=("1", "Slope of force torque over motor torque, motor 1 driving."),
     eta_f_true=("1", "True value."),
-    eta_b_slope=("1", "The same, inverse, motor 1 driven back."),
+    eta_b_slope=("1", "Inverse of that slope, motor 1 driven back."),
     eta_b_true=("1", "True value."),
     undefined="the force does not grow with the current: set more levels",
 )
 
 
 class LoadSweepOptions(ParameterSet):
-    """Strokes of motor 2 there and back, at currents of motor 1 that grow from pair to pair."""
+    """Strokes of motor 2 forward and back, at currents of motor 1 that grow from pair to pair."""
 
     i_drive: Current
     """largest current of motor 1 while it drives"""
@@ -249,7 +250,7 @@ class LoadSweepOptions(ParameterSet):
 
 
 class Stroke(NamedTuple):
-    """One motion: when it begins [s], its direction, and the current of motor 1 [A]."""
+    """One motion: its start [s], its direction, and the current of motor 1 [A]."""
 
     begin: float
     sign: float
@@ -257,7 +258,7 @@ class Stroke(NamedTuple):
 
 
 def strokes(options: LoadSweepOptions) -> tuple[Stroke, ...]:
-    """Return the strokes: at every level one that motor 1 drives, and one that drives it back."""
+    """Return the strokes: at every level, motor 1 drives once and is driven back once."""
     period = (1.0 + _TURN) * options.t_stroke
     moves = []
     for k in range(options.levels):
@@ -302,7 +303,7 @@ def _moved(t: Array, T: float) -> Array:
 
 
 def judge_load_sweep(recordings: Recordings, options: LoadSweepOptions) -> tuple[Kpi, ...]:
-    """Return the efficiencies by the slope of motor 1's torque over the force, both ways."""
+    """Return both efficiencies from the slope of motor 1's torque over the force."""
     run = recordings["run"]
     par = parameters_of(run)
     k, K = slope_of(par), torque_constant_of(par)
@@ -339,7 +340,7 @@ def _line(rows: list[tuple[float, ...]]) -> float:
 LOAD_SWEEP = Experiment(
     name="load-sweep",
     assembly="wedge-brake",
-    summary="screw driving and driven back under growing forces: friction with and without load",
+    summary="screw driving and driven back under growing forces: load-dependent and other friction",
     options=LoadSweepOptions,
     defaults=LoadSweepOptions(i_drive=12.0, i_back=3.0, levels=6, omega_slow=10.0, t_stroke=0.6),
     cases=load_sweep,

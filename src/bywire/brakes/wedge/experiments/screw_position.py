@@ -15,9 +15,8 @@ from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis import step_response
 from bywire.bench.kpis.families import evaluate, units_of
 from bywire.bench.kpis.kpi import Figures, Kpi
-from bywire.brakes.wedge.case import parameters_of, steps
+from bywire.brakes.wedge.case import Stimuli, parameters_of, peak, shaft_case, steps
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.rigs.rig_case import Stimuli, peak, shaft_case
 from bywire.brakes.wedge.rigs.shaft_rig import friction
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Frequency, Unit
@@ -52,7 +51,7 @@ class StepsOptions(ParameterSet):
     f_high: Frequency
     """natural frequency of the high-bandwidth controller"""
     duration: Duration
-    """time recorded after each step"""
+    """recorded time after each step"""
     settle: Duration
     """time at rest before each step"""
     record: Duration
@@ -123,12 +122,12 @@ def _stepped(level: float) -> Stimuli:
 # --- Preloaded roller screw
 
 BAND = Figures(
-    dead_band=("rad", "Angle error that friction and cogging at rest can hold, by their laws."),
+    dead_band=("rad", "Angle error that friction and cogging can hold at rest, by their laws."),
 )
 
 
 def judge_screw_position(recordings: Recordings, options: StepsOptions) -> tuple[Kpi, ...]:
-    """Return the figures of all steps, and the error within which friction holds the shaft."""
+    """Return the figures of all steps, and the angle error that friction can hold."""
     bands: list[Kpi] = []
     for loop in _LOOPS:
         par = parameters_of(recordings[f"{loop}_small"])
@@ -148,7 +147,7 @@ def _stiffness(par: WedgeParameters) -> float:
 SCREW_POSITION = Experiment(
     name="screw-position",
     assembly="wedge-brake",
-    summary="position steps of a single motor with a preloaded roller screw, two bandwidths",
+    summary="position steps of a single motor with a preloaded roller screw, at two bandwidths",
     options=StepsOptions,
     defaults=_DEFAULTS,
     cases=lambda par, options, _: _step_cases(
@@ -165,7 +164,7 @@ SCREW_POSITION = Experiment(
 DUMMY_SHAFT = Experiment(
     name="dummy-shaft",
     assembly="wedge-brake",
-    summary="position steps of a single motor with a dummy shaft, two bandwidths",
+    summary="position steps of a single motor with a dummy shaft, at two bandwidths",
     options=StepsOptions,
     defaults=_DEFAULTS,
     cases=lambda par, options, _: _step_cases(

@@ -1,6 +1,6 @@
-"""Slow rotation: a motor's current during one slow revolution forward and one back.
+"""Slow rotation: a motor's current during one slow revolution forward and back.
 
-Cogging depends only on the angle, dry friction on the direction: both directions separate them.
+Cogging depends only on the angle, dry friction on the direction, so two directions separate them.
 """
 
 from __future__ import annotations
@@ -11,22 +11,21 @@ import numpy as np
 
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis.kpi import Figures, Kpi
-from bywire.brakes.wedge.case import parameters_of
+from bywire.brakes.wedge.case import parameters_of, shaft_case, torque_constant_of
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.rigs.rig_case import shaft_case, torque_constant_of
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration
 from bywire.core.typing import Array
 from bywire.plant.axial_bearing import AngularSpeed
 
-_STARTED = 0.05  # of a stroke, after which the motion counts as steady
+_STARTED = 0.05  # share of a stroke after which the motion counts as steady
 FIGURES = Figures(
-    torque_forward=("N*m", "Mean torque by the current, forward."),
-    torque_backward=("N*m", "The same backward."),
-    friction_torque=("N*m", "Half of their difference."),
-    ripple=("N*m", "Amplitude of a sine of the torque's deviation from its mean."),
+    torque_forward=("N*m", "Mean torque from the current, forward."),
+    torque_backward=("N*m", "Mean torque from the current, backward."),
+    friction_torque=("N*m", "Half the difference between the two."),
+    ripple=("N*m", "Amplitude of a sine that fits the torque's deviation from its mean."),
     cogging_true=("N*m", "True amplitude of the cogging torque."),
-    undefined="the recording has no row in the time of steady motion",
+    undefined="the recording has no row during steady motion",
 )
 
 
@@ -36,7 +35,7 @@ class Options(ParameterSet):
     omega_slow: AngularSpeed
     """speed of the motion"""
     settle: Duration
-    """time at rest before it"""
+    """time at rest before the motion"""
     record: Duration
     """recording interval"""
 
@@ -84,7 +83,7 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
 EXPERIMENT = Experiment(
     name="slow-rotation",
     assembly="wedge-brake",
-    summary="one revolution forward and back, slowly: cogging torque and dry friction",
+    summary="one slow revolution forward and back: cogging torque and dry friction",
     options=Options,
     defaults=Options(omega_slow=0.5, settle=0.05, record=1e-3),
     cases=cases,

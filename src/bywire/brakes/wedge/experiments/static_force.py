@@ -1,8 +1,8 @@
 """Static force: actuation force and brake factor over the pads' friction coefficient.
 
 Roberts et al. (2003), section "Introduction": C* = 2 mu_B / (tan(alpha) - mu_B), positive while
-the actuator pushes, negative while it pulls. That holds without friction; with it, the force at
-rest may lie anywhere in a band, whose edges a slowly rising and a slowly falling moment show.
+the actuator pushes, negative while it pulls. The formula neglects friction. With friction, the
+force at rest has any value in a band. A slowly rising and a slowly falling moment show its limits.
 """
 
 from __future__ import annotations
@@ -31,29 +31,32 @@ from bywire.core.quantities import Duration
 from bywire.core.typing import Array
 
 FREE, DRY = "frictionless", "friction"
-_SHARE = 0.2  # of the moment: how far the ramps go to either side
+_SHARE = 0.2  # half width of the ramps, as a share of the moment
 _NO_FORCE = 1.0  # actuation force [N] below which the brake factor is meaningless
 
 EACH = Figures(
     F_M=("N", "Actuation force at the end, without friction."),
-    F_M_closed=("N", "Closed form of it, (tan(alpha) - mu_B) F_N, at that normal force."),
+    F_M_closed=("N", "Closed form of F_M, (tan(alpha) - mu_B) F_N, at the same normal force."),
     F_M_rising=(
         "N",
-        "With friction: mean force while the moment rises slowly, at that normal force.",
+        "With friction: mean force while the moment rises slowly, at the same normal force.",
     ),
-    F_M_falling=("N", "The same while it falls slowly: the force at rest is anywhere between."),
+    F_M_falling=("N", "The same while it falls slowly; the force at rest is between the two."),
     C_star=("1", "Brake factor without friction, 2 mu_B F_N / F_M."),
-    C_star_closed=("1", "Closed form of it, 2 mu_B / (tan(alpha) - mu_B)."),
+    C_star_closed=("1", "Closed form of C_star, 2 mu_B / (tan(alpha) - mu_B)."),
     C_star_rising=("1", "With friction: brake factor while the moment rises."),
-    C_star_falling=("1", "With friction: brake factor while it falls."),
+    C_star_falling=("1", "With friction: brake factor while the moment falls."),
 )
 ALL = Figures(
-    F_M_error=("N", "Largest difference of force and closed form, without friction."),
-    C_star_error=("%", "Largest difference of brake factor and closed form, without friction."),
-    neutral_mu=("1", "Coefficient at which no actuation force is needed, no friction."),
-    neutral_mu_closed=("1", "Closed form of it, tan(alpha)."),
-    neutral_mu_rising=("1", "The same with friction, while the moment rises."),
-    neutral_mu_falling=("1", "The same with friction, while the moment falls."),
+    F_M_error=("N", "Largest difference between force and closed form, without friction."),
+    C_star_error=(
+        "%",
+        "Largest difference between brake factor and closed form, without friction.",
+    ),
+    neutral_mu=("1", "Coefficient with zero actuation force, without friction."),
+    neutral_mu_closed=("1", "Closed form of neutral_mu, tan(alpha)."),
+    neutral_mu_rising=("1", "Coefficient with zero force with friction, while the moment rises."),
+    neutral_mu_falling=("1", "Coefficient with zero force with friction, while the moment falls."),
 )
 
 
@@ -61,13 +64,13 @@ class Options(ParameterSet):
     """A moment, approached slowly from below and from above, then held."""
 
     M_hold: SomeMoment
-    """moment at which the force is read"""
+    """moment at which the force is evaluated"""
     mu_B: Coefficients
     """friction coefficients of the pads"""
     t_start: Duration
     """time from the first demand to the rising ramp"""
     t_ramp: Duration
-    """length of the rising ramp, and of the falling one; 20 % to either side of the moment"""
+    """length of the rising and of the falling ramp; 20 % on either side of the moment"""
     t_hold: Duration
     """time at the moment, at the end"""
 
@@ -126,8 +129,8 @@ def _each(recordings: Recordings, mu_B: float, options: Options) -> tuple[Kpi, .
     rising, falling = (
         F_N * _slope(dry, at - 0.25 * T, at + 0.25 * T) for at in (middle, middle + T)
     )
-    note = "" if F_N > 0 else "the pads do not press at the end"
-    bad = "" if math.isfinite(rising + falling) else "the pads do not press on the ramps"
+    note = "" if F_N > 0 else "the pads are not applied at the end"
+    bad = "" if math.isfinite(rising + falling) else "the pads are not applied on the ramps"
     F_B = mu_B * F_N
     return EACH(
         f"_{tag(mu_B)}",
@@ -144,15 +147,16 @@ def _each(recordings: Recordings, mu_B: float, options: Options) -> tuple[Kpi, .
 
 def _factor(F_B: float, F_M: float, problem: str) -> tuple[float, str]:
     """Return a brake factor: both pads' braking force over the actuation force."""
-    vague = f"the actuation force is below {_NO_FORCE:g} N: the brake factor is not bounded"
+    vague = f"the actuation force is below {_NO_FORCE:g} N, so the brake factor is unbounded"
     note = problem or ("" if abs(F_M) >= _NO_FORCE else vague)
     return math.nan if note else 2.0 * F_B / F_M, note
 
 
 def _neutral(options: Options, F_M: list[float]) -> tuple[float, str]:
-    """Return the friction coefficient at which a force changes its sign, by straight lines.
+    """Return the friction coefficient at which a force changes its sign, by linear interpolation.
 
-    Forces times mu_B are forces per normal force at equal moments: straight lines over mu_B.
+    At equal moments, force times mu_B is proportional to force per normal force, a straight line
+    over mu_B.
     """
     order = np.argsort(options.mu_B)
     mu, F = np.array(options.mu_B)[order], np.multiply(F_M, options.mu_B)[order]
@@ -178,7 +182,9 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
         if math.isfinite(factor * closed)
     ]
     overall = ALL(
-        F_M_error=max(wrong) if wrong else (math.nan, "the pads do not press at any coefficient"),
+        F_M_error=max(wrong)
+        if wrong
+        else (math.nan, "the pads are not applied at any coefficient"),
         C_star_error=100.0 * max(shares)
         if shares
         else (math.nan, "every brake factor is unbounded"),

@@ -1,4 +1,4 @@
-"""Stiffness of the drive train, on a force sensor between the screws and in the brake heart."""
+"""Drive train stiffness, with a force sensor between the screws, and in the brake heart."""
 
 from __future__ import annotations
 
@@ -10,15 +10,16 @@ import xarray as xr
 
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis.kpi import Figures, Kpi
-from bywire.brakes.wedge.case import case_from_parked, parameters_of
-from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.rigs.rig_case import (
+from bywire.brakes.wedge.case import (
     Stimuli,
+    case_from_parked,
     check_current,
+    parameters_of,
     screw_case,
     slope_of,
     torque_constant_of,
 )
+from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Current, Duration, Length
 from bywire.core.typing import Array
@@ -36,25 +37,25 @@ def _heart_case(par: WedgeParameters, stimulus: Stimuli, duration: float, mode: 
 
 
 def _squeezing_current(run: xr.Dataset) -> Array:
-    """Return the current [A] that squeezes, the mean of both motors."""
+    """Return the squeezing current [A], the mean of both motors."""
     return np.asarray(0.5 * (run["i_1"].values - run["i_2"].values))
 
 
 # --- In current control: ramps of opposite currents
 
-_UPPER = 0.35  # of the largest current: below, bearings and free-play bend the line
-_HOLD = 0.2  # of the ramp's time, at the largest current and between the directions
+_UPPER = 0.35  # share of the largest current; below it, bearings and free-play bend the line
+_HOLD = 0.2  # share of the ramp's time, at the largest current and between the directions
 STIFFNESS_FIGURES = Figures(
-    K_line_compression=("N/m", "Force over travel, sensor between, compression."),
-    K_line_tension=("N/m", "Force over travel, sensor between, tension."),
+    K_line_compression=("N/m", "Force over travel with the sensor, compression."),
+    K_line_tension=("N/m", "Force over travel with the sensor, tension."),
     force_per_current=("N/A", "Force over rising current, mean of compression and tension."),
-    K_S=("N/m", "Stiffness of one screw: that of the line, corrected for the sensor."),
+    K_S=("N/m", "Stiffness of one screw: line stiffness, corrected for the sensor."),
     K_S_true=("N/m", "True value."),
-    K_heart_compression=("N/m", "Force by current over travel, tip to tip."),
-    K_heart_tension=("N/m", "Force by current over travel, through the wedge."),
+    K_heart_compression=("N/m", "Force from current over travel, tip to tip."),
+    K_heart_tension=("N/m", "Force from current over travel, through the wedge."),
     K_W=("N/m", "Stiffness of one interface to the wedge: tension, corrected for the screws."),
     K_W_true=("N/m", "True value."),
-    free_play=("m", "Travel between the lines of compression and tension at no force."),
+    free_play=("m", "Travel between the compression and tension lines at zero force."),
     free_play_true=("m", "True value."),
     undefined="no travel under load: set a larger current",
 )
@@ -85,10 +86,10 @@ def stiffness(
     Notes
     -----
     The evaluation excludes friction as on a real rig. Stage 1 measures force and travel at the
-    sensor, so friction has no effect. Stage 2 has no force sensor: the current gives the force, by
-    a calibration from stage 1 that includes the friction of rising current. As in the paper,
-    symmetry is assumed. Unequal motors drag the wedge along, and its friction then counts as
-    stiffness (K_W is 5 % too high if the torque constants differ by 10 %).
+    sensor, so friction has no effect. Stage 2 has no force sensor. There the force follows from the
+    current and a calibration from stage 1, which includes the friction at rising current. The
+    evaluation assumes symmetry, like the paper. Unequal motors drag the wedge along, and its
+    friction then counts as stiffness (K_W is 5 % too high if the torque constants differ by 10 %).
     """
     check_current("i_max", options.i_max, par)
     t = options.t_ramp
@@ -138,7 +139,7 @@ def judge_stiffness(recordings: Recordings, options: StiffnessOptions) -> tuple[
 
 
 def _profile(options: StiffnessOptions) -> tuple[list[float], list[float]]:
-    """Return times [s] and currents [A] of the corners."""
+    """Return times [s] and currents [A] of the breakpoints."""
     i, hold = options.i_max, _HOLD
     corners = [
         0.0,
@@ -179,7 +180,7 @@ def _line(x: Array, y: Array) -> Line:
 STIFFNESS = Experiment(
     name="stiffness",
     assembly="wedge-brake",
-    summary="stiffnesses of screws and wedge and the free-play, motors against each other",
+    summary="stiffness of screws and wedge, and free-play, with motors against each other",
     options=StiffnessOptions,
     defaults=StiffnessOptions(i_max=15.0, t_ramp=2.0),
     cases=stiffness,
@@ -195,16 +196,16 @@ LABELS = ("sensor", "heart")
 FORCE_CYCLE_FIGURES = Figures(
     force_compression=("N", "Largest force on the sensor."),
     force_tension=("N", "Largest tension on the sensor."),
-    stiffness=("N/m", "Force over travel with the sensor between, by a straight line."),
-    peak_current_sensor=("A", "Largest mean current of both motors, on the sensor."),
-    peak_current_heart=("A", "The same in the brake heart."),
-    hysteresis=("N*m", "Friction torque, half the loop's width, mean over the cycle."),
+    stiffness=("N/m", "Slope of force over travel with the sensor."),
+    peak_current_sensor=("A", "Largest mean current of both motors, with the sensor."),
+    peak_current_heart=("A", "Largest mean current of both motors, in the brake heart."),
+    hysteresis=("N*m", "Friction torque: half the loop's width, mean over the cycle."),
     undefined="no travel: set larger options",
 )
 
 
 class ForceCycleOptions(ParameterSet):
-    """Travels of one nut toward the other: zero, compression, tension, zero."""
+    """Travel of one nut toward the other: zero, compression, tension, zero."""
 
     c_sensor: Length
     """closest, and farthest, with the force sensor between the screws"""
@@ -221,8 +222,8 @@ def force_cycle(
 ) -> tuple[Case, ...]:
     """Return both stages; the wedge stays in its clearance.
 
-    Motors that turn steadily neither stick nor slip. So force over current shows the friction's
-    hysteresis, and force over travel the stiffness, in both directions and through the free-play.
+    Steadily turning motors do not stick. So force over current shows the friction's hysteresis, and
+    force over travel shows the stiffness, in both directions and through the free-play.
     """
     modes = {"rig.mode_1": "position", "rig.mode_2": "position"}
     squeeze, t_sensor = _cycle(par, options.c_sensor, options.c_sensor, options)

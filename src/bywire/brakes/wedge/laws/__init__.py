@@ -1,1 +1,1 @@
-"""Control laws of this brake alone."""
+"""Control laws that only this brake uses."""

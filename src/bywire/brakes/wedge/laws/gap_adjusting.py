@@ -1,7 +1,7 @@
-"""Law of the wedge brake's adjuster: it takes the gap from the moment control, and corrects it.
+"""Law of the wedge brake's adjuster, which corrects the gap that the moment control estimates.
 
 The moment control estimates the travel from parking to contact. The adjuster subtracts its
-commanded teeth from this travel, so that the next application does not creep through a gap that no
+commanded teeth from this travel, so the next application does not creep through a gap that no
 longer exists.
 """
 
@@ -47,9 +47,9 @@ class Parameters(wear_adjuster.Parameters):
 class State(NamedTuple):
     """Memory of the adjuster."""
 
-    applied: Annotated[float, Signal("1", "the brake was applied since it was parked last")]
+    applied: Annotated[float, Signal("1", "the brake was applied since it was last parked")]
     wide: Annotated[float, Signal("1", "applications in a row with too much gap; < 0: too little")]
-    teeth: Annotated[float, Signal("1", "teeth turned, as the adjuster counts them", 3.0)]
+    teeth: Annotated[float, Signal("1", "teeth turned, by the adjuster's count", 3.0)]
 
 
 class Input(NamedTuple):
@@ -66,7 +66,7 @@ class Output(NamedTuple):
     teeth: wear_adjuster.Teeth
     turned: wear_adjuster.Teeth
     mode: Annotated[float, Signal("1", "adjuster: 0 waits, 1 brake applied, 2 turns", 2.0)]
-    gap: Annotated[float, Signal("m", "clearance as the adjuster believes it", 2e-4)]
+    gap: Annotated[float, Signal("m", "clearance estimated by the adjuster", 2e-4)]
 
 
 def output(x: State, u: Input, par: Parameters) -> tuple[State, Output]:
@@ -85,7 +85,7 @@ def output(x: State, u: Input, par: Parameters) -> tuple[State, Output]:
 
 def contact(
     theta_c: Annotated[float, Signal("rad", "contact position, estimated", 1.7)],
-    rate: Annotated[float, Signal("1/s", "teeth that are meant to turn in a second", 50.0)],
+    rate: Annotated[float, Signal("1/s", "intended teeth per second", 50.0)],
     T: Annotated[float, Signal("s", "sample time of the moment control", 1e-3)],
     par: Parameters,
 ) -> Annotated[float, Signal("rad", "contact position, estimated", 1.7)]:

@@ -1,7 +1,7 @@
 """Moment control of a wedge brake: parked, gap crossing, moment, retracting.
 
-It works on the angle toward clamping, so that both directions of rotation look alike. Its output is
-the speed of the common angle reference, which the faster position task integrates.
+It uses the angle toward clamping, so both directions of rotation are the same. Its output is the
+speed of the common angle reference, which the faster position task integrates.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class Parameters(ParameterSet):
     a_gap: Acceleration
     """acceleration while crossing the gap"""
     omega_creep: SpeedLimit
-    """speed at the estimated contact position, kept until contact is detected"""
+    """speed from the estimated contact position until contact is detected"""
     M_on: SomeMoment
     """smallest moment demand for which the brake leaves its parking position"""
     M_contact: SomeMoment
@@ -72,11 +72,11 @@ class Input(NamedTuple):
 
 
 def observed(x: State, u: Input, par: Parameters) -> Moment:
-    """Return the moment to control: measured, or from the angle while the disc stands.
+    """Return the moment to control: measured, or from the angle while the disc is at rest.
 
     Notes
     -----
-    Standstill logic (our choice): a sensor on a standing disc reads zero, and an integral law
+    Standstill logic (our choice): with the disc at rest, the sensor reads zero and an integral law
     would wind up. The control uses the assumed stiffness instead.
     """
     still = ops.fabs(u.Omega) < par.Omega_still
@@ -85,10 +85,10 @@ def observed(x: State, u: Input, par: Parameters) -> Moment:
 
 
 def next_mode(mode: Flag, braking: Flag, touching: Flag, home: Flag) -> Flag:
-    """Return the next mode, by flags of 0 or 1.
+    """Return the next mode from flags of 0 or 1.
 
-    ``braking``, ``touching``, ``home``: flags of a braking demand, of pad contact, of a reference
-    back at its parking position.
+    ``braking``, ``touching``, ``home``: flags for a braking demand, pad contact, and a reference at
+    its parking position.
     """
     from_parked = ops.where(braking > 0.5, GAP, PARKED)
     from_gap = ops.where(braking > 0.5, ops.where(touching > 0.5, MOMENT, GAP), RETRACTING)

@@ -1,4 +1,4 @@
-"""Offset between the two screws: squeeze the wedge to remove free-play, or push it jointly."""
+"""Offset between the two screws, which squeeze the wedge without free-play or push it jointly."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from annotated_types import Gt
 from pydantic import model_validator
 
 from bywire.core import ops
-from bywire.core.parameters import ParameterSet
+from bywire.core.parameters import ParameterSet, RuleError
 from bywire.core.quantities import Duration, Force, GearRatio, Position
 from bywire.core.signals import Signal
 
@@ -17,9 +17,9 @@ ScrewTravel = Annotated[float, Signal("m", "offset of each screw", 4e-5)]
 
 
 class Parameters(ParameterSet):
-    """Positive offsets preload the wedge, negative ones let the screws push on each other.
+    """Positive offsets preload the wedge; with negative offsets, the screws push on each other.
 
-    ``law``: ``"preload"`` keeps the preload; ``"scheduled"`` preloads near the neutral point and
+    ``law``: ``"preload"`` always preloads; ``"scheduled"`` preloads near the neutral point, and
     lets the motors cooperate if the actuation force is large.
     """
 
@@ -41,9 +41,7 @@ class Parameters(ParameterSet):
     @model_validator(mode="after")
     def _ordered(self) -> Parameters:
         if not self.F_low < self.F_high:
-            raise ValueError(
-                f"screw_offset.F_low = {self.F_low:g} N must be below F_high = {self.F_high:g} N"
-            )
+            raise RuleError("F_low", f"{self.F_low:g} N", f"below F_high = {self.F_high:g} N")
         return self
 
 
@@ -65,10 +63,10 @@ def offset(
 
 
 def advance(delta: ScrewTravel, target: ScrewTravel, T: SampleTime, par: Parameters) -> ScrewTravel:
-    """Return the offset one sample later: it approaches its target as a first-order lag.
+    """Return the offset one sample later, which follows its target with a first-order lag.
 
-    The offset itself affects the currents from which the controller estimates the actuation force:
-    a schedule without this lag chatters.
+    The offset affects the currents from which the controller estimates the actuation force, so a
+    schedule without this lag chatters.
     """
     return delta + T / (T + par.T_change) * (target - delta)
 

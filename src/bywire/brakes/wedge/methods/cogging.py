@@ -15,9 +15,9 @@ import numpy as np
 import xarray as xr
 from pydantic import Field
 
+from bywire.brakes.wedge.case import turned
 from bywire.brakes.wedge.experiments import slow_rotation
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.rigs.rig_case import turned
 from bywire.core.errors import ParameterError, not_valid
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Frequency, Unit

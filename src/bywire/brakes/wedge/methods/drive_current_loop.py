@@ -9,8 +9,8 @@ import xarray as xr
 from pydantic import Field
 
 from bywire.bench.experiment import as_run
+from bywire.brakes.wedge.case import check_current, shaft_case
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.rigs.rig_case import check_current, shaft_case
 from bywire.brakes.wedge.rigs.shaft_rig import ShaftRig
 from bywire.core.quantities import Current, Duration, Unit
 from bywire.identification.electrics import CurrentLoop, LoopOptions, levels

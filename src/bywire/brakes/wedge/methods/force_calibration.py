@@ -15,9 +15,9 @@ import xarray as xr
 from numpy.typing import NDArray
 from pydantic import Field
 
+from bywire.brakes.wedge.case import turned
 from bywire.brakes.wedge.experiments.stiffness import FORCE_CYCLE
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.rigs.rig_case import turned
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Frequency, Unit

@@ -14,9 +14,9 @@ import numpy as np
 import xarray as xr
 from pydantic import Field
 
+from bywire.brakes.wedge.case import turned
 from bywire.brakes.wedge.experiments import run_down
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.rigs.rig_case import turned
 from bywire.brakes.wedge.rigs.shaft_rig import DrivenShaft
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
+from bywire.brakes.wedge.case import turned
 from bywire.brakes.wedge.experiments.screw_efficiency import LOAD_SWEEP
 from bywire.brakes.wedge.methods.force_calibration import (
     SIGNALS,
@@ -20,7 +21,6 @@ from bywire.brakes.wedge.methods.force_calibration import (
     drive_sensors,
 )
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.rigs.rig_case import turned
 from bywire.brakes.wedge.rigs.shaft_rig import DrivenShaft
 from bywire.core.errors import ParameterError
 from bywire.core.typing import Array

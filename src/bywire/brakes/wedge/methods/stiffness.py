@@ -16,6 +16,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from bywire.brakes.wedge.case import slope_of, turned
 from bywire.brakes.wedge.experiments.stiffness import FORCE_CYCLE, LABELS
 from bywire.brakes.wedge.methods import force_calibration
 from bywire.brakes.wedge.methods.force_calibration import (
@@ -29,7 +30,6 @@ from bywire.brakes.wedge.methods.force_calibration import (
     squeeze,
 )
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.rigs.rig_case import slope_of, turned
 from bywire.core.errors import ParameterError
 from bywire.core.typing import Array
 from bywire.data.labeled import over

@@ -1,7 +1,7 @@
 """A car's corner with the wedge brake: its disc turns with a wheel on the road.
 
-At the end of a stop the tyre rocks back and the wheel would turn with it: the pads' friction on the
-wedge then changes its sign, and self-reinforcement becomes release.
+At the end of a stop, the tyre rocks back and the wheel tends to turn with it. The pads' friction on
+the wedge then changes its sign, and self-reinforcement becomes release.
 """
 
 from __future__ import annotations
@@ -42,10 +42,10 @@ Memory: Any = joined(__name__, "Memory", control.Memory, corner_slip.Memory)
 
 
 class WedgeCorner(HotCorner[WedgeCornerParameters, Any], WedgeBrake):
-    """The brake with all its controllers; the flywheel is the wheel, turned by the road.
+    """The brake with all its controllers; the flywheel is the wheel, driven by the road.
 
-    Slip control acts above the moment control: it lowers the demanded moment. Pads that fade
-    reinforce the wedge less: the motors have to compensate for it.
+    Slip control acts above the moment control and lowers the demanded moment. Fading pads reinforce
+    the wedge less, so the motors have to compensate.
     """
 
     name: ClassVar[str] = "wedge-corner"

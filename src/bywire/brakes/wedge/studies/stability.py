@@ -1,4 +1,4 @@
-"""Stability of the wedge brake over friction coefficient and slope, with and without control."""
+"""Wedge brake stability over friction coefficient and slope, with and without control."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from bywire.brakes.wedge.laws.moment_control import SomeMoment
 from bywire.brakes.wedge.loops import MOMENT_LOOP
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.plants import full, mechanical, rigid_rate
-from bywire.brakes.wedge.sizing import Count, Slope, redesigned
+from bywire.brakes.wedge.studies.drive_train import Count, Slope, redesigned
 from bywire.core.errors import InputError
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Unit
@@ -182,22 +182,22 @@ Coefficient = Annotated[float, Unit("1", 0.4), Field(gt=0, le=5, allow_inf_nan=F
 Force = Annotated[float, Unit("N", 1e3), Field(gt=0, allow_inf_nan=False)]
 
 _ASSUMPTIONS = (
-    "Exact linear models of the brake without dry friction. Friction also holds the brake, so the "
-    "real brake is stable in a wider range.",
+    "The linear models are exact for the brake without dry friction. Friction also holds the "
+    "brake, so the real brake is stable in a wider range.",
     "Without control: both motors at constant currents, or locked; the wedge is preloaded between "
-    "the screws and carries the given normal force. If the actuation force exceeds the preload, "
-    "one screw loses the wedge, and the other moves or holds it alone.",
-    "With control: sampled moment loop around position and current loops, at the given moment; its "
-    "controllers know the wedge's slope.",
+    "the screws and supports the specified normal force. If the actuation force exceeds the "
+    "preload, one screw loses the wedge, and the other moves or holds it alone.",
+    "With control: sampled moment loop around position and current loops, at the specified moment. "
+    "The controllers use the wedge's slope.",
     "The end stops of the wedge allow the same travel of the pads as before.",
 )
 _HIGHEST = 5.0
-"""largest friction coefficient of the search for the moment loop's border"""
+"""largest friction coefficient in the search for the moment loop's stability limit"""
 _SEARCHED = 40
 _PLANES = {
     "growth_open": ("1/s", "growth rate, motors at constant currents"),
     "frequency_open": ("Hz", "frequency of that motion"),
-    "growth_rigid": ("1/s", "growth rate by the closed form of a rigid brake heart"),
+    "growth_rigid": ("1/s", "growth rate from the closed form of a rigid brake heart"),
     "growth_locked": ("1/s", "growth rate, motors locked"),
     "disk_moment": ("1", "disk margin of the moment loop"),
     "unstable_moment": ("1", "whether the moment loop is unstable"),
@@ -299,8 +299,8 @@ def _maps(data: xr.Dataset, given: Mark) -> dict[str, Map]:
             "mu_B",
             "tan_alpha",
             "Largest growth rate of the wedge without control, motors at constant currents; "
-            "dashed: closed form of the neutral point. The hatched border is computed. Colors are "
-            "interpolated between designs, although the rate jumps at the border.",
+            "dashed: closed form of the neutral point. The hatched boundary is computed. Colors "
+            "are interpolated between designs, although the rate jumps at the boundary.",
             (given,),
             {"unstable without control": ("beyond_open", 0.0)},
             closed,
@@ -334,13 +334,13 @@ def _uncontrolled(par: WedgeParameters, data: xr.Dataset, options: Options) -> t
             "neutral_mu_B",
             neutral(par, options.force),
             "1",
-            "Friction coefficient from which the given wedge runs away without control.",
+            "Friction coefficient above which the given wedge is unstable without control.",
         ),
         Kpi(
             "neutral_deviation",
             float(apart.max()),
             "1",
-            "Largest distance of the neutral point from its closed form tan(alpha).",
+            "Largest distance between the neutral point and its closed form tan(alpha).",
         ),
         Kpi("growth_max", float(growth.max()), "1/s", "Largest growth rate without control."),
         Kpi(
@@ -374,18 +374,18 @@ def _controlled(par: WedgeParameters, data: xr.Dataset, options: Options) -> tup
     ]
     note = "" if border else f"stable up to {_HIGHEST:g}"
     return (
-        Kpi("moment_disk_min", least, "1", "Least disk margin of the moment loop.", where),
+        Kpi("moment_disk_min", least, "1", "Smallest disk margin of the moment loop.", where),
         Kpi(
             "moment_unstable",
             float(np.nansum(unstable)),
             "1",
-            "Designs whose moment loop is unstable.",
+            "Number of designs with an unstable moment loop.",
         ),
         Kpi(
             "moment_mu_B",
             border[0] if border else math.nan,
             "1",
-            "Friction coefficient from which the given wedge's moment loop is unstable with its "
+            "Friction coefficient above which the given wedge's moment loop is unstable with its "
             "given controller.",
             note,
         ),

@@ -1,4 +1,4 @@
-"""Caliper and pads: no force across the clearance, then a spring that stiffens."""
+"""Caliper and pads: no force within the clearance, then a progressive spring."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ Loss = Annotated[float, Signal("W", "viscous loss", role=Role("sink", "viscous f
 
 
 class Parameters(ParameterSet):
-    """A stiff spindle without backlash or windup; friction is the same in both directions."""
+    """Rigid spindle without backlash or windup; friction is the same in both directions."""
 
     J: Inertia
     """inertia of all rotating parts, at the rotor"""
@@ -94,7 +94,7 @@ def output(x: State, par: Parameters) -> Output:
 
 
 def dry_friction(u: Input, par: Parameters) -> Annotated[float, Signal("N*m", "dry friction", 0.1)]:
-    """Return the magnitude of the dry friction, at rest its limit."""
+    """Return the dry friction's magnitude, which at rest is its limit."""
     return par.T_0 + par.c_F * u.force
 
 

@@ -50,8 +50,8 @@ SampleTime = Annotated[float, Signal("s", "sample time", 1e-3), Field(gt=0)]
 
 def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, Output]:
     """Advance the controller by one sample; the integral stops while the voltage is limited."""
-    wanted = ops.clip(par.k_F * (u.F_set - u.F), -par.omega_max, par.omega_max)
-    error = wanted - u.omega
+    omega_ref = ops.clip(par.k_F * (u.F_set - u.F), -par.omega_max, par.omega_max)
+    error = omega_ref - u.omega
     v = par.k_p * error + x.v_i
     growth = ops.where(ops.fabs(v) < par.v_max, par.k_i * error, 0.0)
     return State(x.v_i + T * growth), Output(ops.clip(v, -par.v_max, par.v_max))
