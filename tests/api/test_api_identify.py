@@ -82,7 +82,7 @@ def test_an_interrupt_says_where_it_goes_on(
     bywire.trust("seal-friction", 2, folder=tmp_path, processes=1)
     with monkeypatch.context() as stop:
         stop.setattr("bywire.identification.trust.experiments", stopped)
-        with pytest.raises(KeyboardInterrupt, match="experiments are in"):
+        with pytest.raises(KeyboardInterrupt, match="experiments are saved in"):
             bywire.trust("seal-friction", 4, folder=tmp_path)
     (tmp_path / "starts.jsonl").write_text("")
     method = replace(METHODS.find("seal-friction"), identify=stopped)
@@ -119,5 +119,5 @@ def test_a_file_is_converted(tmp_path: Path) -> None:
     assert found.alignment.samples == found.recording.sizes["time"] == 25
     assert found.as_object()["files"] == [str(target)]
     assert found.tables()["Signals"]["signal"].to_list() == ["p"]
-    with pytest.raises(bywire.BywireError, match="also give the rate, as rate '1 kHz'"):
+    with pytest.raises(bywire.BywireError, match="Add a sample rate, for example rate '1 kHz'"):
         bywire.convert(source, tmp_path / "other.nc", method="average")

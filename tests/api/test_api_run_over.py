@@ -61,9 +61,9 @@ def test_the_figure_of_key_figures_marks_what_misses_its_limit(found):
 def test_what_changes_by_less_than_its_error_is_said_to_be_not_distinct(found):
     near = bywire.run("hard-braking", QUICK, over="motor.R_m=0.35 ohm, 0.3500002 ohm")
     assert near.as_object()["distinct"]["energy"] is False
-    assert "not distinct over motor.R_m within their numerical error: dead_time" in str(near)
+    assert "no change over motor.R_m beyond the numerical error: dead_time" in str(near)
     assert found.as_object()["distinct"]["energy"] is True
-    said = [line for line in str(found).splitlines() if "not distinct over" in line]
+    said = [line for line in str(found).splitlines() if "no change over" in line]
     assert not any("energy" in line for line in said)
 
 

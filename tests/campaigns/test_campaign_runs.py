@@ -208,16 +208,16 @@ def test_what_was_killed_goes_on_with_the_same_bits(campaign, file, folder, monk
     [
         ("[campaign]", "[campain]", "unknown key of a campaign file 'campain'"),
         ('"motor.hot"', '"motor.hott"', "unknown fault of .campaign. only 'motor.hott'"),
-        ('onset = "0.4 s"', 'onset = "0.9 s"', "must be between"),
+        ('onset = "0.4 s"', 'onset = "0.9 s"', "must be in the range"),
         ("healthy = 8", "healthy = 2", "a whole number from 4"),
         ('"pressure.stuck" = ["0 bar"', '"pressure.stuck" = ["0 A"', "wrong unit"),
         ('signal = "p_pd"\nbelow', 'signal = "p_pads"\nbelow', "unknown signal of criterion"),
         ('below_share = "80 %"', 'beneath = "80 %"', "unknown key of ..criteria.. 'beneath'"),
-        ('below_share = "80 %"', 'above = "1 bar"\nbelow = "2 bar"', "give exactly one of"),
+        ('below_share = "80 %"', 'above = "1 bar"\nbelow = "2 bar"', "needs exactly one of"),
         ('name = "too much"', 'name = "loss"', "occurs twice"),
         ("battery = 1", "batery = 1", "unknown fault in .rates. 'batery'"),
         ('delay = "5 ms"', 'delay = "-5 ms"', "must be >= 0 s"),
-        ('"motor.R_m" = "+-10 %"', f'"adc.law" = {LAWS}', "only numbers vary"),
+        ('"motor.R_m" = "+-10 %"', f'"adc.law" = {LAWS}', "only numbers can vary"),
         (
             'bench = "hard-braking"',
             'bench = "hard-braking"\nresiduals = ["x"]',
@@ -230,15 +230,15 @@ def test_what_was_killed_goes_on_with_the_same_bits(campaign, file, folder, monk
         ),
         ("healthy = 8", "healthy = 1000000", "a whole number from 4 to 10000"),
         ('"0 bar", "50 bar"]', "20]", "wrong unit"),
-        ('["0 bar", "50 bar"]', "[]", "give a value, or use leave_out"),
-        ("[values]", '[values]\n"battery.lost" = 3', "battery.lost takes no value"),
+        ('["0 bar", "50 bar"]', "[]", "List a value, or use leave_out"),
+        ("[values]", '[values]\n"battery.lost" = 3', "battery.lost: this fault has no value"),
         ('above_healthy = "5 bar"', "above_healthy = 5", "wrong unit"),
         ('signal = "p_pd"\nbelow', 'signal = ["p_pd"]\nbelow', "unknown signal of criterion"),
-        ("present =", 'leave_out = ["*"]\npresent =', "leaves no fault"),
-        ('delay = "5 ms"', "value = 3", "bridge.open-phase takes no value"),
+        ("present =", 'leave_out = ["*"]\npresent =', "contains no faults"),
+        ('delay = "5 ms"', "value = 3", "bridge.open-phase has no value"),
         ("battery = 1", "battery = 1" + "0" * 400, "battery = a number of 300 digits or more"),
         ("battery = 1", "battery = 1e13", "a number from 0 to 1e12"),
-        (SMALL, 'bench = "bandwidths"', "makes one run without faults, but 'bandwidths' makes"),
+        (SMALL, 'bench = "bandwidths"', "'bandwidths' has 7 runs"),
     ],
 )
 def test_what_does_not_fit_is_refused(tmp_path, right, wrong, message):
@@ -260,7 +260,7 @@ def test_a_campaign_that_does_not_fit_into_memory_is_refused(tmp_path):
     text = SMALL.replace("healthy = 8", "healthy = 1000").replace('"0.6 s"', '"600 s"')
     text = text.partition("[vary]")[0] + "[campaign]" + text.partition("[campaign]")[2]
     (tmp_path / "large.toml").write_text(text)
-    with pytest.raises(InputError, match=r"1000 runs of 6e\+05 rows of"):
+    with pytest.raises(InputError, match=r"1000 runs with 6e\+05 rows of"):
         read_campaign(tmp_path / "large.toml")
 
 
@@ -353,7 +353,7 @@ def test_an_interrupt_says_what_is_kept(campaign, file, folder):
         if share > 0:
             raise KeyboardInterrupt
 
-    with pytest.raises(KeyboardInterrupt, match="7 of 7 faults are kept: rerun the command"):
+    with pytest.raises(KeyboardInterrupt, match=r"7 of 7 faults are saved\. Rerun the command"):
         bywire.run_faults(file, folder, progress=interrupt)
 
 
@@ -399,7 +399,7 @@ def test_harm_done_by_the_reaction_is_counted_run_by_run(campaign):
     assert {k: counts for k, counts in harmed.items() if counts} == {0: {"loss": 2}, 4: {"loss": 1}}
     assert [each.is_relieved for each in faults] == [False] * 5 + [True]
     assert found.harm_of_reaction() == (
-        "the reaction, bridge.open-phase, makes things worse: it alone causes loss in 1 of 2 "
+        "the reaction, bridge.open-phase, is harmful: it alone causes loss in 1 of 2 "
         "harmless, seen faults; loss in 1 of 3 dangerous faults",
         "the reaction, bridge.open-phase, hastens loss in 1 of 3 dangerous faults",
     )
@@ -408,10 +408,10 @@ def test_harm_done_by_the_reaction_is_counted_run_by_run(campaign):
         "harmless"
     )
     shown = FaultCampaign(found)
-    assert str(shown).startswith("The reaction, bridge.open-phase, makes things worse: ")
+    assert str(shown).startswith("The reaction, bridge.open-phase, is harmful: ")
     assert next(iter(shown.as_object())) == "headline"
     banner = shown.document().banner
-    assert banner.text.startswith("The reaction, bridge.open-phase, makes things worse: ")
+    assert banner.text.startswith("The reaction, bridge.open-phase, is harmful: ")
     calm = FaultCampaign(CampaignFindings(plan, campaign.findings.healthy, faults[1:3]))
     assert not calm.warnings
     assert "headline" not in calm.as_object()

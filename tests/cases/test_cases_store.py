@@ -12,6 +12,7 @@ import pytest
 from bywire.cases.identity import digest_of
 from bywire.cases.store import PieceFolder, PieceLines
 from bywire.core.errors import FileError
+from raising import raises
 
 
 def values_of(row: dict[str, Any]) -> list[float]:
@@ -44,7 +45,7 @@ def test_without_a_file_nothing_is_kept() -> None:
 def test_lines_that_cannot_be_read_or_written_are_refused(tmp_path: Path) -> None:
     unreadable = tmp_path / "starts.jsonl"
     unreadable.write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(FileError, match="delete it to start again"):
+    with raises(FileError, name=str(unreadable)):
         list(PieceLines(unreadable).pieces(values_of))
     with pytest.raises(FileError, match="cannot write"):
         PieceLines(unreadable / "starts.jsonl").keep("a", {})
@@ -78,9 +79,7 @@ class SumStore(PieceFolder):
 
 def test_a_folder_is_that_of_one_plan(tmp_path: Path) -> None:
     store = SumStore(tmp_path / "out")
-    with pytest.raises(
-        FileError, match=r"does not contain a sum \(sum\.json: .*'bywire sum' has written"
-    ):
+    with raises(FileError, name=str(store.folder)):
         store.record()
     assert not store.holds(Sums())
     store.begin(Sums(), {"name": "sums"})
@@ -88,7 +87,7 @@ def test_a_folder_is_that_of_one_plan(tmp_path: Path) -> None:
     store.begin(Sums(), {"name": "renamed"})  # it goes on
     assert store.holds(Sums())
     assert not store.holds(Sums({"seed": 2}))
-    other = r"out contains another sum \(seed: 1, now 2\): take another folder"
+    other = r"out contains another sum \(seed: 1, now 2\)\. take another folder"
     for refuse in (store.require, lambda plan: store.begin(plan, {})):
         with pytest.raises(FileError, match=other):
             refuse(Sums({"seed": 2}))
@@ -100,7 +99,7 @@ def test_a_damaged_record_is_refused(tmp_path: Path, text: str) -> None:
     store = SumStore(tmp_path)
     assert not store.holds(Sums())
     for refuse in (store.record, lambda: store.begin(Sums(), {})):
-        with pytest.raises(FileError, match=r"sum\.json is damaged, or not of a sum of many terms"):
+        with raises(FileError, name=str(tmp_path / "sum.json")):
             refuse()
 
 
@@ -127,7 +126,6 @@ def test_a_piece_is_there_whole_or_not_at_all(tmp_path: Path) -> None:
 def test_a_folder_that_cannot_be_written_is_refused(tmp_path: Path) -> None:
     (tmp_path / "terms").write_text("a file in its place")
     store = SumStore(tmp_path)
-    said = "make room there and resume the sum; finished pieces are kept"
     for refuse in (lambda: store.begin(Sums(), {}), lambda: store.keep_file(1, Path.touch)):
-        with pytest.raises(FileError, match=f"cannot write .*{said}"):
+        with pytest.raises(FileError, match=r"cannot write .*resume the sum"):
             refuse()

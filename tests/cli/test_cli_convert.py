@@ -82,7 +82,7 @@ def test_there_and_back(bywire, run, tmp_path, out):
         (("run.csv", "out.nc", "--map", "map.toml", "--signals", "p_cm"), "did you mean 'p_mc'"),
         (("run.csv", "out.nc", "--map", "map.toml", "--rate", "5 ms"), "cannot be converted to Hz"),
         (("run.csv", "out.nc", "--map", "map.toml", "--rate", "0 Hz"), "must be > 0 Hz"),
-        (("run.csv", "out.nc", "--map", "map.toml", "--method", "linear"), "also give the rate"),
+        (("run.csv", "out.nc", "--map", "map.toml", "--method", "linear"), "Add a sample rate"),
         (("run.csv", "no/out.nc", "--map", "map.toml"), "cannot write"),
         (("run.csv", "out.nc", "--map", "none.toml"), "cannot read mapping none.toml"),
     ],

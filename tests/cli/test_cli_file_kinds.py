@@ -40,7 +40,7 @@ def test_a_file_of_another_kind_is_named(bywire, bench, tmp_path, monkeypatch, g
         (("run",), BRAKING + 'bench = "hard-braking"\n', ["bench file 'bench'"]),
         (("study", "run"), f'bench = "hard-braking"\n{BRAKING}', ["study file 'experiment'"]),
         (("study", "run"), 'bench = "hard-braking"\n[values]\n', ["study file 'values'"]),
-        (("faults",), 'bench = "hard-braking"\n[values]\n', ["[[criteria]] are missing"]),
+        (("faults",), 'bench = "hard-braking"\n[values]\n', ["[[criteria]] is missing"]),
         (("faults",), 'bench = "hard-braking"\n[[criteria]]\n[design]\n', ["file 'design'"]),
         (("life",), 'life = "wedge-pads"\nbench = "hard-braking"\n', ["life file 'bench'"]),
     ],

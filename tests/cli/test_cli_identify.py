@@ -239,7 +239,7 @@ def test_parameters_go_on_as_a_bench_file(tmp_path: Path, dither: str) -> None:
     path.write_text(other)
     load(path)
     driven = parameter_file("motor-open-loop", "dardanelli2010", par, {"motor.R_m": 0.321})
-    assert "# experiment 'motor-open-loop' needs more than this file has" in driven
+    assert "# experiment 'motor-open-loop' needs more than this file contains" in driven
     path.write_text(driven)
     assert load(path).par.leaves()["motor.R_m"] == 0.321
 

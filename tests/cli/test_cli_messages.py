@@ -52,7 +52,7 @@ def test_a_full_disk_is_said_with_place_and_next_step(bywire, bench, monkeypatch
     outcome = bywire("run", bench())
     assert outcome.status == 3
     assert outcome.lines == [
-        "bywire: error: somewhere/file: No space left on device: make room there, or name "
+        "bywire: error: somewhere/file: No space left on device. Free some space, or choose "
         "another folder with --out or TMPDIR"
     ]
 

@@ -64,7 +64,7 @@ def test_a_choice_has_no_polynomial(bywire, study, tmp_path):
     bywire("study", "run", study, "--out", tmp_path / "out")
     for at in ((), ("--at", "adc.law=ideal"), ("--at", "motor.R_m=+1%")):
         outcome = bywire("study", "surrogate", tmp_path / "out", *at)
-        refused(outcome, "adc.law: a choice has no polynomial", "a study for each of its values")
+        refused(outcome, "adc.law: cannot depend on a choice", "a study for each of its values")
 
 
 def test_an_unfinished_study_says_so(bywire, study, tmp_path):
@@ -105,7 +105,7 @@ def test_a_file_is_no_folder_of_a_study(bywire, study, tmp_path, monkeypatch, co
 def test_a_folder_that_cannot_be_written_has_no_option(bywire, tmp_path, command):
     (tmp_path / "file").touch()
     outcome = bywire("study", command, tmp_path / "file" / "folder")
-    refused(outcome, "cannot write to the output folder", "you may write there")
+    refused(outcome, "cannot write to the output folder", "you have write permission there")
     assert "--out" not in outcome.err
 
 

@@ -60,7 +60,7 @@ BAD = [
         "set",
         "unknown",
     ),
-    ("faults", {"campaign": ""}, "campaign", "missing"),
+    ("faults", {"campaign": ""}, "campaign", "is required"),
     ("faults", {"campaign": "motorcycl"}, "campaign", "motorcycle"),
     ("faults", {"campaign": "wrong.toml"}, "campaign", "motor.hot"),
     ("faults", {"campaign": "curve.toml"}, "campaign", "this is a bench, not"),
@@ -82,10 +82,20 @@ BAD = [
     ),
     ("size", {"name": "drive-trains"}, "name", "drive-train"),
     ("size", {"name": "drive-train", "parameters": "roberts"}, "parameters", "roberts2003"),
-    ("size", {"name": "drive-train", "parameters": "dardanelli2010"}, "parameters", "is for a"),
+    (
+        "size",
+        {"name": "drive-train", "parameters": "dardanelli2010"},
+        "parameters",
+        "Choose another parameter set",
+    ),
     ("size", {"name": "drive-train", "set": "t_9=1 s"}, "set", "unknown option"),
     ("margins", {"loop": "pressur"}, "loop", "pressure"),
-    ("margins", {**LOOP, "parameters": "roberts2003"}, "parameters", "is for a"),
+    (
+        "margins",
+        {**LOOP, "parameters": "roberts2003"},
+        "parameters",
+        "Choose another parameter set",
+    ),
     ("margins", {**LOOP, "at": "20 A"}, "at", "unit"),
     ("margins", {**LOOP, "set": "motor.R_m=-1 ohm"}, "set", "motor.R_m"),
     ("margins", {**LOOP, "over": "motor.R_m"}, "over", "LOW:HIGH:COUNT"),
@@ -102,7 +112,7 @@ BAD = [
     ("agreement", {**LOOP, "amplitudes": "2 bar, 1 bar"}, "amplitudes", "the small one first"),
     ("reproduce", {"source": "roberts203"}, "source", "roberts2003"),
     ("identify", {"method": "m"}, "method", "unknown"),
-    ("design", {**LOOP, "parameters": "roberts2003"}, "parameters", "is for a"),
+    ("design", {**LOOP, "parameters": "roberts2003"}, "parameters", "Choose another parameter set"),
 ]
 
 
@@ -281,7 +291,7 @@ def test_what_is_asked_twice_is_computed_once(visit):
     assert first.status == 201
     again = visit.begin("faults", campaign="motorcycle")
     assert again.status == 409
-    assert "motorcycle is already being computed" in again.object["error"]
+    assert "already computing motorcycle" in again.object["error"]
     visit("POST", f"/api/jobs/{first.object['number']}/cancel", {})
     assert visit.ended(first.object["number"])["state"] == "canceled"
 

@@ -114,7 +114,7 @@ def test_a_study_is_computed_once_at_a_time(visit):
     assert begun.object["folder"] == "results/some"
     second = visit.begin("study", study="some.toml")
     assert second.status == 409
-    assert "being computed" in second.object["error"]
+    assert "already computing" in second.object["error"]
     visit("POST", f"/api/jobs/{begun.object['number']}/cancel", {})
     assert visit.ended(begun.object["number"])["state"] == "canceled"
 
@@ -122,7 +122,7 @@ def test_a_study_is_computed_once_at_a_time(visit):
 def test_what_does_not_fit_is_told_in_one_message(capsys):
     assert job_process._explained(ParameterError("R_m must be > 0 ohm")) == "R_m must be > 0 ohm"
     missing = job_process._explained(FileNotFoundError(2, "No such file", "a.csv"))
-    assert missing.startswith("a.csv: No such file: check")
+    assert missing.startswith("a.csv: No such file. Check")
     assert "bug in bywire" in job_process._explained(ZeroDivisionError("seeded"))
     assert "seeded" in capsys.readouterr().err
 

@@ -6,6 +6,7 @@ import pytest
 
 import bywire
 from bywire.core.errors import ParameterError
+from raising import raises
 
 FEW = """
 [vary]
@@ -49,7 +50,7 @@ def test_cases_that_are_not_computed_are_taken_back(study, tmp_path, monkeypatch
         bywire.resume_study(out, cases=1_000_000, progress=interrupted)
     with pytest.warns(match="of 1000000 cases are not computed"):
         assert bywire.study_report(out).status == "unfinished"
-    with pytest.raises(ParameterError, match=r"cases = 127: .* already has 128"):
+    with raises(ParameterError, name="cases", value="127", valid=">= 128"):
         bywire.resume_study(out, cases=127)
     assert len(bywire.resume_study(out, cases=128).cases) == 128
     assert len(bywire.study_report(out).cases) == 128

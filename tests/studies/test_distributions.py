@@ -11,6 +11,7 @@ from bywire.core.errors import InputError
 from bywire.core.parameters import Leaf
 from bywire.core.quantities import Unit
 from bywire.studies.distribution import read_choice, read_distribution
+from raising import raises
 
 LEAF = Leaf("motor.R_m", Unit("ohm"), 0.0, 10.0, True, False)
 MIDDLES = (np.arange(200_000) + 0.5) / 200_000
@@ -66,7 +67,7 @@ def test_a_normal_tolerance_ends_where_it_says():
         ({"kind": "normal", "sd": "50 %"}, ["> 0 ohm", "probability of 0.023", "'low'"]),
         (
             {"kind": "uniform", "low": "-1 ohm", "high": "1 ohm"},
-            ["leaves the valid range", "give 'low' and 'high' within it"],
+            ["leaves the valid range", "Choose 'low' and 'high' within"],
         ),
         (
             {"kind": "triangular", "low": "-1 ohm", "high": "1 ohm"},
@@ -76,27 +77,27 @@ def test_a_normal_tolerance_ends_where_it_says():
         ("+-200 %", ["leaves the valid range", "narrower tolerance"]),
         (
             {"kind": "discrete", "values": ["0 ohm", "1 ohm"]},
-            ["leaves the valid range", "leave out 0 ohm"],
+            ["leaves the valid range", "Remove 0 ohm"],
         ),
-        ("+-100 %", ["its end at 0 ohm is not valid", "> 0 ohm and <= 10 ohm"]),
-        ({"kind": "tolerance", "tolerance": "100 %", "shape": "normal"}, ["its end at 0 ohm"]),
-        ({"kind": "uniform", "low": "0 ohm", "high": "1 ohm"}, ["its end at 0 ohm"]),
-        ({"kind": "triangular", "low": "-100 %", "high": "1 ohm"}, ["its end at 0 ohm"]),
+        ("+-100 %", ["Its end at 0 ohm is not valid", "> 0 ohm and <= 10 ohm"]),
+        ({"kind": "tolerance", "tolerance": "100 %", "shape": "normal"}, ["end at 0 ohm"]),
+        ({"kind": "uniform", "low": "0 ohm", "high": "1 ohm"}, ["end at 0 ohm"]),
+        ({"kind": "triangular", "low": "-100 %", "high": "1 ohm"}, ["end at 0 ohm"]),
         ({"kind": "uniform", "low": "1 ohm", "high": "1 ohm"}, ["must be below"]),
         ({"kind": "discrete", "values": [0.3, 0.4]}, ["motor.R_m.values = 0.3 has"]),
-        ("+- 1e-18 %", ["not wider than the last digit"]),
-        ({"kind": "normal", "sd": "1e-18 %"}, ["not wider than the last digit"]),
-        ({"kind": "log-normal", "sd": "1e-18 %"}, ["not wider than the last digit"]),
+        ("+- 1e-18 %", ["too narrow for floating-point numbers"]),
+        ({"kind": "normal", "sd": "1e-18 %"}, ["too narrow for floating-point numbers"]),
+        ({"kind": "log-normal", "sd": "1e-18 %"}, ["too narrow for floating-point numbers"]),
         ({"kind": "discrete", "values": ["0.3 ohm"]}, ["only one value, 0.3 ohm"]),
         (
             {"kind": "discrete", "values": ["0.3 ohm", "1 ohm", "300 mohm"]},
             ["lists the value 0.3 ohm twice", "weights"],
         ),
-        ({"sd": "5 %"}, ["{ sd = '5 %' }: kind is missing", "'normal' or 'log-normal'"]),
+        ({"sd": "5 %"}, ["{ sd = '5 %' } has no kind", "'normal' or 'log-normal'"]),
         ({"kind": ["normal"], "sd": "5 %"}, ["unknown kind", "'normal'"]),
         ({"kind": "normal", "sd": True}, ["sd = true must be one number"]),
         ({"kind": "uniform", "low": "0.5 ohm", "high": "0.4 ohm"}, ["must be below"]),
-        ({"kind": "uniform", "low": "0.5 ohm"}, ["needs 'high'"]),
+        ({"kind": "uniform", "low": "0.5 ohm"}, ["needs the key 'high'"]),
         ({"kind": "uniform", "low": 0.3, "high": "0.4 ohm"}, ["low = 0.3 has", "ohm"]),
         ({"kind": "normal", "sd": "5 V"}, ["wrong unit"]),
         ({"kind": "normal", "sd": "0 %"}, ["width > 0"]),
@@ -111,8 +112,8 @@ def test_a_normal_tolerance_ends_where_it_says():
         ({"kind": "normal", "sd": "1 %", "low": "1.5 ohm"}, ["too little to draw from"]),
         ({"kind": "discrete", "values": []}, ["values = [...]"]),
         ({"kind": "tolerance", "tolerance": "5 %", "shape": "cauchy"}, ["'cauchy'", "normal"]),
-        ("5 %", ["write a tolerance"]),
-        (0.4, ["write a tolerance"]),
+        ("5 %", ["Write a tolerance"]),
+        (0.4, ["Write a tolerance"]),
     ],
 )
 def test_what_is_wrong_is_said(entry, texts):
@@ -137,7 +138,7 @@ def test_what_is_truncated_at_a_limit_that_is_not_admissible_has_levels_within(l
 
 
 def test_a_share_of_zero_needs_an_amount():
-    with pytest.raises(InputError, match="given as an amount"):
+    with raises(InputError, name="motor.R_m", valid="a width > 0"):
         read("+-5 %", nominal=0.0)
 
 

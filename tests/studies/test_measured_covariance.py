@@ -102,19 +102,19 @@ def test_what_is_no_estimate_is_said(study, written, content, text):
     ("lines", "text"),
     [
         ('file = "nowhere"', "bywire identify --out"),
-        ("file = 3", "name the folder"),
+        ("file = 3", "specify the folder"),
         ('file = "id"\nof = ["motor.L_m"]', "motor.L_m"),
         ('file = "id"\nof = ["low:K"]', "parameter of .measured."),
-        ('file = "id"\nof = []', "name those of them"),
+        ('file = "id"\nof = []', "Select parameters of the bench"),
         ('file = "id"\ntruncate = "yes"', "true or false"),
         ('file = "id"\nonly = ["motor.R_m"]', "'only'"),
         (
             'file = "id"\n[vary]\n"motor.K_e" = "+-5 %"',
-            r"motor.K_e varies twice, by \[measured\] and by \[vary\]",
+            r"motor.K_e varies twice, in \[measured\] and in \[vary\]",
         ),
         (
             'file = "id"\n[[correlation]]\nof = ["motor.K_e", "motor.R_m"]\nvalue = 0.1',
-            "is given twice",
+            "twice. Remove one",
         ),
     ],
 )

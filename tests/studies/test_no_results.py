@@ -6,6 +6,7 @@ import pytest
 
 import bywire
 from bywire.core.errors import ParameterError, UnknownNameError
+from raising import raises
 
 VARY = """
 [vary]
@@ -40,7 +41,7 @@ def test_a_study_without_any_result_says_why_and_fails(study, tmp_path, design, 
     assert "report.html" in names
     assert not [name for name in names if name.endswith((".png", ".toml", ".nc"))]
     if requirements:
-        with pytest.raises(ParameterError, match=r"has no .* case: no case has a result"):
+        with raises(ParameterError, name="peak_current"):
             run.worst("peak_current")
         with pytest.raises(UnknownNameError, match="did you mean 'peak_current'"):
             run.worst("peak_curent")

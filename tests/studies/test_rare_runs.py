@@ -18,6 +18,7 @@ from bywire.core.errors import FileError, InputError, RunError
 from bywire.studies import executor
 from bywire.studies.store import StudyStore, case_bench
 from bywire.studies.study_file import read_study
+from raising import raises
 from undrawn import undrawn
 
 pytest.importorskip("openturns")
@@ -225,9 +226,9 @@ def test_each_requirement_in_turn_shares_the_first_level(study, tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "why"),
     [
-        (" with 99.9 %", "", "none has a probability"),
+        (" with 99.9 %", "", "contains no probability"),
         ("cases = 3000", "cases = 600", ">= 640"),
-        ('"subset-simulation"', '"importance-sampling"', "cases_per_level is only for"),
+        ('"subset-simulation"', '"importance-sampling"', "cases_per_level applies only to"),
         ('"subset-simulation"', '"subset"', "did you mean 'subset-simulation'"),
         ("cases_per_level = 640", "levels = 3", "levels"),
         (
@@ -246,7 +247,7 @@ def test_what_does_not_fit_is_refused(study, old, new, why):
 def test_cases_of_another_draw_are_refused(spent):
     store = StudyStore(spent / "out")
     store.write(0, store.columns(1), {})
-    with pytest.raises(FileError, match="other cases than the study asks for"):
+    with raises(FileError, name=str(store.path(0))):
         bywire.study_report(spent / "out")
 
 

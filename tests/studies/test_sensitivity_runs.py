@@ -11,6 +11,7 @@ import pytest
 import bywire
 from bywire.core.errors import ParameterError
 from bywire.studies.findings import Findings
+from raising import raises
 from undrawn import drawn_once, undrawn
 
 AXIS = """
@@ -82,10 +83,10 @@ def test_a_simulated_study_has_the_shares_of_its_closed_form(axis):
         assert indices[name].first.value == pytest.approx(first, abs=0.05)
         assert holds(indices[name].total, first)  # next to nothing together
     assert study.notes == [
-        "256 cases in place of 300, because cases come in whole groups",
-        "sobol-indices: cases share values, so shares of them are not probabilities",
-        "overshoot: 64 groups do not determine shares within +-0.15; ask for more cases in the "
-        "study file, and run it into another folder",
+        "256 cases instead of 300, because cases come in whole groups",
+        "sobol-indices: cases share values, so the share of cases is not a probability",
+        "overshoot: 64 groups are too few to determine shares within +-0.15. Request more cases in "
+        "the study file, and run it in another folder",
     ]
     assert "main influences on overshoot" in str(study)
     with undrawn():
@@ -99,7 +100,7 @@ def test_a_simulated_study_has_the_shares_of_its_closed_form(axis):
     assert bywire.resume_study(out).findings.sensitivity("overshoot").drivers == list(
         indices.values()
     )
-    with pytest.raises(ParameterError, match="groups belong together"):
+    with raises(ParameterError, name="cases", value="512"):
         bywire.resume_study(out, cases=512)
     with pytest.raises(ParameterError, match=">= 256"):
         bywire.run_study(out.with_name("sobol-indices.toml"), out, cases=255)

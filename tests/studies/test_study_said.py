@@ -113,9 +113,9 @@ def test_captions_say_who_is_drawn_and_who_misses(found):
     assert "miss" not in none["parallel"]
     lacking = captions(found("rise_time", np.where(values < 0.06, values, np.nan), "<= 60 ms"))
     assert "all that have it meet the limit" in lacking["scatter-rise_time"]
-    at_edge = "Triangles at the upper edge: cases without it (500), which miss the limit."
+    at_edge = "mark cases without the figure (500), which miss the limit."
     assert lacking["scatter-rise_time"].endswith(at_edge)
-    assert lacking["parallel"].endswith("If a case lacks a figure, its line goes to 'none'.")
+    assert lacking["parallel"].endswith("The line of a case without the figure goes to 'none'.")
 
 
 def test_no_more_points_are_left_out_than_are_said(found):
@@ -139,9 +139,9 @@ def test_a_surrogate_has_the_unit_of_its_figure(found):
 
 def test_histograms_of_designs_that_go_to_the_ends_count_no_frequencies(found):
     findings = found("rise_time", np.linspace(0.05, 0.07, CASES), "<= 60 ms")
-    assert "90 % of them" in captions(findings)["histograms"]
+    assert "90 % of the cases" in captions(findings)["histograms"]
     ends = replace(findings, plan=replace(findings.plan, design="corners"))
-    said = "heights count the cases of corners, and are not probabilities"
+    said = "Heights are numbers of cases of corners, not probabilities"
     assert said in captions(ends)["histograms"]
 
 

@@ -64,7 +64,14 @@ def test_it_is_a_command(monkeypatch: pytest.MonkeyPatch, capsys: Any) -> None:
     assert f"{SUMMARY} Exits with status 1 where there are none." in capsys.readouterr().out
     assert typed(monkeypatch, "letters", "--help") == 0
     text = capsys.readouterr().out
-    for each in "Loop (see 'bywire list').", "--set", "--often", "How often", "--out", "--json":
+    for each in (
+        "Loop (see 'bywire list loops').",
+        "--set",
+        "--often",
+        "How often",
+        "--out",
+        "--json",
+    ):
         assert each in text
     assert typed(monkeypatch, "letters", "slip", "--often", "2", "--json") == 0
     assert '"count": 8' in capsys.readouterr().out

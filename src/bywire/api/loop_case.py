@@ -1,4 +1,4 @@
-"""Common inputs of the use cases of loops: loop, parameters, operating point, ranges."""
+"""Common inputs of use cases for loops: loop, parameters, operating point, ranges."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _MOST = 10_000
 
 @dataclass(frozen=True)
 class LoopCase:
-    """A loop with the requested parameters and operating point.
+    """Loop with the requested parameters and operating point.
 
     Parameters
     ----------
@@ -46,19 +46,19 @@ class LoopCase:
 
     @property
     def point(self) -> str:
-        """The operating point as text, for instance ``"pressure = 20 bar"``."""
+        """Operating point as text, for instance ``"pressure = 20 bar"``."""
         from bywire.report.wording import amount
 
         return f"{self.loop.at.name} = {amount(self.value, self.loop.at.unit)}"
 
     @property
     def input_unit(self) -> str:
-        """SI unit of the excited input."""
+        """SI unit of the input that is excited."""
         model = self.loop.point(self.par, self.value).model
         return signals_of(model.Stimulus)[self.loop.inputs[0]].unit
 
     def frequencies(self, text: str, points: int) -> list[float]:
-        """Return the frequencies [Hz] of a text; by default ``points`` over the loop's band.
+        """Return the frequencies [Hz] of a text. Default: ``points`` over the loop's band.
 
         Raises
         ------
@@ -78,7 +78,7 @@ class LoopCase:
 
     @property
     def heading(self) -> dict[str, Any]:
-        """The first fields of every JSON object of a loop."""
+        """First fields of every loop's JSON object."""
         return {
             "loop": self.loop.name,
             "parameters": self.name,
@@ -93,20 +93,20 @@ def loop_case(
     changes: Mapping[str, Any] = MappingProxyType({}),
     side: str = "",
 ) -> LoopCase:
-    """Return a loop with its parameters and its operating point.
+    """Find a loop, and read its parameters and operating point.
 
     Parameters
     ----------
     name
         Loop.
     parameters
-        Parameter set; empty for the main one of the loop's brake.
+        Parameter set. If empty, the main one of the loop's brake.
     at
-        Operating point with its unit; empty for the loop's nominal one.
+        Operating point with its unit. If empty, the loop's nominal point.
     changes
         Parameters by dotted name, with units.
     side
-        Side of linear models at a corner, see `read_sides`.
+        Side of linear models at a kink (see `read_sides`).
 
     Raises
     ------
@@ -121,12 +121,12 @@ def loop_case(
 
 
 def spread(text: str, unit: str, name: str, *, logarithmic: bool = False) -> list[float]:
-    """Return the values of ``low:high:count``, or of a list with commas; each with its unit.
+    """Return the values of ``low:high:count`` or of a list with commas, each with its unit.
 
     Raises
     ------
     ParameterError
-        If the text is neither.
+        If the text has neither form.
     UnitError
         If a value has no unit or a wrong one.
     """
@@ -136,8 +136,8 @@ def spread(text: str, unit: str, name: str, *, logarithmic: bool = False) -> lis
     count = read_count(parts[2]) if len(parts) == 3 else None
     if count is None or not 2 <= count <= _MOST:
         raise ParameterError(
-            f"{name} = {quoted(text)}: write LOW:HIGH:COUNT with 2 to {_MOST} values, or "
-            "values with commas",
+            f"{name} = {quoted(text)} is not valid. Write LOW:HIGH:COUNT with 2 to {_MOST} values, "
+            "or values separated by commas",
             name=name,
             value=quoted(text),
             valid=f"2 to {_MOST} values",
@@ -145,47 +145,48 @@ def spread(text: str, unit: str, name: str, *, logarithmic: bool = False) -> lis
     low, high = (number(part, unit, name) for part in parts[:2])
     if logarithmic and low <= 0:
         raise ParameterError(
-            f"{name} = {quoted(text)}: the range is logarithmic, and must start above 0 {unit}",
+            f"{name} = {quoted(text)} is not valid: a logarithmic range must start above 0 {unit}",
             name=name,
             value=quoted(text),
             valid=f"above 0 {unit}",
         )
     if low == high:
         raise ParameterError(
-            f"{name} = {quoted(text)}: the range is a single value: write only "
+            f"{name} = {quoted(text)} contains only one value. Write "
             f"{name}={quoted(parts[0])[1:-1]}",
             name=name,
             value=quoted(text),
         )
     if not low < high:
         raise ParameterError(
-            f"{name} = {quoted(text)}: the first value must be below the second",
+            f"{name} = {quoted(text)} is not valid: the first value must be below the second",
             name=name,
             value=quoted(text),
+            valid="below the second",
         )
     between = np.geomspace if logarithmic else np.linspace
     return [float(value) for value in between(low, high, count)]
 
 
 def over_range(text: str, chosen: LoopCase, argument: str = "over") -> tuple[str, str, list[float]]:
-    """Return name, unit and values of a range for a loop, see `range_of`."""
+    """Return name, unit and values of a range for a loop (see `range_of`)."""
     return range_of(text, chosen.loop.at, chosen.par, argument)
 
 
 def range_of(
     text: str, quantity: Quantity, par: ParameterSet, argument: str
 ) -> tuple[str, str, list[float]]:
-    """Return name, unit and values of ``NAME=LOW:HIGH:COUNT``; ``at`` is the operating point.
+    """Return name, unit and values of ``NAME=LOW:HIGH:COUNT``, where ``at`` is the operating point.
 
     Raises
     ------
     InputError
-        See `spread`; also for a name that is neither a parameter nor the operating quantity.
+        See `spread`. Also if the name is neither a parameter nor the operating quantity.
     """
     name, equals, values = (part.strip() for part in text.partition("="))
     if not equals:
         raise ParameterError(
-            f"{option(argument)} {text}: write NAME=LOW:HIGH:COUNT",
+            f"{option(argument)} {text} is not a range. Write NAME=LOW:HIGH:COUNT",
             name=option(argument),
             value=text,
             valid="NAME=LOW:HIGH:COUNT",

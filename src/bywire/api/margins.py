@@ -41,16 +41,16 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 LEGEND = (
-    "Linear sampled loop without dry friction. Gain margins: factors by which the loop gain may "
-    "grow, and to which it may fall. Delay margin: additional dead time the loop tolerates. Disk "
-    "margin: 2 is the best, 0 none. S, T: sensitivity and complementary sensitivity. An unstable "
-    "loop has no margins, nor does a loop without gain."
+    "Linear sampled loop without dry friction. The gain margins are the factors to which the loop "
+    "gain may rise and fall. The delay margin is the additional dead time that the loop tolerates. "
+    "A disk margin of 2 is best, and 0 is none. S and T are the sensitivity and the complementary "
+    "sensitivity. Unstable loops and loops without gain have no margins."
 )
-"""meaning of the headings"""
+"""caption that explains the headings"""
 _CAPTIONS = {
-    "loop-gain": "Loop gain of the sampled loop; spans show the phase and gain margins.",
-    "nyquist": "Nyquist plot near -1; the disk margin keeps the shaded disk free.",
-    "nichols": "Nichols chart with contours of |T|; the disk margin keeps the shaded area free.",
+    "loop-gain": "Loop gain of the sampled loop. Spans show the phase and gain margins.",
+    "nyquist": "Nyquist plot near -1. The shaded disk shows the disk margin.",
+    "nichols": "Nichols chart with contours of |T|. The shaded area shows the disk margin.",
     "sensitivity": "Sensitivity S = 1/(1 + L) and complementary sensitivity T = L/(1 + L), with "
     "the usual limits (Skogestad and Postlethwaite, section 2.4.3).",
 }
@@ -78,7 +78,7 @@ class Margins(Answer):
 
     @property
     def notes(self) -> list[str]:
-        """Side of corners of the linear models."""
+        """Notes on the linear models' side of kinks."""
         return corner_notes(margins.corners for margins in self.margins)
 
     @cached_property
@@ -98,7 +98,9 @@ class Margins(Answer):
         table = TableBlock(margins_table(self.margins, self.name, self.unit, self.values))
         texts = worst_texts(self.margins, self.name, self.unit, self.values) if self.name else []
         worst_of = [Listing(texts, "Worst of each:")] if self.name else []
-        ranged = " Emphasized: the least disk margin, or unstable loops. Dashed: unstable loops."
+        ranged = (
+            " Bold curves have the smallest disk margin or are unstable. Unstable ones are dashed."
+        )
         is_drawn = any(margins.has_loop for margins in self.margins)
         figures: list[Block] = [] if is_drawn else [Paragraph(f"{NO_LOOP}.")]
         figures += [
@@ -160,7 +162,7 @@ class Margins(Answer):
         ]
         if texts:
             return Banner(", ".join(texts), "bad")
-        return Banner("stable over the whole range", "good")
+        return Banner("stable over the entire range", "good")
 
 
 def margins_over(

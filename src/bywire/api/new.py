@@ -1,4 +1,4 @@
-"""A new brake's package, written from the template."""
+"""Package for a new brake, written from a template."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _LONGEST = 40
 
 @dataclass(frozen=True)
 class NewBrake(Answer):
-    """A new brake's package.
+    """Package of a new brake.
 
     Parameters
     ----------
@@ -52,11 +52,11 @@ class NewBrake(Answer):
             f"pip install -e {self.folder}    # then every command finds it without --system",
             f"pytest {self.folder / 'tests'}    # with pytest installed",
         ]
-        written = Paragraph(f"{self.name} is in {self.folder}; its README describes the files")
+        written = Paragraph(f"{self.name} is in {self.folder}. Its README describes the files")
         following = Listing(steps, "Next:")
         return Document(
             f"The brake {self.name}",
-            "A package that passes bywire check; change it step by step.",
+            "A package that passes 'bywire check'. Change it step by step.",
             sections=[Section("Files", [written, Listing(files), following])],
             brief=[written, following],
             data=self._data(steps),
@@ -97,10 +97,10 @@ def write_package(name: str, folder: Path) -> Path:
     target = folder / name
     if target.exists() or target.is_symlink():
         raise FileError(
-            f"{target} already exists: choose another name, or another folder", name=str(target)
+            f"{target} already exists. Choose another name or another folder", name=str(target)
         )
     if folder.exists() and not folder.is_dir():
-        raise FileError(f"{folder} is not a folder: choose another one", name=str(folder))
+        raise FileError(f"{folder} is not a folder. Choose another path", name=str(folder))
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with scratch_folder(folder) as scratch:
@@ -111,8 +111,8 @@ def write_package(name: str, folder: Path) -> Path:
             os.rename(draft, target)
     except OSError as error:
         raise FileError(
-            f"{target} cannot be written: {error.strerror or error}: make room there, or choose "
-            "another folder",
+            f"cannot write {target}: {error.strerror or error}. Free some space, or choose another "
+            "folder",
             name=str(target),
         ) from None
     return target
@@ -134,9 +134,9 @@ def module_name(name: str) -> str:
     package = name.replace("-", "_")
     reason = ""
     if not _ALLOWED.fullmatch(name):
-        reason = "a name must start with a letter and have lowercase letters, digits, single dashes"
+        reason = "it must start with a letter and contain lowercase letters, digits, single dashes"
     elif len(name) > _LONGEST:
-        reason = f"a name has at most {_LONGEST} characters"
+        reason = f"it must have at most {_LONGEST} characters"
     elif keyword.iskeyword(package) or keyword.issoftkeyword(package):
         reason = f"{package} is a Python keyword"
     elif package in sys.stdlib_module_names:
@@ -147,7 +147,7 @@ def module_name(name: str) -> str:
         reason = f"a module {package} is already installed"
     if reason:
         raise ParameterError(
-            f"{quoted(name)} cannot be the name of a new brake: {reason}; choose one such as "
+            f"{quoted(name)} cannot be the name of a new brake: {reason}. Choose a name such as "
             "front-caliper",
             name="name",
             value=quoted(name),

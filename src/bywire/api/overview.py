@@ -1,4 +1,4 @@
-"""Index of names: assemblies, parameter sets, experiments, loops, studies, methods, figures."""
+"""Index of all names: assemblies, parameter sets, experiments, loops, studies, methods, etc."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ from bywire.report.tables import Table, text_table
 _WIDTH = 80  # characters of a line of the index
 _NAME = 21  # columns of a topic
 _HINT = (
-    "'bywire list TOPIC' lists the names of a topic. 'bywire list NAME' shows all\n"
-    "about a name, a parameter (motor.R_m), a group (motor) or a signal (p_mc).\n"
-    "'bywire list WORD' finds other words, such as battery."
+    "'bywire list TOPIC' lists the names in a topic. 'bywire list NAME' shows details\n"
+    "of a name, parameter (motor.R_m), group (motor) or signal (p_mc).\n"
+    "'bywire list WORD' searches for other words, such as battery."
 )
 
 
 @dataclass(frozen=True)
 class Overview(Answer):
-    """Everything that has a name.
+    """Index of everything that has a name.
 
     Parameters
     ----------
@@ -36,9 +36,9 @@ class Overview(Answer):
         Kind of thing -> name -> summary; a list of names without summaries, and the names of the
         key figures of every experiment.
     topic
-        The kind to show; all if empty.
+        Topic to show. If empty, all topics.
     doubts
-        Declarations for something that does not exist.
+        Declarations that refer to something that does not exist.
     """
 
     things: Mapping[str, Any]
@@ -47,11 +47,11 @@ class Overview(Answer):
 
     @property
     def warnings(self) -> list[str]:
-        """Declarations for something that does not exist."""
+        """Declarations that refer to something that does not exist."""
         return [*self.doubts]
 
     def document(self) -> Document:
-        """Return an index of the kinds, and a table of the names and summaries of each."""
+        """Return an index of the topics, and each topic's names and summaries."""
         shown = {self.topic: self.things[self.topic]} if self.topic else self.things
         tables = {key.replace("_", " "): _table(content) for key, content in shown.items()}
         brief = next(iter(tables.items())) if self.topic else None
@@ -65,7 +65,7 @@ class Overview(Answer):
         )
 
     def _index(self) -> str:
-        """Return one line per kind, and a hint, for a screen of 80 by 24."""
+        """Return one line per topic, and a hint, for a terminal of 80 by 24 characters."""
         heads = {
             f"{key.replace('_', ' '):<{_NAME}}{len(content):>3}  ": content
             for key, content in self.things.items()
@@ -76,10 +76,10 @@ class Overview(Answer):
 
 @answering
 def overview(topic: str = "") -> Overview:
-    """Return everything that has a name, from an index that is rebuilt when a file changes.
+    """List everything that has a name, from an index that bywire rebuilds when a file changes.
 
-    Building the index loads every brake with all its parts. It is cached in the folder of compiled
-    kernels, so that a listing does not load them.
+    Building the index loads every brake with all its parts. bywire caches the index in the folder
+    of compiled kernels, so that a listing need not load the brakes.
 
     Parameters
     ----------

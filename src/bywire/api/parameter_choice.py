@@ -1,4 +1,4 @@
-"""The parameters that the user requested, for the brake of a use case."""
+"""Parameters that the user requested for a use case's brake."""
 
 from __future__ import annotations
 
@@ -28,10 +28,11 @@ def set_for(subject: str, assembly: str, name: str) -> CitedSet:
     cited = PARAMETER_SETS.find(name or main_set(assembly))
     if cited.assembly != assembly:
         raise ParameterError(
-            f"{subject} is for a {assembly}, but parameter set {cited.name!r} is for a "
-            f"{cited.assembly}",
+            f"{subject} needs parameters of a {assembly}, but parameter set {cited.name!r} belongs "
+            f"to a {cited.assembly}. Choose another parameter set",
             name="parameters",
             value=cited.name,
+            valid=assembly,
         )
     return cited
 
@@ -46,11 +47,12 @@ def parameters_for(
     subject
         Subject of the use case, for instance ``"loop 'moment'"``.
     assembly
-        The brake to which it belongs.
+        Brake to which the subject belongs.
     name
-        Parameter set; empty for the main one of that brake.
+        Parameter set. If empty, the main one of this brake.
     changes
-        Parameters by dotted name or pattern, with units or as a share, see `settled`.
+        Parameters by dotted name or pattern, with units or relative to their values (see
+        `settled`).
 
     Raises
     ------

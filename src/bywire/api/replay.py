@@ -334,9 +334,11 @@ def columns_of_bench(
     for name, column in columns.items():
         if name in driving and column != name:
             raise ParameterError(
-                f"{name} means two columns: {name} itself, which drives {driving[name]}, and "
-                f"{column}; write the first one with its unit, as "
-                f"{option('inputs', {driving[name]: f'{name}[UNIT]'})}"
+                f"{name} is ambiguous: it is the column that drives {driving[name]}, and also the "
+                f"name of column {column}. Write the first column with its unit, for example "
+                f"{option('inputs', {driving[name]: f'{name}[UNIT]'})}",
+                name=name,
+                value=column,
             )
     return NamedColumns({**{c: c for c in driving}, **columns}, time, units, driving)
 

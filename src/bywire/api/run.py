@@ -62,14 +62,16 @@ def require_scene(bench: Bench, over: str = "") -> None:
     assembly, known = bench.definition.assembly, SCENES.all()
     if assembly not in known:
         raise ParameterError(
-            f"{bench.experiment}: runs of {assembly} have no animation, only those of "
-            f"{' and '.join(known)}: omit animate, or declare a SceneKind in a module "
-            "'animations' of the brake",
+            f"{bench.experiment}: {assembly} has no animation (available for {', '.join(known)}). "
+            "Remove animate, or declare a SceneKind in a module 'animations' of the brake",
             name="animate",
+            value=assembly,
             valid=", ".join(known),
         )
     if over:
-        raise ParameterError("an animation shows single runs: omit animate or over", name="animate")
+        raise ParameterError(
+            "an animation shows single runs. Remove animate or over", name="animate", value=over
+        )
 
 
 def _playable(result: Result) -> list[str]:
@@ -99,7 +101,7 @@ def animations(result: Result) -> list[Attachment]:
 
 
 _SAID = (
-    "Sliding tires mark the road; marks of locked wheels are black. Arrows are braking forces; an "
+    "Sliding tires mark the road. Marks of locked wheels are black. Arrows are braking forces. An "
     "arrow of 1 m equals the weight."
 )
 
@@ -107,9 +109,9 @@ _SAID = (
 # --- The result
 
 _SCATTERED = (
-    'Errors "up to" belong to figures that do not converge: over double, single and half steps, '
-    "their differences do not shrink as the scheme's order 2 requires. Their errors are unknown. "
-    "The value is a bound for 95 % of such errors, from the scatter of the figure over all steps."
+    'Errors marked "up to" belong to figures that do not converge. Over double, single and half '
+    "steps, their differences do not shrink as a scheme of order 2 requires, so their errors are "
+    "unknown. The value is a 95 % bound from the figure's scatter over all steps."
 )
 
 
@@ -365,14 +367,14 @@ def _remark(verdict: Verdict) -> str:
     if not verdict.is_decided and math.isfinite(verdict.error):
         return (
             f"requirement undecided: {verdict.kpi} is {measured_amount(value, unit, error)}, "
-            f"numerical error {error_text(value, unit, error)}{limit}: use a smaller step"
+            f"numerical error {error_text(value, unit, error)}{limit}. Use a smaller step"
         )
     if not verdict.is_decided and not math.isinf(verdict.error):
         return f"requirement undecided: {verdict.kpi} is not defined{limit} ({verdict.note})"
     if not verdict.is_decided:
         return (
-            f"requirement undecided: {verdict.kpi} is defined for only one of the step and half "
-            f"the step{limit}: use a smaller step"
+            f"requirement undecided: {verdict.kpi} is defined either for the step or for half the "
+            f"step, but not for both{limit}. Use a smaller step"
         )
     return f"requirement not met: {verdict.kpi} is {amount(value, unit)}{limit}" + (
         f" ({verdict.note})" if verdict.note else ""

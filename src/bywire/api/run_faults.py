@@ -1,4 +1,4 @@
-"""A campaign of faults, run and judged: what each one does, which monitor detects it, coverage."""
+"""Results of a fault campaign: each fault's effect, the residual that detects it, coverage."""
 
 from __future__ import annotations
 
@@ -154,19 +154,19 @@ class FaultCampaign(Answer):
         alarms, cases = findings.false_alarms, findings.coverage_of_cases
         weight = "failure rates of [rates]" if findings.is_weighted else "unweighted"
         notes = [
-            f"thresholds were tuned on {plan.tuning} healthy runs, alarms and faults judged on "
-            f"{plan.healthy - plan.tuning} others: {alarms.count} of these raise an alarm "
-            f"({100 * alarms.low:.2g} to {100 * alarms.high:.2g} %)",
-            f"coverage is the share of dangerous runs that detect a fault within its fault "
-            f"tolerant time, that of its worst run ({weight}); this is true for {cases.count} of "
+            f"thresholds were tuned on {plan.tuning} healthy runs. Alarms and faults were judged "
+            f"on {plan.healthy - plan.tuning} other healthy runs, of which {alarms.count} raise an "
+            f"alarm ({100 * alarms.low:.2g} to {100 * alarms.high:.2g} %)",
+            f"coverage is the share of dangerous runs that detect the fault within the fault "
+            f"tolerant time of its worst run ({weight}). This applies to {cases.count} of "
             f"{cases.cases} runs ({100 * cases.low:.3g} to {100 * cases.high:.3g} %)",
         ]
         if not plan.varied:
-            notes.append("nothing varies, so thresholds come from a single healthy run: add [vary]")
+            notes.append("nothing varies, so thresholds come from a single healthy run. Add [vary]")
         if plan.reaction is not None:
             notes.append(
                 f"the reaction, {plan.reaction.failing.name} {amount(plan.reaction.delay, 's', 3)} "
-                "after the detection of a fault, is simulated where the fault permits it"
+                "after detection, is simulated for each fault that permits it"
             )
             notes.append(findings.benefit_of_reaction())
         return notes
@@ -348,14 +348,14 @@ class FaultCampaign(Answer):
         return [
             FigureBlock(
                 times,
-                "Dangerous faults: time from onset until a criterion is violated, and until a "
-                "residual detects the fault, for every run.",
+                "Dangerous faults: time from the fault's onset until a criterion is violated, and "
+                "until a residual detects the fault, for each run.",
                 "fault-times",
             ),
             FigureBlock(
                 curves,
-                "Median detection delay in dangerous runs over healthy runs with an alarm, for "
-                "multiples of each threshold. Rings: the thresholds in use.",
+                "Median detection delay in dangerous runs over the number of healthy runs with an "
+                "alarm, for multiples of each threshold. Rings mark the thresholds in use.",
                 "alarm-curves",
             ),
         ]

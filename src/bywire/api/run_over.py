@@ -178,7 +178,7 @@ class BenchRange(Answer):
         ]
         if not names:
             return []
-        return [f"not distinct over {self.name} within their numerical error: {', '.join(names)}"]
+        return [f"no change over {self.name} beyond the numerical error: {', '.join(names)}"]
 
     def _table(self, kpis: Sequence[Kpi]) -> Table:
         """Return some key figures, one row per value, with missed limits marked."""
@@ -238,7 +238,7 @@ class BenchRange(Answer):
         from bywire.report.time_traces import can_overlay
 
         captions = {
-            "curves": "Curves of all values, colored by the scale.",
+            "curves": "Curves for all values. The scale shows their colors.",
             "kpis": "Key figures over the value, with their numerical error where it is visible. "
             "Dotted: the limit; crosses miss it. Figures that are constant or undefined are "
             "omitted.",
@@ -310,7 +310,8 @@ def run_over(
     name, equals, text = (part.strip() for part in over.partition("="))
     if not equals:
         raise ParameterError(
-            f"over {over!r}: write NAME=LOW:HIGH:COUNT, for instance motor.R_m=0.2ohm:0.6ohm:9",
+            f"over {over!r} is not a range. Write NAME=LOW:HIGH:COUNT, for example "
+            "motor.R_m=0.2ohm:0.6ohm:9",
             name="over",
             value=repr(over),
             valid="NAME=LOW:HIGH:COUNT",
@@ -320,7 +321,7 @@ def run_over(
     values = spread(text, leaf.unit.symbol, name)
     if len({*values}) < 2:
         raise ParameterError(
-            f"over {over!r}: give at least two different values", name="over", value=repr(over)
+            f"over {over!r} needs at least two different values", name="over", value=repr(over)
         )
     benches = [changed(bench, {name: value}) for value in values]
     results = run_benches(benches, progress, engine, estimate_error=estimate_error)

@@ -112,8 +112,8 @@ def _set_point(result: Result) -> list[str]:
     if not share > _MISSED:
         return []
     return [
-        f"misses its set point: {step.signal} ends {amount(error.value, error.unit)} from "
-        f"{amount(step.end, error.unit)}, {100 * share:.3g} % of the step"
+        f"misses its set point: {step.signal} ends {amount(error.value, error.unit)} away from "
+        f"{amount(step.end, error.unit)}, which is {100 * share:.3g} % of the step"
     ]
 
 
@@ -155,7 +155,7 @@ def source_says(result: Result) -> list[Block]:
         for each in levels
     ]
     table = text_table(("level", "signal", "stated", "where"), rows)
-    return [TableBlock(table, "Published values for this experiment, green in the figures.")]
+    return [TableBlock(table, "Published values for this experiment, drawn in green.")]
 
 
 def energy(ledgers: Mapping[str, Ledger]) -> list[Section]:

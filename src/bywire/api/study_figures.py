@@ -52,10 +52,11 @@ def _scatter_block(findings: Findings, judgment: Judgment) -> Block:
     sentences = [
         f"{name.replace('_', ' ')} over its main influences; {crosses}.",
         cases.caption("meet the limit", "miss it"),
-        f"Triangles at the upper edge: cases without it ({lacking}), which miss the limit."
+        f"Triangles at the upper edge mark cases without the figure ({lacking}), which miss the "
+        "limit."
         if lacking
         else "",
-        "Cases concentrate near failures, so shares of them are not probabilities."
+        "Cases concentrate near failures, so the share of cases is not a probability."
         if findings.rare
         else "",
     ]
@@ -80,7 +81,7 @@ def parallel(findings: Findings) -> Block:
     )
     drawn = _required(findings)
     if not all(np.isfinite(findings.figure(name)).all() for name in drawn):
-        text += " If a case lacks a figure, its line goes to 'none'."
+        text += " The line of a case without the figure goes to 'none'."
     if absent := [j.demand.figure for j in findings.judgments if j.demand.figure not in drawn]:
         text += f" No case has {', '.join(absent)}."
     return FigureBlock(partial(_parallel, findings, cases), text, "parallel")
@@ -160,15 +161,15 @@ def study_figures(findings: Findings, recordings: _Recordings) -> list[Block]:
     if findings.rare:
         return [*_rare_figures(findings), *scatters(findings), *_overlays(findings, recordings)]
     band = (
-        "; the shaded band contains 90 % of them."
+        ". The shaded band contains 90 % of the cases."
         if findings.plan.is_sampled
-        else f"; heights count the cases of {findings.plan.design}, and are not probabilities."
+        else f". Heights are numbers of cases of {findings.plan.design}, not probabilities."
     )
     blocks: list[Block] = [
         FigureBlock(
             partial(_histograms, findings),
-            f"Spread of the key figures over the cases{band} Dashed: the bench itself; dotted: "
-            "the limit.",
+            f"Spread of the key figures over the cases{band} Dashed lines show the bench itself, "
+            "dotted lines the limit.",
             "histograms",
             is_long=True,
         )
@@ -180,7 +181,7 @@ def study_figures(findings: Findings, recordings: _Recordings) -> list[Block]:
                 partial(_influences, findings),
                 f"Influences on the key figures: "
                 f"{'partial ' * bool(findings.plan.correlations)}rank "
-                "correlations with their intervals. Pale: not distinct from zero."
+                "correlations with their intervals. Pale bars are not distinct from zero."
                 f"{_on_choices(findings)}"
                 f"{strongest(map(findings.influences, figures))}",
                 "influences",
@@ -190,8 +191,8 @@ def study_figures(findings: Findings, recordings: _Recordings) -> list[Block]:
         blocks.append(
             FigureBlock(
                 partial(_tornado, findings, effects),
-                "Effect of each quantity alone on the key figures, from the bench itself. Marks: "
-                "its levels; dotted: the limit."
+                "Effect of each quantity alone on the key figures, starting from the bench itself. "
+                "Marks show its levels, dotted lines the limit."
                 f"{_on_gray(findings)}{_on_edge(effects)}{strongest(effects.values())}",
                 "tornado",
             )
@@ -204,8 +205,8 @@ def study_figures(findings: Findings, recordings: _Recordings) -> list[Block]:
         blocks.append(
             FigureBlock(
                 partial(_convergence, findings),
-                "Probability to meet a requirement, over the number of cases; dotted: the "
-                f"required one.{_on_others(findings)}",
+                "Probability of meeting a requirement, over the number of cases. Dotted lines show "
+                f"the required probability.{_on_others(findings)}",
                 "convergence",
             )
         )
@@ -215,13 +216,17 @@ def study_figures(findings: Findings, recordings: _Recordings) -> list[Block]:
 
 
 def _on_gray(findings: Findings) -> str:
-    return " Gray: a choice, with the names of its extremes." if _has_choices(findings) else ""
+    return (
+        " Gray bars are choices, with the names of their extremes."
+        if _has_choices(findings)
+        else ""
+    )
 
 
 def _on_edge(effects: Mapping[str, Sequence[Effect]]) -> str:
     if not any(effect.lacking for each in effects.values() for effect in each):
         return ""
-    return " Triangle: the figure is not defined at some of its levels."
+    return " A triangle means that the figure is not defined at some levels."
 
 
 def _has_choices(findings: Findings) -> bool:
@@ -231,7 +236,7 @@ def _has_choices(findings: Findings) -> bool:
 def _on_choices(findings: Findings) -> str:
     if not _has_choices(findings):
         return ""
-    return " A choice has no order; its bar is the correlation ratio, without a sign."
+    return " A choice has no order, so its bar is the correlation ratio, without a sign."
 
 
 def _histograms(findings: Findings) -> Figure:
@@ -326,10 +331,10 @@ def _alike_once(each: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
 
 _POINTS = 200  # of a curve
 _CAPTIONS = {
-    "sobol-indices": "Share of each quantity in the variance of each key figure, alone and with "
-    "all others, with intervals. Pale: not distinct from zero.",
-    "morris": "Mean size (with its interval) and standard deviation of the elementary effects of "
-    "each quantity. Pale: not distinct from zero.",
+    "sobol-indices": "Share of each quantity in each key figure's variance, alone and with all "
+    "others, with intervals. Pale bars are not distinct from zero.",
+    "morris": "Mean size (with its interval) and standard deviation of each quantity's elementary "
+    "effects. Pale bars are not distinct from zero.",
 }
 
 
@@ -340,8 +345,8 @@ def _rare_figures(findings: Findings) -> list[FigureBlock]:
     return [
         FigureBlock(
             partial(_curves, findings),
-            "Probability that a key figure is worse than a value, with its interval. Dotted: the "
-            "limit and the permitted probability.",
+            "Probability that a key figure is worse than a value, with its interval. Dotted lines "
+            "show the limit and the permitted probability.",
             "exceedance",
         )
     ]

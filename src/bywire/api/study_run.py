@@ -279,13 +279,13 @@ def warned(findings: Findings, of_the_bench: list[str]) -> list[str]:
     texts += of_the_bench if not texts else []
     if failed := findings.failures:
         texts.append(
-            f"{len(failed)} of {count} cases have no result; they count as missing every "
+            f"{len(failed)} of {count} cases have no result. They count as missing every "
             "requirement"
         )
     if findings.spreads:
         texts += _undefined(findings)
     elif count and not failed:
-        texts.append("no key figure is defined in any case: check the bench with bywire run")
+        texts.append("no key figure is defined in any case. Check the bench with 'bywire run'")
     return texts + (state_texts(findings) if findings.rare and count else [])
 
 
@@ -306,11 +306,11 @@ def _undefined(findings: Findings) -> list[str]:
 def unfinished(plan: StudyPlan, cases: int, resume: str) -> str:
     """Return a text on missing cases, with the command that computes them."""
     if plan.sought is not None:
-        return f"not all cases are computed yet: {resume}"
+        return f"not all cases are computed yet. To continue, type '{resume}'"
     limit = f" (the study file limits each call to {shown(plan.time, 's')})"
     return (
         f"{plan.total - cases} of {plan.total} cases are not computed yet"
-        f"{limit if math.isfinite(plan.time) else ''}: {resume}"
+        f"{limit if math.isfinite(plan.time) else ''}. To continue, type '{resume}'"
     )
 
 
@@ -319,7 +319,7 @@ def noted(findings: Findings, damaged: int) -> list[str]:
     repaired = ""
     if damaged:
         files = "1 damaged chunk is" if damaged == 1 else f"{damaged} damaged chunks are"
-        repaired = f"{files} computed again"
+        repaired = f"{files} recomputed"
     return [
         *filter(None, [repaired]),
         *_rounding(findings.plan),
@@ -349,7 +349,7 @@ def _rounding(plan: StudyPlan) -> list[str]:
     if plan.total == plan.cases or not (plan.is_sampled or plan.sensitivity is not None):
         return []
     what = "whole groups" if plan.sensitivity is not None else f"whole chunks of {CHUNK}"
-    return [f"{plan.total} cases in place of {plan.cases}, because cases come in {what}"]
+    return [f"{plan.total} cases instead of {plan.cases}, because cases come in {what}"]
 
 
 def _on_choices(plan: StudyPlan) -> list[str]:
@@ -357,8 +357,8 @@ def _on_choices(plan: StudyPlan) -> list[str]:
     if not choices or not plan.is_sampled:
         return []
     return [
-        f"{', '.join(choices)}: a choice has no rank correlation. Its correlation ratio ranks it "
-        "among the quantities, without a sign or an interval; 'sobol-indices' gives its share of "
+        f"{', '.join(choices)}: a choice has no rank correlation. Its correlation ratio, without "
+        "sign or interval, ranks it among the quantities. Use 'sobol-indices' to find its share of "
         "the variance"
     ]
 
@@ -371,14 +371,14 @@ def _on_intervals(findings: Findings) -> list[str]:
         return rare_notes(findings)
     if plan.sensitivity is not None:
         return [
-            f"{plan.design}: cases share values, so shares of them are not probabilities",
+            f"{plan.design}: cases share values, so the share of cases is not a probability",
             *((missing_indices(findings) + _wide_shares(findings)) if len(findings.cases) else []),
         ]
     if not plan.is_sampled:
-        return [f"{plan.design}: possible outcomes, without their probability"]
+        return [f"{plan.design}: the cases show possible outcomes, but not their probability"]
     if plan.design == "monte-carlo":
         return []
-    return [f"{plan.design}: intervals are those of independent cases, which usually scatter more"]
+    return [f"{plan.design}: intervals assume independent cases, so they are usually conservative"]
 
 
 def _wide_shares(findings: Findings) -> list[str]:
@@ -396,8 +396,8 @@ def _wide_shares(findings: Findings) -> list[str]:
     if not wide:
         return []
     return [
-        f"{', '.join(wide)}: {design.base} groups do not determine shares within +-{_WIDE:g}; "
-        "ask for more cases in the study file, and run it into another folder"
+        f"{', '.join(wide)}: {design.base} groups are too few to determine shares within "
+        f"+-{_WIDE:g}. Request more cases in the study file, and run it in another folder"
     ]
 
 
@@ -507,7 +507,8 @@ class StudyRun(Answer):
             raise unknown_name("key figure of a requirement", str(kpi), required)
         if kpi not in self._shown.benches:
             raise ParameterError(
-                f"{kpi} has no {self._shown.kind} case: no case has a result, or all are equal",
+                f"{kpi} has no {self._shown.kind} case, because no case has a result or all are "
+                "equal",
                 name=kpi,
             )
         return self._shown.benches[kpi]
@@ -654,7 +655,8 @@ def completed(
     except KeyboardInterrupt:
         of = "" if plan.sought is not None else f" of {plan.chunks}"
         raise KeyboardInterrupt(
-            f"{len(store.finished())}{of} chunks are kept: {store.resume_command}"
+            f"{len(store.finished())}{of} chunks are saved. To continue, type "
+            f"'{store.resume_command}'"
         ) from None
     return replace(_run_of(plan, store, completed.nominal), damaged=completed.damaged)
 
@@ -673,8 +675,8 @@ def kept_plan(store: StudyStore) -> tuple[StudyPlan, Origin]:
     origin = Origin(Path(record["source"]), record["set"])
     if not origin.file.is_file():
         raise FileError(
-            f"the study file {origin.file} of {store.folder} no longer exists: if you moved it, "
-            f"type bywire study run FILE --out {store.folder}",
+            f"the study file {origin.file} of {store.folder} no longer exists. If you moved it, "
+            f"type 'bywire study run FILE --out {store.folder}'",
             name=str(origin.file),
         )
     try:
@@ -684,7 +686,7 @@ def kept_plan(store: StudyStore) -> tuple[StudyPlan, Origin]:
         if not unloaded:
             raise
         raise error.reworded(
-            f"{error}; the study was run with {' '.join(map(_loaded_by, unloaded))}"
+            f"{error}. This study needs {' '.join(map(_loaded_by, unloaded))}"
         ) from None
     is_listed = plan.design in SPANNED
     return (plan if is_listed else replace(plan, cases=int(record["cases"]))), origin

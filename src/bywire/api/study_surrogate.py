@@ -44,7 +44,7 @@ class StudySurrogates(Answer):
         """Warnings on poor surrogates, and the study's warnings."""
         poor = [
             f"the surrogate of {each.kpi} explains {100.0 * each.explained:.0f} % of the variance "
-            "of cases outside its fit; the rest is noise, or not a polynomial"
+            "of cases outside its fit. The rest is noise or is not polynomial"
             for each in self.surrogates.values()
             if each.explained < _POOR
         ]
@@ -53,11 +53,13 @@ class StudySurrogates(Answer):
 
     @property
     def notes(self) -> list[str]:
-        """Notes on values of quantities that the user did not give."""
+        """Notes on values of quantities that the user did not specify."""
         varied, first = self.study.plan.varied, next(iter(self.surrogates.values()))
         moved = [
-            f"no case has the bench's {v.name} = {amount(v.nominal, v.unit)}: bywire takes the "
-            f"nearest, {amount(first.nominal[v.name], v.unit)}; choose another with {option('at')}"
+            f"no case has the bench's {v.name} = {amount(v.nominal, v.unit)}. bywire uses the "
+            "nearest "
+            f"value, {amount(first.nominal[v.name], v.unit)}. To use another value, add "
+            f"{option('at')}"
             for v in varied
             if self.at and v.name not in self.at and first.nominal[v.name] != v.nominal
         ]
@@ -67,7 +69,7 @@ class StudySurrogates(Answer):
             if (pair[0] in self.at) != (pair[1] in self.at)
         ]
         return moved + [
-            f"{' and '.join(pair)} are correlated, but you changed only one of them: give both"
+            f"{' and '.join(pair)} are correlated, but you changed only one of them. Specify both"
             for pair in pairs
         ]
 

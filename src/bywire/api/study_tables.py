@@ -369,31 +369,31 @@ def rare_notes(findings: Findings) -> list[str]:
     notes = []
     if design.kind == SUBSET and design.level != design.asked:
         notes.append(
-            f"{design.level} cases per level in place of {design.asked}, because cases come in "
+            f"{design.level} cases per level instead of {design.asked}, because cases come in "
             "whole chunks"
         )
     if unjudged := [str(each) for each in plan.demands if each not in plan.judged_demands]:
         notes.append(
-            f"no verdict without a required probability: {'; '.join(unjudged)}; cases that search "
+            f"no verdict without a required probability: {'; '.join(unjudged)}. Cases that search "
             "for failures do not represent all cases"
         )
     notes += [
-        f"{each.demand.figure}: failure is less probable than a thousandth of the limit, so the "
-        "search stopped"
+        f"{each.demand.figure}: the probability of failure is below a thousandth of the limit, so "
+        "the search stopped"
         for each in findings.rare
         if each.failure.state == "negligible"
     ]
     for each in findings.judgments if len(findings.cases) else ():
         if each.outcome == "undecided" and each.failure and each.failure.state == "done":
             more = (
-                "more cases_per_level, in another folder, narrow it"
+                "Use more cases_per_level, in another folder, to narrow it"
                 if design.kind == SUBSET
-                else "extend the study"
+                else "Extend the study"
             )
-            notes.append(f"{each.demand.figure}: the interval contains the limit: {more}")
+            notes.append(f"{each.demand.figure}: the interval contains the limit. {more}")
     if design.kind == IMPORTANCE:
         notes.append(
-            "importance-sampling may miss failures far from the design point; 'subset-simulation' "
+            "importance-sampling may miss failures far from the design point. 'subset-simulation' "
             "searches everywhere"
         )
     return notes
@@ -411,12 +411,12 @@ def _state_text(each: RareFailure, plan: StudyPlan, outcome: Outcome) -> str:
             else "by the search for the design point"
         )
         return f"the budget of {plan.cases} cases is spent {where} ({so_far})" + (
-            ": extend the study" if outcome == "undecided" else ""
+            ". Extend the study" if outcome == "undecided" else ""
         )
     if failure.state == "level":
-        return "too many cases have the same figure to rank them: use 'monte-carlo'"
+        return "too many cases have the same figure to rank them. Use 'monte-carlo'"
     if failure.state == "no design point":
-        return f"no design point was found, because {failure.why}: use 'subset-simulation'"
+        return f"bywire found no design point, because {failure.why}. Use 'subset-simulation'"
     return ""
 
 
@@ -482,7 +482,7 @@ def search_notes(findings: Findings) -> list[str]:
     if spent:
         notes.append(
             f"{', '.join(spent)}: the budget of {plan.cases} cases was spent before the search "
-            "ended: extend the study"
+            "ended. Extend the study"
         )
     return notes
 

@@ -205,7 +205,7 @@ def doubts() -> list[str]:
             file, line = PARAMETER_SETS.place(cited.name)
             nearest = unknown_name("assembly", cited.assembly, known)
             texts.append(
-                f"{file}, line {line}: parameter set {cited.name!r} is for an assembly that no "
+                f"{file}, line {line}: parameter set {cited.name!r} belongs to an assembly that no "
                 f"brake declares: {nearest}"
             )
     return texts
@@ -503,7 +503,7 @@ def _system(model: type[Any]) -> Object:
         for kind in thing_kinds()
         if kind.has_assembly
     }
-    parameters = "'bywire list' with the name of a parameter set shows its parameters"
+    parameters = "'bywire list NAME' with a parameter set's name shows its parameters"
     return {
         "summary": system_summary(model),
         **there,
@@ -579,8 +579,8 @@ def _generic_experiment(experiment: GenericExperiment) -> Object:
         "assembly": "any",
         "options": rows,
         "changed_with": "--set options.NAME=VALUE",
-        "see": "'bywire list' with the name of an assembly shows its stimuli and recorded signals; "
-        f"levels are multiples of the nominal value of the signal in option {_named(experiment)}",
+        "see": "'bywire list NAME' with an assembly's name shows its stimuli and recorded signals. "
+        f"Levels are multiples of the nominal value of the signal in option {_named(experiment)}",
     }
 
 
@@ -705,9 +705,9 @@ def _bench_method(method: BenchMethod) -> Object:
         "records": "one or several",
         "options": _option_rows(method.options, method.defaults, method.simulated),
         "changed_with": "--option NAME=VALUE",
-        "see": "'bywire list' with the name of the bench's assembly shows names for --input "
-        "(stimulus), --output (recording) and --estimate-start (state), with the name of a "
-        "parameter set names for --unknown",
+        "see": "'bywire list NAME' with the name of the bench's assembly shows names for --input "
+        "(stimulus), --output (recording) and --estimate-start (state). With a parameter set's "
+        "name, it shows names for --unknown",
     }
 
 

@@ -1,4 +1,4 @@
-"""Trust study: whether a method recovers known values from many simulated experiments."""
+"""Trust study, which tests whether a method recovers known values from simulated experiments."""
 
 from __future__ import annotations
 
@@ -174,6 +174,6 @@ def trust(
         if store is None or not store.exists():
             raise
         raise KeyboardInterrupt(
-            f"finished experiments are in {store}: rerun the command to continue"
+            f"finished experiments are saved in {store}. Rerun the command to continue"
         ) from None
     return TrustStudy(chosen, recovered)

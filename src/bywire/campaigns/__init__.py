@@ -1,1 +1,1 @@
-"""Campaigns of faults: every failure of a brake in a maneuver, its effect, and its detection."""
+"""Fault campaigns: every failure of a brake in a maneuver, its effect, and its detection."""

@@ -1,4 +1,4 @@
-"""Campaign files: TOML in, a plan out; nothing in them is executed."""
+"""Reader of campaign files (TOML), which executes nothing in them."""
 
 from __future__ import annotations
 
@@ -80,21 +80,21 @@ class CampaignFile(Section):
 def read_campaign(
     source: str | Path, overrides: Mapping[str, str] = MappingProxyType({})
 ) -> CampaignPlan:
-    """Return the campaign of a file, or that of a brake by its name.
+    """Read a campaign file, or find a brake's campaign by its name.
 
     Parameters
     ----------
     source
-        Campaign file, see ``docs/faults.md``; or the name of one that comes with a brake.
+        Campaign file (see ``docs/faults.md``), or the name of a campaign that comes with a brake.
     overrides
-        Further changes of the bench, as ``--set`` takes them.
+        Additional changes to the bench, in the form of ``--set``.
 
     Raises
     ------
     FileError
-        When the file cannot be read or is not valid TOML.
+        If the file cannot be read or is not valid TOML.
     InputError
-        For anything in it that does not fit, with the file's name in front.
+        For any invalid entry, with the file's name in front.
     """
     text = str(source)
     if text in CAMPAIGNS.all():
@@ -119,7 +119,8 @@ def _plan(content: Mapping[str, Any], folder: Path, overrides: Mapping[str, str]
     chosen = [v.name for v in varied if not v.unit]
     if chosen:
         raise ParameterError(
-            f"[vary] {chosen[0]} is a choice: in a campaign only numbers vary", name=chosen[0]
+            f"[vary] {chosen[0]} is a choice. In a campaign, only numbers can vary",
+            name=chosen[0],
         )
     known = modes_of(case.model, case.par)
     modes = {name: mode for name, mode in known.items() if not mode.lacks(case.par)}
@@ -127,7 +128,8 @@ def _plan(content: Mapping[str, Any], folder: Path, overrides: Mapping[str, str]
     singles = tuple(_failing(modes, section, file.values))
     if not singles:
         raise ParameterError(
-            "[campaign] leaves no fault: only and leave_out contradict each other",
+            "[campaign] contains no faults, because only and leave_out contradict each other. "
+            "Change one of them",
             name="[campaign]",
         )
     latent = [
@@ -140,7 +142,7 @@ def _plan(content: Mapping[str, Any], folder: Path, overrides: Mapping[str, str]
     criteria = criteria_of(file.criteria, signals_of(case.model.Output))
     if not criteria:
         raise ParameterError(
-            "[[criteria]] are missing: define the effects that a fault must not have",
+            "[[criteria]] is missing. Define the effects that a fault must not have",
             name="criteria",
         )
     plan = CampaignPlan(
@@ -165,12 +167,13 @@ def _plan(content: Mapping[str, Any], folder: Path, overrides: Mapping[str, str]
 def _only_case(bench: Bench) -> Case:
     cases = bench.cases()
     if len(cases) != 1 or bench.faults:
-        what = "has faults already" if bench.faults else f"makes {len(cases)} runs"
+        what = "already has faults" if bench.faults else f"has {len(cases)} runs"
         raise ParameterError(
-            f"the bench of a campaign makes one run without faults, but {bench.experiment!r} "
-            f"{what}",
+            f"a campaign's bench must have exactly one run, without faults, but "
+            f"{bench.experiment!r} {what}",
             name="bench",
             value=bench.experiment,
+            valid="exactly one run",
         )
     return cases[0]
 
@@ -196,10 +199,14 @@ def _require_known_values(values: Mapping[str, Any], modes: Mapping[str, Mode]) 
         if name not in modes:
             raise unknown_name("fault in [values]", name, modes)
         if not modes[name].unit:
-            raise ParameterError(f"[values] {name} takes no value: leave it out", name=name)
+            raise ParameterError(
+                f"[values] {name}: this fault has no value. Remove the key", name=name
+            )
         if given == []:
             raise ParameterError(
-                f"[values] {name} = []: give a value, or use leave_out", name=name, value="[]"
+                f"[values] {name} = [] is empty. List a value, or use leave_out",
+                name=name,
+                value="[]",
             )
 
 
@@ -211,7 +218,7 @@ def _sizes(mode: Mode, values: Mapping[str, Any]) -> Iterator[float]:
 
 
 def _size(mode: Mode, value: Any, where: str) -> float:
-    """Return a value of a mode [SI]; the mode's own is a plain number."""
+    """Return a mode's value [SI]. The mode's default is a plain number."""
     if not mode.unit:
         return 0.0
     size = (
@@ -222,7 +229,7 @@ def _size(mode: Mode, value: Any, where: str) -> float:
 
 
 def _pairs(singles: Sequence[Failing], latent: Sequence[Failing], case: Case) -> Iterator[Failing]:
-    """Yield every fault again with each latent one, if both can be present."""
+    """Yield each fault combined with each latent fault, if both can be present."""
     for before in latent:
         for each in singles:
             if not touch_alike(each, before, case.par):
@@ -242,8 +249,9 @@ def _onsets(section: CampaignSection, case: Case) -> tuple[float, ...]:
     onsets = evenly(first, section.spread, section.onsets or (8 if section.spread > 0 else 1))
     if not (-case.keep <= first and onsets[-1] < case.duration):
         raise ParameterError(
-            f"[campaign] onsets from {first:g} s to {onsets[-1]:g} s: they must be between "
-            f"{-case.keep:g} s and the end of the run at {case.duration:g} s",
+            f"[campaign] onsets from {first:g} s to {onsets[-1]:g} s are not valid: they must be "
+            "in "
+            f"the range {-case.keep:g} s to {case.duration:g} s of the run",
             name="[campaign] onsets",
             value=f"{first:g} s to {onsets[-1]:g} s",
             valid=f"{-case.keep:g} s to {case.duration:g} s",
@@ -278,7 +286,9 @@ def _reaction(section: ReactionSection, modes: Mapping[str, Mode]) -> Reaction:
     mode = modes[section.fault]
     if section.value is not None and not mode.unit:
         raise ParameterError(
-            f"[reaction] {mode.name} takes no value: leave it out", name="[reaction]"
+            f"[reaction] {mode.name} has no value. Remove the key 'value'",
+            name="[reaction]",
+            value=mode.name,
         )
     size = mode.value if section.value is None else section.value
     return Reaction(Failing(mode, _size(mode, size, "[reaction] value")), section.delay)

@@ -1,4 +1,4 @@
-"""Runs with a fault and healthy runs: simulated and compared, with effects and times."""
+"""Simulation of healthy and faulty runs, and comparison of their effects and times."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from bywire.simulation.run import Run, Trajectory, simulate
 from bywire.simulation.tapped import rests
 
 LANES = 64
-"""largest number of runs in one batch, so that their recordings stay small"""
+"""largest number of runs in one batch, to limit the size of their recordings"""
 _MOST = 250e6  # largest number of values in memory: 2 GB
 
 
@@ -38,7 +38,7 @@ class Traces:
     signals
         By name, shape (cases, rows) each.
     doubts
-        Warnings of the solver, each once.
+        Warnings of the solver, without repetitions.
     """
 
     time: Array
@@ -56,7 +56,7 @@ def require_small(plan: CampaignPlan) -> None:
     Raises
     ------
     ParameterError
-        With the size of the recordings.
+        If they do not fit, with their size.
     """
     case = plan.case(0)
     rows = (case.keep + case.duration) / case.record
@@ -64,10 +64,10 @@ def require_small(plan: CampaignPlan) -> None:
     runs = max(plan.healthy, len(plan.onsets))
     if runs * rows * signals > _MOST:
         raise ParameterError(
-            f"{runs} runs of {rows:.3g} rows of {signals} signals are more than {_MOST:.3g} "
-            "numbers: take fewer healthy runs or onsets, a shorter maneuver, or a longer "
-            "simulation.record",
+            f"{runs} runs with {rows:.3g} rows of {signals} signals exceed {_MOST:.3g} numbers. "
+            "Use fewer healthy runs or onsets, a shorter maneuver, or a longer simulation.record",
             name="simulation.record",
+            valid=f"{_MOST:.3g}",
         )
 
 
@@ -95,7 +95,7 @@ def faulty_traces(
     samples
         Healthy runs whose scatter and noise are used.
     reactions
-        Time of the campaign's reaction in each run [s]; None for none.
+        Time of the campaign's reaction in each run [s], or None for no reaction.
     """
     cases = []
     for k, (onset, sample) in enumerate(zip(onsets, samples, strict=True)):
@@ -109,7 +109,7 @@ def faulty_traces(
 
 
 def _case(plan: CampaignPlan, sample: int, faults: Sequence[Injection], is_apart: bool) -> Case:
-    """Return a run of a sample with faults, of the common model or of a separate one."""
+    """Return a sample's run with faults, with the common model or a separate model."""
     taps, tasks = ((), ()) if is_apart else plan.taps
     return injected(plan.case(sample), faults, taps, tasks)
 
@@ -141,7 +141,7 @@ def _computed(runs: Sequence[Run], signals: Sequence[str], engine: str) -> Seque
 
 
 def _missed(case: Case, task: str, time: Array) -> Array:
-    """Return where a task misses its ticks, which a watchdog detects."""
+    """Return the rows in which a task misses its ticks, which a watchdog detects."""
     given = case.falsified(time) if isinstance(case, FaultyCase) else {}
     return np.minimum(given.get(rests(task), np.zeros(time.size)), 1.0)
 
@@ -149,14 +149,14 @@ def _missed(case: Case, task: str, time: Array) -> Array:
 # --- Judging
 
 FACTORS = (0.5, 0.7, 1.0, 1.4, 2.0, 3.0, 5.0)
-"""multiples of each threshold, for delay over false alarms"""
+"""multiples of each threshold, for curves of delay over false alarms"""
 
 Outcome = dict[str, Any]
 
 
 @dataclass(frozen=True)
 class Healthy:
-    """Results of healthy runs: signals, thresholds, false alarms.
+    """Results of healthy runs: signals, thresholds and false alarms.
 
     Parameters
     ----------
@@ -168,7 +168,7 @@ class Healthy:
         Number of runs in the other half in which each residual exceeds its threshold times
         `FACTORS`, by name, shape (factors,).
     any_alarm
-        The same number for any residual.
+        Number of runs in which any residual exceeds its threshold, shape (factors,).
     """
 
     traces: Traces
@@ -178,7 +178,7 @@ class Healthy:
 
 
 def judge_healthy(plan: CampaignPlan, traces: Traces) -> Healthy:
-    """Return thresholds and false alarms of healthy runs, each from one half of the runs."""
+    """Tune thresholds on one half of the healthy runs, and count false alarms in the other."""
     thresholds: dict[str, float] = {}
     alarms: dict[str, list[int]] = {}
     alarmed = np.zeros(plan.healthy - plan.tuning, dtype=bool)
@@ -198,7 +198,7 @@ def judge_healthy(plan: CampaignPlan, traces: Traces) -> Healthy:
 
 
 def _scaled(limit: float, factor: float) -> float:
-    """Return a threshold that is less sensitive by a factor, for either sign."""
+    """Return a threshold of either sign that is less sensitive by a factor."""
     if limit <= NEVER:  # there is none to scale
         return limit
     return limit * factor if limit >= 0 else limit / factor
@@ -290,7 +290,7 @@ def _with_reaction(
 
 
 def _is_the_same(plan: CampaignPlan, failing: Failing) -> bool:
-    """Return whether fault and reaction change the same value: then no reaction is possible."""
+    """Return whether fault and reaction change the same value, which excludes a reaction."""
     assert plan.reaction is not None
     par = plan.case(0).par
     return touch_alike(failing, plan.reaction.failing, par) or (

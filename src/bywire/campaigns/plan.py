@@ -1,4 +1,4 @@
-"""Plan of a campaign: maneuver, faults and onsets, criteria, and residuals."""
+"""Plan of a campaign: maneuver, faults with onsets, criteria and residuals."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ SENSES: tuple[Sense, ...] = ("above", "below", "above_healthy", "below_healthy",
 
 
 class CriterionSection(Section):
-    """A section ``[[criteria]]``; its level has the unit of its signal."""
+    """Section ``[[criteria]]``, whose level has its signal's unit."""
 
     name: Name
     signal: Any = ""
@@ -49,7 +49,7 @@ class CriterionSection(Section):
 
 @dataclass(frozen=True)
 class Criterion:
-    """Criterion of a campaign: an effect that a fault must not have.
+    """Criterion of a campaign, an effect that a fault must not have.
 
     Parameters
     ----------
@@ -58,9 +58,9 @@ class Criterion:
     signal
         Recorded signal that is judged.
     sense, level
-        Forbidden side [SI]: of a level, of a distance from the healthy run, or of a share of it.
+        Forbidden side of a level [SI], of a distance from the healthy run, or of a share of it.
     lasting
-        Duration without a break [s].
+        Uninterrupted duration [s] of a violation.
     severity
         Severity class from the user, for instance ``"S3"``.
     """
@@ -85,7 +85,7 @@ class Criterion:
         return np.asarray(self.level * healthy - values)
 
     def reached(self, values: Array, healthy: Array, time: Array, onset: Array) -> Array:
-        """Return when the violation has lasted long enough [s], NaN for never; shape (cases,)."""
+        """Return when the violation has lasted long enough [s], NaN for never, shape (cases,)."""
         dt = float(time[1] - time[0])
         rows = round(min(self.lasting, dt * time.size) / dt) + 1
         lasted = least_of_the_last(self.excess(values, healthy), rows)
@@ -108,13 +108,15 @@ def criteria_of(
     Raises
     ------
     InputError
-        When one of them is not valid.
+        If one of them is not valid.
     """
     criteria = tuple(_criterion(each, signals) for each in sections)
     names = [criterion.name for criterion in criteria]
     for name in names:
         if names.count(name) > 1:
-            raise ParameterError(f"[[criteria]] {name!r} occurs twice: rename one", name=name)
+            raise ParameterError(
+                f"[[criteria]] {name!r} occurs twice. Rename one of them", name=name
+            )
     return criteria
 
 
@@ -125,7 +127,7 @@ def _criterion(section: CriterionSection, signals: Mapping[str, Signal]) -> Crit
     senses = [sense for sense in SENSES if sense in section.given]
     if len(senses) != 1:
         raise ParameterError(
-            f"[[criteria]] {name!r}: give exactly one of {', '.join(SENSES)}, for instance "
+            f"[[criteria]] {name!r} needs exactly one of {', '.join(SENSES)}, for example "
             'above_healthy = "5 bar"',
             name=name,
             valid=", ".join(SENSES),
@@ -150,9 +152,9 @@ class Failing:
     mode, value
         Failure mode, and its value [SI].
     is_present
-        Whether it is present before the run starts; times then count from zero.
+        Whether the fault is present before the run starts. If so, times count from zero.
     latent
-        Another, undetected fault that is present before; None for none.
+        Another undetected fault that is already present, or None.
     """
 
     mode: Mode
@@ -162,7 +164,7 @@ class Failing:
 
     @property
     def name(self) -> str:
-        """The mode, and the value [SI] where it takes one."""
+        """Name of the mode, and its value [SI] if the mode has one."""
         unit = "" if self.mode.unit == "1" else f" {self.mode.unit}"
         name = f"{self.mode.name} {self.value:.6g}{unit}" if self.mode.unit else self.mode.name
         return f"{name} after {self.latent.name}" if self.latent is not None else name
@@ -219,7 +221,7 @@ class CampaignPlan:
     rates
         Failure rates by fault, or by its place.
     reaction
-        Reaction to a detected fault; None without reaction.
+        Reaction to a detected fault, or None.
     """
 
     name: str
@@ -325,12 +327,12 @@ class CampaignPlan:
 
     @cached_property
     def digest(self) -> str:
-        """What distinguishes the campaign from any other."""
+        """Digest that identifies the campaign."""
         return digest_of(self.identity)
 
     @cached_property
     def identity(self) -> Mapping[str, Any]:
-        """Everything that the figures of its runs depend on."""
+        """Everything that affects the figures of its runs."""
         bench, reaction = self.bench, self.reaction
         return as_json(
             {
@@ -365,6 +367,6 @@ def evenly(first: float, spread: float, count: int) -> tuple[float, ...]:
 
 
 def touch_alike(first: Failing, second: Failing, par: ParameterSet) -> bool:
-    """Return whether two faults change the same value: then they cannot both be present."""
+    """Return whether two faults change the same value, so that they cannot both be present."""
     one, other = (touched(each.mode, each.value, par) for each in (first, second))
     return bool(one & other)

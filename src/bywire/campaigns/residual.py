@@ -1,4 +1,4 @@
-"""Residuals, by which a controller can detect a fault; the campaigns that a brake declares."""
+"""Residuals with which a controller can detect faults, and campaigns that brakes declare."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from bywire.core.typing import Array
 
 
 def least_of_the_last(values: Array, rows: int) -> Array:
-    """Return the least of the last rows, including the present one, along the last axis."""
+    """Return the minimum of the last rows, including the present one, along the last axis."""
     size = max(min(rows, values.shape[-1]), 1)
     return np.asarray(minimum_filter1d(values, size, axis=-1, origin=(size - 1) // 2))
 
 
 def largest_of_the_last(values: Array, rows: int) -> Array:
-    """Return the largest of the last rows, including the present one, along the last axis."""
+    """Return the maximum of the last rows, including the present one, along the last axis."""
     return -least_of_the_last(-values, rows)
 
 
@@ -33,7 +33,7 @@ def mean_of_the_last(values: Array, rows: int) -> Array:
 
 
 def first_time(holds: Array, time: Array, since: Array) -> Array:
-    """Return the first time [s] at or after another at which a condition is true; else NaN.
+    """Return the first time [s] since a given time at which a condition is true, otherwise NaN.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ NEVER = -1e9
 
 @dataclass(frozen=True)
 class Residual:
-    """Residual: a quantity that is small without faults.
+    """Residual, a quantity that is small without faults.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ RESIDUALS = Kind("residual", ("residuals",), instances(Residual), declared="a Re
 
 
 def residuals_of(model: Any) -> dict[str, Residual]:
-    """Return the residuals of a model, and those of the assemblies within it.
+    """Return the residuals of a model and of the assemblies within it.
 
     These are named by the path of the parameters there, and use signals recorded under a prefix.
     """
@@ -139,7 +139,7 @@ def _within(
 def missed_ticks(task: str, assembly: str, period: float) -> Residual:
     """Return the watchdog of a task: number of missed ticks among the last five.
 
-    It takes a signal ``missed_TASK`` that counts 1 where a tick is missed.
+    It uses a signal ``missed_TASK`` that is 1 where a tick is missed.
     """
     signal = f"missed_{task}"
 
@@ -152,7 +152,7 @@ def missed_ticks(task: str, assembly: str, period: float) -> Residual:
 
 
 def threshold(largest: Array, share: float) -> float:
-    """Return the threshold that at most a share of healthy runs exceeds.
+    """Return the threshold that at most a given share of healthy runs exceeds.
 
     Parameters
     ----------

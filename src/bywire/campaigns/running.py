@@ -1,4 +1,4 @@
-"""Execution of a campaign: each fault judged and stored, with the coverage of residuals."""
+"""Execution of a campaign, which judges and stores each fault and computes the coverage."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class FaultFinding:
     failing
         The fault.
     reached
-        Time from onset until each criterion is violated [s], by name; NaN if it is not.
+        Time from onset until each criterion is violated [s], by name. NaN if it is not violated.
     detected
         Time from onset until each residual detects it [s], by name; shape (factors, cases).
     extremes
@@ -67,7 +67,7 @@ class FaultFinding:
 
     @cached_property
     def violated(self) -> Array:
-        """Time until the first criterion is violated [s], NaN where none is; shape (cases,)."""
+        """Time until the first criterion is violated [s], NaN if none is, shape (cases,)."""
         return _first([*self.reached.values()])
 
     @cached_property
@@ -141,7 +141,7 @@ class FaultFinding:
 
     @property
     def first_seen_by(self) -> str:
-        """Residual that detects it first in most runs; empty without detection."""
+        """Residual that detects the fault first in most runs. Empty without detection."""
         names = [*self.detected]
         times = np.array([self.detected[name][_AT] for name in names])
         if not times.size:
@@ -171,7 +171,7 @@ class FaultFinding:
 
 @dataclass(frozen=True)
 class CampaignFindings:
-    """Findings of a campaign, as far as they are computed."""
+    """Findings of a campaign that are computed so far."""
 
     plan: CampaignPlan
     healthy: Healthy
@@ -226,7 +226,7 @@ class CampaignFindings:
         caused = _harm({k: [f.only_with_reaction for f in each] for k, each in groups.items()})
         sooner = _harm({k: [f.sooner_with_reaction for f in each] for k, each in groups.items()})
         named = f"the reaction, {self.plan.reaction.failing.name},"
-        worse = f"{named} makes things worse: it alone causes {'; '.join(caused)}"
+        worse = f"{named} is harmful: it alone causes {'; '.join(caused)}"
         return (
             *([worse] if caused else []),
             *([f"{named} hastens {'; '.join(sooner)}"] if sooner else []),
@@ -316,7 +316,7 @@ class CampaignStore(PieceFolder):
     @property
     def elsewhere(self) -> str:
         """Advice if the folder contains another campaign."""
-        return f"name another folder with {option('out')}, or remove it"
+        return f"Choose another folder with {option('out')}, or remove this folder"
 
     def kept(self, plan: CampaignPlan) -> dict[int, dict[str, Any]]:
         """Return the stored outcomes of faults, by number, without damaged ones."""
@@ -335,7 +335,7 @@ class CampaignStore(PieceFolder):
         Raises
         ------
         FileError
-            When it is not writable.
+            If the folder is not writable.
         """
         text = json.dumps(outcome) + "\n"
         self.keep_file(number, lambda fresh: fresh.write_text(text, encoding="utf-8"))
@@ -347,23 +347,23 @@ class CampaignStore(PieceFolder):
 def run_campaign(
     plan: CampaignPlan, store: CampaignStore | None, progress: Progress
 ) -> CampaignFindings:
-    """Return the findings of a campaign; outcomes that its folder contains are not computed again.
+    """Run a campaign, except for faults whose outcomes are in its folder.
 
     Parameters
     ----------
     plan, store
-        The campaign and its folder; None to store nothing.
+        Campaign and its folder, or None to store nothing.
     progress
         Called with the fault's name and the finished share, 0 to 1.
 
     Raises
     ------
     InputError
-        When a fault cannot be injected, or the folder belongs to another campaign.
+        If a fault cannot be injected, or the folder belongs to another campaign.
     RunError
-        When a run fails.
+        If a run fails.
     KeyboardInterrupt
-        When interrupted; finished faults stay.
+        If interrupted. Finished faults remain.
     """
     if store is not None:
         store.begin(plan, {"name": plan.name})

@@ -1,1 +1,1 @@
-"""Long work in pieces: its identity, its computation, and the store of finished pieces."""
+"""Long work in pieces: identity, computation, and store of finished pieces."""

@@ -1,4 +1,4 @@
-"""Identity of a computation: everything that determines its figures, as stored in its folder."""
+"""Identity of a computation: everything that affects its figures, as stored in its folder."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ class Plan(Protocol):
 
     @property
     def identity(self) -> Mapping[str, Any]:
-        """Everything that determines the figures of its pieces."""
+        """Everything that affects the figures of its pieces."""
         ...
 
 
-_SHOWN = 3  # number of differing entries to name
+_SHOWN = 3  # number of differing entries to list
 _WORDS = {
     "version": "the version of bywire",
     "computed equations": "the equations of the model",
@@ -52,7 +52,7 @@ def digest_of(identity: Mapping[str, Any]) -> str:
 
 
 def differing(before: Mapping[str, Any], now: Mapping[str, Any]) -> str:
-    """Return which entries of two identities differ, for a reader; empty if that is unknown.
+    """Describe the entries in which two identities differ. Empty if they are unknown.
 
     Examples
     --------

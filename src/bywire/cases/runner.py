@@ -1,4 +1,4 @@
-"""Pieces of work, computed side by side and kept as soon as they are finished."""
+"""Parallel computation of pieces of work, which stores each piece as soon as it is finished."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def complete(
     workers: int | None = None,
     pool: Callable[[int], AbstractContextManager[Executor]] = thread_pool,
 ) -> dict[K, T]:
-    """Return the results of all pieces, without computing kept results again.
+    """Return the results of all pieces, computing only those that are missing.
 
     Parameters
     ----------
@@ -41,14 +41,14 @@ def complete(
     progress
         Called in this thread afterward, with the piece and the finished share, 0 to 1.
     workers
-        Number of workers; one per core by default.
+        Number of workers. Default: one per core.
     pool
         Kind of workers: `thread_pool` for work that releases Python's lock, or processes.
 
     Raises
     ------
     KeyboardInterrupt
-        When interrupted; finished pieces are kept.
+        If interrupted. Finished pieces are stored.
     """
     results = {piece: kept[piece] for piece in pieces if piece in kept}
     missing = [piece for piece in pieces if piece not in results]
@@ -82,7 +82,7 @@ def as_completed(
     pieces
         The pieces.
     ahead
-        Largest number of submitted unfinished pieces; all of them by default.
+        Largest number of submitted unfinished pieces. Default: all.
     """
     left = iter(pieces)
     begun = {pool.submit(compute, piece): piece for piece in islice(left, ahead)}

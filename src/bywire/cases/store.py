@@ -1,8 +1,8 @@
-"""Store of finished pieces of long work, from which an interrupted run continues.
+"""Store of finished pieces of long work, with which an interrupted run can continue.
 
-Large pieces are files of a folder, with a record of the work to which they belong (`PieceFolder`);
-small ones are lines of one file (`PieceLines`). A killed process loses its unfinished pieces. A
-damaged piece counts as missing, and is computed again.
+Large pieces are files in a folder with a record of the work (`PieceFolder`). Small pieces are
+lines of one file (`PieceLines`). A killed process loses its unfinished pieces. A damaged piece
+counts as missing and is recomputed.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ def json_object(text: bytes | str) -> dict[str, Any]:
     Raises
     ------
     ValueError
-        When the file does not contain a JSON object, or one that is nested too deeply.
+        If the file does not contain a JSON object, or one that is nested too deeply.
     """
     try:
         value = json.loads(text)
@@ -42,8 +42,8 @@ def json_object(text: bytes | str) -> dict[str, Any]:
 class PieceFolder(ABC):
     """Folder with a record of the work, and a file for each finished piece.
 
-    A piece's file is written completely or not at all. Two commands may use the same folder; if
-    both compute a piece, they only lose time.
+    A piece's file is written completely or not at all. Two commands may use the same folder. If
+    both compute the same piece, they only lose time.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ class PieceFolder(ABC):
         Raises
         ------
         FileError
-            When the folder contains the pieces of another plan, or cannot be written.
+            If the folder contains pieces of another plan, or cannot be written.
         """
         record = self.folder / self.RECORD
         if record.exists():
@@ -106,13 +106,13 @@ class PieceFolder(ABC):
         Raises
         ------
         FileError
-            When the folder contains the pieces of another plan, or no record.
+            If the folder contains pieces of another plan, or no record.
         """
         known = self.record()
         if known["digest"] != plan.digest:
             differs = differing(known[self.NOUN], plan.identity)
             raise FileError(
-                f"{self.folder} contains another {self.NOUN}{differs and f' ({differs})'}: "
+                f"{self.folder} contains another {self.NOUN}{differs and f' ({differs})'}. "
                 f"{self.elsewhere}",
                 name=str(self.folder),
             )
@@ -124,7 +124,7 @@ class PieceFolder(ABC):
         Raises
         ------
         FileError
-            When the folder contains no record.
+            If the folder contains no record.
         """
         path = self.folder / self.RECORD
         try:
@@ -133,14 +133,16 @@ class PieceFolder(ABC):
                 return said
         except OSError as error:
             raise FileError(
-                f"{self.folder} does not contain a {self.NOUN} ({path.name}: {error.strerror}): "
-                f"name the folder that '{self.COMMAND}' has written",
+                f"{self.folder} does not contain a {self.NOUN} ({path.name}: {error.strerror}). "
+                f"Specify the folder that '{self.COMMAND}' created",
                 name=str(self.folder),
             ) from None
         except (ValueError, KeyError):
             pass
         raise FileError(
-            f"{path} is damaged, or not of a {self.KIND}: run the {self.NOUN} into another folder",
+            f"{path} is damaged, or does not belong to a {self.KIND}. Run the {self.NOUN} in "
+            "another "
+            "folder",
             name=str(path),
         )
 
@@ -173,7 +175,7 @@ class PieceFolder(ABC):
         Raises
         ------
         FileError
-            When the file cannot be written.
+            If the file cannot be written.
         """
         path = self.path(number)
         try:
@@ -184,8 +186,8 @@ class PieceFolder(ABC):
 
     def _unwritable(self, path: Path, error: OSError) -> FileError:
         return FileError(
-            f"cannot write {path}: {error.strerror or error}: make room there and resume the "
-            f"{self.NOUN}; finished pieces are kept",
+            f"cannot write {path}: {error.strerror or error}. Free some space, and resume the "
+            f"{self.NOUN}. Finished pieces are saved",
             name=str(path),
         )
 
@@ -199,7 +201,7 @@ class PieceLines:
     Parameters
     ----------
     path
-        The file; if None, nothing is stored.
+        The file. If None, nothing is stored.
     """
 
     path: Path | None
@@ -216,7 +218,7 @@ class PieceLines:
         Raises
         ------
         FileError
-            When the file cannot be read.
+            If the file cannot be read.
         """
         if self.path is None or not self.path.exists():
             return
@@ -224,7 +226,7 @@ class PieceLines:
             lines = self.path.read_text(encoding="utf-8").splitlines()
         except (OSError, UnicodeDecodeError) as error:
             raise FileError(
-                f"{self.path} cannot be read: {error}; delete it to start again",
+                f"cannot read {self.path}: {error}. To start again, delete this file",
                 name=str(self.path),
             ) from None
         for line in lines:
@@ -240,7 +242,7 @@ class PieceLines:
         Raises
         ------
         FileError
-            When the file cannot be written.
+            If the file cannot be written.
         """
         if self.path is None:
             return
@@ -257,7 +259,7 @@ class PieceLines:
                 file.write(line)
         except OSError as error:
             raise FileError(
-                f"cannot write {self.path}: {error.strerror}: make room there, or name another "
+                f"cannot write {self.path}: {error.strerror}. Free some space, or choose another "
                 "folder",
                 name=str(self.path),
             ) from None

@@ -257,13 +257,13 @@ def cases_of(bench: Bench) -> tuple[Case, ...]:
     Raises
     ------
     ParameterError
-        When the bench makes no run.
+        If the bench makes no run.
     """
     cases = bench.cases()
     if not cases:
         raise ParameterError(
-            f"experiment {bench.experiment!r} computes a characteristic without any run, so that "
-            "nothing to export. Use another experiment, for instance 'open-loop'",
+            f"experiment {bench.experiment!r} computes a characteristic without any run, so bywire "
+            "cannot export it. Use another experiment, for example 'open-loop'",
             name="experiment",
             value=repr(bench.experiment),
         )
@@ -281,9 +281,9 @@ def exported(bench: Bench, label: str = "") -> Exported:
     Raises
     ------
     ParameterError
-        When the bench makes no run, several without a choice, or one whose parameters change.
+        If the bench makes no run, several without a choice, or one whose parameters change.
     UnknownNameError
-        When it has no run with that label.
+        If it has no run with that label.
     """
     cases = cases_of(bench)
     labels = [case.label for case in cases]
@@ -291,16 +291,18 @@ def exported(bench: Bench, label: str = "") -> Exported:
         raise unknown_name("run", label, labels)
     if not label and len(cases) > 1:
         raise ParameterError(
-            f"the bench makes {len(cases)} runs, but only one is exported: choose it, "
-            f"case = {' or '.join(map(repr, labels))}",
+            f"the bench has {len(cases)} runs, but bywire exports only one. Choose a run with "
+            "case, "
+            f"one of {', '.join(labels)}",
             name="case",
+            value=str(len(cases)),
             valid=", ".join(labels),
         )
     number = labels.index(label) if label else 0
     run = run_of(bench, cases[number], number)
     if run.changes:
         raise ParameterError(
-            "parameters of this bench change during the run, which cannot be exported: leave out "
+            "parameters of this bench change during the run, which bywire cannot export. Remove "
             "its [[faults]], or export it with the changed parameters",
             name="[[faults]]",
         )

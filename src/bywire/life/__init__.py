@@ -1,1 +1,1 @@
-"""Life of a brake: small changes by every stop, projected over thousands of stops."""
+"""A brake's life: small changes by each stop, projected over thousands of stops."""

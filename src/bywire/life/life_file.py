@@ -1,4 +1,4 @@
-"""Life files, and their plan: wear of a brake, its stops, and the steps of the projection."""
+"""Life files and their plan: a brake's wear, its stops, and the steps of the projection."""
 
 from __future__ import annotations
 
@@ -147,15 +147,15 @@ def read_life(source: str | Path, overrides: Mapping[str, str] = MappingProxyTyp
     Parameters
     ----------
     source
-        TOML file with ``life`` and optional sections ``[set]``, ``[vary]`` and ``[projection]``,
-        see ``docs/life.md``; or the bare name of a life, with its declared population of stops.
+        TOML file with ``life`` and optional sections ``[set]``, ``[vary]`` and ``[projection]``
+        (see ``docs/life.md``), or the name of a life, with its declared population of stops.
     overrides
-        Further changes, which override those of ``[set]``.
+        Additional changes, which override those in ``[set]``.
 
     Raises
     ------
     FileError
-        When the file cannot be read or is not valid TOML.
+        If the file cannot be read or is not valid TOML.
     InputError
         For any invalid entry, with the file's name in front.
     """
@@ -232,16 +232,16 @@ def _varied(bench: Bench, conditions: StopConditions, section: Mapping[str, Any]
 
 
 def _require_free(life: Life, bench: Bench, wear: ParameterSet, varied: tuple[Varied, ...]) -> None:
-    """Require variations of numbers that do not follow from slow states."""
+    """Reject variations of numbers that follow from slow states."""
     slow = life.follows(life.begin(bench.par, wear), bench.par, wear)
     for each in varied:
         if not each.unit:
             name = f"[vary] {each.name}"
-            raise ParameterError(f"{name} is a choice: only numbers can vary", name=name)
+            raise ParameterError(f"{name} is a choice. Only numbers can vary", name=name)
         for name in (each.name, *each.together):
             if name in slow:
                 raise ParameterError(
-                    f"[vary] {name} follows from the wear: its first value is the bench's, "
-                    "change it by [set]",
+                    f"[vary] {name} follows from wear, so it cannot vary. To change its initial "
+                    "value, use [set]",
                     name=f"[vary] {name}",
                 )

@@ -1,4 +1,4 @@
-"""Life projected: rates of slow states, and Heun's steps over many stops.
+"""Projection of a life: rates of slow states, and Heun's steps over many stops.
 
 Within a step the states advance stop by stop with constant rates, so that an adjuster acts at the
 right stop. Only the ends of steps are simulated.
@@ -55,11 +55,11 @@ def rates(plan: LifePlan, z: Values) -> Rates:
     Raises
     ------
     InputError
-        When the brake cannot be set up with these states.
+        If the brake cannot be set up with these states.
     RunError
-        When a run fails, or a stop lacks a key figure from which wear is computed.
+        If a run fails, or a stop lacks a key figure from which wear is computed.
     KeyboardInterrupt
-        When interrupted.
+        If interrupted.
     """
     figures, warnings = stop_figures(plan, z)
     given = plan.life.effects(figures, conditions(plan), z, plan.bench.par, plan.wear)
@@ -98,7 +98,7 @@ def _simulated(
         if lacking.size:
             stop = ", ".join(f"{n} = {v[which[lacking[0]]]:g}" for n, v in plan.population.items())
             raise RunError(
-                f"a stop{stop and f' with {stop} (in SI)'} has no {name}: "
+                f"a stop{stop and f' with {stop} (SI)'} has no {name}: "
                 + figures[name].note_of(lacking[0]),
                 name=name,
             )
@@ -128,7 +128,7 @@ def _stop_bench(plan: LifePlan, follows: Mapping[str, float], k: int) -> Bench:
     return changed(plan.bench, {**drawn, **follows})
 
 
-# --- The projection: every event between stops counts
+# --- The projection, which includes every event between stops
 
 CONFIDENCE = 0.95
 """confidence of the interval of a life"""
@@ -144,7 +144,7 @@ class Step:
     first, count
         Number of the stop before the first, and number of stops.
     rates
-        Rates at its begin and at its end.
+        Rates at the beginning and the end of the step.
     """
 
     first: int
@@ -204,11 +204,11 @@ def projected(plan: LifePlan, progress: Progress = silent) -> Projection:
     Raises
     ------
     InputError
-        When the brake has no life at the start, or cannot be set up.
+        If the brake is at the end of its life from the start, or cannot be set up.
     RunError
-        When a run fails.
+        If a run fails.
     KeyboardInterrupt
-        When interrupted.
+        If interrupted.
     """
     z = plan.life.begin(plan.bench.par, plan.wear)
     _require_alive(plan, z)
@@ -244,7 +244,7 @@ def _require_alive(plan: LifePlan, z: Values) -> None:
             limit = plan.life.limits[name]
             raise ParameterError(
                 f"life {plan.life.name!r} ends before its first stop: {limit.label} is "
-                f"{shown(value, limit.unit)} at the start, and must be above zero",
+                f"{shown(value, limit.unit)} at the start, but must be above zero",
                 name=limit.label,
                 value=shown(value, limit.unit),
                 valid="above zero",
@@ -351,7 +351,7 @@ def _falls(plan: LifePlan, held: Rates, limit: str) -> Array:
     return now - np.array([life.left(z, par, wear)[limit] for z in each])
 
 
-# --- Brute force: stops run one by one, each with the slow states after the one before
+# --- Brute force: stops simulated one by one, each with the slow states of the previous stop
 
 
 def one_by_one(plan: LifePlan, stops: int, progress: Progress = silent) -> dict[str, Array]:
@@ -372,13 +372,13 @@ def one_by_one(plan: LifePlan, stops: int, progress: Progress = silent) -> dict[
     Raises
     ------
     RunError
-        When a run fails, or a stop lacks a key figure from which wear is computed.
+        If a run fails, or a stop lacks a key figure from which wear is computed.
     KeyboardInterrupt
-        When interrupted.
+        If interrupted.
     """
     life, par, wear, count = plan.life, plan.bench.par, plan.wear, plan.count
     z = life.begin(par, wear)
-    figures, _ = stop_figures(plan, z)  # of the stops before the first, for its heat
+    figures, _ = stop_figures(plan, z)  # of stops before the first one, which heated the brake
     path: list[Values] = [z]
     for n in range(stops):
         k = n % count

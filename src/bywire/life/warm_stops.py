@@ -59,7 +59,7 @@ def temperatures(work: Array, pause: Array, T_air: Array, par: Parameters) -> tu
     Raises
     ------
     ParameterError
-        When the disc would melt.
+        If the disc would melt.
     """
     rise, kept = work / par.C_d, np.exp(-pause / par.tau_d)
     factor, offset = 1.0, 0.0  # of the temperature before the first stop, a cycle later
@@ -73,9 +73,10 @@ def temperatures(work: Array, pause: Array, T_air: Array, par: Parameters) -> tu
     after = before + rise
     if not (hottest := float(np.max(after))) < _HOTTEST:
         raise ParameterError(
-            f"the disc would reach {hottest - 273.15:.0f} degC: give longer pauses (stop.pause), "
-            "a larger disc, or faster cooling",
+            f"the disc would reach {hottest - 273.15:.0f} degC and melt. Use longer pauses "
+            "(stop.pause), a larger disc, or faster cooling",
             name="stop.pause",
+            value=f"{hottest - 273.15:.0f} degC",
         )
     return before, after
 

@@ -1,4 +1,4 @@
-"""Requests and replies of routes, and rejected requests."""
+"""Requests and replies of routes, and errors for rejected requests."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from typing import Any, Protocol
 
 
 class RefusedError(Exception):
-    """A request that the server rejects.
+    """Request that the server rejects.
 
     Parameters
     ----------
     status
         HTTP status.
     text
-        What is wrong, and what to do.
+        Description of the error, with advice.
     field
-        Field of the form that shows the text; empty if it concerns no single field.
+        Field of the form that shows the text. Empty if the error concerns no single field.
     """
 
     def __init__(self, status: int, text: str, field: str = "") -> None:
@@ -68,7 +68,7 @@ class Request:
     headers
         Headers as sent.
     body, length
-        Stream of the body, and its length in bytes; -1 if the request does not declare it.
+        Stream of the body, and its length in bytes, or -1 if the request does not declare it.
     """
 
     method: str
@@ -87,14 +87,14 @@ class Request:
             With status 415, 411, 413 or 400 if the body is not a valid form.
         """
         if self.headers.get("Content-Type", "").partition(";")[0].strip() != "application/json":
-            raise RefusedError(415, "a form must be application/json: use the page's button")
+            raise RefusedError(415, "a form must be application/json. Use the page's button")
         self.require_length(LARGEST_FORM, "a form")
         try:
             content = json.loads(self.body.read(self.length))
         except (ValueError, RecursionError):
             content = None
         if not isinstance(content, dict):
-            raise RefusedError(400, "the form is not a JSON object: use the page's button")
+            raise RefusedError(400, "the form is not a JSON object. Use the page's button")
         return content
 
     def require_length(self, most: int, what: str) -> None:
@@ -106,12 +106,12 @@ class Request:
             With status 411 or 413.
         """
         if self.length < 0:
-            raise RefusedError(411, f"{what} needs a Content-Length: send it in one piece")
+            raise RefusedError(411, f"{what} needs a Content-Length. Send it in one piece")
         if self.length > most:
             raise RefusedError(
                 413,
                 f"{what} of {self.length / 1e6:,.1f} MB is too large (at most "
-                f"{most / 1e6:,.1f} MB): copy it into the served folder, or make it smaller with "
+                f"{most / 1e6:,.1f} MB). Copy it into the served folder, or make it smaller with "
                 "'bywire convert'",
             )
 

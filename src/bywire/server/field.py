@@ -1,4 +1,4 @@
-"""Fields of forms, and the checks of their values before the computation."""
+"""Fields of forms, and checks of their values before a computation."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ _LONGEST = 20_000  # characters of a field
 
 @dataclass(frozen=True)
 class Field:
-    """A field of a form.
+    """Field of a form.
 
     Parameters
     ----------
     name, label
-        Name of the field, and its label on the page.
+        Name of the field, and label on the page.
     kind
         A ``text``, a ``whole`` number, ``lines`` of text, ``pairs`` (lines of ``KEY=VALUE``),
         ``changes`` (such pairs, of which some name files), ``names`` (lines of ``NAME`` or
         ``NAME=TEXT``), a ``flag``, a ``choice``, a measurement ``file`` or ``files`` of the folder,
         or a ``thing`` or ``things``: a known name, or a file of the folder.
     hint
-        Its meaning; the help of the command's option.
+        Help of the command's option.
     example
-        A value that it shows while it is empty.
+        Value that the field shows while it is empty.
     choices
         Returns the known names.
     offered
@@ -58,7 +58,7 @@ class Field:
     least: int = 0
 
     def read(self, given: Any, place: Place) -> Any:
-        """Check and return the value of a form; paths are relative to the folder.
+        """Check and return a form's value, with paths relative to the folder.
 
         Raises
         ------
@@ -76,7 +76,7 @@ class Field:
             raise not_valid(self.name, quoted(given), f"a text of at most {_LONGEST:,} characters")
         lines = [line.strip() for line in text.splitlines() if line.strip()]
         if self.is_required and not lines:
-            raise ParameterError(f"{self.label} is missing: fill it in", name=self.label)
+            raise ParameterError(f"{self.label} is required. Fill it in", name=self.label)
         return self._checked(lines, text.strip(), place)
 
     def _checked(self, lines: list[str], text: str, place: Place) -> Any:

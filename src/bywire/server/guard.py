@@ -1,4 +1,4 @@
-"""Access control: only requests with the link's token, from this machine, not from another site.
+"""Access control, which accepts only this machine's requests with the link's token.
 
 A page of another site can send requests to this machine. With a name that resolves to this machine
 it could even read the answers. The headers Host, Origin and Sec-Fetch-Site identify such requests.
@@ -44,17 +44,17 @@ def require_place(method: str, headers: Message, port: int) -> None:
         host = host.removesuffix(f":{port}")  # browsers omit it, other clients may not
     if host not in {name if port == _PLAIN else f"{name}:{port}" for name in NAMES}:
         raise RefusedError(
-            421, f"this server answers only as {HERE}:{port}: open the link that it printed"
+            421, f"this server answers only as {HERE}:{port}. Open the link that it printed"
         )
     origin = headers.get("Origin")
     if origin is not None and origin != f"http://{host}":
         raise RefusedError(
-            403, "another site's page sent this request: use the pages of this server"
+            403, "another site's page sent this request. Use the pages of this server"
         )
     is_visit = method in ("GET", "HEAD") and headers.get("Sec-Fetch-Mode") == "navigate"
     if headers.get("Sec-Fetch-Site", "none") not in _HERE and not is_visit:
         raise RefusedError(
-            403, "another site's page sent this request: use the pages of this server"
+            403, "another site's page sent this request. Use the pages of this server"
         )
 
 
@@ -69,13 +69,13 @@ def require_token(headers: Message, query: Mapping[str, str], port: int, token: 
     given = [query["token"]] if "token" in query else _kept(headers, port)
     if not given:
         raise RefusedError(
-            401, "the token is missing: open the complete link that 'bywire serve' printed"
+            401, "the token is missing. Open the complete link that 'bywire serve' printed"
         )
     if not any(secrets.compare_digest(each.encode(), token.encode()) for each in given):
         raise RefusedError(
             401,
-            "the token is not valid for this server (each start creates a new one): open the link "
-            "that 'bywire serve' printed last",
+            "the token is not valid, because each start of the server creates a new one. Open the "
+            "link that 'bywire serve' printed last",
         )
 
 

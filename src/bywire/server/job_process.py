@@ -66,13 +66,16 @@ def _explained(error: Exception) -> str:
         return str(error)
     if isinstance(error, OSError):
         place = f"{error.filename}: " if error.filename else ""
-        return f"{place}{error.strerror or error}: check that it exists and that there is room"
+        return (
+            f"{place}{error.strerror or error}. Check that it exists and that the disk is not full"
+        )
     if line := foreign_line(error):
         return line
     traceback.print_exception(error)
     return (
-        f"{type(error).__name__}: this is a defect of bywire; please report it with the lines that "
-        "the server printed"
+        f"{type(error).__name__}: this is a bug in bywire. Please report it with the lines that "
+        "the "
+        "server printed"
     )
 
 

@@ -23,7 +23,7 @@ from bywire.server.task import Task
 
 
 def started(folder: Path) -> subprocess.Popen[bytes]:
-    """Start a process that waits for its order; it does not run code of the served folder."""
+    """Start a process that waits for its order and does not run code of the served folder."""
     return start_python("bywire.server.job_process", untrusted=(folder,))
 
 
@@ -36,7 +36,7 @@ def interrupt(process: subprocess.Popen[bytes]) -> None:
 
 
 def kill(process: subprocess.Popen[bytes]) -> None:
-    """Kill a process and all that it started."""
+    """Kill a process and all its child processes."""
     if os.name == "posix":
         _signal(process, signal.SIGKILL)
     elif process.poll() is None:
@@ -52,9 +52,9 @@ def _signal(process: subprocess.Popen[bytes], number: int) -> None:
 # --- Jobs
 
 TOGETHER = 2
-"""jobs that compute at the same time; others wait"""
+"""number of jobs that compute at the same time"""
 MOST = 100
-"""jobs that wait or compute; the server rejects more"""
+"""largest number of jobs that wait or compute"""
 _KEPT = 200  # jobs in the list
 _PATIENCE = 5.0  # s that a job has to end after an interrupt
 _ENDED = ("done", "failed", "canceled")
@@ -62,7 +62,7 @@ _ENDED = ("done", "failed", "canceled")
 
 @dataclass(eq=False)
 class Job:
-    """A computation.
+    """Job: a computation in a separate process.
 
     Parameters
     ----------
@@ -143,12 +143,13 @@ class Jobs:
             if not self._is_open:
                 raise RefusedError(503, "the server is shutting down")
             if len(active) >= MOST:
-                raise RefusedError(429, f"{MOST} jobs are already waiting: cancel some, or wait")
+                raise RefusedError(429, f"{MOST} jobs are already waiting. Cancel some, or wait")
             same = [each.out for each in active if each.task is task and each.asked == asked]
             out = out or (same[0] if task.case.holds and same else self._folder(task, asked))
             if any(each.out == out for each in active):
                 raise RefusedError(
-                    409, f"{task.said_of(asked)} is already being computed: wait, or cancel it"
+                    409,
+                    f"another job is already computing {task.said_of(asked)}. Wait, or cancel it",
                 )
             job = Job(max(self._jobs, default=0) + 1, task, asked, out)
             self._jobs[job.number] = job
@@ -180,11 +181,11 @@ class Jobs:
         with self._lock:
             job = self._jobs.get(read_count(number) or 0)
         if job is None:
-            raise RefusedError(404, f"there is no job {number[:20]!r}: see the list of jobs")
+            raise RefusedError(404, f"job {number[:20]!r} does not exist. See the list of jobs")
         return job
 
     def cancel(self, job: Job) -> None:
-        """Cancel a job; finished parts of a study stay."""
+        """Cancel a job. Finished parts of a study remain."""
         with self._lock:
             job.is_unwanted = True
             process = job.process
@@ -215,7 +216,7 @@ class Jobs:
             try:
                 self._compute(job)
             except OSError as error:
-                job.state, job.message = "failed", f"the process cannot be started: {error}"
+                job.state, job.message = "failed", f"cannot start the process: {error}"
             finally:
                 with contextlib.suppress(OSError):  # not empty: it contains a result
                     job.out.rmdir()
@@ -279,7 +280,7 @@ def _end(job: Job, last: Mapping[str, Any], status: int) -> None:
     else:
         how = f"signal {signal.Signals(-status).name}" if status < 0 else f"status {status}"
         job.message, job.state = (
-            f"the process was ended by {how}, probably out of memory: compute less, or run the "
-            f"command 'bywire {job.task.command}' in a terminal",
+            f"the process ended with {how}, probably out of memory. Reduce the number of cases, or "
+            f"run 'bywire {job.task.command}' in a terminal",
             "failed",
         )

@@ -1,4 +1,4 @@
-"""Live pages of benches: created on the first request, kept until their bench changes."""
+"""Live pages of benches, created on the first request and stored until their bench changes."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class LivePages:
                 self._made[key] = job
         job.ended.wait()
         if job.state != "done":
-            raise RefusedError(422, job.message or "the page was canceled: load it again")
+            raise RefusedError(422, job.message or "the page was canceled. Reload it")
         return job.out
 
     def _state(self, asked: dict[str, Any]) -> Iterator[str]:

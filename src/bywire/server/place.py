@@ -81,7 +81,7 @@ class Place:
         """Return the error for a path that the server does not serve."""
         shown = text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
         return RefusedError(
-            404, f"there is no {shown!r} in the served folder: the start page lists its contents"
+            404, f"the served folder does not contain {shown!r}. The start page lists its contents"
         )
 
     def named(self, path: Path) -> str:
@@ -107,7 +107,8 @@ class Place:
                 raise _unwritable(folder, error) from None
             return folder
         raise FileError(
-            f"{parent} contains 9,999 results of {stem}: move them elsewhere", name=str(parent)
+            f"{parent} already contains 9,999 results of {stem}. Move them elsewhere",
+            name=str(parent),
         )
 
     def same_folder(self, name: str) -> Path:
@@ -155,7 +156,7 @@ class Place:
             path = claim(fresh, (parent / each for each in names))
         if path is None:
             raise FileError(
-                f"{parent} contains 9,999 files named {plain.name}: move them elsewhere",
+                f"{parent} already contains 9,999 files named {plain.name}. Move them elsewhere",
                 name=str(parent),
             )
         return path
@@ -218,7 +219,7 @@ def place_of(folder: Path) -> Place:
     """
     if not folder.is_dir():
         raise FileError(
-            f"{folder} is not a folder: name the folder to serve with "
+            f"{folder} is not a folder. Specify the folder to serve with "
             f"{'--folder' if is_command_line() else 'folder'}",
             name=str(folder),
         )
@@ -240,6 +241,6 @@ def require_inside(place: Place, settings: Mapping[str, str], keys: tuple[str, .
 
 def _unwritable(path: Path, error: OSError) -> FileError:
     return FileError(
-        f"cannot create {path}: {error.strerror or error}: make room there, or serve a folder that "
-        "you may write to"
+        f"cannot create {path}: {error.strerror or error}. Free some space, or serve a folder to "
+        "which you can write"
     )

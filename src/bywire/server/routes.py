@@ -42,7 +42,7 @@ def uploaded(place: Place, request: Request, name: str, largest: int) -> Path:
         raise _unknown_format(name)
     request.require_length(largest, "a measurement")
     if request.length == 0:
-        raise RefusedError(400, f"{name[:100]!r} is empty: was the recording stopped?")
+        raise RefusedError(400, f"{name[:100]!r} is empty. Check the recording")
     with scratch_folder(place.measurements()) as scratch:
         fresh = scratch / "measurement"
         with fresh.open("wb") as stream:
@@ -50,7 +50,7 @@ def uploaded(place: Place, request: Request, name: str, largest: int) -> Path:
             while left:
                 piece = request.body.read(min(left, _PIECE))
                 if not piece:
-                    what = f"{name[:100]!r} arrived incomplete: send it again"
+                    what = f"{name[:100]!r} arrived incomplete. Send it again"
                     raise RefusedError(400, what)
                 stream.write(piece)
                 left -= len(piece)
@@ -113,12 +113,12 @@ def answer(service: Service, request: Request) -> Reply:
         if request.path == first or (first.endswith("/") and request.path.startswith(first)):
             if method not in route:
                 raise RefusedError(
-                    405, f"{request.method} is not supported here: use {', '.join(route)}"
+                    405, f"{request.method} is not supported here. Use {', '.join(route)}"
                 )
             if first == "/" and request.path != "/":
                 continue
             return route[method](service, request, request.path.removeprefix(first))
-    raise RefusedError(404, f"there is no page {quoted(request.path)}: begin at the start page")
+    raise RefusedError(404, f"page {quoted(request.path)} does not exist. Use the start page")
 
 
 def _index(service: Service, request: Request, rest: str) -> Reply:
@@ -149,7 +149,7 @@ def _live(service: Service, request: Request, rest: str) -> Reply:
 def _task(service: Service, request: Request, rest: str) -> Reply:
     known = [each.name for each in tasks().values() if each.form.is_listed]
     if rest not in known:
-        raise RefusedError(404, f"there is no task {quoted(rest)}: known are {', '.join(known)}")
+        raise RefusedError(404, f"task {quoted(rest)} does not exist. Known are {', '.join(known)}")
     with service.reading:
         there = contents(service.place)
         return page(task_page(tasks()[rest], there, request.query, service.largest))
@@ -161,7 +161,7 @@ def _study(service: Service, request: Request, rest: str) -> Reply:
     service.place.file(name)
     if name not in there.studies:
         raise ParameterError(
-            f"{name} is not a study file: it has no bench and no section [vary]", name=name
+            f"{name} is not a study file, because it has no bench and no section [vary]", name=name
         )
     folder = f"{RESULTS}/{folder_name(name)}"
     progress = how_far(service.place.root / folder)
@@ -186,7 +186,7 @@ def _file(service: Service, request: Request, rest: str) -> Reply:
 def _asset(service: Service, request: Request, rest: str) -> Reply:
     del service, request
     if rest not in _ASSETS:
-        raise RefusedError(404, f"there is no {quoted(rest)}")
+        raise RefusedError(404, f"{quoted(rest)} does not exist")
     package, name, kind = _ASSETS[rest]
     return Reply(files(package).joinpath(name).read_bytes(), kind)
 
@@ -204,7 +204,7 @@ def _begin(service: Service, request: Request, rest: str) -> Reply:
     if not isinstance(name, str) or name not in known:
         raise unknown_name("task", str(name), known)
     if not isinstance(form, dict):
-        raise ParameterError("the form has no fields: use the page's button")
+        raise ParameterError("the form has no fields. Use the page's button", name="fields")
     task = tasks()[name]
     with service.reading:
         asked = task.read(form, service.place)
@@ -220,7 +220,7 @@ def _job(service: Service, request: Request, rest: str) -> Reply:
 def _cancel(service: Service, request: Request, rest: str) -> Reply:
     number, slash, word = rest.partition("/")
     if not slash or word != "cancel":
-        raise RefusedError(404, f"there is no {quoted(request.path)}: jobs only support /cancel")
+        raise RefusedError(404, f"{quoted(request.path)} does not exist. Jobs support only /cancel")
     job = service.jobs.find(number)
     service.jobs.cancel(job)
     return plain(job.shown(service.place))
@@ -248,7 +248,9 @@ def _columns(service: Service, request: Request, rest: str) -> Reply:
 def _subject(request: Request) -> str:
     name = request.query.get("of", "")
     if not name:
-        raise ParameterError("the address names no bench: follow the links of the start page")
+        raise ParameterError(
+            "the address contains no bench. Follow the links on the start page", name="of"
+        )
     return name
 
 

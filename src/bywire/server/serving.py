@@ -91,18 +91,17 @@ class Handler(BaseHTTPRequestHandler):
         except BywireError as error:
             return self._refused(400, str(error))
         except (ConnectionError, TimeoutError):
-            return self._refused(408, "the request arrived incomplete: send it again")
+            return self._refused(408, "the request arrived incomplete. Send it again")
         except OSError as error:
             if error.errno in (errno.ENAMETOOLONG, errno.ELOOP, errno.EINVAL):
-                return self._refused(404, "there is no such file: its name is not valid")
+                return self._refused(404, "this file does not exist, because its name is not valid")
             place = f"{error.filename}: " if error.filename else ""
-            return self._refused(507, f"{place}{error.strerror or error}: make room there")
+            return self._refused(507, f"{place}{error.strerror or error}. Free some space there")
         except Exception as error:  # a defect ends a request, not the server
             traceback.print_exception(error)
             return self._refused(
                 500,
-                "this is a defect of bywire; please report it with the lines that the server "
-                "printed",
+                "this is a bug in bywire. Please report it with the lines that the server printed",
             )
 
     def _answered(self) -> Reply:
@@ -115,7 +114,7 @@ class Handler(BaseHTTPRequestHandler):
         query = dict(parse_qsl(address.query, keep_blank_values=True))
         guard.require_token(self.headers, query, port, self.service.token)
         if self.command not in _METHODS:
-            raise RefusedError(405, f"{self.command} is not supported: use {', '.join(_METHODS)}")
+            raise RefusedError(405, f"{self.command} is not supported. Use {', '.join(_METHODS)}")
         request = Request(
             self.command, unquote(address.path), query, self.headers, self._body(), self._length()
         )
@@ -197,10 +196,10 @@ class Handler(BaseHTTPRequestHandler):
         if code == HTTPStatus.NOT_IMPLEMENTED:
             code, message = (
                 405,
-                f"{quoted(self.command)} is not supported: use {', '.join(_METHODS)}",
+                f"{quoted(self.command)} is not supported. Use {', '.join(_METHODS)}",
             )
         elif code == HTTPStatus.HTTP_VERSION_NOT_SUPPORTED:
-            code, message = 400, "this version of HTTP is not supported: use HTTP/1.1"
+            code, message = 400, "this version of HTTP is not supported. Use HTTP/1.1"
         status = HTTPStatus(code)
         body = refusal_page(code, message or status.phrase).encode()
         self.send_response(code)
@@ -312,8 +311,10 @@ def opened(
                 yield Opened(server, service, f"http://{HERE}:{number}{path}token={service.token}")
         except OSError as error:
             raise FileError(
-                f"{place.root}: {error.strerror or error}: name a folder that you may write to "
-                f"with {_flag('folder')}, and make room there"
+                f"{place.root}: {error.strerror or error}. Choose a folder to which you can write "
+                f"with {_flag('folder')}, or free some space",
+                name=_flag("folder"),
+                value=str(place.root),
             ) from None
 
 
@@ -325,28 +326,28 @@ def serve(
     folder: str | Path = "",
     say: Callable[[str], None] = print,
 ) -> None:
-    """Show a folder's benches, results and studies in a browser on this machine, until Ctrl-C.
+    """Show a folder's benches, results and studies in this machine's browser until Ctrl-C.
 
-    Live pages compute in the browser, as those of `bywire.page` do. Tasks that need Python
-    (reports, replay of measurements, identification, design, campaigns) run in separate processes.
-    The server answers only this machine, only with the token of the link. It neither reads nor
-    writes outside the folder.
+    Live pages compute in the browser, like those of `bywire.page`. Tasks that need Python (reports,
+    replay of measurements, identification, design, campaigns) run in separate processes. The server
+    answers only requests of this machine that contain the link's token. It neither reads nor writes
+    outside the folder.
 
     Parameters
     ----------
     subject
-        Bench file, experiment or folder; by default the current folder.
+        Bench file, experiment or folder. Default: the current folder.
     port
-        Port on which it listens, 1 to 65535; 0 for any free port.
+        Port, 1 to 65535. 0 selects a free port.
     folder
-        Folder to serve; by default the folder of the bench file, or the current one.
+        Folder to serve. Default: the bench file's folder, or the current folder.
     say
         Called with the link.
 
     Returns
     -------
     None
-        Never: it answers until it is interrupted.
+        Never, because it runs until it is interrupted.
 
     Raises
     ------
@@ -386,7 +387,7 @@ def _asked(subject: str, folder: str) -> tuple[Place, str]:
         if folder and Path(folder).resolve() != Path(subject).resolve():
             raise ParameterError(
                 f"{subject} and {_flag('folder')} {folder} are two folders, but bywire serves only "
-                f"one and its subfolders: bywire serve {subject}, or bywire serve {folder}",
+                f"one. Type 'bywire serve {subject}' or 'bywire serve {folder}'",
                 name=_flag("folder"),
                 value=str(folder),
             )
@@ -398,15 +399,16 @@ def _asked(subject: str, folder: str) -> tuple[Place, str]:
     file = Path(subject).resolve()
     if not file.is_file():
         raise FileError(
-            f"{subject} does not exist: name a bench file, an experiment or a folder",
+            f"{subject} does not exist. Specify a bench file, an experiment or a folder",
             name=str(subject),
         )
     place = place_of(Path(folder) if folder else file.parent)
     if not file.is_relative_to(place.root):
         raise FileError(
-            f"{subject} is not in {place.root}: name a folder that contains both with "
+            f"{subject} is not in {place.root}. Specify a folder that contains it with "
             f"{_flag('folder')}",
             name=str(subject),
+            value=str(place.root),
         )
     return place, place.named(file)
 
@@ -418,9 +420,13 @@ def _flag(argument: str) -> str:
 def _taken(port: int, error: OSError) -> ParameterError:
     if error.errno == errno.EADDRINUSE:
         return ParameterError(
-            f"port {port} is in use, perhaps by another 'bywire serve': use the link that it "
-            f"printed, or {_flag('port')} 0 for any free port"
+            f"port {port} is in use, perhaps by another 'bywire serve'. Use the link that it "
+            f"printed, or {_flag('port')} 0 for a free port",
+            name=_flag("port"),
+            value=str(port),
         )
     return ParameterError(
-        f"port {port}: {error.strerror or error}: try {_flag('port')} 0 for any free port"
+        f"port {port}: {error.strerror or error}. Use {_flag('port')} 0 for a free port",
+        name=_flag("port"),
+        value=str(port),
     )

@@ -1,4 +1,4 @@
-"""Tasks of pages: every use case with a form."""
+"""Tasks of pages: all use cases with a form."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from bywire.usecases.declare import Argument, Form, UseCase
 
 @dataclass(frozen=True)
 class Task:
-    """A use case that pages offer, computed in a separate process.
+    """Use case that pages offer, computed in a separate process.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ class Task:
         return [known[field.name] for field in self.fields]
 
     def _filled_in(self, asked: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the filled-in values; empty fields take the default."""
+        """Return the filled-in values. Empty fields have the default."""
         filled = {name: value for name, value in asked.items() if value not in ("", None, [], {})}
         for each in self._arguments():
             if each.ask.ticked and filled.pop(each.name, False):
@@ -128,9 +128,9 @@ class Task:
         return found
 
     def _require_fitting(self, given: Mapping[str, Any], place: Place) -> None:
-        """Reject what the use case rejects, with the field that causes the error.
+        """Raise the use case's error with the field that causes it.
 
-        That is the first field for which the error stays the same without all later fields.
+        This is the first field for which the error remains the same without all later fields.
         """
         try:
             self.case.read(given)

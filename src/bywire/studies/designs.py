@@ -143,10 +143,12 @@ def spanned(
     """
     if kind == "corners" and len(distributions) > _CORNERS:
         raise ParameterError(
-            f"[design] corners of {len(distributions)} quantities are too many (at most "
-            f"{_CORNERS}): take 'latin-hypercube', or 'one-at-a-time' to see which matter",
+            f"[design] kind = {kind!r} is not possible for {len(distributions)} quantities (at "
+            f"most {_CORNERS}). Use 'latin-hypercube', or 'one-at-a-time' to see which "
+            "quantities matter",
             name="[design] kind",
             value=kind,
+            valid=f"at most {_CORNERS}",
         )
     each = [d.levels(2 if kind == "corners" else levels) for d in distributions]
     if kind == "one-at-a-time":
@@ -159,10 +161,11 @@ def spanned(
         count = int(np.prod([float(len(values)) for values in each]))
         if count > MOST:
             raise ParameterError(
-                f"[design] a grid of {count:.3g} cases is too large (at most {MOST:.0e}): take "
-                "fewer levels, or 'latin-hypercube'",
+                f"[design] kind = {kind!r} has {count:.3g} cases, which is too many (at most "
+                f"{MOST:.0e}). Use fewer levels, or 'latin-hypercube'",
                 name="[design] kind",
                 value=kind,
+                valid=f"at most {MOST:.0e}",
             )
         rows = [list(row) for row in product(*each)]
     rows.insert(0, list(nominal))
@@ -256,7 +259,7 @@ class SensitivityDesign:
         Raises
         ------
         FileError
-            When SALib is not installed.
+            If SALib is not installed.
         """
         # A generator, because SALib treats the seed 0 as no seed.
         rng = np.random.default_rng(self.seed)
@@ -386,9 +389,9 @@ class SoughtDesign:
         Raises
         ------
         ParameterError
-            When it is below a single batch or level, or larger than the largest study.
+            If it is below a single batch or level, or larger than the largest study.
         FileError
-            When OpenTURNS is not installed.
+            If OpenTURNS is not installed.
         """
         if self.kind in RARE:
             library("openturns", *OPENTURNS)
@@ -416,6 +419,6 @@ def library_version(kind: str) -> str:
     Raises
     ------
     FileError
-        When it is not installed.
+        If it is not installed.
     """
     return str(scipy.__version__ if kind == WORST else library("openturns", *OPENTURNS).__version__)

@@ -304,9 +304,9 @@ def read_choice(name: str, entry: Any, admitted: Sequence[Any]) -> Distribution:
     values = entry.get("values") if isinstance(entry, Mapping) else None
     if not isinstance(values, Sequence) or isinstance(values, str) or not values:
         raise ParameterError(
-            f"[vary] {name} = {quoted(entry)}: a choice varies among values, "
+            f"[vary] {name} = {quoted(entry)} is not valid for a choice. Write "
             f"{{ kind = '{DISCRETE}', values = [...] }}"
-            + (f", of {', '.join(map(repr, texts))}" if texts else ""),
+            + (f" with values from {', '.join(map(repr, texts))}" if texts else ""),
             name=f"[vary] {name}",
             value=quoted(entry),
             valid=", ".join(map(repr, texts)),
@@ -315,7 +315,8 @@ def read_choice(name: str, entry: Any, admitted: Sequence[Any]) -> Distribution:
         raise unknown_name(f"key of [vary] {name} (a choice)", key, (*KEYS, "kind"))
     if entry.get("kind", DISCRETE) != DISCRETE:
         raise ParameterError(
-            f"[vary] {name} is a choice: its kind is '{DISCRETE}', not {quoted(entry['kind'])}",
+            f"[vary] {name} is a choice, so its kind must be '{DISCRETE}', not "
+            f"{quoted(entry['kind'])}",
             name=f"[vary] {name}",
             value=quoted(entry["kind"]),
             valid=f"'{DISCRETE}'",
@@ -357,15 +358,15 @@ def require_several(where: str, values: Sequence[Any], shown: Sequence[str]) -> 
     """
     if len(values) == 1:
         raise ParameterError(
-            f"{where} has only one value, {shown[0]}, so nothing varies: list at least two, or "
-            "set this value in [set]",
+            f"{where} has only one value, {shown[0]}, so nothing varies. List at least two values, "
+            "or set this value in [set]",
             name=where,
             value=shown[0],
         )
     for value, text in zip(values, shown, strict=True):
         if values.count(value) > 1:
             raise ParameterError(
-                f"{where} lists the value {text} twice: list it once, and give its frequency by "
+                f"{where} lists the value {text} twice. List it once, and specify frequencies with "
                 "weights = [...]",
                 name=where,
                 value=text,
@@ -434,11 +435,11 @@ def weights_of(where: str, section: Mapping[str, Any], count: int) -> Array:
 # --- Distributions as study files write them: a tolerance, or a section with ``kind``
 
 _NEXT = {
-    "tolerance": "take a narrower tolerance, or kind 'uniform' with ends within it",
-    "uniform": "give 'low' and 'high' within it",
-    "normal": "truncate it, with 'low' or 'high' within it",
-    "log-normal": "take another 'median', or a smaller 'sd'",
-    "triangular": "give 'low', 'mode' and 'high' within it",
+    "tolerance": "Use a narrower tolerance, or kind 'uniform' with ends within this range",
+    "uniform": "Choose 'low' and 'high' within this range",
+    "normal": "Truncate the distribution with 'low' or 'high' within this range",
+    "log-normal": "Use another 'median' or a smaller 'sd'",
+    "triangular": "Choose 'low', 'mode' and 'high' within this range",
 }
 """advice, by the kind of a distribution"""
 _ROUNDING = 1e-12  # share of a range by which rounding may put an end beyond a limit
@@ -475,7 +476,7 @@ def admitted(where: str, made: Distribution, leaf: Leaf, advice: str = "") -> Di
     if beyond > NEVER:
         often = f", with a probability of {beyond:.2g}" if beyond < 1.0 else ""
         raise ParameterError(
-            f"{where}: {made.text} leaves the valid range, {valid}{often}: {advice}",
+            f"{where}: {made.text} leaves the valid range, {valid}{often}. {advice}",
             name=where,
             value=made.text,
             valid=valid,
@@ -487,8 +488,8 @@ def admitted(where: str, made: Distribution, leaf: Leaf, advice: str = "") -> Di
     for end in (low, high):
         if math.isfinite(end) and not leaf.admits(end):
             raise ParameterError(
-                f"{where}: {made.text}: its end at {shown(end, leaf.unit.symbol)} is not "
-                f"valid: it must be {valid}; {advice}",
+                f"{where}: {made.text}. Its end at {shown(end, leaf.unit.symbol)} is not valid: "
+                f"it must be {valid}. {advice}",
                 name=where,
                 value=shown(end, leaf.unit.symbol),
                 valid=valid,
@@ -515,9 +516,8 @@ def _require_single_values(where: str, kind: str, leaf: Leaf, nominal: float) ->
         return
     near = [x for x in (nominal - 1.0, nominal, nominal + 1.0) if leaf.admits(x)]
     raise ParameterError(
-        f"{where} is a whole number, {leaf.range_text}, and kind {kind!r} has values in between: "
-        f"vary it for instance by kind = '{DISCRETE}', values = "
-        f"[{', '.join(f'{x:g}' for x in near)}]",
+        f"{where} is a whole number, {leaf.range_text}, but kind {kind!r} has values in between. "
+        f"Use for example kind = '{DISCRETE}', values = [{', '.join(f'{x:g}' for x in near)}]",
         name=where,
         value=kind,
         valid=f"'{DISCRETE}'",
@@ -571,7 +571,7 @@ def _require_singles(where: str, values: Sequence[float], leaf: Leaf) -> None:
     if beyond:
         texts = [", ".join(shown(x, leaf.unit.symbol) for x in each) for each in (values, beyond)]
         raise ParameterError(
-            f"{where}: one of {texts[0]} leaves the valid range, {leaf.range_text}: leave out "
+            f"{where}: one of {texts[0]} leaves the valid range, {leaf.range_text}. Remove "
             f"{texts[1]}",
             name=where,
             value=texts[1],
@@ -621,10 +621,12 @@ def read_distribution(
         entry = {"kind": "tolerance", "tolerance": tolerance[1]}
     if not isinstance(entry, Mapping):
         raise ParameterError(
-            f"{title} {name} = {quoted(entry)}: write a tolerance such as '+-5 %', or a section "
-            "such as { kind = 'normal', sd = '5 %' }",
+            f"{title} {name} = {quoted(entry)} is not valid. Write a tolerance such as '+-5 %', "
+            "or a "
+            "section such as { kind = 'normal', sd = '5 %' }",
             name=f"{title} {name}",
             value=quoted(entry),
+            valid="a tolerance such as '+-5 %'",
         )
     if "kind" not in entry:
         raise _without_kind(f"{title} {name}", entry, leaf)
@@ -640,8 +642,8 @@ def read_distribution(
     first, *_, last = made.levels(2)
     if not made.singles and not first < last:
         raise ParameterError(
-            f"{title} {name}: {made.text} is not wider than the last digit of a number, so "
-            "nothing varies: give it a larger width",
+            f"{title} {name}: {made.text} is too narrow for floating-point numbers, so nothing "
+            "varies. Use a larger width",
             name=f"{title} {name}",
             value=made.text,
         )
@@ -655,7 +657,12 @@ def _without_kind(where: str, entry: Mapping[str, Any], leaf: Leaf) -> Parameter
     near = [DISCRETE] if leaf.is_whole else near
     which = " or ".join(map(repr, near or _KINDS))
     others = f" (there are {', '.join(_KINDS)})" if near else ""
-    return ParameterError(f"{where} = {quoted(entry)}: kind is missing: add kind = {which}{others}")
+    return ParameterError(
+        f"{where} = {quoted(entry)} has no kind. Add kind = {which}{others}",
+        name=where,
+        value=quoted(entry),
+        valid=f"kind = {which}",
+    )
 
 
 @dataclass(frozen=True)
@@ -687,7 +694,7 @@ class _Entry:
         else:
             width = self._number(key, text, difference_unit(self.leaf.unit.symbol))
         if not width > 0.0 or not math.isfinite(width):
-            advice = "" if of else "given as an amount: a share of 0 is 0"
+            advice = "" if of else "with a unit, because a percentage of 0 is 0"
             raise not_valid(f"{self.where}.{key}", quoted(text), "a width > 0", advice)
         return width
 
@@ -701,7 +708,9 @@ class _Entry:
     def _given(self, key: str) -> Any:
         if key not in self.section:
             raise ParameterError(
-                f"{self.where} of kind {self.section['kind']} needs {key!r}", name=key
+                f"{self.where} of kind {self.section['kind']} needs the key {key!r}",
+                name=key,
+                value=str(self.section["kind"]),
             )
         return self.section[key]
 
@@ -761,8 +770,8 @@ def _normal(entry: _Entry) -> Distribution:
     kept = law.sf(low) - law.sf(high) if low > mean else law.cdf(high) - law.cdf(low)
     if kept < NEVER:
         raise entry.refused(
-            f"only a probability of {kept:.2g} of {text} lies between low and high, too little to "
-            "draw from: give other ends, or another mean"
+            f"only a probability of {kept:.2g} of {text} lies between low and high, which is too "
+            "little to draw from. Choose other ends or another mean"
         )
     cut = truncated_normal((low - mean) / sd, (high - mean) / sd, mean, sd)
     sides = [
@@ -794,7 +803,7 @@ def _triangular(entry: _Entry) -> Distribution:
 def _discrete(entry: _Entry) -> Distribution:
     values = entry.section.get("values")
     if not isinstance(values, list) or not values:
-        raise entry.refused("it needs values = [...]")
+        raise entry.refused("this kind needs values = [...]")
     each = [replace(entry, section={"values": value}).level("values") for value in values]
     read = whole(entry.where, each, entry.leaf)
     weights = weights_of(entry.where, entry.section, len(read))

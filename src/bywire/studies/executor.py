@@ -32,7 +32,7 @@ T = TypeVar("T")
 
 
 class Beside(Generic[T]):
-    """A computation that runs beside the chunks.
+    """Computation that runs in parallel with the chunks.
 
     ``future``: gives its value, and the warnings from another process.
     """
@@ -91,7 +91,7 @@ class Executor(Protocol):
         Raises
         ------
         RunError
-            When all workers are lost.
+            If all workers are lost.
         """
         ...
 
@@ -119,8 +119,8 @@ CLUSTER_SETTINGS = {
 CLUSTER_MEMORY = {"MALLOC_TRIM_THRESHOLD_": 1 << 28, "MALLOC_MMAP_THRESHOLD_": 1 << 25}
 """recommended environment of workers where the C library is glibc [byte]"""
 
-_LOST = "the cluster lost its workers ({}): resume the study when some are there"
-_GONE = "the cluster's scheduler is gone: resume the study when it is there again, or elsewhere"
+_LOST = "the cluster lost its workers ({}). Resume the study when workers are available again"
+_GONE = "the cluster's scheduler is gone. Restart it, or use other workers, and resume the study"
 _WHAT = ("studies on a cluster", "cluster")
 
 
@@ -146,7 +146,11 @@ class Cluster:
         with _client(self.address) as client:
             workers = len(client.scheduler_info()["workers"])
             if not workers:
-                raise RunError(f"the cluster at {self.address} has no workers: start some first")
+                raise RunError(
+                    f"the cluster at {self.address} has no workers. Start some with 'dask worker'",
+                    name=option("cluster"),
+                    value=self.address,
+                )
             client.run(load_brakes, loaded_files())
             yield Apart(partial(_of_cluster, client, plan, workers))
 
@@ -159,8 +163,11 @@ def _client(address: str) -> Iterator[Any]:
         client = distributed.Client(address, timeout=_SECONDS, set_as_default=False)
     except (OSError, ValueError, TimeoutError) as error:
         raise RunError(
-            f"no cluster answers at {address!r} ({error}): start one with 'dask scheduler' and "
-            "'dask worker', and give the address that the scheduler prints"
+            f"no cluster answers at {address!r} ({error}). Start one with 'dask scheduler' and "
+            "'dask "
+            f"worker', and pass the scheduler's address to {option('cluster')}",
+            name=option("cluster"),
+            value=repr(address),
         ) from None
     log = logging.getLogger("distributed.client")  # it would print each lost connection
     before = log.level
@@ -223,7 +230,7 @@ def _lost(client: Any, error: BaseException) -> str:
     return _LOST.format("all of them" if "forgotten" in reason else reason)
 
 
-# --- Who computes
+# --- Choice of the executor
 
 # Chunks of one batch on a graphics processor: 4,096 cases, for hard braking 2 GB of this machine's
 # memory for stimuli and rows.
@@ -286,7 +293,7 @@ class Pool:
     @contextmanager
     def opened(self, plan: StudyPlan) -> Iterator[Compute]:
         """Return the computation; see `Executor`."""
-        fewer = f"resume it, with fewer {option('workers')}"
+        fewer = f"resume it with fewer {option('workers')}"
         with processes_with_brakes(self.workers, fewer, _give, plan) as pool:
             yield _InPool(pool, _AHEAD * self.workers)
 
@@ -298,18 +305,18 @@ def executor_of(
     together: int | None = None,
     engine: str = "auto",
 ) -> Executor:
-    """Return the executor: a cluster if one is named, else that many processes.
+    """Return the executor, a cluster if its address is given, otherwise processes.
 
     Parameters
     ----------
     workers
-        Number of processes; None for one per core where the work is worth their start.
+        Number of processes. None for one per core if the work justifies starting them.
     cluster
-        Address of a Dask scheduler; empty for this machine.
+        Address of a Dask scheduler. Empty for this machine.
     chunks
         Number of remaining chunks.
     together
-        Largest number of chunks per batch; all by default.
+        Largest number of chunks per batch. Default: all.
     engine
         Engine of the bench: a graphics processor takes many chunks per batch, from one process.
 
@@ -341,14 +348,15 @@ def require_workers(workers: int | None, cluster: str, engine: str) -> None:
         whole_number("workers", workers, 1, _MOST_WORKERS)
     if engine == CUDA and (workers is not None or cluster):
         raise ParameterError(
-            "engine = 'cuda' computes all cases on one graphics processor: leave out "
+            "engine = 'cuda' computes all cases on one graphics processor. Remove "
             f"{option('cluster' if cluster else 'workers')}",
             name=option("cluster" if cluster else "workers"),
         )
     if cluster and workers is not None:
         raise ParameterError(
-            f"a cluster has its own workers: leave out {option('workers')} or {option('cluster')}",
+            f"a cluster has its own workers. Remove {option('workers')} or {option('cluster')}",
             name=option("workers"),
+            value=str(workers),
         )
 
 

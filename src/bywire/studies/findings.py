@@ -375,10 +375,11 @@ class Findings:
         known, design = self._sensitivities, self.plan.sensitivity
         if design is None:
             raise ParameterError(
-                f"a study of {self.plan.design!r} has no indices: take 'sobol-indices' or 'morris'",
+                f"[design] kind = {self.plan.design!r} has no sensitivity indices. Use "
+                "'sobol-indices' or 'morris'",
                 name="[design] kind",
                 value=self.plan.design,
-                valid="'sobol-indices', 'morris'",
+                valid="'sobol-indices' or 'morris'",
             )
         if name not in known:
             names = [v.name for v in self.plan.varied]

@@ -228,7 +228,7 @@ def importance_sampling(
     Raises
     ------
     FileError
-        When OpenTURNS is not installed.
+        If OpenTURNS is not installed.
 
     References
     ----------
@@ -406,7 +406,7 @@ def subset_simulation(
     Raises
     ------
     FileError
-        When OpenTURNS is not installed.
+        If OpenTURNS is not installed.
 
     References
     ----------

@@ -1,4 +1,4 @@
-"""The intended study: a file, perhaps without its ending, or a folder."""
+"""Study that the user meant: a file, perhaps without its suffix, or a folder."""
 
 from __future__ import annotations
 
@@ -24,9 +24,11 @@ def require_study_file(file: Path) -> None:
         return
     meant = meant_study(file)
     if meant is None and os.path.exists(file):
-        return  # its reader reports what it is
-    advice = "check the path" if meant is None else f"did you mean {meant}?"
-    raise FileError(f"the study file {file} does not exist: {advice}", name=str(file))
+        return  # its reader raises a better error
+    advice = "Check the path" if meant is None else f"Did you mean {meant}?"
+    raise FileError(
+        f"the study file {file} does not exist. {advice}", name=str(file), valid=str(meant or "")
+    )
 
 
 def meant_study(file: Path) -> Path | None:
@@ -59,11 +61,11 @@ def require_no_file(folder: Path) -> None:
     there = first_there(each / RECORD for each in near)
     is_study = kind_of_file(folder) == STUDY
     advice = (
-        f"did you mean {there.parent}?"
+        f"Did you mean {there.parent}?"
         if there is not None
-        else f"'bywire study run {folder}' makes one"
+        else f"To create its folder, type 'bywire study run {folder}'"
         if is_study
-        else "name the one that 'bywire study run' has written"
+        else "Use the folder that 'bywire study run' created"
     )
     kind = "study file" if is_study else "file"
-    raise FileError(f"{folder} is a {kind}, not the folder of a study: {advice}", name=str(folder))
+    raise FileError(f"{folder} is a {kind}, not a study's folder. {advice}", name=str(folder))

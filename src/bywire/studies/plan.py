@@ -64,7 +64,7 @@ def correlation_factor(
     Raises
     ------
     ParameterError
-        When the matrix is not positive definite: no quantities can have these correlations.
+        If the matrix is not positive definite: no quantities can have these correlations.
     """
     if not correlations:
         return None
@@ -78,9 +78,8 @@ def correlation_factor(
         least = float(np.linalg.eigvalsh(matrix)[0])
         told = "; ".join(f"{a}, {b}: {value:g}" for (a, b), value in correlations.items())
         raise ParameterError(
-            f"[[correlation]] {told}: no quantities can have these correlations, because their "
-            f"matrix is not positive definite (least eigenvalue {least:.2g}): take values closer "
-            "to zero",
+            f"[[correlation]] {told}: these correlations contradict each other. Their matrix is "
+            f"not positive definite (smallest eigenvalue {least:.2g}). Use values closer to zero",
             name="[[correlation]]",
             value=told,
         ) from None

@@ -1,4 +1,4 @@
-"""Running a study: missing chunks are computed, and stored as soon as they are complete."""
+"""Run of a study, which computes missing chunks and stores each one as soon as it is complete."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def complete(
     progress: Progress,
     meanwhile: Callable[[], object] = tuple,
 ) -> Completed:
-    """Compute the bench of a study itself, and the chunks that are missing in its folder.
+    """Compute a study's bench itself and the chunks that are missing from its folder.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def complete(
     progress
         Called with a label and the finished share, 0 to 1.
     meanwhile
-        Called once when the first chunks have started and this process would wait for them.
+        Called once while this process would otherwise wait for the first chunks.
 
     Returns
     -------
@@ -66,15 +66,15 @@ def complete(
     Raises
     ------
     ParameterError
-        For an invalid number of workers; then nothing is written.
+        If the number of workers is invalid. Nothing is written.
     FileError
-        When the folder belongs to another study, or is not writable.
+        If the folder belongs to another study, or is not writable.
     RunError
-        When the bench itself fails, or all workers are lost.
+        If the bench itself fails, or all workers are lost.
     DeviceError
-        When the bench needs a graphics processor and there is none.
+        If the bench needs a graphics processor, and there is none.
     KeyboardInterrupt
-        When interrupted; finished chunks stay.
+        If interrupted. Finished chunks remain.
     """
     until = time.monotonic() + plan.time
     require_workers(workers, cluster, plan.bench.engine)

@@ -131,7 +131,7 @@ def sensitivity(
     Raises
     ------
     FileError
-        When SALib is not installed.
+        If SALib is not installed.
 
     References
     ----------

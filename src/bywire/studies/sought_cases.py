@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bywire.bench.requirements import Limit
+from bywire.core.callers import option
 from bywire.core.errors import FileError
 from bywire.core.typing import Array, Progress, silent
 from bywire.studies.designs import SUBSET, SoughtDesign, population
@@ -96,9 +97,9 @@ class SoughtCases:
         Raises
         ------
         UnfinishedError
-            When some are missing, and nothing is computed.
+            If some are missing, and nothing is computed.
         FileError
-            When the folder has other cases in their place.
+            If the folder has other cases in their place.
         """
         numbers = self._shared.setdefault(scores.tobytes(), numbers)
         wanted = {
@@ -135,8 +136,10 @@ class SoughtCases:
             )
             if not is_same:
                 raise FileError(
-                    f"{self.store.path(number)} holds other cases than the study asks for now: "
-                    "another machine or library draws differently; run it into another folder"
+                    f"{self.store.path(number)} contains cases that this study does not request, "
+                    "because another machine or library version draws differently. Choose another "
+                    f"folder with {option('out')}",
+                    name=str(self.store.path(number)),
                 )
 
 
@@ -277,11 +280,11 @@ def rare_failures(
     Raises
     ------
     FileError
-        When OpenTURNS is not installed, or the folder is not readable or writable.
+        If OpenTURNS is not installed, or the folder is not readable or writable.
     RunError
-        When workers are lost.
+        If workers are lost.
     KeyboardInterrupt
-        When interrupted.
+        If interrupted.
     """
     with SoughtCases(plan, store, executor, progress) as cases:
         failures = tuple(
@@ -470,11 +473,11 @@ def worst_cases(
     Raises
     ------
     FileError
-        When the folder is not readable or writable.
+        If the folder is not readable or writable.
     RunError
-        When workers are lost.
+        If workers are lost.
     KeyboardInterrupt
-        When interrupted.
+        If interrupted.
     """
     with SoughtCases(plan, store, executor, progress) as cases:
         found = tuple(

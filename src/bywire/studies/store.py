@@ -77,9 +77,9 @@ def computed_chunk(
     Raises
     ------
     DeviceError
-        When the bench's graphics processor fails: the cases are not the cause.
+        If the bench's graphics processor fails: the cases are not the cause.
     KeyboardInterrupt
-        When interrupted.
+        If interrupted.
     """
     ((_, columns),) = computed_chunks(plan, [chunk], threads)
     return columns
@@ -158,7 +158,7 @@ def case_bench(plan: StudyPlan, number: int, values: Mapping[str, Any]) -> Bench
     Raises
     ------
     InputError
-        When the values contradict each other, or the experiment does not run with them.
+        If the values contradict each other, or the experiment does not run with them.
     """
     seed = plan.bench.seed + number if _is_noisy(plan, number) else None
     return changed(plan.bench, values, seed)
@@ -218,7 +218,7 @@ def _require_pyarrow() -> None:
     Raises
     ------
     FileError
-        When it is not installed.
+        If it is not installed.
     """
     library("pyarrow", *_WHAT)
 
@@ -242,9 +242,9 @@ def _write_chunk(
     Raises
     ------
     FileError
-        When pyarrow is not installed.
+        If pyarrow is not installed.
     OSError
-        When the file cannot be written.
+        If the file cannot be written.
     """
     pa, parquet = library("pyarrow", *_WHAT), library("pyarrow.parquet", *_WHAT)
     texts = [name for name, column in columns.items() if column.dtype.kind == "O"]
@@ -333,8 +333,7 @@ class StudyStore(PieceFolder):
     def elsewhere(self) -> str:
         """Advice if the folder contains another study."""
         return (
-            "what is computed there does not belong to this one; run it into another folder, "
-            "bywire study run FILE --out FOLDER, or remove that one"
+            "Type 'bywire study run FILE --out FOLDER' to use another folder, or remove this folder"
         )
 
     def open(self, plan: StudyPlan, origin: Origin) -> None:
@@ -343,7 +342,7 @@ class StudyStore(PieceFolder):
         Raises
         ------
         FileError
-            When it contains another study, or is not writable.
+            If it contains another study, or is not writable.
         """
         _require_pyarrow()
         about = {
@@ -381,7 +380,7 @@ class StudyStore(PieceFolder):
         Raises
         ------
         FileError
-            When it contains none.
+            If it contains none.
         """
         require_no_file(self.folder)
         return super().record()
@@ -416,7 +415,7 @@ class StudyStore(PieceFolder):
         Raises
         ------
         FileError
-            When it is not writable.
+            If it is not writable.
         """
         columns = {  # texts as read from the file
             name: column.astype(object) if column.dtype.kind == "U" else column
@@ -432,7 +431,7 @@ class StudyStore(PieceFolder):
         Raises
         ------
         FileError
-            When a file is damaged.
+            If a file is damaged.
         """
         import pandas as pd
 
@@ -446,7 +445,7 @@ class StudyStore(PieceFolder):
         Raises
         ------
         FileError
-            When its file is damaged.
+            If its file is damaged.
         """
         if chunk not in self._known:
             self._known[chunk] = self._read(chunk)
@@ -460,14 +459,15 @@ class StudyStore(PieceFolder):
             columns, marks = _read_chunk(path)
         except Exception as error:  # the library raises all kinds of exceptions for damaged files
             raise FileError(
-                f"{path} is damaged ({type(error).__name__}): '{self.resume_command}' computes it "
-                "again",
+                f"{path} is damaged ({type(error).__name__}). To recompute it, type "
+                f"'{self.resume_command}'",
                 name=str(path),
             ) from None
         if any(marks.get(key) != value for key, value in self._marks(chunk).items()):
             raise FileError(
-                f"{path} belongs to another study, or is another chunk of this one: "
-                f"'{self.resume_command}' computes it again",
+                f"{path} belongs to another study, or is another chunk of this study. To "
+                "recompute it, "
+                f"type '{self.resume_command}'",
                 name=str(path),
             )
         return columns
@@ -513,11 +513,12 @@ def with_cases(plan: StudyPlan, store: StudyStore, cases: int | None) -> StudyPl
         asked, computed = store.asked_and_computed(plan)
         if cases is not None and cases < computed:
             raise ParameterError(
-                f"cases = {cases}: {store.folder} already has {computed}, and bywire removes none: "
-                "ask for more, or name another folder",
+                f"cases = {cases} is not valid: it must be >= {computed}, because {store.folder} "
+                "already "
+                "contains that many. Request more cases, or choose another folder",
                 name="cases",
                 value=str(cases),
-                valid=f"{computed}",
+                valid=f">= {computed}",
             )
         extended = replace(plan, cases=max(plan.cases, asked) if cases is None else cases)
         if extended.sought is not None:
@@ -534,18 +535,18 @@ def require_extensible(plan: StudyPlan, cases: int) -> None:
     Raises
     ------
     ParameterError
-        When its cases are listed, or belong together in groups.
+        If its cases are listed, or belong together in groups.
     """
     if plan.is_sampled or plan.sought is not None:
         return
     why = (
-        "it lists them by quantities and levels"
+        "quantities and levels determine its cases"
         if plan.design in SPANNED
-        else "its groups belong together"
+        else "it evaluates all groups together"
     )
     raise ParameterError(
-        f"cases = {cases}: a study of {plan.design!r} cannot be extended, because {why}: change "
-        "the study file, and run it into another folder",
+        f"cases = {cases} is not valid: bywire cannot extend a study with design {plan.design!r}, "
+        f"because {why}. Change the study file, and run it in another folder",
         name="cases",
         value=str(cases),
     )

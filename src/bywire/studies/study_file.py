@@ -1,4 +1,4 @@
-"""Study files: TOML in, a plan out; nothing in them is executed."""
+"""Reader of study files (TOML), which executes nothing in them."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ from bywire.studies.distribution import rising
 from bywire.studies.plan import StudiedBench, StudyPlan, Varied, correlation_factor
 from bywire.studies.vary_section import MeasuredSection, read_all_varied
 
-_CORRELATION = Hint("write for instance of = ['motor.R_m', 'motor.K_e'] and value = 0.5")
+_CORRELATION = Hint("write for example of = ['motor.R_m', 'motor.K_e'] and value = 0.5")
 
 
 class CorrelationSection(Section):
@@ -94,15 +94,17 @@ def _read_correlations(
                 raise unknown_name("quantity of [[correlation]]", name, names)
             if not names[name].unit:
                 raise ParameterError(
-                    f"[[correlation]] of {pair[0]} and {pair[1]}: {name} is a choice; choices have "
-                    "no order, so that they cannot be correlated: leave it out, or make a study "
-                    "for each of its values",
+                    f"[[correlation]] of {pair[0]} and {pair[1]}: {name} is a choice. Choices "
+                    "have no "
+                    "order and therefore no correlation. Remove this section, or run a study for "
+                    "each "
+                    "value",
                     name=name,
                 )
         first, second = sorted(pair)
         if (first, second) in {**known, **pairs}:
             raise ParameterError(
-                f"[[correlation]] of {first} and {second} is given twice: leave one out",
+                f"[[correlation]] lists {first}, {second} twice. Remove one of the sections",
                 name=f"{first}, {second}",
             )
         pairs[first, second] = section.value
@@ -119,7 +121,7 @@ _DEMAND = "99 %"
 
 
 def _read_demands(bench: Bench, section: Mapping[str, Any]) -> Iterator[Limit]:
-    """Yield the requirements: those of the study, and the bench's for other key figures.
+    """Yield the study's requirements, and the bench's requirements on other key figures.
 
     Raises
     ------
@@ -141,15 +143,16 @@ def _probability(kpi: str, text: str, given: str) -> float:
         example = f"{100.0 * float(given):.10g} %" if _SHARE.fullmatch(given) else _DEMAND
         raise ParameterError(
             f"requirement {kpi} = {quoted(text)}: the probability after 'with' must be in percent, "
-            f"not {quoted(given)}: write for instance 'with {example}'",
+            f"not {quoted(given)}. Write for example 'with {example}'",
             name=kpi,
             value=quoted(given),
+            valid="in percent",
         )
     share = parse(given, "1", f"probability of requirement {kpi}")
     if not 0.0 < share < 1.0:
         raise ParameterError(
-            f"requirement {kpi}: a probability of {given} is not valid: it must be between 0 "
-            "and 100 %, as 'with 99.9 %'; leave it out where every case must meet the limit",
+            f"requirement {kpi}: a probability of {given} is not valid: it must be between 0 and "
+            "100 %, as in 'with 99.9 %'. Remove it if every case must meet the limit",
             name=kpi,
             value=given,
             valid="between 0 and 100 %",
@@ -157,7 +160,7 @@ def _probability(kpi: str, text: str, given: str) -> float:
     return share
 
 
-# --- What a design admits: probabilities, correlations, and how many cases
+# --- Probabilities, correlations and numbers of cases that a design permits
 
 _DEPENDENT = "has cases that share values and are not independent"
 
@@ -179,21 +182,23 @@ def _require_agreement(plan: StudyPlan) -> None:
     others = ", ".join(map(repr, SAMPLED))
     if plan.correlations:
         why = (
-            "exchanges each quantity separately, so that none may depend on another"
+            "exchanges quantities one at a time, so they must be independent"
             if is_indexed
             else "visits the ends of each quantity separately"
         )
         raise ParameterError(
-            f"[[correlation]]: {plan.design!r} {why}: leave it out, or take {others}",
+            f"[[correlation]] is not possible: {plan.design!r} {why}. Remove it, or use {others}",
             name="[[correlation]]",
+            value=plan.design,
             valid=others,
         )
     if plan.design == MORRIS:
         for each in plan.varied:
             if (count := len(each.distribution.singles)) > LEVELS:
                 raise ParameterError(
-                    f"[vary] {each.name} has {count} values, but {plan.design!r} takes only "
-                    f"{LEVELS} levels: list {LEVELS} of them, or take 'sobol-indices'",
+                    f"[vary] {each.name} has {count} values, but {plan.design!r} uses only "
+                    f"{LEVELS} "
+                    f"levels. List at most {LEVELS} values, or use 'sobol-indices'",
                     name=f"[vary] {each.name}",
                     value=str(count),
                     valid=str(LEVELS),
@@ -202,18 +207,20 @@ def _require_agreement(plan: StudyPlan) -> None:
         if demand.probability is not None:
             why = _DEPENDENT if plan.design == "sobol-indices" else "draws nothing"
             raise ParameterError(
-                f"requirement {str(demand)!r}: {plan.design!r} {why}, so that its cases "
-                f"have no probability: take {others}, or leave out 'with ...', so that every case "
-                "must meet the limit",
+                f"requirement {str(demand)!r}: {plan.design!r} {why}, so its cases have no "
+                f"probability. Use {others}, or remove 'with ...' to require that every case meets "
+                "the limit",
                 name=demand.figure,
                 value=str(demand),
+                valid=others,
             )
     if plan.sought is not None:
         if not plan.demands:
             raise ParameterError(
-                f"[requirements]: {plan.design!r} searches for the worst case of each requirement, "
-                'but there is none: write for instance overshoot = "<= 15 %"',
+                f"[requirements] is empty, but {plan.design!r} searches for the worst case of each "
+                'requirement. Write for example overshoot = "<= 15 %"',
                 name="[requirements]",
+                value=plan.design,
             )
         plan.sought.require_budget()
         return
@@ -224,15 +231,16 @@ def _require_rare(plan: StudyPlan, design: SoughtDesign) -> None:
     """Reject rare failures without a probability, and design points among discrete values."""
     if not plan.judged_demands:
         raise ParameterError(
-            f"[requirements]: {plan.design!r} computes the probability that a requirement is "
-            'missed, but none has a probability: write for instance "<= 15 % with 99.99 %"',
+            f"[requirements] contains no probability, but {plan.design!r} computes the probability "
+            'of missing a requirement. Write for example "<= 15 % with 99.99 %"',
             name="[requirements]",
+            value=plan.design,
         )
     singles = [each.name for each in plan.varied if each.distribution.is_discrete]
     if singles and plan.design == IMPORTANCE:
         raise ParameterError(
-            f"[vary] {', '.join(singles)}: {plan.design!r} follows derivatives, and single values "
-            f"have none: take {SUBSET!r}",
+            f"[vary] {', '.join(singles)}: {plan.design!r} needs derivatives, but discrete values "
+            f"have none. Use {SUBSET!r}",
             name=f"[vary] {', '.join(singles)}",
             valid=repr(SUBSET),
         )
@@ -247,7 +255,7 @@ _Cases = Annotated[int | None, Field(ge=1, le=MOST)]
 
 
 class DesignSection(Section):
-    """The section ``[design]``; omitted keys have the defaults of `StudyPlan`."""
+    """Section ``[design]``. Omitted keys have the defaults of `StudyPlan`."""
 
     kind: str = StudyPlan.design
     cases: _Cases = None
@@ -279,25 +287,31 @@ def _require_of_use(kind: str, section: Mapping[str, Any]) -> None:
     """Reject keys that the design does not use."""
     if "levels" in section and kind not in _WITH_LEVELS:
         raise ParameterError(
-            f"[design] levels: {kind!r} has none to choose"
-            + (f", it always takes {LEVELS}" if kind == "morris" else "")
-            + ": leave them out",
+            f"[design] levels has no effect for {kind!r}"
+            + (f", which always uses {LEVELS}" if kind == "morris" else "")
+            + ". Remove it",
             name="[design] levels",
+            value=str(kind),
         )
     if "cases_per_level" in section and kind != SUBSET:
         raise ParameterError(
-            f"[design] cases_per_level is only for {SUBSET!r}, not for {kind!r}: leave it out",
+            f"[design] cases_per_level applies only to {SUBSET!r}, not to {kind!r}. Remove it",
             name="[design] cases_per_level",
+            value=str(kind),
+            valid=str(SUBSET),
         )
     if "time" in section and kind in SOUGHT:
         raise ParameterError(
-            f"[design] time: the budget of {kind!r} is its 'cases': leave it out",
+            f"[design] time has no effect for {kind!r}, whose budget is 'cases'. Remove it",
             name="[design] time",
+            value=str(kind),
         )
     if "cases" in section and kind in SPANNED:
         raise ParameterError(
-            f"[design] cases: quantities and levels determine those of {kind!r}: leave it out",
+            f"[design] cases has no effect for {kind!r}, because quantities and levels determine "
+            "the number. Remove it",
             name="[design] cases",
+            value=str(kind),
         )
 
 
@@ -334,12 +348,12 @@ def read_study(path: str | Path, overrides: Mapping[str, str] = MappingProxyType
         TOML file with ``bench``, the section ``[vary]``, and optional sections ``[design]``,
         ``[[correlation]]``, ``[set]`` and ``[requirements]``; see ``docs/studies.md``.
     overrides
-        Further changes of the bench, which override those of ``[set]``.
+        Additional changes to the bench, which override those in ``[set]``.
 
     Raises
     ------
     FileError
-        When the file cannot be read or is not valid TOML.
+        If the file cannot be read or is not valid TOML.
     InputError
         For any invalid entry, with the file's name in front.
     """
@@ -362,7 +376,8 @@ def _plan(content: Mapping[str, Any], file: Path, overrides: Mapping[str, str]) 
     varied, measured = read_all_varied(bench, study.vary, study.measured, file.parent)
     if not varied:
         raise ParameterError(
-            "[vary] is empty: write what varies, such as \"motor.R_m\" = '+-10 %'", name="[vary]"
+            "[vary] is empty. Add a quantity that varies, such as \"motor.R_m\" = '+-10 %'",
+            name="[vary]",
         )
     correlations = {**measured, **_read_correlations(study.correlation, varied, measured)}
     plan = StudyPlan(
@@ -379,13 +394,13 @@ def _plan(content: Mapping[str, Any], file: Path, overrides: Mapping[str, str]) 
 
 
 def _require_no_bench(content: Mapping[str, Any]) -> None:
-    """Reject sections of a bench, and name the place where they belong."""
+    """Reject sections of a bench file, and explain where they belong."""
     keys = StudyFile.model_fields
     for key in content:
         if key in bench_file.SECTIONS and key not in keys:
             raise ParameterError(
-                f"[{key}] belongs into the bench file, not into a study file: write it there, or "
-                f'change single values in [set], as "{key}.NAME" = "VALUE"; a study file has '
+                f"[{key}] belongs in the bench file, not in a study file. Move it there, or change "
+                f'single values in [set], as "{key}.NAME" = "VALUE". A study file can contain '
                 f"{', '.join(keys)}",
                 name=f"[{key}]",
                 valid=", ".join(keys),
@@ -395,15 +410,16 @@ def _require_no_bench(content: Mapping[str, Any]) -> None:
 def read_bench(
     source: str, changes: Mapping[str, Any], folder: Path, overrides: Mapping[str, str]
 ) -> Bench:
-    """Return the bench of a study file, with the changes of its ``[set]`` and further ones."""
+    """Return a study file's bench with the changes in ``[set]`` and additional changes."""
     flat = bench_file.flattened(changes)
     for key, value in flat.items():
         if not isinstance(value, str):
             raise ParameterError(
-                f"[set] {key} = {quoted(value)}: write the value as a text, "
-                f"with its unit, as {option('overrides')} takes it",
+                f"[set] {key} = {quoted(value)} is not valid: it must be a text with its unit, in "
+                f"the form of {option('overrides')}",
                 name=f"[set] {key}",
                 value=quoted(value),
+                valid="a text with its unit",
             )
     there = source if names_experiment(source) else folder / source
     return bench_file.read(there, {**flat, **overrides})

@@ -101,7 +101,9 @@ class Surrogate:
         try:
             wide = np.broadcast_arrays(*columns)
         except ValueError:
-            raise ParameterError("values of quantities must have the same shape") from None
+            raise ParameterError(
+                "values must be arrays of the same shape", name="values", valid="the same shape"
+            ) from None
         points = np.column_stack([column.ravel() for column in wide])
         if not points.size:  # OpenTURNS rejects an empty sample
             return np.zeros(wide[0].shape)
@@ -168,7 +170,7 @@ def surrogate_of(findings: Findings, kpi: str) -> Surrogate:
         For designs without points between their levels, structural choices among the varied
         quantities, too few cases, and a figure that does not vary.
     FileError
-        When OpenTURNS is not installed.
+        If OpenTURNS is not installed.
     """
     plan = findings.plan
     require_fittable(plan)
@@ -180,13 +182,16 @@ def surrogate_of(findings: Findings, kpi: str) -> Surrogate:
     x, y = np.column_stack(list(columns.values()))[known], y[known]
     if y.size < _FEWEST:
         raise ParameterError(
-            f"{kpi} is defined in {y.size} of the cases: a surrogate needs at least {_FEWEST}",
+            f"{kpi} is defined in only {y.size} cases, but a surrogate needs at least {_FEWEST}. "
+            "Extend the study",
             name=kpi,
             value=str(y.size),
-            valid=str(_FEWEST),
+            valid=f"at least {_FEWEST}",
         )
     if np.ptp(y) == 0.0:
-        raise ParameterError(f"{kpi} is the same in all cases and cannot be fitted", name=kpi)
+        raise ParameterError(
+            f"{kpi} is the same in all cases, so a surrogate would be a constant", name=kpi
+        )
     errors, best = min(
         (_of_unseen(plan.varied, x, y, degree, 0) for degree in _degrees(x.shape)),
         key=lambda told: float(np.mean(told[0] ** 2)),
@@ -223,16 +228,17 @@ def require_fittable(plan: StudyPlan) -> None:
     """
     if plan.design in _LACKING:
         raise ParameterError(
-            f"the cases of {plan.design!r} do not show what lies between them: a surrogate "
-            "takes 'monte-carlo', 'latin-hypercube', 'sobol', 'sobol-indices' or 'grid'",
+            f"the cases of {plan.design!r} do not determine values between them. For a surrogate, "
+            "use 'monte-carlo', 'latin-hypercube', 'sobol', 'sobol-indices' or 'grid'",
             name="[design] kind",
             value=plan.design,
+            valid="'monte-carlo', 'latin-hypercube', 'sobol', 'sobol-indices' or 'grid'",
         )
     choices = [v.name for v in plan.varied if not v.unit]
     if choices:
         raise ParameterError(
-            f"{', '.join(choices)}: a choice has no polynomial: make a study for each of its "
-            "values",
+            f"{', '.join(choices)}: a surrogate cannot depend on a choice. Run a study for each of "
+            "its values",
             name=", ".join(choices),
         )
 

@@ -1,4 +1,4 @@
-"""The section ``[vary]``: what varies of a bench, and how, also from measured estimates."""
+"""Section ``[vary]``: quantities of a bench that vary, including measured estimates."""
 
 from __future__ import annotations
 
@@ -34,19 +34,19 @@ from bywire.studies.distribution import (
 )
 from bywire.studies.plan import Varied
 
-# --- What varies as it was measured
+# --- Quantities that vary by their measured uncertainty
 
 _ESTIMATE = "estimate.json"
 """file with the estimates in an identification's folder"""
 _LARGEST = 20_000_000  # largest size of the file in bytes
-_TRUNCATE = "cut it off, with truncate = true"
+_TRUNCATE = "Truncate the distribution with truncate = true"
 _WEAK = 1e-9  # correlation that counts as zero
 
 
 class MeasuredSection(Section):
     """The section ``[measured]``: estimates of an identification, of which parameters vary."""
 
-    file: Annotated[Name, Hint("name the folder that 'bywire identify --out' has written")]
+    file: Annotated[Name, Hint("specify the folder that 'bywire identify --out' created")]
     of: Names | None = None
     truncate: bool = False
 
@@ -76,7 +76,7 @@ class Measured:
         Raises
         ------
         UnknownNameError
-            When one was not estimated.
+            If one was not estimated.
         """
         for name in names:
             if name not in self.values:
@@ -116,9 +116,10 @@ def _varied_as_measured(
     of = [name for name in measured.values if name in leaves] if section.of is None else section.of
     if not of:
         raise ParameterError(
-            f"[measured] {section.file} has estimates of {', '.join(measured.values)}: "
-            "name those of them that the bench has too with of = [...]",
-            name="[measured] of",
+            f"[measured] {section.file} has no estimates of parameters in the bench. It contains "
+            f"{', '.join(measured.values)}. Select parameters of the bench with of = [...]",
+            name="[measured]",
+            value=str(section.file),
             valid=", ".join(measured.values),
         )
     chosen = measured.only(of)
@@ -157,7 +158,7 @@ def _read_measured(path: Path) -> Measured:
     Raises
     ------
     FileError
-        When it is missing or damaged.
+        If it is missing or damaged.
     """
     file = path / _ESTIMATE if path.is_dir() else path
     try:
@@ -165,8 +166,8 @@ def _read_measured(path: Path) -> Measured:
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise FileError(
-            f"cannot read {file}: {reason}: name the folder that 'bywire identify --out' has "
-            "written",
+            f"cannot read {file}: {reason}. Specify the folder that 'bywire identify --out' "
+            "created",
             name=str(file),
         ) from None
     try:
@@ -177,7 +178,7 @@ def _read_measured(path: Path) -> Measured:
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise FileError(
             f"{file} contains no estimates of an identification ({type(error).__name__}: "
-            f"{quoted(str(error))}): name the folder that 'bywire identify --out' has written",
+            f"{quoted(str(error))}). Specify the folder that 'bywire identify --out' created",
             name=str(file),
         ) from None
 
@@ -224,13 +225,13 @@ def _number(value: Any) -> float:
     return float(value)
 
 
-# --- What varies
+# --- Quantities that vary
 
 
 def read_all_varied(
     bench: Bench, section: Mapping[str, Any], estimates: MeasuredSection | None, folder: Path
 ) -> tuple[tuple[Varied, ...], Mapping[tuple[str, str], float]]:
-    """Return what varies, from the file or from measurements, with its correlations.
+    """Return the varied quantities from the file or from measurements, with their correlations.
 
     Parameters
     ----------
@@ -264,7 +265,7 @@ def _put_once(places: dict[str, str], name: str, place: str) -> None:
     """Record where a quantity varies, or reject one that varies elsewhere too."""
     if name in places:
         raise ParameterError(
-            f"[vary] {name} varies twice, by {places[name]} and by {place}: leave one of them out",
+            f"[vary] {name} varies twice, in {places[name]} and in {place}. Remove one of them",
             name=f"[vary] {name}",
         )
     places[name] = place
@@ -286,7 +287,9 @@ def read_varied(bench: Bench, section: Mapping[str, Any]) -> Iterator[Varied]:
         if name in choices:
             if together:
                 raise ParameterError(
-                    f"[vary] {name} is a choice: nothing varies by its ratio", name=f"[vary] {name}"
+                    f"[vary] {name} is a choice, so 'together' cannot apply to it. Remove "
+                    "'together'",
+                    name=f"[vary] {name}",
                 )
             law = read_choice(name, entry, choices[name])
             _require_alike(bench, name, law.singles)
@@ -294,14 +297,14 @@ def read_varied(bench: Bench, section: Mapping[str, Any]) -> Iterator[Varied]:
             continue
         if isinstance(values[name], (str, bool)):
             raise ParameterError(
-                f"[vary] {name} = {quoted(values[name])} names a signal or a file: only numbers "
-                "vary, and choices among listed values",
+                f"[vary] {name} = {quoted(values[name])} is a signal or a file. Only numbers and "
+                "choices among listed values can vary",
                 name=f"[vary] {name}",
                 value=quoted(values[name]),
             )
         if isinstance(values[name], tuple):
             raise ParameterError(
-                f"[vary] {name} is a table: only single numbers and choices vary",
+                f"[vary] {name} is a table. Only single numbers and choices can vary",
                 name=f"[vary] {name}",
             )
         leaf = varied_leaf(bench, name)
@@ -345,9 +348,9 @@ def _require_alike(bench: Bench, name: str, values: Sequence[str]) -> None:
         if given != figures:
             differing = sorted(given.keys() ^ figures.keys()) or sorted(figures)
             raise ParameterError(
-                f"[vary] {name} = {value!r}: {bench.experiment!r} has other key figures with it "
-                f"than with the bench's own ({', '.join(differing)}): vary it among values that "
-                "have the same, or make a study for each",
+                f"[vary] {name} = {value!r}: with this value, {bench.experiment!r} has different "
+                f"key figures than with the bench's value ({', '.join(differing)}). List only "
+                "values with the same key figures, or run a study for each value",
                 name=f"[vary] {name}",
                 value=repr(value),
             )
@@ -372,8 +375,8 @@ def entries_of(section: Mapping[str, Any], known: Collection[str]) -> dict[str, 
     for name, entry in _spread(section, known):
         if name in entries:
             raise ParameterError(
-                f'[vary] {name} varies twice, by {name} and by "{name}" in quotation marks: '
-                "leave one of them out",
+                f'[vary] {name} varies twice, as {name} and as "{name}" in quotation marks. Remove '
+                "one of them",
                 name=f"[vary] {name}",
             )
         entries[name] = entry
@@ -409,20 +412,22 @@ def _together(name: str, entry: Any, bench: Bench, values: Mapping[str, Any]) ->
             raise unknown_name(kind, choice_text(each), leaves)
         if isinstance(values[each], tuple):
             raise ParameterError(
-                f"[vary] {name}.together {each} is a table: only single numbers vary",
+                f"[vary] {name}.together {each} is a table. Only single numbers can vary",
                 name=f"[vary] {name}.together",
                 value=each,
             )
         if leaves[each].is_whole:
             raise ParameterError(
-                f"[vary] {name}.together {each} is a whole number, which keeps no ratio: vary it "
-                "by itself, or leave it as in the bench",
+                f"[vary] {name}.together {each} is a whole number, which cannot stay in "
+                "proportion. "
+                "Vary it separately, or remove it",
                 name=f"[vary] {name}.together",
                 value=each,
             )
     if given and not values.get(name):
         raise ParameterError(
-            f"[vary] {name} is zero in the bench: nothing can keep its ratio to it",
+            f"[vary] {name} is zero in the bench, so no parameter can stay in proportion to it. "
+            "Remove 'together'",
             name=f"[vary] {name}",
         )
     return tuple(given)

@@ -10,7 +10,7 @@ from bywire.usecases.declare import Ask
 if TYPE_CHECKING:
     from bywire.bench.bench import Bench
 
-LoopName = Annotated[str, Ask("Loop (see 'bywire list').", "Loop", known=("loops",))]
+LoopName = Annotated[str, Ask("Loop (see 'bywire list loops').", "Loop", known=("loops",))]
 ParameterSetName = Annotated[
     str, Ask("Parameter set, e.g. roberts2003.", "Parameter set", known=("parameter_sets",))
 ]
@@ -25,19 +25,21 @@ Changes = Annotated[
         completes="changes",
     ),
 ]
-Frequencies = Annotated[str, Ask("Frequencies, e.g. '1 Hz:150 Hz:20', or a list.", "Frequencies")]
+Frequencies = Annotated[
+    str, Ask("Frequencies, e.g. '1 Hz:150 Hz:20' or '1 Hz, 5 Hz'.", "Frequencies")
+]
 Side = Annotated[
     str,
     Ask(
-        "Side of the corner at which the point lies: above, below, or FILE:LINE=above.",
-        "Side of corners",
+        "Side of the kink on which the operating point lies: above, below, or FILE:LINE=above.",
+        "Side of kinks",
     ),
 ]
 
 BenchName = Annotated[
     "Bench | str | Path",
     Ask(
-        "Bench file (TOML), or an experiment.",
+        "Bench file (TOML) or experiment.",
         "Bench",
         metavar="BENCH",
         known=("experiments", "generic_experiments"),
@@ -56,28 +58,34 @@ BenchChanges = Annotated[Mapping[str, str], BENCH_CHANGES]
 ErrorEstimate = Annotated[
     bool,
     Ask(
-        "Repeat in other steps to estimate the numerical error.",
+        "Rerun with other step sizes to estimate the numerical error.",
         "Estimate the error",
         name="error_estimate",
     ),
 ]
 LastBenchChanges = Annotated[Mapping[str, str], replace(BENCH_CHANGES, is_last=True)]
-NeededCase = Annotated[str, Ask("Run of the experiment; required if there are several.", "Run")]
-CaseName = Annotated[str, Ask("Run of the experiment; the first by default.", "Run")]
+NeededCase = Annotated[
+    str, Ask("Run of the experiment. Required if there is more than one.", "Run")
+]
+CaseName = Annotated[str, Ask("Run of the experiment. Default: the first.", "Run")]
 OUT = Ask("Folder for recordings, figures and the report.", is_folder=True)
 LastOutFolder = Annotated[str | Path | None, replace(OUT, is_last=True)]
-ExportFolder = Annotated[str | Path, Ask("Folder of the export.", is_folder=True)]
+ExportFolder = Annotated[str | Path, Ask("Folder for the exported files.", is_folder=True)]
 
 Cases = Annotated[
     int | None,
     Ask(
-        "Number of cases, in place of the file's. A larger number extends the study, a smaller "
-        "one drops cases not yet computed.",
+        "Number of cases. Overrides the file. A larger number extends the study. A smaller "
+        "number drops cases that are not yet computed.",
         "Cases",
     ),
 ]
-Workers = Annotated[int | None, Ask("Processes; by default one per core, if worthwhile.")]
-ClusterAddress = Annotated[str, Ask("Dask scheduler that runs the cases.", metavar="ADDRESS")]
+Workers = Annotated[
+    int | None, Ask("Number of processes. Default: one per core for large studies.")
+]
+ClusterAddress = Annotated[
+    str, Ask("Address of a Dask scheduler that runs the cases.", metavar="ADDRESS")
+]
 EngineName = Annotated[str, Ask("Engine, e.g. cuda for a GPU.")]
 StudyFolder = Annotated[str | Path, Ask("Folder of the study.", metavar="FOLDER")]
 
@@ -93,14 +101,14 @@ def require_study_folder(folder: Path, **others: Any) -> None:
 STUDY_FOLDER: dict[str, Any] = {
     "before": require_study_folder,
     "writes": "folder",
-    "advice": "check that you may write there",  # its chunks are there
+    "advice": "Check that you have write permission there",  # another folder has no chunks
 }
-"""settings of commands that write into the folder of a study"""
+"""settings of commands that write into a study's folder"""
 
 TestBench = Annotated[
     "Bench | str | Path",
     Ask(
-        "Bench file (TOML), or an experiment's name.",
+        "Bench file (TOML) or experiment.",
         "Bench",
         known=("experiments", "generic_experiments"),
         offered=("benches",),
@@ -110,8 +118,8 @@ TestBench = Annotated[
 MeaningFile = Annotated[
     str | Path | None,
     Ask(
-        "Meaning of the columns (TOML).",
-        "Meaning of the columns",
+        "File that maps columns to signals (TOML).",
+        "Map of the columns",
         name="map",
         metavar="PATH",
         offered=("maps",),
@@ -129,5 +137,5 @@ Inputs = Annotated[
 ]
 Time = Annotated[
     str,
-    Ask("Time column, e.g. 'Zeit [s]', or a sample rate, '1 kHz'.", "Time", metavar="COLUMN"),
+    Ask("Time column, e.g. 'Zeit [s]', or sample rate, e.g. '1 kHz'.", "Time", metavar="COLUMN"),
 ]

@@ -1,4 +1,4 @@
-"""Test of a brake, or of a part of one, against every contract."""
+"""Test of a brake, or of one of its parts, against every contract."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 Checked = Annotated[
     str | None,
     Ask(
-        "A brake, model, experiment, element, control law or parameter set. By default what "
-        "--system loads, otherwise all.",
+        "Brake, model, experiment, element, control law or parameter set. Default: the brake "
+        "that --system loads, otherwise everything.",
         is_positional=True,
     ),
 ]
@@ -30,26 +30,25 @@ def check(
 ) -> "Check":
     """Test a brake or an element against every contract.
 
-    Elements and control laws: units, back ends, derivatives, energy, losses, round trip and ranges
-    of their parameters. Models: units, order of the step, exact rest, energy of a run, engines,
-    lanes, linear model, derivatives of a run. Experiments: the assembly, figures, stimuli and
-    signals that they name, and the key figures that they declare.
+    For elements and control laws, contracts cover units, back ends, derivatives, energy, losses,
+    and round trip and ranges of parameters. For models, they cover units, order of the step, exact
+    rest, energy of a run, engines, lanes, linear model, and derivatives of a run. For experiments,
+    they cover the assembly, figures, stimuli, signals and key figures that the experiment declares.
 
     Parameters
     ----------
     name
-        Name of a brake, a model, an experiment, an element, a control law or a parameter set. By
-        default the brake of ``system``, otherwise those loaded from files, otherwise everything
-        that is installed.
+        Name of a brake, model, experiment, element, control law or parameter set. Default: the
+        brake of ``system``, otherwise brakes loaded from files, otherwise everything installed.
     system
-        File or folder of a brake to load first; bywire executes its code.
+        File or folder of a brake to load first. bywire executes its code.
     progress
         Called with the subject of the check and the finished share, 0 to 1.
 
     Returns
     -------
     Check
-        Contracts that pass, that fail, and that could not be checked.
+        Contracts that pass, contracts that fail, and contracts that could not be checked.
 
     Raises
     ------

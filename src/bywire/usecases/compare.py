@@ -1,4 +1,4 @@
-"""Comparison of runs: result folders are read, benches and experiments are run."""
+"""Comparison of runs. bywire reads result folders, and runs benches and experiments."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 Runs = Annotated[
     "Comparable",
     Ask(
-        "Result folders of run --out, bench files, or experiments.",
+        "Result folders from run --out, bench files, or experiments.",
         "Runs",
         metavar="RUN RUN...",
         known=("experiments", "generic_experiments"),
@@ -25,8 +25,8 @@ Runs = Annotated[
 IsFull = Annotated[
     bool,
     Ask(
-        "Also show settings and key figures that are equal.",
-        "Also show what is equal",
+        "Also show equal settings and key figures.",
+        "Also show equal values",
         name="full",
     ),
 ]
@@ -52,24 +52,24 @@ def compare(
     progress: "Progress | None" = None,
     estimate_error: ErrorEstimate = True,
 ) -> "Comparison":
-    """Compare runs: settings and key figures that differ, verdicts, curves on top of each other.
+    """Compare the settings, key figures, verdicts and curves of several runs.
 
     Parameters
     ----------
     runs
-        Two or more, each a result folder (written by ``run --out`` or `BenchResult.write`), a
-        `BenchResult`, or a bench to run: a `Bench`, a bench file, an experiment's name. A result
+        Two or more runs. Each is a result folder (from ``run --out`` or `BenchResult.write`), a
+        `BenchResult`, or a bench to run: a `Bench`, a bench file or an experiment's name. A result
         folder takes precedence over an experiment of the same name.
     overrides
-        Changes of every bench that this call runs, as ``--set`` takes them.
+        Changes to each bench that this call runs, in the form of ``--set``.
     is_full
         Whether to also show equal settings and key figures.
     progress
         Called with a label and the finished share, 0 to 1.
     estimate_error
-        Whether to repeat the runs of this call in half and double steps; see `bywire.run`. Key
-        figures are not distinct if they differ by less than their numerical errors, as estimated
-        here or recorded in a result folder.
+        Whether to repeat this call's runs in half and double steps (see `bywire.run`). Key figures
+        are not distinct if they differ by less than their numerical errors, which bywire estimates
+        here or reads from a result folder.
 
     Returns
     -------

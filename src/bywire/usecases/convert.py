@@ -16,19 +16,22 @@ SourceFile = Annotated[str | Path, Ask("Measurement file.", metavar="IN")]
 TargetFile = Annotated[str | Path, Ask("File to write.", metavar="OUT")]
 Signals = Annotated[
     Sequence[str],
-    Ask("Signals to keep, e.g. 'p_mc, x_mc' or 'p_mc=Pressure [psi]'.", is_listing=True),
+    Ask("Signals to convert, e.g. 'p_mc, x_mc' or 'p_mc=Pressure [psi]'.", is_listing=True),
 ]
-Rate = Annotated[str | float | None, Ask("Resample all signals to one time axis, e.g. '1 kHz'.")]
-Method = Annotated[str, Ask("Resampling: linear (default), previous, nearest, average.")]
+Rate = Annotated[
+    str | float | None, Ask("Sample rate to which all signals are resampled, e.g. '1 kHz'.")
+]
+Method = Annotated[str, Ask("Resampling method: linear (default), previous, nearest or average.")]
 Exclude = Annotated[
     Sequence[str] | None,
-    Ask("Leave out gaps, missing (both by default), clipped; or nothing.", is_listing=True),
+    Ask(
+        "Samples to exclude: gaps, missing, clipped or nothing. Default: gaps, missing.",
+        is_listing=True,
+    ),
 ]
-MaxGap = Annotated[
-    str, Ask("Pauses up to this length are not gaps, e.g. '50 ms'; 10 steps by default.")
-]
-Format = Annotated[str, Ask("Format to write, e.g. mat73; by default from the file name's ending.")]
-Force = Annotated[bool, Ask("Replace an existing file.")]
+MaxGap = Annotated[str, Ask("Longest pause that is not a gap, e.g. '50 ms'. Default: 10 steps.")]
+Format = Annotated[str, Ask("Output format, e.g. mat73. Default: from the file name.")]
+Force = Annotated[bool, Ask("Overwrite an existing file.")]
 
 
 @use_case(Command("convert", writes=""))
@@ -47,39 +50,39 @@ def convert(
     force: Force = False,
     progress: "Progress | None" = None,
 ) -> "Conversion":
-    """Convert a measurement file: CSV, TSV, Parquet, MAT, MDF4, NetCDF.
+    """Convert a measurement file between CSV, TSV, Parquet, MAT, MDF4 and NetCDF.
 
     Parameters
     ----------
     source, target
-        File to read, and file to write: CSV, TSV, Parquet, MAT, MDF4, NetCDF.
+        File to read and file to write, each in CSV, TSV, Parquet, MAT, MDF4 or NetCDF format.
     mapping
-        File with the meaning of the columns.
+        File that maps columns to signals.
     signals
-        Signals to keep, all by default: names, columns such as ``"Pressure [psi]"``, or columns
-        with a new name, ``"p_mc=Pressure [psi]"``.
+        Signals to convert: names, columns such as ``"Pressure [psi]"``, or columns with a new name,
+        ``"p_mc=Pressure [psi]"``. Default: all.
     time
-        Time column, such as ``"Zeit [s]"``, or a sample rate. By default as the file declares it.
+        Time column, such as ``"Zeit [s]"``, or a sample rate. Default: as the file declares it.
     rate
-        Sample rate of the common time axis, for instance ``"1 kHz"`` [Hz]. By default every signal
+        Sample rate [Hz] of the common time axis, for instance ``"1 kHz"``. By default, each signal
         keeps its time axis.
     method
         Resampling method: ``linear`` (default), ``previous``, ``nearest`` or ``average``.
     exclude
-        Samples to leave out: ``gaps`` and ``missing`` (both by default), ``clipped``.
+        Samples to exclude: ``gaps``, ``missing``, ``clipped``. Default: ``gaps`` and ``missing``.
     max_gap
-        Pauses up to this length are not gaps, for instance ``"50 ms"``; 10 steps by default.
+        Longest pause that is not a gap, for instance ``"50 ms"``. Default: 10 steps.
     format
-        Format to write, for instance ``mat73``; by default from the file name's ending.
+        Output format, for instance ``mat73``. Default: from the file name's suffix.
     force
-        Whether to replace an existing file.
+        Whether to overwrite an existing file.
     progress
         Called with a label and the finished share, 0 to 1.
 
     Returns
     -------
     Conversion
-        The signals read, resampled and written, with rates in Hz and gaps in s.
+        Signals of the file, resampled if requested, with rates in Hz and gaps in s.
 
     Raises
     ------
@@ -102,7 +105,8 @@ def convert(
     for name, value in {"method": method, "exclude": left_out, "max_gap": max_gap}.items():
         if value and rate is None:
             raise ParameterError(
-                f"{option(name)} {value} is only for resampling: also give the rate, as "
+                f"{option(name)} {value} applies only to resampling. Add a sample rate, for "
+                "example "
                 f"{option('rate')} '1 kHz'",
                 name=option(name),
                 value=str(value),

@@ -1,8 +1,8 @@
 """Declare a use case by an annotated function: its command, form and public name follow from it.
 
-An argument's annotation holds its type and an `Ask`: the help of the flag, the label and hint of
-the form's field, and its completions. The first line of the docstring is the summary, which the
-help of the command, the form and the reference show. Messages name an argument by
+An argument's annotation contains its type and an `Ask`: the flag's help, the label and hint of the
+form's field, and its completions. The docstring's first line is the summary, which appears in the
+command's help, the form and the reference. Messages write an argument's name with
 `bywire.core.callers.option`.
 """
 
@@ -33,61 +33,61 @@ Kind = Literal[
     "thing",
     "things",
 ]
-"""kinds of a form's fields; see `bywire.server.field`"""
+"""kinds of form fields (see `bywire.server.field`)"""
 _EXAMPLE = re.compile(
     r"(?:e\.g\.|such as|for example|:) '([^']+)'"
     r"|(?:e\.g\.|such as|for example) (\S+?)(?=[,;.)]*(?:\s|$))"
 )
 NOTHING: Mapping[str, Any] = MappingProxyType({})
-"""default of an argument that maps names to values"""
+"""default of arguments that map names to values"""
 
 
 @dataclass(frozen=True)
 class Ask:
-    """Texts and valid values of a command's flag and of a form's field, for one argument.
+    """Texts and valid values of an argument's command flag and form field.
 
     Parameters
     ----------
     help
-        Help of the flag, hint of the field.
+        Help of the flag and hint of the field.
     label
-        Label of the field; an argument without a label has no field.
+        Label of the field. An argument without a label has no field.
     name
-        Name of flag and field, if it differs from the argument's.
+        Name of flag and field, if it differs from the argument's name.
     kind
         Kind of the field, if it does not follow from the type.
     metavar
-        Placeholder of the value in the command's help; derived from the type by default.
+        Placeholder of the value in the command's help. By default, derived from the type.
     known
-        Kinds of things whose names are valid and complete, as `bywire.overview` calls them.
+        Topics of `bywire.overview` whose names are valid and complete in the shell.
     files
-        Ending of files that are also valid, for instance ``".toml"``.
+        Suffix of files that are also valid, for instance ``".toml"``.
     offered
         Parts of `bywire.server.contents.Contents` that the form offers.
     words
         All valid words: a tuple, or a function that returns them.
     completes
-        Names that complete: ``"changes"`` or ``"parameters"`` of a bench.
+        Names to complete in the shell: ``"changes"`` or ``"parameters"`` of a bench.
     least, most
         Range of a whole number.
     ticked
-        Value that a checkbox of the form sets, in place of a field for any value.
+        Value that the form's checkbox sets, instead of a field for any value.
     is_flag
-        Whether a required argument is a flag of the command.
+        Whether a required argument is a flag in the command.
     is_positional
         Whether an argument with a default is positional in the command.
     is_listing
-        Whether a command takes a list with commas, in place of the flag several times.
+        Whether a command accepts a list with commas, instead of repeated flags.
     is_text
-        Whether a command takes a text where the function also takes a path.
+        Whether a command passes a text where the function also accepts a path.
     is_folder
-        Whether it names a folder that the command writes to.
+        Whether it is a folder that the command writes to.
     is_last
-        Whether the command lists it after all others.
+        Whether the command lists it after all other arguments.
     shown_default
-        Text for the default in the command's help; the default itself if None.
+        Text for the default in the command's help. If None, the default itself.
     panel
-        Heading of the command's help that lists it.
+        Heading in the command's help under which it appears.
     """
 
     help: str
@@ -120,31 +120,31 @@ class Ask:
 
 @dataclass(frozen=True)
 class Command:
-    """A command of a use case.
+    """Command of a use case.
 
     Parameters
     ----------
     words
         Words to type after ``bywire``.
     help
-        Its help; the summary of the use case by default.
+        Help of the command. Default: the use case's summary.
     status_1
-        End of the sentence "exit status 1 ...".
+        End of the sentence "Exits with status 1 ...".
     before
-        ``before(**asked)``: rejects invalid arguments before the folder of results is created.
+        ``before(**asked)``: rejects invalid arguments before the command creates the result folder.
     writes
-        Argument that names the folder of the result; empty if the command writes no result. The
-        command gets a flag ``--out`` if no argument is called ``out``.
+        Argument that contains the result folder. Empty if the command writes no result. The command
+        gets a flag ``--out`` if no argument is called ``out``.
     default_folder
-        ``default_folder(**asked)``: returns the folder if the user names none.
+        ``default_folder(**asked)``: returns the folder if the user specifies none.
     advice
-        Next step if the folder is not writable.
+        Advice if the folder is not writable.
     first
-        Arguments that it lists first.
+        Arguments that its help lists first.
     without
-        Arguments for which it has no flag.
+        Arguments without a flag in this command.
     required
-        Arguments that the command requires although the function has a default, with their help.
+        Arguments with a default that this command nevertheless requires, with their help.
     """
 
     words: str
@@ -161,22 +161,22 @@ class Command:
 
 @dataclass(frozen=True)
 class Form:
-    """The form of a use case in ``bywire serve``.
+    """Form of a use case in ``bywire serve``.
 
     Parameters
     ----------
     title, action
         Heading, and label of the button.
     subject
-        Field that names the result's folder.
+        Field from which the result's folder gets its name.
     name
-        Name of the task; the words of the command by default.
+        Name of the task. Default: the words of the command.
     fields
-        Fields in their order; default: all arguments with a label.
+        Fields in their order. Default: all arguments with a label.
     is_listed
         Whether the start page links to a separate page for it.
     is_kept
-        Whether a repeated subject continues in the same folder.
+        Whether another run of the same subject continues in its folder.
     is_file
         Whether ``out`` is a file that the use case writes itself.
     """
@@ -193,18 +193,18 @@ class Form:
 
 @dataclass(frozen=True)
 class Argument:
-    """An argument of a use case.
+    """Argument of a use case.
 
     Parameters
     ----------
     argument
-        Its name in Python.
+        Name in Python.
     ask
         Texts and valid values of flag and field.
     type, default
         From the function's signature.
     is_many
-        Whether it takes any number of positional arguments.
+        Whether it accepts any number of positional arguments.
     """
 
     argument: str
@@ -230,18 +230,18 @@ class Argument:
 
     @property
     def is_positional(self) -> bool:
-        """Whether a command takes it without a flag."""
+        """Whether a command accepts it without a flag."""
         return self.is_many or self.ask.is_positional or (self.is_required and not self.ask.is_flag)
 
     @property
     def is_path(self) -> bool:
-        """Whether a command takes a path."""
+        """Whether its value in a command is a path."""
         names = str(self.type)
         return "Path" in names and not self.ask.is_text
 
     @property
     def kind(self) -> Kind:
-        """Kind of the field; a command reads its flag likewise, except for `ticked`."""
+        """Kind of the field. A command reads its flag the same way, except for `ticked`."""
         ask, outer = self.ask, get_origin(self.type)
         if ask.kind is not None:
             return ask.kind
@@ -263,12 +263,12 @@ class Argument:
 
 @dataclass(frozen=True)
 class UseCase:
-    """A use case as declared; see `use_case`.
+    """Declared use case (see `use_case`).
 
     Parameters
     ----------
     public, function
-        The public function, and the one that command and form call, usually the same.
+        The public function, and the function that command and form call. They are usually the same.
     arguments
         Arguments of command and form.
     commands, form, check, holds
@@ -297,14 +297,14 @@ class UseCase:
         return (inspect.getdoc(self.public) or "").partition("\n")[0]
 
     def call(self, asked: Mapping[str, Any], **more: Any) -> Any:
-        """Call the function with the values of fields by name, and with further arguments."""
+        """Call the function with the fields' values by name, and with additional arguments."""
         others = {name: value for name, value in more.items() if name in self.takes}
         given = {a.argument: asked[a.name] for a in self.arguments if a.name in asked}
         many = [value for a in self.arguments if a.is_many for value in given.pop(a.argument, ())]
         return self.function(*many, **given, **others)
 
     def read(self, asked: Mapping[str, Any]) -> Any:
-        """Check the values of fields by name, without computing anything.
+        """Check the fields' values by name, without computing anything.
 
         Raises
         ------
@@ -332,22 +332,22 @@ def use_case(
     holds: Callable[[Path, Any], bool] | None = None,
     asked: Callable[..., Any] | None = None,
 ) -> Callable[[Callable[Asked, Given]], Callable[Asked, Given]]:
-    """Declare a use case; its function checks its arguments and emits the result's warnings.
+    """Declare a use case, whose function checks its arguments and emits the result's warnings.
 
     Parameters
     ----------
     commands
-        Commands, each a `Command` or the words after ``bywire``.
+        Commands, each as a `Command` or as the words after ``bywire``.
     form
-        Its form.
+        Form of the use case.
     check
-        ``check(...)``: reads any of the arguments and computes nothing.
+        ``check(...)``: reads any of the arguments, and computes nothing.
     holds
-        ``holds(folder, read)``: returns whether a folder holds results of what ``check`` read, so
-        that the command can continue there.
+        ``holds(folder, read)``: returns whether a folder contains results for the value that
+        ``check`` returned, so that the command can continue there.
     asked
-        Function that command and form call, with the arguments they offer; the public function by
-        default.
+        Function that command and form call, with the arguments that they offer. Default: the public
+        function.
     """
 
     def declare(function: Callable[Asked, Given]) -> Callable[Asked, Given]:

@@ -1,4 +1,4 @@
-"""Gains of a loop from requirements."""
+"""Design of a loop's gains from requirements."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -14,37 +14,37 @@ if TYPE_CHECKING:
 
 Required = Annotated[
     Sequence[str],
-    Ask("Requirement, e.g. 'bandwidth >= 10 Hz'; may be repeated.", "Requirements"),
+    Ask("Requirement, e.g. 'bandwidth >= 10 Hz'. Repeatable.", "Requirements"),
 ]
-RequirementsFile = Annotated[str | Path | None, Ask("TOML file with a section 'requirements'.")]
+RequirementsFile = Annotated[str | Path | None, Ask("TOML file with a section [requirements].")]
 Ranges = Annotated[
     Sequence[str],
-    Ask("Range to cover also, e.g. motor.R_m=0.2ohm:0.6ohm:5 or at=5bar:35bar:7.", "Ranges"),
+    Ask("Range that the gains must cover, e.g. at=5bar:35bar:7. Repeatable.", "Ranges"),
 ]
 SineAmplitudes = Annotated[
-    str, Ask("Amplitudes of the sines on the bench, e.g. '1 bar, 3 bar'.", "Amplitudes")
+    str, Ask("Amplitudes of the bench's sine tests, e.g. '1 bar, 3 bar'.", "Amplitudes")
 ]
 Schedule = Annotated[
-    bool, Ask("Schedule gains by region; --at lists the points of all regions.", "Gains by region")
+    bool, Ask("Schedule gains by region. --at lists one point per region.", "Gains by region")
 ]
-LinearOnly = Annotated[bool, Ask("Skip the nonlinear bench.", "Linear only (faster)")]
+LinearOnly = Annotated[bool, Ask("Skip the test on the nonlinear bench.", "Linear only (faster)")]
 FreeDerivative = Annotated[
     bool,
-    Ask("Allow a derivative filter faster than the sampling, and differentiate the set point."),
+    Ask("Let the derivative filter be faster than the sampling and act on the set point."),
 ]
 DrawnFrom = Annotated[
     str | Path,
     Ask(
-        "Study file: draw models as it draws cases, and judge the gains by further models.",
+        "Study file whose distributions bywire uses to draw models for the design.",
         metavar="FILE",
         is_text=True,
     ),
 ]
-Drawn = Annotated[int, Ask("Models drawn for the gains.")]
+Drawn = Annotated[int, Ask("Number of models to draw for the design.")]
 Probability = Annotated[
-    str, Ask("Probability to meet all requirements, e.g. '99 %'; needs --vary.")
+    str, Ask("Required probability of meeting all requirements, e.g. '99 %'. Needs --vary.")
 ]
-Seed = Annotated[int, Ask("Random seed of the searches.", least=0)]
+Seed = Annotated[int, Ask("Random seed of the search.", least=0)]
 
 
 def _read(loop: str, parameters: str, overrides: Mapping[str, Any], side: str) -> None:
@@ -95,38 +95,38 @@ def design(
     progress: "Progress | None" = None,
     side: Side = "",
 ) -> "LoopDesign | LoopScheduleDesign":
-    """Choose a loop's gains from requirements.
+    """Design a loop's gains from requirements.
 
     Parameters
     ----------
     loop, parameters, at, overrides
-        See `bywire.margins`. A parameter that is set is fixed. With ``schedule``, ``at`` lists the
-        points of all regions.
+        See `bywire.margins`. A parameter that you set is fixed. With ``schedule``, ``at`` lists
+        one point for each region.
     require
         Requirements, for instance ``"bandwidth >= 10 Hz"``.
     requirements
         TOML file with a section ``requirements``.
     over
-        Ranges to cover also, ``"NAME=LOW:HIGH:COUNT"`` each.
+        Ranges that the gains must also cover, each as ``"NAME=LOW:HIGH:COUNT"``.
     amplitudes
-        Amplitudes of the sines on the bench, with units and commas. By default those that the loop
-        declares.
+        Amplitudes of the bench's sine tests, with units, separated by commas. Default: those that
+        the loop declares.
     schedule
         Whether to schedule the gains by region.
     linear_only
-        Whether to skip the nonlinear bench.
+        Whether to skip the test on the nonlinear bench.
     free_derivative
-        Whether the derivative's filter may be faster than the sampling and act on the set point.
-        The figures get better, but the gains are hardly suitable for an ECU.
+        Whether the derivative filter may be faster than the sampling and act on the set point. The
+        figures improve, but such gains are rarely suitable for an ECU.
     vary
-        Study file. The gains are chosen for models drawn as its cases are, and judged by further
-        models.
+        Study file. bywire draws models from its distributions, chooses the gains for these models,
+        and judges them on additional models.
     drawn
-        Number of models drawn to choose the gains.
+        Number of models to draw for choosing the gains.
     probability
-        Required probability to meet all requirements together, for instance ``"99 %"``.
+        Required probability of meeting all requirements together, for instance ``"99 %"``.
     seed
-        Random seed of the searches.
+        Random seed of the search.
     progress
         Called with a label and the finished share, 0 to 1.
     side
@@ -135,8 +135,8 @@ def design(
     Returns
     -------
     LoopDesign or LoopScheduleDesign
-        Gains in SI units, the figures they achieve, the binding requirement, and the results on
-        the nonlinear bench.
+        Gains in SI units, the achieved figures, the binding requirement, and the results on the
+        nonlinear bench.
 
     Raises
     ------
@@ -151,8 +151,9 @@ def design(
     whole_number("seed", seed, 0, 2**63 - 1)
     if schedule and vary:
         raise ParameterError(
-            "give either schedule or vary: bywire cannot choose gains by region for drawn models",
+            "use either schedule or vary, not both. bywire cannot schedule gains for drawn models",
             name="schedule",
+            value="True",
         )
     sizes = None if linear_only else amplitudes
     if schedule:

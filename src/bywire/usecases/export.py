@@ -12,20 +12,21 @@ if TYPE_CHECKING:
     from bywire.api.exports import BenchPage, ControllerExport, ExportedFmu, ExportedWasm
     from bywire.core.typing import Progress
 
-Precision = Annotated[str, Ask("Floating-point precision of the C: double, or single.")]
-Vectors = Annotated[int, Ask("Test vectors per task.")]
+Precision = Annotated[str, Ask("Floating-point precision of the C code: double or single.")]
+Vectors = Annotated[int, Ask("Number of test vectors per task.")]
 IsChecked = Annotated[
     bool,
     Ask(
-        "Run the C here and on emulated Cortex-M3, M4F and M7, in both precisions; exit status 1 "
-        "if a bit differs."
+        "Run the C code on this machine and on emulated Cortex-M3, M4F and M7, in both "
+        "precisions. Exits with status 1 if a bit differs."
     ),
 ]
-Bus = Annotated[bool, Ask("Also describe the ECU's memory for a CAN bus.")]
+Bus = Annotated[bool, Ask("Also write a description of the ECU's memory for a CAN bus (DBC).")]
 Prefix = Annotated[
     str,
     Ask(
-        "Prefix of files and symbols, so that several ECUs link into one program.",
+        "Prefix of file and symbol names. Different prefixes let several ECUs link into one "
+        "program.",
         shown_default="the model's name",
     ),
 ]
@@ -43,30 +44,31 @@ def export_controller(
     dbc: Bus = False,
     name: Prefix = "",
 ) -> "ControllerExport":
-    """Write the ECU as readable C99 with parameters, test vectors and a harness.
+    """Export the ECU as readable C99 with parameters, test vectors and a test harness.
 
     Parameters
     ----------
     bench
-        Bench, bench file, or name of an experiment. The ECU gets its parameters and options; of
-        several cases, those of the first. The export ignores faults of the bench.
+        Bench, bench file, or name of an experiment. The ECU uses the bench's parameters and
+        options, or those of the first case if there are several. The export ignores the bench's
+        faults.
     out
-        Folder, created if missing. The export replaces files of an earlier export in it.
+        Folder, created if missing. The export overwrites the files of an earlier export there.
     overrides
-        Changes of a bench file or experiment, as ``--set`` takes them.
+        Changes to a bench file or experiment, in the form of ``--set``.
     precision
         ``"double"``, bit-identical to Python, or ``"single"``.
     vectors
-        Test vectors per task.
-    check
-        Whether to compile the C in both precisions, run it on the vectors, compare it bit for bit,
-        and measure it. This happens on this machine and on Cortex-M3, M4F and M7, if
+        Number of test vectors per task.
+        check
+        Whether to compile the C code in both precisions, run it on the vectors, compare it bit for
+        bit, and measure it. bywire does this on this machine, and also on Cortex-M3, M4F and M7 if
         arm-none-eabi-gcc and qemu-system-arm are installed.
     dbc
-        Whether to describe the memory as signals of a CAN bus, with C that fills the messages.
+        Whether to describe the memory as signals of a CAN bus, with C code that fills the messages.
     name
-        Prefix of files and symbols, a C identifier; the model's name by default. ECUs with
-        different names link into one program.
+        Prefix of file and symbol names, a C identifier. Default: the model's name. ECUs with
+        different prefixes link into one program.
 
     Returns
     -------
@@ -78,7 +80,7 @@ def export_controller(
     ParameterError
         If the name is not a valid C identifier.
     ModelError
-        If an operation cannot be translated, with its file and line.
+        If bywire cannot translate an operation, with its file and line.
     FileError
         If the folder is not writable.
     CompilerError
@@ -122,13 +124,14 @@ def export_controller(
 # --- A bench's model as a functional mock-up unit
 
 Part = Annotated[
-    str, Ask("Part: brake, plant or ecu.", shown_default="brake; plant for model-exchange")
+    str,
+    Ask("Part to export: brake, plant or ecu.", shown_default="brake, or plant for model-exchange"),
 ]
-UnitKind = Annotated[str, Ask("Kind: co-simulation, or model-exchange of the plant.")]
+UnitKind = Annotated[str, Ask("Kind of unit: co-simulation, or model-exchange (plant only).")]
 Version = Annotated[int, Ask("FMI version: 2 or 3.")]
 Targets = Annotated[
     Sequence[str],
-    Ask("Target platform, e.g. linux64 or win64; may be repeated.", name="target"),
+    Ask("Target platform, e.g. linux64 or win64. Repeatable.", name="target"),
 ]
 
 
@@ -145,43 +148,44 @@ def export_fmu(
     targets: Targets = (),
     progress: "Progress | None" = None,
 ) -> "ExportedFmu":
-    """Write a functional mock-up unit for co-simulation or model exchange.
+    """Export a functional mock-up unit (FMU) for co-simulation or model exchange.
 
     Parameters
     ----------
     bench
         A `Bench`, the path of a bench file, or the name of an experiment.
     out
-        Folder for the file ``NAME_PART.fmu``; an existing file is replaced.
+        Folder for the file ``NAME_PART.fmu``. An existing file is overwritten.
     overrides
-        Changes of a bench file or experiment, as ``--set`` takes them.
+        Changes to a bench file or experiment, in the form of ``--set``.
     part
-        ``"brake"``: everything; ``"plant"``: its inputs are the ECU's outputs, its outputs are the
-        ECU's readings; ``"ecu"``: the reverse. By default the brake; for model exchange the plant.
+        ``"brake"`` exports everything. ``"plant"`` has the ECU's outputs as inputs and the ECU's
+        readings as outputs. ``"ecu"`` is the reverse. Default: the brake, or the plant for model
+        exchange.
     kind
-        ``"co-simulation"``: the unit steps by itself, as the bench does; ``"model-exchange"``: the
-        plant for a client's solver, with derivatives, event indicators and modes.
+        ``"co-simulation"`` is a unit with the bench's own solver. ``"model-exchange"`` is the plant
+        for a client's solver, with derivatives, event indicators and modes.
     fmi
-        FMI version: 2 for 2.0, 3 for 3.0 (tasks are clocks, tables are arrays).
+        FMI version: 2 for 2.0, or 3 for 3.0, in which tasks are clocks and tables are arrays.
     case
-        Run of the experiment to export; optional if there is only one.
+        Run of the experiment to export. Optional if there is only one.
     targets
         Platforms of the binaries: ``linux64``, ``win64``, ``darwin64``, ``aarch64-linux``,
-        ``aarch64-darwin``; by default the platform of this machine.
+        ``aarch64-darwin``. Default: the platform of this machine.
     progress
         Called with a label and the finished share, 0 to 1.
 
     Returns
     -------
     ExportedFmu
-        The file and its contents; all values in it are SI.
+        The file and its contents. All values in it are in SI units.
 
     Raises
     ------
     InputError
         If the bench cannot be exported, or the file cannot be written.
     CompilerError
-        If a platform has no compiler here, or the compiler fails.
+        If this machine has no compiler for a platform, or the compiler fails.
     """
     from bywire.api.exports import ExportedFmu, export_folder
     from bywire.api.run import bench_of
@@ -197,8 +201,8 @@ def export_fmu(
         raise unknown_name("part", part, PARTS)
     if kind == "model-exchange" and part != "plant":
         raise ParameterError(
-            f"part = {part!r}: model exchange supports only the plant, because the ECU runs in "
-            "ticks; export the ECU separately, for co-simulation",
+            f"part = {part!r} is not valid: for model exchange it must be 'plant', because the ECU "
+            "runs in ticks. Export the ECU separately for co-simulation",
             name="part",
             value=repr(part),
             valid="plant",
@@ -227,24 +231,24 @@ def export_wasm(
     *,
     case: NeededCase = "",
 ) -> "ExportedWasm":
-    """Write a run as WebAssembly with a loader: parameters in, recording out.
+    """Export a run as a WebAssembly function from parameters to a recording, with a loader.
 
     Parameters
     ----------
     bench
         A `Bench`, the path of a bench file, or the name of an experiment.
     out
-        Folder of the files; existing files are replaced.
+        Folder for the files. Existing files are overwritten.
     overrides
-        Changes of a bench file or experiment, as ``--set`` takes them.
+        Changes to a bench file or experiment, in the form of ``--set``.
     case
-        Run of the experiment to export; optional if there is only one.
+        Run of the experiment to export. Optional if there is only one.
 
     Returns
     -------
     ExportedWasm
-        The files: ``NAME.wasm``, ``NAME.json`` (parameters, signals, stimulus, all SI), and the
-        loader ``bywire.mjs`` with its types.
+        The files: ``NAME.wasm``, ``NAME.json`` (parameters, signals and stimulus in SI units), and
+        the loader ``bywire.mjs`` with its types.
 
     Raises
     ------
@@ -275,11 +279,11 @@ def export_wasm(
 
 # --- A bench as one page that anyone can open
 
-PageFile = Annotated[str | Path, Ask("File of the page (.html).", is_flag=True)]
+PageFile = Annotated[str | Path, Ask("HTML file to write (.html).", is_flag=True)]
 Sliders = Annotated[
     Sequence[str],
     Ask(
-        "Parameter at the top of the page; may be repeated.",
+        "Parameter to show at the top of the page. Repeatable.",
         completes="parameters",
     ),
 ]
@@ -299,21 +303,21 @@ def page(
     vary: Sliders = (),
     case: NeededCase = "",
 ) -> "BenchPage":
-    """Write a bench as one interactive HTML file: move parameters, and the curves follow.
+    """Write a bench as one interactive HTML file that updates its curves as you move parameters.
 
     Parameters
     ----------
     bench
         A `Bench`, the path of a bench file, or the name of an experiment.
     out
-        File of the page (.html); an existing file is replaced.
+        File of the page (.html). An existing file is overwritten.
     overrides
-        Changes of a bench file or experiment, as ``--set`` takes them.
+        Changes to a bench file or experiment, in the form of ``--set``.
     vary
-        Parameters at the top of the page. By default those that the bench changes, otherwise
-        those that its brake declares (`bywire.authoring.Sliders`).
+        Parameters at the top of the page. Default: those that the bench changes, otherwise those
+        that its brake declares (`bywire.authoring.Sliders`).
     case
-        Run of the experiment that the page computes; optional if there is only one.
+        Run of the experiment that the page computes. Optional if there is only one.
 
     Returns
     -------
@@ -351,7 +355,7 @@ def page(
             raise unknown_name("parameter", name, used)
         if name not in used:
             raise ParameterError(
-                f"{name} has no effect in this bench: leave it out of vary", name=name
+                f"{name} has no effect in this bench. Remove it from vary", name=name
             )
     result = run(bench)
     panels = shown_panels(result.recordings[made.case.label])

@@ -1,4 +1,4 @@
-"""Parameters with their confidence, from measured or simulated experiments."""
+"""Identification of parameters with their confidence from measured or simulated experiments."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -26,8 +26,10 @@ if TYPE_CHECKING:
     from bywire.core.typing import Progress
     from bywire.identification.question import Question
 
-_ANY_BENCH = "Methods of any bench"
-MethodName = Annotated[str, Ask("Method (see 'bywire list').", "Method", known=("methods",))]
+_ANY_BENCH = "Methods for any bench"
+MethodName = Annotated[
+    str, Ask("Method (see 'bywire list methods').", "Method", known=("methods",))
+]
 Measurements = Annotated[
     Sequence[Path],
     Ask(
@@ -49,27 +51,28 @@ MethodOptions = Annotated[
 ]
 Starts = Annotated[
     int | None,
-    Ask("Starts of the search: 16, or 1 with --study.", "Starts of the search", least=1),
+    Ask("Number of search starts. Default: 16, or 1 with --study.", "Search starts", least=1),
 ]
 Seed = Annotated[
-    int, Ask("Seed of the starts, or first seed of --study.", "Seed of the starts", least=0)
+    int, Ask("Random seed of the starts, or first seed of --study.", "Seed of the starts", least=0)
 ]
 Synthetic = Annotated[
     int | None,
     Ask(
-        "Identify a simulated measurement instead.",
+        "Use a simulated measurement with this seed instead of a file.",
         "Simulated measurement",
         metavar="SEED",
         least=0,
     ),
 ]
 Experiments = Annotated[
-    int | None, Ask("Test the method on many simulated measurements.", metavar="COUNT", least=2)
+    int | None,
+    Ask("Test the method on this many simulated measurements.", metavar="COUNT", least=2),
 ]
 AnyBench = Annotated[
     Path | None,
     Ask(
-        "Bench file (TOML), or an experiment's name.",
+        "Bench file (TOML) or experiment.",
         "Bench",
         known=("experiments", "generic_experiments"),
         offered=("benches",),
@@ -79,7 +82,7 @@ AnyBench = Annotated[
 NoisyOutputs = Annotated[
     Mapping[str, str],
     Ask(
-        "Measured output, with column and noise: 'p_mc=Pressure [psi] +- 0.02 bar'.",
+        "Measured output with column and noise, e.g. 'p_mc=Pressure [psi] +- 0.02 bar'.",
         "Outputs",
         name="output",
         kind="names",
@@ -90,7 +93,7 @@ NoisyOutputs = Annotated[
 Unknowns = Annotated[
     Mapping[str, str],
     Ask(
-        "Unknown to estimate, e.g. 'motor.R_m=0.1..1 ohm' or offset.i_meas.",
+        "Unknown to estimate, e.g. 'motor.R_m=0.1..1 ohm' or 'offset.i_meas'.",
         "Unknowns",
         name="unknown",
         kind="names",
@@ -122,7 +125,7 @@ States = Annotated[
 Loss = Annotated[
     str,
     Ask(
-        "Loss: linear, soft_l1, huber or cauchy.",
+        "Loss function: linear, soft_l1, huber or cauchy.",
         "Loss",
         words=("linear", "soft_l1", "huber", "cauchy"),
         panel=_ANY_BENCH,
@@ -131,7 +134,7 @@ Loss = Annotated[
 Holdout = Annotated[
     Path | None,
     Ask(
-        "Measurement for validation, excluded from the fit.",
+        "Measurement for validation. The fit does not use it.",
         "Measurement for validation",
         kind="file",
         panel=_ANY_BENCH,
@@ -165,7 +168,7 @@ def _asked(
 ) -> "Identification | TrustStudy":
     """Identify parameters, or test a method on many simulated experiments.
 
-    A command takes the fields of a `Question` one by one.
+    The command has one flag for each field of a `Question`.
     """
     from bywire.api.trust import trust
     from bywire.identification.question import Question
@@ -192,14 +195,15 @@ def _asked(
         )
     if measurements or synthetic is not None:
         raise ParameterError(
-            f"{method}: give only one of measurement files, {option('synthetic')} SEED, "
+            f"{method} accepts only one of measurement files, {option('synthetic')} SEED, or "
             f"{option('study')} COUNT",
             name=option("study"),
+            value=str(study),
         )
     for name, value in {"mapping": mapping, "time": time or None, "holdout": holdout}.items():
         if value is not None:
             raise ParameterError(
-                f"{option(name)} is only for measurement files: leave it out", name=option(name)
+                f"{option(name)} applies only to measurement files. Remove it", name=option(name)
             )
     return trust(method, study, starts=starts or 1, **shared)
 
@@ -256,28 +260,30 @@ def identify(
     Parameters
     ----------
     method
-        Name of the method, see ``bywire list``.
+        Name of the method (see ``bywire list methods``).
     measurements
-        One measurement, or several records of it: files, or results of `bywire.read_measurement`.
+        One measurement, or several records of it, as files or results of
+        `bywire.read_measurement`.
     parameters, overrides
-        Parameter set at which the search begins (by default the main one of the method's brake),
-        and changes of it: SI numbers, or texts with units.
+        Parameter set at which the search starts (default: the main one of the method's brake), and
+        changes to it as SI numbers or texts with units.
     question
-        For methods of any bench: the bench, the measured outputs, and the unknowns. For a method of
-        one brake, ``outputs`` may name the columns of its signals.
+        For methods for any bench: the bench, the measured outputs and the unknowns. For a method of
+        a single brake, ``outputs`` may specify the columns of its signals.
     mapping
-        File with the meaning of the columns of measurement files.
+        File that maps columns of measurement files to signals.
     time
-        Time column, such as ``"Zeit [s]"``, or a sample rate. By default as the file declares it.
+        Time column, such as ``"Zeit [s]"``, or a sample rate. Default: as the file declares it.
     options
-        Options of the method: SI numbers, or texts with units.
+        Options of the method as SI numbers or texts with units.
     starts, seed
-        Starts of the search, and the seed of all but the first.
+        Number of search starts, and the random seed of all starts except the first.
     synthetic
-        Seed of a simulated measurement, in place of a measured one.
+        Seed of a simulated measurement, to use instead of a real one.
     folder
-        Folder of the result. A folder with the result of another method is rejected, an earlier
-        result is removed. Finished starts stay there, so that an interrupted search can continue.
+        Folder of the result. bywire rejects a folder with another method's result, and removes an
+        earlier result of the same method. It saves finished starts there, so that an interrupted
+        search can continue.
     progress
         Called with a label and the finished share, 0 to 1.
 

@@ -45,30 +45,30 @@ def margins(
     *,
     side: Side = "",
 ) -> "Margins":
-    """Compute margins and bandwidth of a sampled loop, and the worst case over a range.
+    """Compute a sampled loop's margins and bandwidth, and the worst case over a range.
 
     Parameters
     ----------
     loop
         Name of the loop.
     parameters
-        Parameter set; the main one of the loop's brake by default.
+        Parameter set. Default: the main one of the loop's brake.
     at
-        Operating point with its unit, for instance ``"20 bar"``. By default the loop's nominal one.
+        Operating point with its unit, for instance ``"20 bar"``. Default: the loop's nominal point.
     overrides
-        Other parameters by dotted name: SI numbers, or texts with units.
+        Changes of parameters by dotted name, as SI numbers or texts with units.
     over
-        Range, for instance ``"motor.R_m=0.2 ohm:0.6 ohm:9"``, or ``"at=5 bar:35 bar:7"``.
+        Range, for instance ``"motor.R_m=0.2 ohm:0.6 ohm:9"`` or ``"at=5 bar:35 bar:7"``.
     side
-        Side of a corner to take if the operating point lies on one: ``"above"``, ``"below"``, or
-        for single operations ``"FILE:LINE=above"``, with commas. Without it, a point on a corner
-        is rejected if the linear models of both sides differ.
+        Side of a kink to use if the operating point lies on one: ``"above"``, ``"below"``, or
+        ``"FILE:LINE=above"`` for single operations, separated by commas. Without a side, bywire
+        rejects such a point if the linear models of both sides differ.
 
     Returns
     -------
     Margins
-        Gain margins as factors, phase margin in degree, crossover and bandwidth in Hz, delay margin
-        in s: at the operating point, or at each value of the range, with the worst case.
+        Gain margins as factors, phase margin in degrees, crossover and bandwidth in Hz, delay
+        margin in s, at the operating point or at each value of the range, with the worst case.
 
     Raises
     ------
@@ -94,22 +94,20 @@ LoopOrPlant = Annotated[
     str, Ask("Loop or plant (see 'bywire list').", "Loop", name="loop", known=("loops", "plants"))
 ]
 LocusRange = Annotated[
-    str, Ask("Root locus over a range, e.g. motor.R_m=0.1ohm:1ohm:71.", "Root locus")
+    str, Ask("Range of a root locus, e.g. motor.R_m=0.1ohm:1ohm:71.", "Root locus")
 ]
-Reduce = Annotated[
-    str, Ask("Reduce the model to an order, e.g. 4, or a band, e.g. '150 Hz'.", "Reduce")
-]
+Reduce = Annotated[str, Ask("Order (e.g. 4) or band (e.g. '150 Hz') of a reduced model.", "Reduce")]
 FrictionKind = Annotated[
     str,
     Ask(
-        "Dry friction of a plant: removed (as in loops), sliding, or stuck.",
+        "Dry friction of a plant: removed (as in loops), sliding or stuck.",
         "Dry friction",
         words=("removed", "sliding", "stuck"),
     ),
 ]
-Speed = Annotated[str, Ask("Motor speed for sliding, e.g. '5 rad/s'.", "Speed")]
+Speed = Annotated[str, Ask("Motor speed for sliding friction, e.g. '5 rad/s'.", "Speed")]
 Dither = Annotated[
-    bool, Ask("Also linearize about the motion under dither, with friction.", "Under dither")
+    bool, Ask("Also linearize about the loop's motion under dither, with friction.", "Under dither")
 ]
 
 
@@ -165,18 +163,18 @@ def linearize(
     dither: Dither = False,
     side: Side = "",
 ) -> "LinearizedLoop | LinearizedPlant | PlantLocus":
-    """Derive the exact linear model of a closed loop, with its sampling, or of a plant.
+    """Derive the exact linear model of a sampled closed loop or of a plant.
 
     Parameters
     ----------
     name
         Name of a loop or of a plant.
     parameters
-        Parameter set; the main one of its brake by default.
+        Parameter set. Default: the main one of the loop's or plant's brake.
     at
-        Operating point with its unit, for instance ``"20 bar"``. By default the loop's nominal one.
+        Operating point with its unit, for instance ``"20 bar"``. Default: the loop's nominal point.
     overrides
-        Other parameters by dotted name: SI numbers, or texts with units.
+        Changes of parameters by dotted name, as SI numbers or texts with units.
     locus
         Range of the root locus, ``"NAME=LOW:HIGH:COUNT"``.
     reduce
@@ -184,14 +182,14 @@ def linearize(
     friction, speed
         For a plant: ``"removed"``, ``"sliding"`` or ``"stuck"``, and the motor speed for sliding.
     dither
-        For a loop: whether to linearize also about its motion under dither, with friction.
+        For a loop: whether to also linearize about its motion under dither, with friction.
     side
         See `bywire.margins`.
 
     Returns
     -------
     LinearizedLoop, LinearizedPlant or PlantLocus
-        The linear model in SI units, with its poles in 1/s; over a range only the poles.
+        The linear model in SI units, with its poles in 1/s. Over a range, only the poles.
 
     Raises
     ------
@@ -214,13 +212,13 @@ Amplitudes = Annotated[str, Ask("Amplitudes, e.g. '0.5 rad, 1 rad'.", "Amplitude
 Excitation = Annotated[
     str,
     Ask(
-        "sine (one frequency at a time), multisine, or chirp.",
+        "Excitation: sine (one frequency at a time), multisine or chirp.",
         "Excitation",
         words=_EXCITATIONS,
     ),
 ]
 BandwidthRange = Annotated[
-    str, Ask("Range of a parameter for bandwidths, e.g. motor.R_m=0.2ohm:0.6ohm:5.", "Range")
+    str, Ask("Range over which to compute bandwidths, e.g. motor.R_m=0.2ohm:0.6ohm:5.", "Range")
 ]
 
 
@@ -262,32 +260,33 @@ def frequency_response(
     estimate_error: ErrorEstimate = True,
     side: Side = "",
 ) -> "FrequencyResponse":
-    """Measure a closed loop's response by amplitude: friction, limits and sampling included.
+    """Measure a closed loop's response by amplitude, including friction, limits and sampling.
 
     Parameters
     ----------
     loop, parameters, at, overrides
         See `bywire.margins`.
     frequencies
-        ``"1 Hz:150 Hz:20"``, or a list with commas. By default twenty over the loop's band.
+        Frequencies as ``"1 Hz:150 Hz:20"`` or separated by commas. Default: twenty over the loop's
+        band.
     amplitudes
-        Amplitudes with their unit and commas. By default those that the loop declares.
+        Amplitudes with units, separated by commas. Default: those that the loop declares.
     excitation
         ``"sine"`` (one frequency at a time), ``"multisine"``, or ``"chirp"``.
     over
-        Range of a parameter for bandwidths, ``"NAME=LOW:HIGH:COUNT"``.
+        Range of a parameter over which to compute bandwidths, ``"NAME=LOW:HIGH:COUNT"``.
     progress
         Called with a label and the finished share, 0 to 1.
     estimate_error
-        Whether to repeat the measurement in half steps. Gain, phase and bandwidths then come with
-        their numerical error (``NAME_step_error`` in ``data``).
+        Whether to repeat the measurement in half steps. ``data`` then contains the numerical error
+        of gain, phase and bandwidths (``NAME_step_error``).
     side
         Side of the linear models; see `bywire.margins`.
 
     Returns
     -------
     FrequencyResponse
-        Gain and phase [degree] by frequency [Hz] and amplitude [SI], with bandwidths in Hz.
+        Gain and phase [degrees] by frequency [Hz] and amplitude [SI], with bandwidths in Hz.
 
     Raises
     ------
@@ -319,7 +318,7 @@ def frequency_response(
 
 _AGREEMENT_POINTS = 6
 TwoAmplitudes = Annotated[
-    str, Ask("A small and a large amplitude, e.g. '0.001 rad, 1 rad'.", "Amplitudes")
+    str, Ask("Small and large amplitude, e.g. '0.001 rad, 1 rad'.", "Amplitudes")
 ]
 
 
@@ -356,16 +355,17 @@ def agreement(
     progress: "Progress | None" = None,
     side: Side = "",
 ) -> "LoopAgreement":
-    """Attribute the nonlinearity of a loop to its causes, one by one.
+    """Attribute a loop's nonlinearity to its causes, one by one.
 
     Parameters
     ----------
     loop, parameters, at, overrides
         See `bywire.margins`.
     frequencies
-        ``"1 Hz:150 Hz:20"``, or a list with commas. By default six over the loop's band.
+        Frequencies as ``"1 Hz:150 Hz:20"`` or separated by commas. Default: six over the loop's
+        band.
     amplitudes
-        A small and a large one, ``"0.001 rad, 1 rad"``. By default those that the loop declares.
+        Small and large amplitude, ``"0.001 rad, 1 rad"``. Default: those that the loop declares.
     progress
         Called with a label and the finished share, 0 to 1.
     side
@@ -374,8 +374,8 @@ def agreement(
     Returns
     -------
     LoopAgreement
-        Differences of the loop's responses by cause: frequencies in Hz, gains, phases in degree,
-        shares of the difference in percent.
+        Differences between the loop's responses by cause: frequencies in Hz, gains, phases in
+        degrees, shares of the difference in percent.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""A package for your own brake."""
+"""Package for your own brake."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -12,21 +12,21 @@ BrakeName = Annotated[str, Ask("Name of the brake, e.g. my-brake.")]
 ProjectFolder = Annotated[
     str | Path,
     Ask(
-        "Parent folder of the new package; by default the current one.", name="out", is_folder=True
+        "Parent folder of the new package. Default: the current folder.", name="out", is_folder=True
     ),
 ]
 
 
 @use_case(Command("new", writes=""))
 def new(name: BrakeName, folder: ProjectFolder = ".") -> "NewBrake":
-    """Write a package for your own brake, with tests, that passes bywire check.
+    """Create a package for your own brake, with tests, that passes 'bywire check'.
 
     Parameters
     ----------
     name
         Name of the brake: lowercase letters, digits and single dashes, such as ``my-brake``.
     folder
-        Parent of its folder ``my-brake``, created if missing; by default the current folder.
+        Parent of its folder ``my-brake``, created if missing. Default: the current folder.
 
     Returns
     -------

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 LifeName = Annotated[
     str | Path,
     Ask(
-        "Life file (TOML), or the name of a life.",
+        "Life file (TOML) or a life's name (see 'bywire list lives').",
         "Life",
         name="life",
         known=("lives",),
@@ -25,7 +25,7 @@ LifeName = Annotated[
 ]
 CheckedStops = Annotated[
     int,
-    Ask("Stops to simulate one by one, to check the projection.", "Stops one by one", least=0),
+    Ask("Number of stops to simulate one by one, as a check.", "Stops one by one", least=0),
 ]
 
 
@@ -46,30 +46,30 @@ def project_life(
     check: CheckedStops = 0,
     progress: "Progress | None" = None,
 ) -> "LifeResult":
-    """Project a brake's wear over thousands of stops, and its end of life.
+    """Project a brake's wear over thousands of stops until its end of life.
 
     Parameters
     ----------
     source
-        Life file, see ``docs/life.md``; or the name of a life.
+        Life file (see ``docs/life.md``), or the name of a life.
     overrides
-        Changes of the bench, of wear (``wear.NAME``) and of the time between stops
+        Changes to the bench, to wear (``wear.NAME``) and to the conditions of stops
         (``stop.NAME``), as texts with units.
     check
-        Stops to simulate one by one also, to check the projection, in whole rounds of the
-        population; none by default.
+        Number of stops to also simulate one by one, to check the projection, in whole rounds of
+        the population. Default: none.
     progress
         Called with a label and the finished share, 0 to 1.
 
     Returns
     -------
     LifeResult
-        Stops until the end of life, with an interval; slow states after every stop in SI units.
+        Stops until the end of life with an interval, and slow states after each stop in SI units.
 
     Raises
     ------
     InputError
-        For an invalid life file, and a brake that starts at the end of its life.
+        If the life file is invalid, or the brake is at the end of its life from the start.
     RunError
         If a run fails, or a stop lacks a key figure on which wear depends.
     KeyboardInterrupt

@@ -1,4 +1,4 @@
-"""Replay of a measured demand: the model's response against the measured one."""
+"""Replay of a measured demand, which compares the model's response with the measured one."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -28,7 +28,7 @@ ModelChanges = Annotated[Mapping[str, Any], BENCH_CHANGES]
 Outputs = Annotated[
     Sequence[str] | Mapping[str, str],
     Ask(
-        "Signals to compare, e.g. 'p_mc=Pressure [psi]'; all by default.",
+        "Signal to compare, e.g. 'p_mc=Pressure [psi]'. Default: all.",
         "Outputs",
         name="output",
         kind="names",
@@ -38,20 +38,22 @@ Outputs = Annotated[
 Tolerances = Annotated[
     Sequence[str],
     Ask(
-        "Tolerance, e.g. 'nrmse <= 5 %', 'p_mc.max_error <= 2 bar'.", "Tolerances", name="tolerance"
+        "Tolerance, e.g. 'nrmse <= 5 %' or 'p_mc.max_error <= 2 bar'.",
+        "Tolerances",
+        name="tolerance",
     ),
 ]
 Segments = Annotated[
     str | Path,
     Ask(
-        "Segments to judge: auto (steps and holds), or a TOML file.",
+        "Segments to judge: auto (steps and holds) or a TOML file.",
         "Judge steps and holds separately",
         is_text=True,
         ticked="auto",
     ),
 ]
 Tracked = Annotated[
-    Sequence[str], Ask("Also track a drifting parameter, e.g. mu_B.", "Drifting parameters")
+    Sequence[str], Ask("Drifting parameter to track, e.g. mu_B.", "Drifting parameters")
 ]
 
 
@@ -99,39 +101,39 @@ def replay(
     progress: "Progress | None" = None,
     estimate_error: ErrorEstimate = True,
 ) -> "Replay":
-    """Drive the model with a measured demand and compare the responses.
+    """Drive the model with a measured demand, and compare the responses.
 
     Parameters
     ----------
     measurement
         A file, or the result of `bywire.read_measurement`.
     bench, overrides
-        A `Bench`, the path of a bench file, or an experiment's name; and its changes, as ``--set``
-        takes them.
+        A `Bench`, the path of a bench file, or an experiment's name, and changes to it in the form
+        of ``--set``.
     mapping
-        File with the meaning of the columns of a measurement file.
+        File that maps columns of a measurement file to signals.
     inputs
-        Stimulus of the model -> measured signal, or column such as ``"Demand [bar]"``; default:
-        all of the same name.
+        Stimulus of the model -> measured signal, or column such as ``"Demand [bar]"``. Default: all
+        signals with the same name.
     outputs
-        Signals to compare; default: all measured ones that show how well the model fits. A
-        mapping names their columns: ``{"p_mc": "Pressure [psi]"}``, empty for the same name.
+        Signals to compare. Default: all measured signals that show how well the model fits. A
+        mapping specifies their columns, ``{"p_mc": "Pressure [psi]"}``, empty for the same name.
     time
-        Time column, such as ``"Zeit [s]"``, or a sample rate. By default as the file declares it.
+        Time column, such as ``"Zeit [s]"``, or a sample rate. Default: as the file declares it.
     case
-        Run of the experiment; the first by default.
-    tolerances
+        Run of the experiment. Default: the first.
+        tolerances
         Limits such as ``"nrmse <= 5 %"`` or ``"p_mc.max_error <= 2 bar"``.
     segments
-        Segments to judge: ``"auto"`` for steps and holds, or a TOML file; by default the whole
+        Segments to judge: ``"auto"`` for steps and holds, or a TOML file. Default: the whole
         record.
     track
         Drifting parameters to track, for instance ``"mu_B"``.
     progress
         Called with a label and the finished share, 0 to 1.
     estimate_error
-        Whether to repeat the run in half and double steps, to estimate the numerical error of the
-        figures. A tolerance closer than this error is undecided, neither met nor missed.
+        Whether to repeat the run in half and double steps to estimate the figures' numerical error.
+        If a figure is closer to its tolerance than this error, the tolerance is undecided.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Reproduction of a paper's tables and figures: published against computed values."""
+"""Reproduction of a paper's tables and figures: published and computed values."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated
@@ -23,7 +23,7 @@ SourceName = Annotated[str, Ask("Published source, e.g. dardanelli2010.", "Sourc
 @use_case("reproduce", form=Form("Reproduce a source", "Reproduce", "source"))
 @on_one_thread()
 def reproduce(source: SourceName, *, progress: "Progress | None" = None) -> "Reproduction":
-    """Reproduce a paper's tables and figures: published and computed values, and their agreement.
+    """Reproduce a paper's tables and figures, and compare published with computed values.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Run of a bench or an experiment, judged by its requirements."""
+"""Run of a bench or experiment, judged by its requirements."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from bywire.bench.bench import Bench
     from bywire.core.typing import Progress
 
-Over = Annotated[str, Ask("Run for each value, e.g. motor.R_m=0.2ohm:0.6ohm:9.")]
+Over = Annotated[str, Ask("Range of values to run, e.g. motor.R_m=0.2ohm:0.6ohm:9.")]
 Faults = Annotated[
     Sequence[str],
     Ask(
@@ -25,8 +25,8 @@ Faults = Annotated[
         metavar="NAME[=VALUE][@ONSET]",
     ),
 ]
-Engine = Annotated[str, Ask("Engine, e.g. sil: the ECU's compiled C in the loop.")]
-Animate = Annotated[bool, Ask("Write pages that play the runs, with --out.")]
+Engine = Annotated[str, Ask("Engine, e.g. sil for the ECU's compiled C code in the loop.")]
+Animate = Annotated[bool, Ask("Write pages that animate the runs. Needs --out.")]
 
 
 def _read(bench: Path, overrides: Mapping[str, str], faults: Sequence[str]) -> None:
@@ -40,8 +40,9 @@ def _require_folder(animate: bool, out: Path | None, **others: Any) -> None:
     del others
     if animate and out is None:
         raise InputError(
-            f"{option('animate')} needs a folder to write to: add {option('out')}",
+            f"{option('animate')} needs a folder to write to. Add {option('out')}",
             name=option("animate"),
+            valid=option("out"),
         )
 
 
@@ -88,40 +89,40 @@ def run(
     estimate_error: ErrorEstimate = True,
     animate: Animate = False,
 ) -> "BenchResult | BenchRange":
-    """Run a bench file or an experiment.
+    """Run a bench file or experiment, and judge it by its requirements.
 
     Parameters
     ----------
     bench
-        A `Bench`, the path of a bench file, or the name of an experiment, which runs with its
-        defaults and the main parameter set of its brake.
+        A `Bench`, the path of a bench file, or the name of an experiment. An experiment runs with
+        its defaults and its brake's main parameter set.
     overrides
-        Changes of a bench file or experiment, as ``--set`` takes them.
+        Changes to a bench file or experiment, in the form of ``--set``.
     over
-        Range, for instance ``"motor.R_m=0.2 ohm:0.6 ohm:9"`` or ``"options.p_to=20 bar, 30 bar"``:
-        the values run side by side, and the result is a `BenchRange`.
+        Range, for instance ``"motor.R_m=0.2 ohm:0.6 ohm:9"`` or ``"options.p_to=20 bar, 30 bar"``.
+        All values run side by side, and the result is a `BenchRange`.
     faults
-        Faults in addition to the bench's, as ``--fault`` takes them, for instance
+        Faults in addition to the bench's faults, in the form of ``--fault``, for instance
         ``"pressure.stuck=20 bar@1 s"``.
     progress
         Called with the run's label and its finished share, 0 to 1.
     engine
-        ``compiled``, ``virtual-machine``, or the compiled C of the ECU in the loop, ``sil``
-        (double precision) or ``sil-single``; ``auto`` takes the bench's engine.
+        ``compiled``, ``virtual-machine``, ``sil`` (the ECU's compiled C code in the loop, in double
+        precision) or ``sil-single`` (in single precision). ``auto`` uses the bench's engine.
     estimate_error
-        Whether to repeat all runs in half and double steps, to estimate the numerical error of key
-        figures and recorded signals. A requirement closer to its limit than this error is
-        undecided, neither met nor missed.
+        Whether to repeat all runs in half and double steps to estimate the numerical error of key
+        figures and recorded signals. If a key figure is closer to its limit than this error, the
+        requirement is undecided.
     animate
-        Whether to write a page that plays each run into the result's folder, if the assembly has
-        an animation.
+        Whether to write a page that animates each run into the result's folder, if the assembly
+        declares an animation.
 
     Returns
     -------
     BenchResult
         Recordings and key figures in SI units, verdicts on requirements, energy balance in J.
     BenchRange
-        For a range: the same for every value.
+        For a range: the same for each value.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""A campaign of faults, which continues fault by fault."""
+"""Fault campaign, which can continue after an interrupt."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 CampaignName = Annotated[
     str | Path,
     Ask(
-        "Campaign file (TOML), or a campaign's name, e.g. motorcycle.",
+        "Campaign file (TOML) or a campaign's name, e.g. motorcycle.",
         "Campaign",
         known=("campaigns",),
         files=".toml",
@@ -50,34 +50,34 @@ def run_faults(
     *,
     progress: "Progress | None" = None,
 ) -> "FaultCampaign":
-    """Simulate every fault of a maneuver: effect, detection, coverage.
+    """Simulate every fault in a maneuver, and report effects, detection and coverage.
 
     Parameters
     ----------
     campaign
-        Campaign file, see ``docs/faults.md``; or the name of a campaign that comes with a brake.
+        Campaign file (see ``docs/faults.md``), or the name of a campaign that comes with a brake.
     out
-        Folder that keeps the outcomes, so that the same call continues after an interrupt. By
-        default nothing is kept.
+        Folder that stores the outcomes, so that the same call continues after an interrupt. By
+        default, nothing is stored.
     overrides
-        Changes of the bench, as texts with units.
+        Changes to the bench, as texts with units.
     progress
         Called with a label and the finished share, 0 to 1.
 
     Returns
     -------
     FaultCampaign
-        Effect, fault tolerant time, time to detection [s] and class of every fault; diagnostic
-        coverage, false alarms.
+        Effect, fault tolerant time, time to detection [s] and class of each fault, diagnostic
+        coverage, and false alarms.
 
     Raises
     ------
     InputError
-        For an invalid campaign, and a folder that contains another campaign.
+        If the campaign is invalid, or the folder contains another campaign.
     RunError
         If a run fails.
     KeyboardInterrupt
-        If interrupted; finished faults stay in the folder.
+        If interrupted. Finished faults remain in the folder.
     """
     from bywire.api.run_faults import FaultCampaign
     from bywire.bench import running
@@ -93,7 +93,7 @@ def run_faults(
             raise
         kept = len(store.kept(plan))
         raise KeyboardInterrupt(
-            f"{kept} of {len(plan.faults)} faults are kept: rerun the command to continue"
+            f"{kept} of {len(plan.faults)} faults are saved. Rerun the command to continue"
         ) from None
     nominal = running.run(plan.bench, estimate_error=False)
     return FaultCampaign(findings, None if store is None else store.folder, nominal)

@@ -1,4 +1,4 @@
-"""Studies: run, continued, reported, estimated between cases; and sizing studies."""
+"""Studies: run, resume, report and surrogates, and sizing studies."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -30,7 +30,7 @@ StudyFile = Annotated[
 ]
 FolderOfStudy = Annotated[
     str | Path | None,
-    Ask("Folder of the study; by default named like the file.", is_folder=True),
+    Ask("Folder of the study. Default: the study file's name.", is_folder=True),
 ]
 
 
@@ -81,46 +81,46 @@ def run_study(
     engine: EngineName = "auto",
     progress: "Progress | None" = None,
 ) -> "StudyRun":
-    """Run a bench for many values of varied quantities: probabilities, spread, main influences.
+    """Run a bench for many values of varied quantities to find probabilities and influences.
 
-    Results in the study's folder are not computed again. The same call therefore continues a study
-    that was interrupted or killed.
+    bywire does not recompute results that are in the study's folder. The same call therefore
+    continues a study that was interrupted or killed.
 
     Parameters
     ----------
     study
-        Study file; see ``docs/studies.md``.
+        Study file (see ``docs/studies.md``).
     out
-        Folder of the study; by default the file's name without its ending, in the current folder.
+        Folder of the study. Default: the file's name without its suffix, in the current folder.
     overrides
-        Changes of the bench, as texts with units; kept with the study.
+        Changes to the bench, as texts with units. They are saved with the study.
     cases
-        Number of cases, in place of the file's, up to 10 million. A number larger than so far
-        extends the study, a smaller one drops cases not yet computed. If the folder has more cases
-        than the file asks for, all are judged.
+        Number of cases, up to 10 million, which overrides the file's. A larger number than before
+        extends the study. A smaller number drops cases that are not yet computed. If the folder
+        contains more cases than the file requests, bywire judges all of them.
     workers
-        Processes; by default one per core, if the work justifies their start.
+        Number of processes. Default: one per core, if the work justifies starting them.
     cluster
         Address of a Dask scheduler that runs the cases.
     engine
-        Engine; ``auto`` takes the bench's engine, ``cuda`` a graphics processor.
+        Engine. ``auto`` uses the bench's engine, ``cuda`` a graphics processor.
     progress
         Called with a label and the finished share, 0 to 1.
 
     Returns
     -------
     StudyRun
-        Probabilities of the requirements with intervals, the spread of key figures in SI units,
-        the main influences, the worst cases.
+        Probabilities of meeting requirements, with intervals, the spread of key figures in SI
+        units, the main influences, and the worst cases.
 
     Raises
     ------
     InputError
         For an invalid study file, and a folder that contains another study.
     RunError
-        If the nominal bench fails, or workers are lost. A failed case only lacks a result.
+        If the nominal bench fails, or workers are lost. A case that fails only lacks a result.
     KeyboardInterrupt
-        If interrupted; finished chunks stay.
+        If interrupted. Finished chunks remain.
     """
     from bywire.api.study_run import completed, with_engine
     from bywire.studies.meant_study import require_study_file
@@ -141,7 +141,7 @@ def run_study(
     Command("study resume", without=("cases",), **STUDY_FOLDER),
     Command(
         "study extend",
-        "Add cases to a study, from the same sequence of points.",
+        "Add cases to a study, continuing its sequence of points.",
         required={"cases": "Total number of cases."},
         **STUDY_FOLDER,
     ),
@@ -162,15 +162,15 @@ def resume_study(
     folder
         Folder of the study.
     cases
-        Number of cases, in place of the number so far. A larger number extends the study by points
-        of the same sequence, a smaller one drops cases not yet computed.
+        Number of cases, which replaces the present one. A larger number extends the study with
+        points of the same sequence. A smaller number drops cases that are not yet computed.
     workers, cluster, engine, progress
         See `run_study`.
 
     Returns
     -------
     StudyRun
-        See `run_study`; values in SI units.
+        See `run_study`. Values are in SI units.
 
     Raises
     ------
@@ -179,7 +179,7 @@ def resume_study(
     RunError
         If workers are lost.
     KeyboardInterrupt
-        If interrupted; finished chunks stay.
+        If interrupted. Finished chunks remain.
     """
     from pathlib import Path
 
@@ -201,15 +201,15 @@ def resume_study(
 @use_case(
     Command(
         "study report",
-        "Judge the results of a study so far by its file's requirements, and write its report.",
+        "Judge a study's results so far by the requirements in its file, and write the report.",
         **STUDY_FOLDER,
     ),
     Command("study status", before=require_study_folder, writes=""),
 )
 def study_report(folder: StudyFolder) -> "StudyRun":
-    """Show the progress of a study and its results so far, without writing anything.
+    """Show a study's progress and results so far without writing anything.
 
-    The requirements are those that are now in the study file.
+    bywire uses the requirements that are now in the study file.
 
     Parameters
     ----------
@@ -219,7 +219,7 @@ def study_report(folder: StudyFolder) -> "StudyRun":
     Returns
     -------
     StudyRun
-        See `run_study`; values in SI units.
+        See `run_study`. Values are in SI units.
 
     Raises
     ------
@@ -235,11 +235,11 @@ def study_report(folder: StudyFolder) -> "StudyRun":
 
 KeyFigures = Annotated[
     str | Sequence[str],
-    Ask("Key figure; by default those of requirements.", name="kpi", metavar="NAME"),
+    Ask("Key figure to estimate. Default: those with requirements.", name="kpi", metavar="NAME"),
 ]
 Values = Annotated[
     Mapping[str, Any],
-    Ask("Values at which to estimate, e.g. motor.R_m=0.4ohm.", metavar="KEY=VALUE"),
+    Ask("Value at which to estimate, e.g. motor.R_m=0.4ohm.", metavar="KEY=VALUE"),
 ]
 
 
@@ -249,30 +249,30 @@ def study_surrogates(
     kpis: KeyFigures = (),
     at: Values = NOTHING,
 ) -> "StudySurrogates":
-    """Estimate key figures between the cases of a study by polynomials, with their error.
+    """Estimate key figures between a study's cases with polynomials, including their error.
 
     Parameters
     ----------
     folder
         Folder of the study.
     kpis
-        Key figure, or several; by default those with a requirement, or all.
+        One or several key figures. Default: those with a requirement, otherwise all.
     at
-        Values of the varied quantities at which to estimate: SI numbers, texts with units, or
-        changes such as ``"+5 %"`` of the bench's value. The others are as in the bench.
+        Values of varied quantities at which to estimate, as SI numbers, texts with units, or
+        changes such as ``"+5 %"`` of the bench's value. All others have the bench's value.
 
     Returns
     -------
     StudySurrogates
-        Each surrogate with its error in the key figure's unit; ``.surrogates["overshoot"]`` is
-        called with values or arrays [SI].
+        Each surrogate with its error in the key figure's unit. ``.surrogates["overshoot"]`` is a
+        function of values or arrays [SI].
 
     Raises
     ------
     InputError
-        If the folder contains no study or too few cases, for unknown names, values outside the
-        range of the cases or between the values of a discrete quantity. Also for designs that do
-        not determine what lies between their points, and if structural choices vary.
+        If the folder contains no study or too few cases, a name is unknown, or a value is outside
+        the range of the cases or between the values of a discrete quantity. Also if the design does
+        not determine values between its points, or structural choices vary.
     """
     from bywire.api.study_run import kept_study
     from bywire.api.study_surrogate import StudySurrogates
@@ -304,14 +304,14 @@ def study_surrogates(
             refused[kpi] = str(error)
     if not surrogates:
         why = "; ".join(dict.fromkeys(refused.values()))
-        raise ParameterError(why or f"{folder}: no case is computed yet")
+        raise ParameterError(why or f"{folder}: no case is computed yet", name=str(folder))
     return StudySurrogates(report, surrogates, values, refused)
 
 
 # --- Sizing study: designs of a brake compared at equal demands
 
 SizingName = Annotated[
-    str, Ask("Sizing study (see 'bywire list').", "Sizing study", known=("studies",))
+    str, Ask("Sizing study (see 'bywire list studies').", "Sizing study", known=("studies",))
 ]
 SizingChanges = Annotated[
     Mapping[str, Any],
@@ -342,17 +342,22 @@ def _require_sizing(name: str, **others: Any) -> None:
     file = meant_study(Path(name))
     if file is not None:
         raise UnknownNameError(
-            f"unknown sizing study {name!r}: to run the study file {file}, type 'bywire study run "
-            f"{file}'"
+            f"unknown sizing study {name!r}. To run the study file {file}, type 'bywire study run "
+            f"{file}'",
+            name="sizing study",
+            value=name,
+            valid=f"bywire study run {file}",
         )
     if loaded_files():
         raise STUDIES.unknown(name)  # explains how a user's brake declares a sizing study
     error = str(unknown_name("sizing study", name, STUDIES.all()))
     more = (
-        "; for one of your own brake add --system PATH, and to run a study file type 'bywire "
-        "study run FILE'"
+        ". To load your own brake, add --system PATH. To run a study file, type 'bywire study run "
+        "FILE'"
     )
-    raise UnknownNameError(error if error.endswith("?") else error + more)
+    raise UnknownNameError(
+        error if error.endswith("?") else error + more, name="sizing study", value=name
+    )
 
 
 @use_case(
@@ -368,17 +373,17 @@ def study(
     *,
     progress: "Progress | None" = None,
 ) -> "StudyResult":
-    """Compare designs of a brake at equal demands: the best, its limits and its cost.
+    """Compare brake designs at equal demands to find the best design, its limits and its cost.
 
     Parameters
     ----------
     name
         Name of the study.
     parameters
-        Parameter set; the main one of the study's brake by default.
+        Parameter set. Default: the main one of the study's brake.
     overrides
-        Changes: names with a dot are the brake's parameters, others the study's options; SI
-        numbers, or texts with units.
+        Changes as SI numbers or texts with units. Names with a dot are the brake's parameters, and
+        all others are the study's options.
     progress
         Called with a label and the finished share, 0 to 1.
 

@@ -16,6 +16,7 @@ from bywire.core.errors import CompilerError, FileError, ParameterError, Unknown
 from bywire.export.fmu import archive
 from bywire.usecases.export import export_fmu
 from export.fmu.clients import Client
+from raising import raises
 
 MOTORCYCLE = bywire.Bench(
     "hard-braking",
@@ -289,14 +290,14 @@ def test_the_same_bench_gives_the_same_bytes(motorcycle: ExportedFmu, tmp_path: 
 
 
 def test_what_cannot_be_exported_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    with pytest.raises(ParameterError, match="makes 9 runs, but only one is exported"):
+    with raises(ParameterError, name="case", value="9"):
         export_fmu("friction-sweep", tmp_path)
     with pytest.raises(ParameterError, match="without any run"):
         export_fmu("seal-stribeck", tmp_path)
     with pytest.raises(UnknownNameError, match="part 'plants': did you mean 'plant'"):
         export_fmu(MOTORCYCLE, tmp_path, part="plants")
     failing = [{"fault": "motor.demagnetized", "onset": "50 ms"}]
-    with pytest.raises(ParameterError, match=r"leave out its \[\[faults\]\]"):
+    with raises(ParameterError, name="[[faults]]"):
         export_fmu(bywire.Bench("hard-braking", "dardanelli2010", faults=failing), tmp_path)
     monkeypatch.setattr(archive, "find_compiler", lambda: None)
     with pytest.raises(CompilerError):

@@ -362,7 +362,7 @@ def test_parameters_that_drive_the_run_are_held(pages):
         ({"out": "page.txt"}, ParameterError, "ends in .html"),
         ({"vary": ["motor.R"]}, UnknownNameError, "motor.R_m"),
         ({"vary": ["motor_heat.R_wh"]}, bywire.BywireError, "motor_heat"),
-        ({"bench": "force-cycle"}, ParameterError, "choose it"),
+        ({"bench": "force-cycle"}, ParameterError, "Choose a run"),
         ({"bench": "seal-stribeck"}, ParameterError, "without any run"),
     ],
 )

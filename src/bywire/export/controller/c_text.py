@@ -55,12 +55,15 @@ class Precision:
         Raises
         ------
         ModelError
-            When the value does not exist in this type.
+            If the value does not exist in this type.
         """
         number = float(value)
         if self.suffix and number != 0.0 and not 2.0**-126 <= abs(number) < 2.0**128:
             raise ModelError(
-                f"{number!r} has no single precision: export with precision = 'double'"
+                f"{number!r} is out of range in single precision. Export with precision = 'double'",
+                name="precision",
+                value=repr(number),
+                valid="precision = 'double'",
             )
         if not math.isfinite(number):
             raise ModelError(f"{number!r} is in the laws, but C has no literal for it")
@@ -105,7 +108,7 @@ def checked_name(name: str) -> str:
         return name
     valid = "a letter, then letters, digits and underscores, for instance front_brake"
     raise ParameterError(
-        f"name = {quoted(name)} {fault}: use {valid}", name="name", value=quoted(name), valid=valid
+        f"name = {quoted(name)} {fault}. Use {valid}", name="name", value=quoted(name), valid=valid
     )
 
 

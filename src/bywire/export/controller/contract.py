@@ -88,7 +88,7 @@ def commands(model: Model, renewed: Iterable[str], structs: Structs, shape: Shap
     Raises
     ------
     ModelError
-        When a limit is neither a parameter nor a stimulus.
+        If a limit is neither a parameter nor a stimulus.
     """
     limits, found = limits_of(model.Memory), []
     for name in renewed:

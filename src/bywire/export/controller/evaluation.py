@@ -537,7 +537,7 @@ class Evaluator:
         line = getattr(node, "lineno", 0)
         shown = ast.unparse(node).splitlines()[0][:60]
         return ModelError(
-            f"{self.file}, line {line}: the ECU cannot be exported as C: {what}, in: {shown}"
+            f"{self.file}, line {line}: bywire cannot export the ECU as C: {what}, in: {shown}"
         )
 
     def value(self, node: ast.expr) -> Any:

@@ -51,7 +51,7 @@ class SoftwareInTheLoop:
     ModelError
         With file, line and operation of a construct that cannot be translated.
     CompilerError
-        When there is no compiler, or it fails.
+        If there is no compiler, or it fails.
     """
 
     def __init__(

@@ -187,7 +187,7 @@ def program(model: Model, par: ParameterSet, precision: str = "double", name: st
     Raises
     ------
     ParameterError
-        When a name is not an identifier of C.
+        If a name is not an identifier of C.
     ModelError
         With file, line and operation of a construct that cannot be translated; for a model that
         contains another model with its own ECU.
@@ -195,9 +195,11 @@ def program(model: Model, par: ParameterSet, precision: str = "double", name: st
     for sub in getattr(model, "subs", {}).values():
         if any(sub.tasks(par)):
             raise ModelError(
-                f"{model.name} contains a {sub.assembly.name} ({sub.label}) with its own ECU: "
-                "two ECUs cannot be one in C; export each from an experiment with that ECU alone, "
-                f"such as those of {sub.assembly.name}"
+                f"{model.name} contains a {sub.assembly.name} ({sub.label}) with its own ECU, but "
+                "bywire exports only one ECU at a time. Export each ECU from an experiment that "
+                f"contains only this ECU, such as those of {sub.assembly.name}",
+                name=model.name,
+                value=sub.label,
             )
     short = checked_name(name) if name else c_name(model.name).lower()
     used: frozenset[Use] | None = None

@@ -75,22 +75,24 @@ def node_of(function: types.FunctionType) -> Function:
     Raises
     ------
     ModelError
-        When its source is missing, or two functions are on its line.
+        If its source is missing, or two functions are on its line.
     """
     code = function.__code__
     try:
         here = _functions(code.co_filename).get(code.co_firstlineno, ())
     except OSError:
         raise ModelError(
-            f"{place_of(function)}: the ECU cannot be exported as C: the source of "
-            f"{function.__qualname__} is missing; put it into a file"
+            f"{place_of(function)}: bywire cannot export the ECU as C, because the source of "
+            f"{function.__qualname__} is missing. Define it in a file",
+            name=function.__qualname__,
         ) from None
     matches = [node for node in here if _is_of(node, code)]
     if len(matches) != 1:
         raise ModelError(
-            f"{code.co_filename}, line {code.co_firstlineno}: the ECU cannot be exported as C: "
-            f"{len(matches)} functions are on the line of {function.__qualname__}; give it a "
-            "separate line"
+            f"{code.co_filename}, line {code.co_firstlineno}: bywire cannot export the ECU as C, "
+            f"because {len(matches)} functions share the line of {function.__qualname__}. Put each "
+            "function on its own line",
+            name=function.__qualname__,
         )
     return matches[0]
 
@@ -427,7 +429,9 @@ class Translation:
             if self.depth > DEEP:
                 raise ModelError(
                     f"{function.__code__.co_filename}, line {function.__code__.co_firstlineno}: "
-                    f"the ECU cannot be exported as C: {function.__qualname__} calls itself"
+                    f"bywire cannot export the ECU as C, because {function.__qualname__} calls "
+                    "itself",
+                    name=function.__qualname__,
                 )
             made = self._translated(function, arguments, closure, steady)
             self.depth -= 1

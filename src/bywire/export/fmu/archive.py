@@ -114,7 +114,7 @@ def compiled(sources: Path, kernel: str, functions: str, target: str, library: P
     UnknownNameError
         For another system.
     CompilerError
-        When there is no compiler for it, or it fails.
+        If there is no compiler for it, or it fails.
     """
     if target not in PLATFORMS:
         raise unknown_name("target", target, PLATFORMS)
@@ -144,15 +144,18 @@ def _compiler_for(target: str) -> tuple[Compiler, tuple[str, ...]]:
         compiler = find_compiler()
         if compiler is None:
             raise CompilerError(
-                "an FMU contains a compiled model, but there is no C compiler: install one, or the "
-                "extra bywire[compiler] (in your clone: pip install -e '.[compiler]')"
+                "an FMU contains a compiled model, but this machine has no C compiler. Install "
+                "one, "
+                "or the extra bywire[compiler] (in your clone: pip install -e '.[compiler]')",
+                name="compiler",
+                valid="bywire[compiler]",
             )
         return compiler, ()
     command = bundled_compiler()
     if command is None:
         raise CompilerError(
-            f"target {target}: this system's compiler only compiles for {this_platform()}; install "
-            "the extra bywire[compiler], which compiles for all systems "
+            f"target {target}: this system's compiler supports only {this_platform()}. Install the "
+            "extra bywire[compiler], which supports all platforms "
             "(in your clone: pip install -e '.[compiler]')",
             name="target",
             value=target,
@@ -263,9 +266,9 @@ def write_unit(unit: Unit, path: Path, targets: Sequence[str], progress: Progres
     Raises
     ------
     CompilerError
-        When a binary cannot be made.
+        If a binary cannot be made.
     OSError
-        When the file cannot be written.
+        If the file cannot be written.
     """
     labels = []
     with replacing(path) as fresh, scratch_folder(fresh.parent) as scratch:

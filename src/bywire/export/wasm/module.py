@@ -163,7 +163,7 @@ def table(formulas: Sequence[Formula], places: _Places) -> bytes:
     Raises
     ------
     CompilerError
-        When there are more values than the table can name.
+        If there are more values than the table can name.
     """
     orders = [needed(f.graph, [n for _, n in f.results], lambda _: False) for f in formulas]
     uses, graphs = _uses(formulas, orders)
@@ -219,8 +219,11 @@ def _packed(made: _Table, leaves: int, numbers: list[int], constants: Sequence[f
     count = max(len(made.tokens), len(made.operands), len(numbers) + len(made.operands))
     if count > _MOST or len(kinds) > 255:
         raise CompilerError(
-            f"the formulas of this run have {count} operands, but a module has room for {_MOST}: "
-            "export the run as an FMU, whose kernel is compiled"
+            f"this run's formulas have {count} operands, but a module can contain only {_MOST}. "
+            "Export the run as an FMU, whose kernel is compiled",
+            name="operands",
+            value=str(count),
+            valid=str(_MOST),
         )
     far = Counter(name for name, count in made.operands if not _is_near(name, count, leaves))
     often = sorted(name for name, _ in far.most_common(255 - _NEAR))
@@ -457,8 +460,10 @@ def _compiled(headers: Mapping[str, str], further: Mapping[str, str]) -> bytes:
     compiler = bundled_compiler()
     if compiler is None:
         raise CompilerError(
-            "WebAssembly is compiled by the extra bywire[compiler], which is not installed; "
-            f"{how_to_install('compiler')}"
+            "WebAssembly needs the extra bywire[compiler], which is not installed "
+            f"({how_to_install('compiler')})",
+            name="compiler",
+            valid="bywire[compiler]",
         )
     with scratch_folder(process_folder()) as folder:
         for name in ("math.h", "string.h", "page.c"):

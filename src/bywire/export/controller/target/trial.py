@@ -186,7 +186,7 @@ def host_trial(program: Program, folder: Path, compiler: Compiler, scratch: Path
     Raises
     ------
     CompilerError
-        When it cannot be compiled or run.
+        If it cannot be compiled or run.
     """
     made = scratch / "host"
     _call(
@@ -215,7 +215,7 @@ def target_trial(
     Raises
     ------
     CompilerError
-        When it cannot be compiled or run.
+        If it cannot be compiled or run.
     """
     objects = []
     for source in _sources(program, folder):
