@@ -110,7 +110,8 @@ def parameter_rows(
             continue
         limits = interval(leaf)
         if defaults is not None:
-            default, limits = shown(defaults[dotted], leaf.unit.symbol), range_text(leaf)
+            default = shown(defaults[dotted], leaf.unit.symbol)
+            limits = range_text(leaf, defaults[dotted])
         unit = unit_text(leaf.unit.symbol) or "1"
         yield symbol(dotted), f"`{dotted}`", unit, default, limits, notes[name]
 

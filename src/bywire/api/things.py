@@ -31,7 +31,7 @@ from bywire.identification.method import METHODS, Method
 from bywire.identification.question import BENCH_METHODS, BenchMethod
 from bywire.life.declaration import LIVES, Life
 from bywire.report.tables import value_text
-from bywire.report.wording import amount, range_text, readable_units, unit_text
+from bywire.report.wording import amount, range_text, readable_units, unit_beside, unit_text
 from bywire.synthesis.study import STUDIES, Study
 
 Object = dict[str, Any]
@@ -327,7 +327,8 @@ def _parameter(name: str) -> Object:
             (row,) = (row for row in rows if row["name"] == name)
             values.append({"parameter set": cited.name, "value": row["value"]})
             for key, texts in descriptions.items():
-                texts += [] if row[key] in texts else [row[key]]
+                is_other = key == "range" and cited.name != main_set(cited.assembly)
+                texts += [] if is_other or row[key] in texts else [row[key]]
     merged = {key: " or ".join(filter(None, texts)) for key, texts in descriptions.items()}
     return {
         "summary": merged["meaning"],
@@ -379,7 +380,9 @@ def _class_of(cls: type[Any], name: str) -> type[Any]:
 
 
 def _option_rows(
-    cls: type[ParameterSet], values: ParameterSet | None, simulated: Collection[str] = ()
+    cls: type[ParameterSet],
+    values: ParameterSet | Mapping[str, Any] | None,
+    simulated: Collection[str] = (),
 ) -> list[dict[str, Any]]:
     """Return a row for every number and choice of a parameter class, in their order.
 
@@ -393,7 +396,9 @@ def _option_rows(
         First parts of the names of options that affect only simulated experiments.
     """
     leaves, notes = leaf_fields(cls), field_notes(cls)
-    known: Mapping[str, Any] = _given_by(cls) if values is None else values.flat()
+    known = _given_by(cls) if values is None else values
+    if isinstance(known, ParameterSet):
+        known = known.flat()
     rows = []
     for name in notes:
         leaf = leaves.get(name)
@@ -406,7 +411,7 @@ def _option_rows(
                 "name": name,
                 "value": value_text(known[name], unit) if name in known else None,
                 "unit": "" if leaf is None else display_unit(unit),
-                "range": _choices(cls, name) if leaf is None else _range(leaf),
+                "range": _choices(cls, name) if leaf is None else _range(leaf, known.get(name)),
                 "meaning": meaning,
             }
         )
@@ -423,14 +428,16 @@ _PLACES = {"input": "the input", "output": "the output", "level": "the signal"}
 """units of levels without a signal yet, in generic experiments and stimuli"""
 
 
-def _range(leaf: Leaf) -> str:
+def _range(leaf: Leaf, value: object) -> str:
+    """Return a valid range in the unit of the value beside it."""
     place, _, per = leaf.unit.symbol.partition("/")
     if place in _PLACES:
         numbers = range_text(leaf).replace(f" {leaf.unit.symbol}", "")
         return f"{numbers} in the unit of {_PLACES[place]}{per and f' per {per}'}"
     bounded = math.isfinite(leaf.low) or math.isfinite(leaf.high)
-    unit = unit_text(display_unit(leaf.unit.symbol))
-    return range_text(leaf) + ("" if bounded or not unit else f" in {unit}")
+    symbol = leaf.unit.symbol
+    unit = unit_text(unit_beside(value, symbol) or display_unit(symbol))
+    return range_text(leaf, value) + ("" if bounded or not unit else f" in {unit}")
 
 
 def _choices(cls: type[ParameterSet], name: str) -> str:
@@ -570,7 +577,7 @@ def _experiment(experiment: Experiment) -> Object:
 
 
 def _generic_experiment(experiment: GenericExperiment) -> Object:
-    rows = _option_rows(experiment.options, None)
+    rows = _option_rows(experiment.options, experiment.defaults)
     for row in rows:
         value = experiment.defaults.get(row["name"])
         row["value"] = None if value is None else _default(value, row["unit"], experiment)
