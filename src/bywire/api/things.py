@@ -109,11 +109,11 @@ def thing_kinds() -> tuple[ThingKind, ...]:
             has_assembly=True,
         ),
         ThingKind(
-            "experiment of any brake",
+            "generic experiment",
             GENERIC_EXPERIMENTS.all,
             _generic_experiment,
             "generic_experiments",
-            lambda experiment: f"{experiment.summary} (any)",
+            lambda experiment: f"{experiment.summary} (any brake)",
             meaning=_summary,
         ),
         ThingKind("element", elements_by_name, _element, "elements", listed=every_element),
@@ -159,7 +159,7 @@ def thing_kinds() -> tuple[ThingKind, ...]:
             BENCH_METHODS.all,
             _bench_method,
             "methods",
-            lambda method: f"{method.summary} (any, with --bench)",
+            lambda method: f"{method.summary} (any brake, with --bench)",
             meaning=_summary,
         ),
         ThingKind("stimulus", STIMULI.all, _stimulus, "stimuli", meaning=_summary),
@@ -278,7 +278,7 @@ def _fault(places: list[tuple[str, Mode]]) -> dict[str, Any]:
 
 
 def _residual_line(residual: Residual) -> str:
-    unit = display_unit(residual.unit)
+    unit = unit_text(display_unit(residual.unit)) or "-"
     return f"{residual.summary} [{unit}] ({', '.join(residual.assemblies)})"
 
 
@@ -403,7 +403,7 @@ def _option_rows(
     for name in notes:
         leaf = leaves.get(name)
         unit = "1" if leaf is None else leaf.unit.symbol
-        meaning = " ".join(notes[name].split())
+        meaning = " ".join(notes[name].split()).replace("``", "")
         if name.split(".")[0] in simulated and "synthetic" not in meaning:
             meaning += " (simulated experiments)"
         rows.append(
@@ -424,7 +424,13 @@ def _given_by(cls: type[ParameterSet]) -> Mapping[str, Any]:
     return {name: info.default for name, info in fields if not info.is_required()}
 
 
-_PLACES = {"input": "the input", "output": "the output", "level": "the signal"}
+_PLACES = {
+    "input": "the input's unit",
+    "output": "the output's unit",
+    "level": "the signal's unit",
+    "friction": "the velocity's unit",
+    "along": "the state's unit",
+}
 """units of levels without a signal yet, in generic experiments and stimuli"""
 
 
@@ -433,7 +439,7 @@ def _range(leaf: Leaf, value: object) -> str:
     place, _, per = leaf.unit.symbol.partition("/")
     if place in _PLACES:
         numbers = range_text(leaf).replace(f" {leaf.unit.symbol}", "")
-        return f"{numbers} in the unit of {_PLACES[place]}{per and f' per {per}'}"
+        return f"{numbers}, in {_PLACES[place]}{per and f' per {per}'}"
     bounded = math.isfinite(leaf.low) or math.isfinite(leaf.high)
     symbol = leaf.unit.symbol
     unit = unit_text(unit_beside(value, symbol) or display_unit(symbol))
@@ -587,7 +593,7 @@ def _generic_experiment(experiment: GenericExperiment) -> Object:
         "options": rows,
         "changed_with": "--set options.NAME=VALUE",
         "see": "'bywire list NAME' with an assembly's name shows its stimuli and recorded signals. "
-        f"Levels are multiples of the nominal value of the signal in option {_named(experiment)}",
+        f"'x nominal' multiplies the nominal value of the signal that {_named(experiment)} selects",
     }
 
 
@@ -599,7 +605,8 @@ def _default(value: Any, unit: str, experiment: GenericExperiment) -> str:
 
 
 def _named(experiment: GenericExperiment) -> str:
-    return " or ".join(experiment.signals)
+    *first, last = experiment.signals
+    return f"option {', '.join(first)} or {last}" if first else f"option {last}"
 
 
 def _stimulus(stimulus: StimulusKind) -> Object:
@@ -686,8 +693,11 @@ def _element(element: Element) -> Object:
 
 
 def _method_line(method: Method) -> str:
-    signals = ", ".join(f"{name} [{unit or 'any'}]" for name, unit in method.signals.items())
-    return f"{method.summary}; needs {signals} ({method.assembly or 'any'})"
+    signals = ", ".join(
+        f"{name} [{unit_text(unit) or '-'}]" if unit else name
+        for name, unit in method.signals.items()
+    )
+    return f"{method.summary}; needs {signals} ({method.assembly or 'any brake'})"
 
 
 def _method(method: Method) -> Object:

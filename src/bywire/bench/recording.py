@@ -154,12 +154,10 @@ def watch_cases(
 
 
 def solver_doubts(doubt: str, unsettled: int) -> list[str]:
-    """Return a solver's warnings; ``unsettled``: substeps that hit the contact iteration's limit."""
+    """Return a solver's warnings; ``unsettled``: substeps at the contact iteration's limit."""
     doubts = [doubt] if doubt else []
     if unsettled:
-        doubts.append(
-            f"{unsettled} substeps hit the contact iteration's limit. Use a smaller step"
-        )
+        doubts.append(f"{unsettled} substeps hit the contact iteration's limit. Use a smaller step")
     return doubts
 
 
