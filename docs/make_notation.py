@@ -110,7 +110,8 @@ def parameter_rows(
             continue
         limits = interval(leaf)
         if defaults is not None:
-            default, limits = shown(defaults[dotted], leaf.unit.symbol), range_text(leaf)
+            default = shown(defaults[dotted], leaf.unit.symbol)
+            limits = range_text(leaf, defaults[dotted])
         unit = unit_text(leaf.unit.symbol) or "1"
         yield symbol(dotted), f"`{dotted}`", unit, default, limits, notes[name]
 
@@ -246,16 +247,16 @@ def bench_reference() -> str:
         figures = (f"`{name}`{bracketed(unit)}" for name, unit in e.kpis.items())
         lines += [f"Key figures: {', '.join(figures)}.", ""]
     lines += [
-        "## Experiments of any brake",
+        "## Generic experiments",
         "",
-        "These experiments take names of signals. A unit such as `input` or `output` is that of "
-        "the signal that the option of that name selects. By default, levels are multiples of "
+        "These experiments work with any brake. Options select signals by name. A unit such as "
+        "`input` or `output` is that of the signal that the option of that name selects. By default, levels are multiples of "
         "the signal's nominal magnitude.",
         "",
     ]
     for g in GENERIC_EXPERIMENTS.all().values():
         summary = g.summary[0].upper() + g.summary[1:]
-        lines += [f"### {g.name}, of any brake", "", f"{summary}.", ""]
+        lines += [f"### {g.name} (any brake)", "", f"{summary}.", ""]
         rows = [("", *row[1:3], "", *row[4:]) for row in parameter_rows(g.options)]
         lines += table(("", "option", "unit", "", "range or choices", "meaning"), rows)
     lines += [

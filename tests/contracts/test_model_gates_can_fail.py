@@ -129,7 +129,7 @@ def test_a_linear_model_that_is_the_mean_of_two_sides_is_found(
     """What differentiation makes of a magnitude at 0, without a word."""
     monkeypatch.setattr(linearize, "linear_models", lambda of: of.models(of.point))
     with seeded(tmp_path, "seeded-mean", MISTAKES["kink where it rests"]) as subject:
-        found = examine(OF_A_MODEL["linear model on corners"], subject, subject.place())
+        found = examine(OF_A_MODEL["linear model on kinks"], subject, subject.place())
     assert not found.holds, found.text
     assert re.search(r"\w+\.py:\d+ at its kink", found.text)
 

@@ -235,7 +235,7 @@ class Loop:
     locked
         States that its linear models hold, such as those of a clamped shaft.
     side
-        Side of its linear models if the operating point is on the corner of an operation, see
+        Side of its linear models if the operating point is on the kink of an operation, see
         `corners.read_sides`; if empty, such a point raises an error.
     """
 
@@ -439,7 +439,7 @@ class Plant:
     side: str = ""
 
     def linear(self, par: ParameterSet, point: PlantPoint) -> LinearModel:
-        """Return `model` on the plant's side of corners."""
+        """Return `model` on the plant's side of kinks."""
         with taking(self.side):
             return self.model(par, point)
 

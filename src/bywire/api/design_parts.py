@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from bywire.analysis.loop_figures import LOOP_FIGURES
+from bywire.analysis.margins import NO_LOOP
 from bywire.api.loop_case import LoopCase
 from bywire.bench.requirements import Limit
 from bywire.core.callers import option
@@ -384,9 +385,12 @@ def requirement_table(
 
 
 def is_brief(part: Part) -> bool:
-    """Return whether a terminal shows a part without ``--verbose``: gains, limits, conflicts."""
+    """Return whether a terminal shows a part without ``--verbose``: gains, limits, conflicts.
+
+    A missing loop explains why no requirement is met.
+    """
     if isinstance(part, str):
-        return ": at best " in part or part.startswith(_LIMITED)
+        return ": at best " in part or part.startswith((_LIMITED, NO_LOOP))
     return part.columns[0].heading in _GAINS
 
 

@@ -187,8 +187,8 @@ class FrequencyResponse(Answer):
         table = TableBlock(
             _table(response, self.linear, self.unit), "Gain and phase by frequency and amplitude."
         )
-        heed = [self.note, *self.warnings] if self.note else self.warnings
-        listing: list[Block] = [Listing(heed)] if heed else []
+        notices = [self.note, *self.warnings] if self.note else self.warnings
+        listing: list[Block] = [Listing(notices)] if notices else []
         bode = FigureBlock(
             self._bode,
             "Closed loop: exact linear response without friction, and nonlinear responses.",
@@ -208,7 +208,7 @@ class FrequencyResponse(Answer):
             brief=self._brief(table),
             data=self._data(),
             attachments=[recording_file(f"{loop.name}-frequency-response.nc", response)],
-            heed=[self.note] if self.note else [],
+            notices=[self.note] if self.note else [],
             changes=self.case.subject.changes,
         )
 

@@ -31,7 +31,7 @@ from bywire.identification.method import METHODS, Method
 from bywire.identification.question import BENCH_METHODS, BenchMethod
 from bywire.life.declaration import LIVES, Life
 from bywire.report.tables import value_text
-from bywire.report.wording import amount, range_text, readable_units, unit_text
+from bywire.report.wording import amount, range_text, readable_units, unit_beside, unit_text
 from bywire.synthesis.study import STUDIES, Study
 
 Object = dict[str, Any]
@@ -109,11 +109,11 @@ def thing_kinds() -> tuple[ThingKind, ...]:
             has_assembly=True,
         ),
         ThingKind(
-            "experiment of any brake",
+            "generic experiment",
             GENERIC_EXPERIMENTS.all,
             _generic_experiment,
             "generic_experiments",
-            lambda experiment: f"{experiment.summary} (any)",
+            lambda experiment: f"{experiment.summary} (any brake)",
             meaning=_summary,
         ),
         ThingKind("element", elements_by_name, _element, "elements", listed=every_element),
@@ -159,7 +159,7 @@ def thing_kinds() -> tuple[ThingKind, ...]:
             BENCH_METHODS.all,
             _bench_method,
             "methods",
-            lambda method: f"{method.summary} (any, with --bench)",
+            lambda method: f"{method.summary} (any brake, with --bench)",
             meaning=_summary,
         ),
         ThingKind("stimulus", STIMULI.all, _stimulus, "stimuli", meaning=_summary),
@@ -278,7 +278,7 @@ def _fault(places: list[tuple[str, Mode]]) -> dict[str, Any]:
 
 
 def _residual_line(residual: Residual) -> str:
-    unit = display_unit(residual.unit)
+    unit = unit_text(display_unit(residual.unit)) or "-"
     return f"{residual.summary} [{unit}] ({', '.join(residual.assemblies)})"
 
 
@@ -327,7 +327,8 @@ def _parameter(name: str) -> Object:
             (row,) = (row for row in rows if row["name"] == name)
             values.append({"parameter set": cited.name, "value": row["value"]})
             for key, texts in descriptions.items():
-                texts += [] if row[key] in texts else [row[key]]
+                is_other = key == "range" and cited.name != main_set(cited.assembly)
+                texts += [] if is_other or row[key] in texts else [row[key]]
     merged = {key: " or ".join(filter(None, texts)) for key, texts in descriptions.items()}
     return {
         "summary": merged["meaning"],
@@ -379,7 +380,9 @@ def _class_of(cls: type[Any], name: str) -> type[Any]:
 
 
 def _option_rows(
-    cls: type[ParameterSet], values: ParameterSet | None, simulated: Collection[str] = ()
+    cls: type[ParameterSet],
+    values: ParameterSet | Mapping[str, Any] | None,
+    simulated: Collection[str] = (),
 ) -> list[dict[str, Any]]:
     """Return a row for every number and choice of a parameter class, in their order.
 
@@ -393,12 +396,14 @@ def _option_rows(
         First parts of the names of options that affect only simulated experiments.
     """
     leaves, notes = leaf_fields(cls), field_notes(cls)
-    known: Mapping[str, Any] = _given_by(cls) if values is None else values.flat()
+    known = _given_by(cls) if values is None else values
+    if isinstance(known, ParameterSet):
+        known = known.flat()
     rows = []
     for name in notes:
         leaf = leaves.get(name)
         unit = "1" if leaf is None else leaf.unit.symbol
-        meaning = " ".join(notes[name].split())
+        meaning = " ".join(notes[name].split()).replace("``", "")
         if name.split(".")[0] in simulated and "synthetic" not in meaning:
             meaning += " (simulated experiments)"
         rows.append(
@@ -406,7 +411,7 @@ def _option_rows(
                 "name": name,
                 "value": value_text(known[name], unit) if name in known else None,
                 "unit": "" if leaf is None else display_unit(unit),
-                "range": _choices(cls, name) if leaf is None else _range(leaf),
+                "range": _choices(cls, name) if leaf is None else _range(leaf, known.get(name)),
                 "meaning": meaning,
             }
         )
@@ -419,18 +424,26 @@ def _given_by(cls: type[ParameterSet]) -> Mapping[str, Any]:
     return {name: info.default for name, info in fields if not info.is_required()}
 
 
-_PLACES = {"input": "the input", "output": "the output", "level": "the signal"}
+_PLACES = {
+    "input": "the input's unit",
+    "output": "the output's unit",
+    "level": "the signal's unit",
+    "friction": "the velocity's unit",
+    "along": "the state's unit",
+}
 """units of levels without a signal yet, in generic experiments and stimuli"""
 
 
-def _range(leaf: Leaf) -> str:
+def _range(leaf: Leaf, value: object) -> str:
+    """Return a valid range in the unit of the value beside it."""
     place, _, per = leaf.unit.symbol.partition("/")
     if place in _PLACES:
         numbers = range_text(leaf).replace(f" {leaf.unit.symbol}", "")
-        return f"{numbers} in the unit of {_PLACES[place]}{per and f' per {per}'}"
+        return f"{numbers}, in {_PLACES[place]}{per and f' per {per}'}"
     bounded = math.isfinite(leaf.low) or math.isfinite(leaf.high)
-    unit = unit_text(display_unit(leaf.unit.symbol))
-    return range_text(leaf) + ("" if bounded or not unit else f" in {unit}")
+    symbol = leaf.unit.symbol
+    unit = unit_text(unit_beside(value, symbol) or display_unit(symbol))
+    return range_text(leaf, value) + ("" if bounded or not unit else f" in {unit}")
 
 
 def _choices(cls: type[ParameterSet], name: str) -> str:
@@ -570,7 +583,7 @@ def _experiment(experiment: Experiment) -> Object:
 
 
 def _generic_experiment(experiment: GenericExperiment) -> Object:
-    rows = _option_rows(experiment.options, None)
+    rows = _option_rows(experiment.options, experiment.defaults)
     for row in rows:
         value = experiment.defaults.get(row["name"])
         row["value"] = None if value is None else _default(value, row["unit"], experiment)
@@ -580,7 +593,7 @@ def _generic_experiment(experiment: GenericExperiment) -> Object:
         "options": rows,
         "changed_with": "--set options.NAME=VALUE",
         "see": "'bywire list NAME' with an assembly's name shows its stimuli and recorded signals. "
-        f"Levels are multiples of the nominal value of the signal in option {_named(experiment)}",
+        f"'x nominal' multiplies the nominal value of the signal that {_named(experiment)} selects",
     }
 
 
@@ -592,7 +605,8 @@ def _default(value: Any, unit: str, experiment: GenericExperiment) -> str:
 
 
 def _named(experiment: GenericExperiment) -> str:
-    return " or ".join(experiment.signals)
+    *first, last = experiment.signals
+    return f"option {', '.join(first)} or {last}" if first else f"option {last}"
 
 
 def _stimulus(stimulus: StimulusKind) -> Object:
@@ -679,8 +693,11 @@ def _element(element: Element) -> Object:
 
 
 def _method_line(method: Method) -> str:
-    signals = ", ".join(f"{name} [{unit or 'any'}]" for name, unit in method.signals.items())
-    return f"{method.summary}; needs {signals} ({method.assembly or 'any'})"
+    signals = ", ".join(
+        f"{name} [{unit_text(unit) or '-'}]" if unit else name
+        for name, unit in method.signals.items()
+    )
+    return f"{method.summary}; needs {signals} ({method.assembly or 'any brake'})"
 
 
 def _method(method: Method) -> Object:

@@ -141,7 +141,7 @@ def watch_cases(
     """Return the warnings of `watch` for each of several runs of one structure and plan.
 
     ``rows``: rows of all runs; ``unsettled``: number of substeps of each run that hit the contact
-    iteration's cap; ``books``: `energy_doubts` of each run.
+    iteration's limit; ``books``: `energy_doubts` of each run.
     """
     solver = map(solver_doubts, doubts_of(runs), unsettled)
     model, pars = runs[0].model, [run.par for run in runs]
@@ -154,12 +154,10 @@ def watch_cases(
 
 
 def solver_doubts(doubt: str, unsettled: int) -> list[str]:
-    """Return a solver's warnings; ``unsettled``: substeps that hit the contact iteration's cap."""
+    """Return a solver's warnings; ``unsettled``: substeps at the contact iteration's limit."""
     doubts = [doubt] if doubt else []
     if unsettled:
-        doubts.append(
-            f"{unsettled} substeps hit the cap of the contact iteration. Use a smaller step"
-        )
+        doubts.append(f"{unsettled} substeps hit the contact iteration's limit. Use a smaller step")
     return doubts
 
 

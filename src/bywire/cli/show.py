@@ -180,7 +180,7 @@ def show(
             for text in (*stop.args, "interrupted"):
                 output.message(str(text))
             raise typer.Exit(output.INTERRUPTED) from None
-    for text in document.heed:
+    for text in document.notices:
         output.message(text)
     others = [str(w.message) for w in caught if not issubclass(w.category, AnswerWarning)]
     for text in dict.fromkeys([*others, *answer.warnings]):

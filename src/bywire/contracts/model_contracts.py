@@ -539,7 +539,7 @@ OF_A_MODEL: dict[str, Contract] = {
     "engines": has_agreeing_engines,
     "lanes": has_agreeing_lanes,
     "linear model": is_its_linear_model,
-    "linear model on corners": is_linear_beside_its_corners,
+    "linear model on kinks": is_linear_beside_its_corners,
     "derivatives of a run": has_its_derivatives,
     "faults": has_faults_of_what_is_there,
 }

@@ -64,7 +64,7 @@ def format_to_read(path: Path, name: str = "") -> FileFormat:
             return kind
     if not wanted:
         raise FileError(
-            f"{path} is not in a known format. Known formats are {_names()}",
+            f"{path} is not in a known format. Valid formats are {_names()}",
             name=str(path),
             valid=_names(),
         )

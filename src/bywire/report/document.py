@@ -222,7 +222,7 @@ class Document:
         Data files.
     record
         File of the output folder for the JSON object; empty for none.
-    heed
+    notices
         Lines for standard error before the result, such as changed or omitted settings.
     remarks
         Lines for standard error after the result, such as missed requirements.
@@ -251,7 +251,7 @@ class Document:
     banner: Banner | None = None
     attachments: Sequence[Attachment] = ()
     record: str = ""
-    heed: Sequence[str] = ()
+    notices: Sequence[str] = ()
     remarks: Sequence[str] = ()
     file_notes: Sequence[str] = ()
     prepare: Callable[[Path], None] | None = None

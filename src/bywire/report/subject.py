@@ -44,7 +44,7 @@ def parameter_rows(
                 name=name,
                 value=value,
                 unit="1" if leaf is None else leaf.unit.symbol,
-                range=notes[name] if leaf is None else range_text(leaf),
+                range=notes[name] if leaf is None else range_text(leaf, value),
                 kind=kind,
                 where=where,
             )

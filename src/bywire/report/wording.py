@@ -247,15 +247,44 @@ def _readable(number: float, value: float, symbol: str) -> tuple[float, str]:
     return convert(float(number), symbol, unit), unit
 
 
-def range_text(leaf: Leaf) -> str:
-    """Return the valid range of a parameter in its display unit, for instance ``> 0 mm``."""
+def range_text(leaf: Leaf, value: object = None) -> str:
+    """Return the valid range of a parameter, for instance ``> 0 mm``.
+
+    Parameters
+    ----------
+    leaf
+        The parameter.
+    value
+        Number or table of numbers beside the range, whose unit the range uses; by default each
+        bound has its most readable unit.
+    """
+    symbol, unit = leaf.unit.symbol, unit_beside(value, leaf.unit.symbol)
+
+    def bound_text(bound: float) -> str:
+        if not unit:
+            return amount(bound, symbol, 6)
+        return _with_unit(_figures(convert(float(bound), symbol, unit), symbol, 6), unit)
+
     if leaf.low == leaf.high:
-        return f"exactly {amount(leaf.low, leaf.unit.symbol, 6)}"
+        return f"exactly {bound_text(leaf.low)}"
     limits = []
     for sign, bound, is_open in (
         (">", leaf.low, leaf.low_open),
         ("<", leaf.high, leaf.high_open),
     ):
         if math.isfinite(bound):
-            limits.append(f"{sign if is_open else sign + '='} {amount(bound, leaf.unit.symbol, 6)}")
+            limits.append(f"{sign if is_open else sign + '='} {bound_text(bound)}")
     return " and ".join(limits) or "any finite number"
+
+
+def unit_beside(value: object, symbol: str) -> str:
+    """Return the unit in which a number, or the largest of a table, is written; else empty.
+
+    Examples
+    --------
+    >>> unit_beside(1.2, "s"), unit_beside((0.02, 0.3), "m"), unit_beside(None, "s")
+    ('s', 'mm', '')
+    """
+    values = value if isinstance(value, (tuple, list)) else (value,)
+    sizes = [abs(v) for v in values if isinstance(v, (int, float)) and math.isfinite(v)]
+    return readable_unit(max(sizes), symbol) if sizes else ""

@@ -60,8 +60,8 @@ def uploaded(place: Place, request: Request, name: str, largest: int) -> Path:
 def _unknown_format(name: str) -> RefusedError:
     return RefusedError(
         415,
-        f"{name[:100]!r} does not have the ending of a measurement format: known are "
-        f"{', '.join(endings())}",
+        f"{name[:100]!r} does not have the ending of a measurement format. Valid endings "
+        f"are {', '.join(endings())}",
     )
 
 
@@ -149,7 +149,8 @@ def _live(service: Service, request: Request, rest: str) -> Reply:
 def _task(service: Service, request: Request, rest: str) -> Reply:
     known = [each.name for each in tasks().values() if each.form.is_listed]
     if rest not in known:
-        raise RefusedError(404, f"task {quoted(rest)} does not exist. Known are {', '.join(known)}")
+        text = f"task {quoted(rest)} does not exist. Valid names are {', '.join(known)}"
+        raise RefusedError(404, text)
     with service.reading:
         there = contents(service.place)
         return page(task_page(tasks()[rest], there, request.query, service.largest))

@@ -100,7 +100,7 @@ class RunGroup(Sequence[Trajectory]):
 
     @property
     def unsettled(self) -> NDArray[np.int64]:
-        """Substeps of each run that hit the cap of the contact iteration, shape (runs,)."""
+        """Substeps of each run that hit the contact iteration's limit, shape (runs,)."""
         return np.asarray(self.vectors[self.kernel.layout.start["counters"]], dtype=np.int64)
 
     def __len__(self) -> int:

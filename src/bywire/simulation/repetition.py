@@ -184,7 +184,7 @@ class Repeated:
     repeats
         Whether the last window repeated the previous one, shape (cases,).
     unsettled
-        Substeps of each case that hit the cap of the contact iteration, shape (cases,).
+        Substeps of each case that hit the contact iteration's limit, shape (cases,).
     """
 
     time: Array

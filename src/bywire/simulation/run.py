@@ -91,7 +91,7 @@ class Trajectory:
     names
         Signals, in the order of the columns.
     status
-        ``done``; ``unsettled`` if some substeps hit the cap of the contact iteration;
+        ``done``; ``unsettled`` if some substeps hit the contact iteration's limit;
         ``interrupted`` if the user stopped it (the rows end there).
     unsettled, repeated
         Numbers of substeps that hit the cap, and that took more than one pass.

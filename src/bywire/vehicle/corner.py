@@ -1,4 +1,4 @@
-"""A car's corner with any disc brake: body, tyre, road, and the disc's heat.
+"""A quarter car with any disc brake: body, tyre, road, and the disc's heat.
 
 A corner inherits from `Corner` and from its brake's assembly, whose disc turns with the wheel. Its
 method ``wheel`` returns the disc's speed. `tyre_torque` is the road's torque on the disc.

@@ -1,4 +1,4 @@
-"""Slip control of a car's corner, which lowers the moment demand of any brake.
+"""Slip control of a quarter car, which lowers the moment demand of any brake.
 
 The laws use pressures. For a brake that follows a moment, the demand is converted to a pressure
 with ``slip.k_hat``, and the lowered pressure is converted back.

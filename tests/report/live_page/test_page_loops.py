@@ -97,7 +97,7 @@ def test_corners_and_loops_without_gain_are_said(tmp_path):
     cases = ({"pressure_sensor.p_high": at}, {"pressure_sensor.p_high": 1.1 * at}, gains)
     answers = tried(page, tmp_path, *({"kind": "loops", "changes": each} for each in cases))
     corner, usual, none = (each["answer"][0] for each in answers)
-    assert "corner of the model" in corner["reason"]
+    assert "kink of the model" in corner["reason"]
     assert "bywire margins pressure" in corner["reason"]
     assert usual["margins"]["hasLoop"]
     assert none["margins"] == {"isStable": True, "hasLoop": False}

@@ -1,9 +1,9 @@
-"""Operating points on corners of a model: the operation, its line, and the side to use.
+"""Operating points on kinks of a model: the operation, its line, and the side to use.
 
 A minimum, a limit, a dead band or an absolute value has two derivatives where its sides meet.
 There, algorithmic differentiation returns a mean of both, which is the slope of neither side. A
 linear model is therefore compared with those next to its operating point. If they differ, bywire
-names the operations on their corners, and takes the side that the user states.
+names the operations on their kinks, and takes the side that the user states.
 """
 
 from __future__ import annotations
@@ -32,35 +32,35 @@ from bywire.core.signals import signals_of
 from bywire.core.typing import Array
 
 ABOVE, BELOW = "above", "below"
-"""side of the tested quantity: above or below its corner. The tested quantity is the first argument
+"""side of the tested quantity: above or below its kink. The tested quantity is the first argument
 of a minimum, a maximum or a comparison minus the second, or the argument of an absolute value"""
 REACH = 1e-9
-"""distance within which a corner counts as at the operating point, relative to the signals' usual
-magnitudes: operating points are solved to 1e-10 of these, so that the side of a nearer corner is
+"""distance within which a kink counts as at the operating point, relative to the signals' usual
+magnitudes: operating points are solved to 1e-10 of these, so that the side of a nearer kink is
 unknown; and smooth functions hardly change over such a distance"""
 _FINER = 1.0 / 4.0  # smooth functions differ by a quarter at a quarter of the distance
-_LASTING = 0.4  # remaining share of a difference nearby, above which a corner explains it
+_LASTING = 0.4  # remaining share of a difference nearby, above which a kink explains it
 _SAME = 1e-6  # of an entry of a Jacobian: smaller differences need no further comparison
 _SMALL = 1e-8  # the same, of the largest entry in its row, scaled by usual magnitudes
 _EQUAL = 1e-5  # of a response: models with smaller differences are equal
-_ACROSS = 0.02  # of the reach: on either side of a corner
+_ACROSS = 0.02  # of the reach: on either side of a kink
 _TURNS = 8
 _FREQUENCIES = 40
 _OPS_FILE = ops.__file__
 
 
 class CornerError(ParameterError):
-    """Operating point on a corner whose sides have different linear models."""
+    """Operating point on a kink whose sides have different linear models."""
 
 
 @dataclass(frozen=True)
 class Sides:
-    """Sides of corners that a user states.
+    """Sides of kinks that a user states.
 
     Parameters
     ----------
     usual
-        ``"above"``, ``"below"``, or empty to reject corners.
+        ``"above"``, ``"below"``, or empty to reject kinks.
     at
         Sides of single places, ``"FILE:LINE"``, where FILE is at least the end of the path.
     """
@@ -108,7 +108,7 @@ _STATED: ContextVar[Sides] = ContextVar("sides", default=Sides())  # noqa: B039 
 
 @contextmanager
 def taking(side: str) -> Iterator[None]:
-    """Set the side of every corner for linear models computed in this context; see `read_sides`.
+    """Set the side of every kink for linear models computed in this context; see `read_sides`.
 
     An empty text keeps the sides of the enclosing context.
     """
@@ -169,20 +169,20 @@ class Linearization:
 
 @dataclass(frozen=True, eq=False)
 class Kink:
-    """Operation near its corner.
+    """Operation near its kink.
 
     Parameters
     ----------
     place, source
         ``"FILE:LINE"``, and the source code there.
     excess
-        Tested quantity, positive above the corner.
+        Tested quantity, positive above the kink.
     slope
         Derivative of the excess by the free signals, in their usual magnitudes.
     corner
-        Value of both arguments at the corner.
+        Value of both arguments at the kink.
     order
-        Number in the order in which operations with a corner are computed.
+        Number in the order in which operations with a kink are computed.
     """
 
     place: str
@@ -194,7 +194,7 @@ class Kink:
 
     @property
     def side(self) -> str:
-        """Side of the corner on which the operation is."""
+        """Side of the kink on which the operation is."""
         return ABOVE if self.excess > 0.0 else BELOW
 
 
@@ -217,14 +217,14 @@ def magnitudes(point: SmoothPoint) -> Array:
 
 
 def beside_point(point: SmoothPoint, free: NDArray[np.bool_]) -> Array:
-    """Return the displacements of state, memory and stimulus to leave corners, in one vector."""
+    """Return the displacements of state, memory and stimulus to leave kinks, in one vector."""
     by = np.zeros(free.size)
     by[free] = REACH * _generic(int(free.sum()))[0] * magnitudes(point)[free]
     return by
 
 
 def _generic(count: int) -> Array:
-    """Return two generic directions, along which no corner lies by chance, shape (2, count)."""
+    """Return two generic directions, along which no kink lies by chance, shape (2, count)."""
     rng = np.random.default_rng(20)
     return np.asarray(rng.uniform(0.5, 1.0, (2, count)) * rng.choice([-1.0, 1.0], (2, count)))
 
@@ -232,7 +232,7 @@ def _generic(count: int) -> Array:
 def kinks_at(
     point: SmoothPoint, free: NDArray[np.bool_], usual: Array, *, outputs: bool, ticks: bool
 ) -> list[Kink]:
-    """Return the operations with a corner that a point's free signals can move to it.
+    """Return the operations with a kink that a point's free signals can move to it.
 
     Parameters
     ----------
@@ -276,12 +276,12 @@ def _size(slope: Array) -> float:
 
 
 def linear_models(of: Linearization) -> tuple[LinearModel, ...]:
-    """Return the linear models at an operating point, on the stated side of its corners.
+    """Return the linear models at an operating point, on the stated side of its kinks.
 
     Raises
     ------
     CornerError
-        When the point lies on a corner whose sides have different models, and no side is stated.
+        When the point lies on a kink whose sides have different models, and no side is stated.
     """
     limits = _limits_reached(of)
     if limits and _STATED.get().usual != ABOVE:
@@ -307,7 +307,7 @@ def _limits_reached(of: Linearization) -> list[str]:
 
 
 class _Corner:
-    """Search for the corners at an operating point, along directions of the free signals."""
+    """Search for the kinks at an operating point, along directions of the free signals."""
 
     def __init__(self, of: Linearization) -> None:
         self.of = of
@@ -401,7 +401,7 @@ class _Corner:
         return found if self.differ(first, self.here, self.here) else self.models(self.here)
 
     def taken(self, sides: Sides) -> tuple[LinearModel, ...]:
-        """Return the models on the stated sides; if corners exclude each other, by the first."""
+        """Return the models on the stated sides; if kinks exclude each other, by the first."""
         rows: dict[tuple[str, int], tuple[Array, float, float]] = {}
         direction = self.generic[0]
         for _ in range(_TURNS):
@@ -421,7 +421,7 @@ class _Corner:
         return tuple(replace(model, corners=texts) for model in self.models(direction))
 
     def kinks(self, direction: Array) -> list[Kink]:
-        """Return the operations whose corner changes the models when crossed near a direction."""
+        """Return the operations whose kink changes the models when crossed near a direction."""
         known: dict[tuple[bytes, float], bool] = {}
         return [each for each in self.near(direction) if self._matters(each, direction, known)]
 
@@ -437,11 +437,11 @@ class _Corner:
         return known[key]
 
     def matters(self, kink: Kink, direction: Array) -> bool:
-        """Return whether the two sides of an operation's corner have different models."""
+        """Return whether the two sides of an operation's kink have different models."""
         largest = np.abs(kink.slope).max()
         c = kink.slope / largest
         missing = c @ direction + self.offset(kink, direction) / largest
-        along = direction - c * missing / (c @ c)  # exactly on the corner
+        along = direction - c * missing / (c @ c)  # exactly on the kink
         one, other = along + _ACROSS * c, along - _ACROSS * c
         if not self.breaks(one, other, along):
             return False
@@ -452,7 +452,7 @@ class _Corner:
         return any(name in felt or name == "an output" for name in jumping)
 
     def near(self, direction: Array) -> list[Kink]:
-        """Return the operations with a corner near the point, evaluated at a displaced point."""
+        """Return the operations with a kink near the point, evaluated at a displaced point."""
         usual = magnitudes(self.of.point)
         kinks = kinks_at(
             self.moved(direction),
@@ -502,7 +502,7 @@ def _direction(rows: Sequence[tuple[Array, float, float]], generic: Array) -> Ar
             continue
         *_, least = solution = np.asarray(answer.x)
         if least > 1e-6:
-            # A small share of the generic direction avoids other corners.
+            # A small share of the generic direction avoids other kinks.
             best = solution[:n] + 0.3 * min(float(least), 1.0) * generic
             kept, offsets = tried, beyond
     return np.asarray(best)
@@ -538,14 +538,14 @@ def _felt(model: LinearModel) -> tuple[str, ...]:
 
 
 class _Watch:
-    """Operations with a corner, in the order in which they are computed."""
+    """Operations with a kink, in the order in which they are computed."""
 
     def __init__(self) -> None:
         self.kinks: list[Kink] = []
         self.count = 0
 
     def see(self, excess: float, slope: Array, corner: float) -> None:
-        """Record an operation whose corner can be reached."""
+        """Record an operation whose kink can be reached."""
         self.count += 1
         if np.isfinite(slope).all() and slope.any():
             self.kinks.append(Kink(*_place(), excess, slope, corner, self.count))

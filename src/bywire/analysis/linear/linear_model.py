@@ -39,7 +39,7 @@ class LinearModel:
     period
         Sample time [s]; 0 for a continuous model.
     corners
-        Side of an operation's corner for which the model holds, if the operating point is on one;
+        Side of an operation's kink for which the model holds, if the operating point is on one;
         see `bywire.analysis.linear.corners`.
     """
 

@@ -75,7 +75,7 @@ def linearize(
         When a contact just touches, a friction is at rest with ``friction="sliding"``, or moves
         with ``"stuck"``.
     CornerError
-        When the point lies on the corner of an operation (a limit, a dead band, a magnitude)
+        When the point lies on a kink of an operation (a limit, a dead band, a magnitude)
         whose sides have different models, and no side is stated; see `corners.taking`.
 
     Notes
@@ -161,7 +161,7 @@ def jacobians(
 
 
 def plant_model(point: SmoothPoint, inputs: Sequence[str], outputs: Sequence[str]) -> LinearModel:
-    """Return the Jacobians of the smooth part at a point, which may lie on a corner."""
+    """Return the Jacobians of the smooth part at a point, which may lie on a kink."""
     model = point.model
     A, B, C, D, rate, _ = point.plant()
     C, D = _rows(model, outputs, C, D)
@@ -375,7 +375,7 @@ def equilibrium(
     names = [*(model.State._fields[k] for k in free), *inputs]
     size = np.array([known[name].nominal for name in names])
     for _ in range(_TURNS):
-        # On a corner, any side is suitable, because the search only crosses it.
+        # On a kink, any side is suitable, because the search only crosses it.
         at = plant_model(smooth_point(model, par, (state, memory, None), friction), inputs, ())
         A = at.A.copy()
         if tied:

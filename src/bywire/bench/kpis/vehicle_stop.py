@@ -124,7 +124,7 @@ def mean_deceleration(stop: Stop, x: Samples) -> float | Undefined:
 
 @measure("m/s**3")
 def jerk(stop: Stop, a: Samples) -> float:
-    """Largest rate of change of the deceleration (0.02 s average), after 0.3 s, above 2.5 m/s."""
+    """Largest slope of the deceleration (0.02 s average), after 0.3 s, at speeds above 2.5 m/s."""
     t = stop.t
     mean = moving_average(t, a, _FILTER)
     last = len(t) - 1
@@ -169,49 +169,49 @@ def disc_energy(stop: Stop, heat_front: Samples, heat_rear: Samples) -> float:
 
 @measure("1")
 def peak_slip_front(stop: Stop, slip_front: Samples) -> float:
-    """Largest slip above 2.5 m/s."""
+    """Largest slip at speeds above 2.5 m/s."""
     return _peak_slip(stop, slip_front)
 
 
 @measure("1")
 def peak_slip_rear(stop: Stop, slip_rear: Samples) -> float:
-    """Largest slip above 2.5 m/s."""
+    """Largest slip at speeds above 2.5 m/s."""
     return _peak_slip(stop, slip_rear)
 
 
 @measure("s")
 def excess_slip_time_front(stop: Stop, slip_front: Samples, setting: Setting) -> float:
-    """Time with more than twice the slip of largest adhesion, above 2.5 m/s."""
+    """Time during which slip exceeds twice that of peak adhesion, at speeds above 2.5 m/s."""
     return _excess_slip_time(stop, slip_front, setting.peak_slip)
 
 
 @measure("s")
 def excess_slip_time_rear(stop: Stop, slip_rear: Samples, setting: Setting) -> float:
-    """Time with more than twice the slip of largest adhesion, above 2.5 m/s."""
+    """Time during which slip exceeds twice that of peak adhesion, at speeds above 2.5 m/s."""
     return _excess_slip_time(stop, slip_rear, setting.peak_slip)
 
 
 @measure("s")
 def locked_time_front(stop: Stop, omega_front: Samples) -> float:
-    """Time during which the wheel is locked, above 2.5 m/s."""
+    """Time during which the wheel is locked, at speeds above 2.5 m/s."""
     return _locked_time(stop, omega_front)
 
 
 @measure("s")
 def locked_time_rear(stop: Stop, omega_rear: Samples) -> float:
-    """Time during which the wheel is locked, above 2.5 m/s."""
+    """Time during which the wheel is locked, at speeds above 2.5 m/s."""
     return _locked_time(stop, omega_rear)
 
 
 @measure("s")
 def longest_lock_front(stop: Stop, omega_front: Samples) -> float:
-    """Longest uninterrupted time during which the wheel is locked, above 2.5 m/s."""
+    """Longest uninterrupted time during which the wheel is locked, at speeds above 2.5 m/s."""
     return _longest_lock(stop, omega_front)
 
 
 @measure("s")
 def longest_lock_rear(stop: Stop, omega_rear: Samples) -> float:
-    """Longest uninterrupted time during which the wheel is locked, above 2.5 m/s."""
+    """Longest uninterrupted time during which the wheel is locked, at speeds above 2.5 m/s."""
     return _longest_lock(stop, omega_rear)
 
 

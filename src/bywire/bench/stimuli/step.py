@@ -11,14 +11,14 @@ from bywire.core.quantities import TimeConstant
 
 
 class Parameters(ParameterSet):
-    """Two levels and the instant of the step."""
+    """Two levels and the time of the step."""
 
     start: Level
     """value before the step"""
     end: Level
     """value from the step on"""
     t_step: TimeConstant
-    """instant of the step"""
+    """time of the step"""
 
 
 def sample(t: NDArray[np.float64], par: Parameters) -> NDArray[np.float64]:

@@ -25,8 +25,8 @@ from bywire.core.signals import Limited, Signal
 class Stimulus(NamedTuple):
     """Demands of the rider."""
 
-    p_f_set: Annotated[float, Signal("Pa", "front pressure demand of the rider", 2e6), Ge(0)]
-    p_r_set: Annotated[float, Signal("Pa", "rear pressure demand of the rider", 2e6), Ge(0)]
+    p_f_set: Annotated[float, Signal("Pa", "rider's front pressure demand", 2e6), Ge(0)]
+    p_r_set: Annotated[float, Signal("Pa", "rider's rear pressure demand", 2e6), Ge(0)]
 
 
 class Memory(NamedTuple):

@@ -1,4 +1,4 @@
-"""Animation of the wedge brake on a car's corner."""
+"""Animation of the wedge brake on a quarter car."""
 
 from __future__ import annotations
 

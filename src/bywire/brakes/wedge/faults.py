@@ -15,7 +15,7 @@ _SIGNALS = (
     Channel("encoder_2", "encoder 2", "rad", "theta_2", offset=0.1),
     Channel("drive_1", "demand of motor 1", "A", "i_1_ref", "drive", task="position"),
     Channel("drive_2", "demand of motor 2", "A", "i_2_ref", "drive", task="position"),
-    Channel("power", "switch of the power stages", "1", "power_off", "demand", stuck=1.0),
+    Channel("power", "power-stage switch", "1", "power_off", "demand", stuck=1.0),
 )
 
 _NOTHING = 1e-6  # share of a torque constant, which must be positive

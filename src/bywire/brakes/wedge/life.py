@@ -1,6 +1,6 @@
 """Pad life of the wedge brake: pads wear, the clearance grows, and the caliper becomes stiffer.
 
-Stops of a car's corner supply the friction work; see `bywire.life`.
+Stops of a quarter car supply the friction work; see `bywire.life`.
 """
 
 from __future__ import annotations
@@ -125,7 +125,7 @@ def left(z: Values, par: WedgeCornerParameters, wear: WearParameters) -> Values:
 
 WEDGE_PADS = Life(
     name="wedge-pads",
-    summary="wedge brake pads on a car's corner, until lining or wedge travel is used up",
+    summary="wedge brake pads on a quarter car, until lining or wedge travel is used up",
     experiment="corner-stop",
     wear=WearParameters,
     values={

@@ -108,7 +108,7 @@ RESIDUALS = (
     ),
     Residual(
         "effort",
-        "the larger demand of both motors",
+        "the larger of both motors' demands",
         NAME,
         "A",
         ("i_1_ref", "i_2_ref", "M_set"),

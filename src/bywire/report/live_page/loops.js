@@ -69,7 +69,7 @@ function jacobiansOf({ memory, room, parameters, ...functions }, { entry, size, 
 
 const EQUAL = 1e-5, SAME = 1e-6, FREQUENCIES = 40; // models, numbers that count as one; where models are compared
 
-/** Return a loop's gain where sides of corners agree; null without a point, "corner" where they do not. */
+/** Return a loop's gain where both sides of a kink agree; null without a point, "corner" where they do not. */
 function modelOf(exported, loop) {
   const found = [0, 1, -1].map((side) => jacobiansOf(exported, loop, side));
   if (found.includes(null)) return null;

@@ -91,7 +91,7 @@ function marginsOf(model, bode) {
 /** Return Bode diagram and margins of a loop at the module's parameters, or why there are none. */
 function loopAt(exported, loop) {
   const model = modelOf(exported, loop);
-  if (model === "corner") return { reason: "the operating point lies on a corner of the model, whose sides have different loop gains: " +
+  if (model === "corner") return { reason: "the operating point lies on a kink of the model, whose sides have different loop gains: " +
     `run bywire margins ${loop.name} to see the operation` };
   if (!model) return { reason: "no operating point with these values: a contact opens or closes there" };
   const bode = bodeOf(model);

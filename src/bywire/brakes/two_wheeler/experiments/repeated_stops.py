@@ -329,7 +329,7 @@ _DEFAULTS = Options(
 EXPERIMENT = Experiment(
     name="repeated-stops",
     assembly="two-wheeler-by-wire",
-    summary="repeated stops ({stops}) from {v_0:km/h} at {deceleration} every {pause} with brakes "
+    summary="{stops} stops from {v_0:km/h} at {deceleration} every {pause} with brakes "
     "that warm up, then parked",
     options=Options,
     defaults=_DEFAULTS,

@@ -1,4 +1,4 @@
-"""Stops of a car's corner: a stop with hold, and a panic stop beyond the road's adhesion."""
+"""Stops of a quarter car: a stop with hold, and a panic stop beyond the road's adhesion."""
 
 from __future__ import annotations
 
@@ -133,7 +133,7 @@ def _stop(
 CORNER_STOP = Experiment(
     name="corner-stop",
     assembly="wedge-corner",
-    summary="the wedge brake stops a car's corner from {v_0:km/h} with {M_brake}, and holds it",
+    summary="the wedge brake stops a quarter car from {v_0:km/h} with {M_brake}, and holds it",
     options=CornerStopOptions,
     defaults=CornerStopOptions(
         v_0=50.0 / 3.6, M_brake=600.0, surface="dry-asphalt", T_disc=293.15, t_hold=5.5, t_end=0.5
@@ -228,7 +228,7 @@ def _ideal(v_0: float, par: WedgeCornerParameters) -> float:
 CORNER_PANIC = Experiment(
     name="corner-panic",
     assembly="wedge-corner",
-    summary="the wedge brake stops a car's corner from {v_0:km/h} on {surface} with slip control",
+    summary="the wedge brake stops a quarter car from {v_0:km/h} on {surface} with slip control",
     options=CornerPanicOptions,
     defaults=CornerPanicOptions(
         v_0=100.0 / 3.6, M_brake=1500.0, surface="wet-asphalt", T_disc=293.15, duration=5.0

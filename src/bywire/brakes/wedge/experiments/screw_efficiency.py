@@ -340,7 +340,7 @@ def _line(rows: list[tuple[float, ...]]) -> float:
 LOAD_SWEEP = Experiment(
     name="load-sweep",
     assembly="wedge-brake",
-    summary="screw driving and driven back under growing forces: load-dependent and other friction",
+    summary="screw driving and back-driven under rising forces: load-dependent and other friction",
     options=LoadSweepOptions,
     defaults=LoadSweepOptions(i_drive=12.0, i_back=3.0, levels=6, omega_slow=10.0, t_stroke=0.6),
     cases=load_sweep,

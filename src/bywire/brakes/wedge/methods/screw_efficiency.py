@@ -270,7 +270,7 @@ def synthetic(par: WedgeParameters, options: Options, seed: int) -> xr.Dataset:
 METHOD = Method(
     name="screw-efficiency",
     assembly="wedge-brake",
-    summary="roller screw's efficiency driving and driven back, without the bearing friction",
+    summary="roller screw's efficiency driving and back-driven, without bearing friction",
     experiment="load-sweep",
     signals=SIGNALS,
     options=Options,

@@ -1,1 +1,1 @@
-"""Rigs of the drive train, and a car's corner."""
+"""Rigs of the drive train, and a quarter car."""

@@ -116,7 +116,7 @@ class Answer:
     stop
         Largest force on the wedge's end stops [N].
     unsettled
-        Substeps of all cases that hit the cap of the contact iteration.
+        Substeps of all cases that hit the contact iteration's limit.
     """
 
     closing_speed: float
@@ -632,7 +632,7 @@ def _cuts(data: xr.Dataset, best: _Best) -> tuple[Cut, ...]:
 
 def _warnings(data: xr.Dataset) -> tuple[str, ...]:
     count = data.attrs["unsettled_substeps"]
-    return (f"{count} substeps hit the cap of the contact iteration",) if count else ()
+    return (f"{count} substeps hit the contact iteration's limit",) if count else ()
 
 
 def _edges(best: _Best, options: Options) -> tuple[str, ...]:
