@@ -76,7 +76,7 @@ def test_smoothing_removes_the_ripple_and_says_so():
     found = figures(y, T, smoothing=0.02)
     assert found["settling_time"].value == pytest.approx(tau * math.log(50), abs=2e-3)
     assert found["rise_time"].value == pytest.approx(tau * math.log(9), abs=2e-3)
-    assert found["rise_time"].note == "moving average over 0.02 s"
+    assert found["rise_time"].note == "moving average over 20 ms"
     assert math.isnan(figures(y, T)["settling_time"].value)
 
 

@@ -21,6 +21,7 @@ import xarray as xr
 from bywire.bench.kpis.kpi import Undefined, measure
 from bywire.bench.kpis.samples import defect, signal, smoothed, treatment
 from bywire.core.typing import Array
+from bywire.core.units import shown
 
 _OPEN = 0.05  # of the drive's range: largest distance between both ends of a closed loop
 _LEFT = 0.01  # of the response's range: smallest residual at the end that a note mentions
@@ -111,8 +112,8 @@ class Loop:
         parts = [self.treatment] if self.treatment else []
         if left > _LEFT * float(np.ptp(self.response)):
             parts.append(
-                f"the response ends {left:.3g} {self.response_unit} away from its start, so a "
-                "straight line closes the loop"
+                f"the response ends {shown(float(f'{left:.3g}'), self.response_unit)} away from "
+                "its start, so a straight line closes the loop"
             )
         return "; ".join(parts)
 

@@ -15,6 +15,7 @@ import xarray as xr
 from bywire.bench.kpis.kpi import Undefined
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.typing import Array
+from bywire.core.units import shown
 
 Samples = list[float]
 """samples of a signal, or their times"""
@@ -203,4 +204,5 @@ def smoothed(t: Array, y: Array, period: float) -> Array:
 
 def treatment(period: float) -> str:
     """Return the note on figures of a smoothed signal; empty for the raw one."""
-    return f"moving average over {period:g} s" if period > 0 else ""
+    unit = "ms" if period < 1.0 else "s"
+    return f"moving average over {shown(period, 's', unit)}" if period > 0 else ""
