@@ -172,11 +172,11 @@ CONTROLLED = (
 )
 FIVEFOLD = (
     "140 is five times 28, but the contribution of sticking does not increase"
-    " with the run-out. Relative to stationary screws, the ripple is 1.48 at "
+    " with the runout. Relative to stationary screws, the ripple is 1.48 at "
     "4 um, 1.19 at 8 um, 1.07 at 12 um and 0.98 at 20 um"
 )
 STANDING = (
-    "the formula is 2 mu_B r_B K_cal times the peak-to-peak run-out, which "
+    "the formula is 2 mu_B r_B K_cal times the peak-to-peak runout, which "
     "gives 21.0 N m and five times this value"
 )
 CREEP = (

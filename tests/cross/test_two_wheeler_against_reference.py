@@ -174,7 +174,7 @@ def end_of(result: Trajectory) -> tuple[float, float]:
 
 
 def test_locked_stop(locked: Scene) -> None:
-    """Both wheels lock; the stop ends, and the vehicle rocks back on its tyres."""
+    """Both wheels lock; the stop ends, and the vehicle rocks back on its tires."""
     events = [what for _, what in locked.reference.changes]
     assert events[:2] == ["front slides", "front stands"]
     result = locked.simulated()
@@ -185,7 +185,7 @@ def test_locked_stop(locked: Scene) -> None:
 
 
 def test_controlled_stop(held: Scene) -> None:
-    """The front tyre slides once and grips again; until the stop."""
+    """The front tire slides once and grips again; until the stop."""
     events = [what for _, what in held.reference.changes]
     assert events[:2] == ["front slides", "front grips"]
     result = held.simulated()
@@ -194,7 +194,7 @@ def test_controlled_stop(held: Scene) -> None:
 
 
 def test_slow_stop(slow: Scene) -> None:
-    """The rebound, and the ringing after it: wheels lock and break loose on the damped tyres."""
+    """The rebound, and the ringing after it: wheels lock and break loose on the damped tires."""
     assert sum(what == "standstill" for _, what in slow.reference.changes) >= 5
     result = slow.simulated()
     assert not above(apart(result, slow.reference), CLOSE)

@@ -178,7 +178,7 @@ def test_two_per_cent_of_a_parameter_show(name: str, parameter: str, step: float
 
 @pytest.mark.parametrize("mu_B", [0.2, 0.6])
 def test_control_is_stable_on_both_sides_of_the_neutral_point(mu_B: float) -> None:
-    """Without run-out the brake comes to rest at the demand after both steps, in both codes.
+    """Without runout the brake comes to rest at the demand after both steps, in both codes.
 
     A crossover of 80 Hz instead of 8 Hz does not.
     """

@@ -13,7 +13,7 @@ from bywire.plant import adhesion
 from bywire.plant.road import SURFACES
 from raising import raises
 
-# A set for dry tarmac as it circulates; a stiff tyre with E < 0, one with E = 1.
+# A set for dry tarmac as it circulates; a stiff tire with E < 0, one with E = 1.
 TYRES = [
     {"B": 10.0, "C": 1.9, "D": 1.0, "E": 0.97},
     {"B": 12.0, "C": 2.3, "D": 0.82, "E": 1.0},

@@ -1,16 +1,16 @@
 """Reference of a two-wheeler's stop on a level road, each stick and slide an event of its own.
 
-A wheel rolls or stands, a tyre grips or slides: four modes, between which the vehicle is smooth and
+A wheel rolls or stands, a tire grips or slides: four modes, between which the vehicle is smooth and
 is integrated by the explicit pair of Dormand and Prince with control of its error. Each change of
-mode is located to round-off, as is each change of sign of the speed. A tyre that slides has no
+mode is located to round-off, as is each change of sign of the speed. A tire that slides has no
 deflection of its own: its force is that of its slip, and it grips again with the deflection that
 gives this force. It shares no code with the package.
 
-Symbols: v, x speed and distance, omega a wheel's speed, u a tyre's deflection, N a load, p a
+Symbols: v, x speed and distance, omega a wheel's speed, u a tire's deflection, N a load, p a
 pressure. The rear wheel stays on the ground: N_r > 0 is checked.
 
 Pair of orders 5 and 4: E. Hairer, S. Norsett, G. Wanner, "Solving Ordinary Differential Equations
-I", table II.5.2. Tyre: M. Burckhardt, "Fahrwerktechnik: Radschlupf-Regelsysteme", 1993 (curve);
+I", table II.5.2. Tire: M. Burckhardt, "Fahrwerktechnik: Radschlupf-Regelsysteme", 1993 (curve);
 H. Pacejka, "Tire and Vehicle Dynamics", chapters 7 and 8 (relaxation length, damping at low speed).
 """
 
@@ -76,7 +76,7 @@ class Surface(NamedTuple):
 
 @dataclass(frozen=True)
 class Wheel:
-    """A wheel with its tyre and brake; k: moment over pressure."""
+    """A wheel with its tire and brake; k: moment over pressure."""
 
     J: float
     r: float
@@ -114,14 +114,14 @@ class TwoWheeler:
         return min(max((v - rolled) / faster, -1.0), 1.0) if faster else 0.0
 
     def limit(self, slip: float) -> float:
-        """Return the most that a tyre's deflection over its relaxation length reaches."""
+        """Return the most that a tire's deflection over its relaxation length reaches."""
         peak = self.surface.peak
         return self.surface.rising(slip) if slip > peak else peak
 
 
 @dataclass
 class Modes:
-    """Sign of the motion of each wheel and of the vehicle, sign of the slide of each tyre."""
+    """Sign of the motion of each wheel and of the vehicle, sign of the slide of each tire."""
 
     turns: list[int] = field(default_factory=lambda: [1, 1])
     slides: list[int] = field(default_factory=lambda: [0, 0])
@@ -144,7 +144,7 @@ def loads(y: Row, bike: TwoWheeler) -> tuple[float, float]:
 
 
 def force(k: int, y: Row, modes: Modes, bike: TwoWheeler) -> float:
-    """Return the force of a tyre on its wheel: of the slip if it slides, else of the deflection."""
+    """Return the force of a tire on its wheel: of the slip if it slides, else of the deflection."""
     N, wheel, sliding = loads(y, bike)[k], bike.wheels[k], modes.slides[k]
     if sliding:
         return sliding * N * bike.surface.mu(abs(bike.slip(k, y, modes)))
@@ -153,7 +153,7 @@ def force(k: int, y: Row, modes: Modes, bike: TwoWheeler) -> float:
     if abs(v) < wheel.v_low:
         fade = 0.5 * (1.0 + math.cos(math.pi * v / wheel.v_low))
         mu += wheel.c_t * (v - y[2 + k] * wheel.r) * fade
-        # No more than a tyre that slides has: damping does not end by a jump of the force.
+        # No more than a tire that slides has: damping does not end by a jump of the force.
         most = bike.surface.mu(max(bike.surface.peak, abs(bike.slip(k, y, modes))))
         mu = min(max(mu, -most), most)
     return N * mu
@@ -182,7 +182,7 @@ def derivative(y: Row, modes: Modes, demand: tuple[float, float], bike: TwoWheel
 
 
 def held(k: int, y: Row, dy: Row, modes: Modes, bike: TwoWheeler) -> float:
-    """Return how fast a sliding tyre would leave its limit [m/s]; it grips below zero.
+    """Return how fast a sliding tire would leave its limit [m/s]; it grips below zero.
 
     The limit itself moves with the slip: d(limit) = sigma mu'(slip)/mu'(rising) d|slip|.
     """
@@ -317,7 +317,7 @@ def advance(
 
 
 def shown(y: Row, modes: Modes, bike: TwoWheeler) -> Row:
-    """Return the states with the deflection that a sliding tyre has."""
+    """Return the states with the deflection that a sliding tire has."""
     row = list(y)
     for k, sign in enumerate(modes.slides):
         if sign:

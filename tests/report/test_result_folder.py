@@ -85,7 +85,7 @@ def test_killed_while_files_are_moved_it_says_so(
         json.loads((tmp_path / "result.json").read_text())["label"],
     }
     if (tmp_path / UNFINISHED).exists():
-        with pytest.raises(FileError, match="is incomplete: run the command"):
+        with pytest.raises(FileError, match="contains an incomplete result"):
             require_finished(tmp_path)
     else:
         assert len(contents) == 1

@@ -166,9 +166,18 @@ def test_statements_show_beside_curves_and_key_figures(tmp_path: Path) -> None:
     [
         ('citations = "x"', "'citations': did you mean 'citation'"),
         ('citation = "{titel}"\nplaces.title = "A"', "unknown place 'titel': did you mean 'title'"),
-        ("[groups.motor]\nR = 0.4", 'groups.motor.R: write { chosen = ..., where = "..." }'),
-        ('[groups.motor]\nR = { where = "here" }', "groups.motor.R takes one of paper, derived"),
-        ('[groups.motor]\nR = { guess = 1.0, where = "here" }', "groups.motor.R takes one of"),
+        (
+            "[groups.motor]\nR = 0.4",
+            'groups.motor.R is not valid. Write { chosen = ..., where = "..." }',
+        ),
+        (
+            '[groups.motor]\nR = { where = "here" }',
+            "groups.motor.R needs exactly one of paper, derived",
+        ),
+        (
+            '[groups.motor]\nR = { guess = 1.0, where = "here" }',
+            "groups.motor.R needs exactly one of",
+        ),
         ('[groups.a]\ngroup = "b"', "groups.a.group: group of values 'b'"),
         ('[tolerances.a]\nwhat = "x"\nunit = "1"\nreason = "y"', "tolerances.a: size is missing"),
         ('[statements.a]\nunit = "1"\nwhere = "x"', "statements.a: value is missing"),

@@ -24,7 +24,9 @@ TEXT = """
 [design]
 kind = "corners"
 """
-SENTENCE = "fault pressure.stuck-at-last, from 10 ms to 15 ms: pressure sensor holds its last value"
+SENTENCE = (
+    "fault pressure.stuck-at-last, from 10 ms to 15 ms: pressure sensor is stuck at its last value"
+)
 
 
 def test_a_study_says_which_bench_with_which_faults_and_changes_was_tested(study, tmp_path):

@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 LEGEND = (
     "Linear sampled loop without dry friction. The gain margins are the factors to which the loop "
     "gain may rise and fall. The delay margin is the additional dead time that the loop tolerates. "
-    "A disk margin of 2 is best, and 0 is none. S and T are the sensitivity and the complementary "
+    "The best disk margin is 2, and the worst is 0. S and T are the sensitivity and the complementary "
     "sensitivity. Unstable loops and loops without gain have no margins."
 )
 """caption that explains the headings"""

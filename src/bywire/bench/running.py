@@ -87,7 +87,8 @@ class Result:
         warnings = [
             f"{label}: {text}" if len(self.recordings) > 1 else text
             for label, recording in self.recordings.items()
-            for text in recording.attrs.get("warnings", ())
+            for text in np.atleast_1d(recording.attrs.get("warnings", [])).tolist()
+            if text  # a brake may write one text instead of a list
         ]
         return warnings + ([self.unestimated] if self.unestimated else [])
 

@@ -68,7 +68,7 @@ def rests_exactly(trial: Trial) -> Iterator[Evidence]:
                 waiting.discard(name)
                 text = f"{name} is exactly zero at {amount:g} of the controllers' moves"
                 yield Evidence(True, text, place=place)
-    for name in sorted(waiting):  # other loads, such as a disc's run-out, may move it later
+    for name in sorted(waiting):  # other loads, such as a disc's runout, may move it later
         first = float(run[1, names.index(name)])
         text = (
             f"{name} is {first:.2g} after one sample time at {SLOW_SHARES[-1]:g} of the "

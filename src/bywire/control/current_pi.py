@@ -1,4 +1,4 @@
-"""Current PI with tracking anti-wind-up: duty cycle from the current error."""
+"""Current PI with tracking anti-windup: duty cycle from the current error."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Parameters(ParameterSet):
     k_i: DutyPerCurrentTime
     """integral gain"""
     T_t: Duration
-    """tracking time of the anti-wind-up"""
+    """tracking time of the anti-windup"""
     D_max: Fraction
     """limit of the duty cycle that the ECU demands"""
 

@@ -25,7 +25,7 @@ class Parameters(ParameterSet):
     T_i: Duration
     """integral time"""
     T_t: Duration
-    """tracking time of the anti-wind-up"""
+    """tracking time of the anti-windup"""
 
 
 class State(NamedTuple):

@@ -1,4 +1,4 @@
-"""Pressure PID with set-point weights, filtered derivative and tracking anti-wind-up."""
+"""Pressure PID with set-point weights, filtered derivative and tracking anti-windup."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Parameters(ParameterSet):
     c: Weight
     """set-point weight of the derivative part; with 0 it acts only on the measurement"""
     T_t: Duration
-    """tracking time of the anti-wind-up"""
+    """tracking time of the anti-windup"""
     i_max: Current
     """limit of the current demand's magnitude"""
 

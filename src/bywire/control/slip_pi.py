@@ -32,7 +32,7 @@ class Parameters(ParameterSet):
     T_i: Duration
     """integral time"""
     T_t: Duration
-    """tracking time of the anti-wind-up"""
+    """tracking time of the anti-windup"""
     eager: Gain
     """additional integral gain without slip, as a factor; it falls to zero at the set slip"""
     v_off: Annotated[float, Unit("m/s", 2.0), Field(gt=0, allow_inf_nan=False)]
@@ -97,7 +97,7 @@ def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, O
 
     Notes
     -----
-    On the rising branch the tyre's slip is stiff, and an integral alone closes the loop in
+    On the rising branch the tire's slip is stiff, and an integral alone closes the loop in
     :math:`T_i\, N r \mu'(\lambda)/(k K_p)`: 2 s on dry asphalt at a slip of 0.04, half a stop.
     ``eager`` shortens that far below the set slip, above v_fall, and does not change the loop at
     the set slip.

@@ -382,7 +382,7 @@ class Track:
 def track(name: str, data: xr.Dataset, par: Any, block: float | None = None) -> Track:
     """Track a parameter.
 
-    Samples are averaged over blocks, so that the sensor's lag and the disc's run-out do not make
+    Samples are averaged over blocks, so that the sensor's lag and the disc's runout do not make
     neighbors depend on each other; drift and noise are those of maximum likelihood.
 
     Parameters

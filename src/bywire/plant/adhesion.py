@@ -1,4 +1,4 @@
-"""Adhesion of a tyre on a surface as a function of slip: Burckhardt, or the Magic Formula."""
+"""Adhesion of a tire on a surface as a function of slip: Burckhardt, or the Magic Formula."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _MAGIC_NEWTON = 6  # steps, from the tangent at zero; enough up to E = 1 and a p
 
 
 class SurfaceParameters(ParameterSet):
-    """Adhesion of a tyre on a surface: after Burckhardt, and by the Magic Formula."""
+    """Adhesion of a tire on a surface: after Burckhardt, and by the Magic Formula."""
 
     c1: Coefficient
     """limit of Burckhardt's adhesion, before c3 is subtracted"""
@@ -64,7 +64,7 @@ class SurfaceParameters(ParameterSet):
 
 
 class Surface(NamedTuple):
-    """Coefficients of the adhesion of a tyre on a surface."""
+    """Coefficients of the adhesion of a tire on a surface."""
 
     c1: C1
     c2: C2

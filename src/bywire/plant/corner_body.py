@@ -42,9 +42,9 @@ class Balance(NamedTuple):
 
 
 class Input(NamedTuple):
-    """Braking force of the tyre, and the slope."""
+    """Braking force of the tire, and the slope."""
 
-    F: Annotated[float, Signal("N", "braking force of the tyre", 1e3)]
+    F: Annotated[float, Signal("N", "braking force of the tire", 1e3)]
     sine: Annotated[float, Signal("1", "sine of the slope", 0.05)]
 
 
@@ -71,5 +71,5 @@ def energy(x: State, par: Parameters) -> Energy:
 
 
 def power_in(x: State, u: Input, par: Parameters) -> Power:
-    """Return the power of tyre and slope."""
+    """Return the power of tire and slope."""
     return -(u.F + par.m * par.g * u.sine) * x.v

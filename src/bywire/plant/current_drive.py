@@ -37,7 +37,7 @@ class Parameters(ParameterSet):
     k_i: DutyPerCurrentTime
     """integral gain"""
     T_t: Duration
-    """tracking time of the anti-wind-up"""
+    """tracking time of the anti-windup"""
     V_dc: Voltage
     """supply voltage: gain and limit of the PWM stage"""
     R_off: Resistance
@@ -107,7 +107,7 @@ def rate(x: State, u: Input, par: Parameters) -> Rate:
 
     .. math:: \dot I = k_i e + (\mathrm{sat}(k_p e + I) - k_p e - I)/T_t
 
-    The last term is the anti-wind-up (our interpretation; the paper has none). While the stage is
+    The last term is the anti-windup (our interpretation; the paper has none). While the stage is
     off, the integral part decays with T_t.
     """
     e = error(x, par)

@@ -110,7 +110,7 @@ class Input(NamedTuple):
     """Power of the brake's friction, speed of the vehicle, and whether pads press on the discs.
 
     The power is that of the set-valued friction, limit times speed where the wheel turns and 0
-    at standstill: a locked wheel heats its tyre.
+    at standstill: a locked wheel heats its tire.
     """
 
     P: Annotated[float, Signal("W", "friction power of the brake", 3e4), Ge(0)]

@@ -1,4 +1,4 @@
-"""Flywheel and disc of the test stand: coasting or driven, with run-out."""
+"""Flywheel and disc of the test stand: coasting or driven, with runout."""
 
 from __future__ import annotations
 
@@ -37,10 +37,10 @@ class Parameters(ParameterSet):
     Omega_still: StillSpeed
     """speed up to which the disc counts as stopped"""
     runout: RunOut
-    """amplitude of the run-out that the floating caliper does not follow"""
+    """amplitude of the runout that the floating caliper does not follow"""
 
 
-FAULTS = (ParameterFault("run-out", "disc run-out larger by a factor", ("runout",), 5.0),)
+FAULTS = (ParameterFault("run-out", "disc runout larger by a factor", ("runout",), 5.0),)
 
 
 class State(NamedTuple):
@@ -94,14 +94,14 @@ def balance(x: State, u: Input, par: Parameters) -> Balance:
 
 
 def runout(x: State, par: Parameters) -> Annotated[float, Signal("m", "run-out", 4e-6)]:
-    """Return the run-out at the pads: once per revolution."""
+    """Return the runout at the pads: once per revolution."""
     return par.runout * ops.sin(x.phi)
 
 
 def runout_rate(
     x: State, par: Parameters
-) -> Annotated[float, Signal("m/s", "rate of the run-out", 2e-4)]:
-    """Return the rate of the run-out."""
+) -> Annotated[float, Signal("m/s", "rate of the runout", 2e-4)]:
+    """Return the rate of the runout."""
     return par.runout * ops.cos(x.phi) * x.Omega
 
 

@@ -20,7 +20,7 @@ Loss = Annotated[
 
 
 class Parameters(ParameterSet):
-    """Upright stiffness of rear tyre and suspension, which carries the load."""
+    """Upright stiffness of rear tire and suspension, which carries the load."""
 
     k: Stiffness
     """stiffness"""

@@ -38,7 +38,7 @@ SURFACES = {
     "snow": Surface(0.1946, 94.129, 0.0646, 39.04, 1.754, 0.19, 0.9312),
     "ice": Surface(0.05, 306.39, 1e-4, 148.1, 1.653, 0.05, 1.0),
 }
-"""values for car tyres from open code, attributed there to M. Burckhardt,
+"""values for car tires from open code, attributed there to M. Burckhardt,
 Fahrwerktechnik: Radschlupf-Regelsysteme (1993); c3 of ice circulates as 0, which has no peak. The
 Magic Formulas are fitted to these curves: the same peak at the same slip, and least squares from
 no slip to a locked wheel"""

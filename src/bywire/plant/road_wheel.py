@@ -15,7 +15,7 @@ WheelInertia = Annotated[float, Unit("kg*m**2", 0.5), Field(gt=0, allow_inf_nan=
 
 
 class Parameters(ParameterSet):
-    """Rigid wheel with its tyre and brake discs."""
+    """Rigid wheel with its tire and brake discs."""
 
     J: WheelInertia
     """inertia"""
@@ -44,9 +44,9 @@ class Balance(NamedTuple):
 
 
 class Input(NamedTuple):
-    """Force of the road on the tyre, and the torque of brake and rolling resistance."""
+    """Force of the road on the tire, and the torque of brake and rolling resistance."""
 
-    F: Annotated[float, Signal("N", "braking force of the tyre", 1e3)]
+    F: Annotated[float, Signal("N", "braking force of the tire", 1e3)]
     friction: Annotated[float, Signal("N*m", "torque of brake and rolling resistance", 300.0)]
 
 

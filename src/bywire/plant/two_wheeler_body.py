@@ -92,9 +92,9 @@ class Balance(NamedTuple):
 
 
 class Input(NamedTuple):
-    """Sum of both tyres' braking forces, slope, and the ground's force on the rear wheel."""
+    """Sum of both tires' braking forces, slope, and the ground's force on the rear wheel."""
 
-    F: Annotated[float, Signal("N", "braking force of both tyres", 1e3)]
+    F: Annotated[float, Signal("N", "braking force of both tires", 1e3)]
     sine: Sine
     cosine: Cosine
     support: Annotated[float, Signal("N", "force of the ground on the rear wheel", 1e3)]
@@ -133,7 +133,7 @@ def static_load(
 
 
 def rear_load(
-    F: Annotated[float, Signal("N", "braking force of both tyres", 1e3)],
+    F: Annotated[float, Signal("N", "braking force of both tires", 1e3)],
     F_d: Annotated[float, Signal("N", "air drag", 100.0)],
     cosine: Cosine,
     par: Parameters,
@@ -225,7 +225,7 @@ def energy(x: State, par: Parameters) -> Energy:
 
 
 def power_in(x: State, u: Input, par: Parameters) -> Power:
-    """Return the power of tyres and slope, and of the moments that pitch the body."""
+    """Return the power of tires and slope, and of the moments that pitch the body."""
     travel = -(u.F + par.m * par.g * u.sine) * x.v
     return travel + pitch_power(x, u, par) + u.support * par.L * x.phi_rate
 

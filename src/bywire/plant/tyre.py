@@ -1,4 +1,4 @@
-"""Longitudinal tyre: a deflection that relaxes while rolling, and slides at the adhesion limit."""
+"""Longitudinal tire: a deflection that relaxes while rolling, and slides at the adhesion limit."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ class Parameters(adhesion.Parameters):
     sigma: Length
     """relaxation length"""
     c_t: Annotated[float, Unit("s/m", 1.0), Field(ge=0, allow_inf_nan=False)]
-    """damping of the sticking tyre near standstill, relative to load"""
+    """damping of the sticking tire near standstill, relative to load"""
     v_low: Annotated[float, Unit("m/s", 2.0), Field(gt=0, allow_inf_nan=False)]
     """speed above which the damping c_t is zero"""
     tau_slide: Duration
-    """time constant with which a sliding tyre loses the deflection beyond its limit"""
+    """time constant with which a sliding tire loses the deflection beyond its limit"""
 
 
 class State(NamedTuple):
@@ -50,7 +50,7 @@ class Contact(NamedTuple):
 
 
 class Limits(NamedTuple):
-    """Limits of a tyre's force at its slip."""
+    """Limits of a tire's force at its slip."""
 
     mu: Annotated[float, Signal("1", "largest adhesion", 1.0)]
     u: Annotated[float, Signal("m", "largest deflection", 1e-2)]
@@ -74,9 +74,9 @@ class Input(NamedTuple):
 
 
 class Output(NamedTuple):
-    """Force of the tyre."""
+    """Force of the tire."""
 
-    F: Annotated[float, Signal("N", "braking force of the tyre", 1e3)]
+    F: Annotated[float, Signal("N", "braking force of the tire", 1e3)]
 
 
 def braking_slip(u: Contact, par: Parameters) -> Slip:
@@ -105,14 +105,14 @@ def _ground(u: Contact | Input) -> adhesion.Surface:
 def rate(x: State, u: Input, par: Parameters) -> Annotated[float, Signal("m/s", "rate", 0.5)]:
     r"""Return the rate of the deflection, :math:`\dot u = v - \omega r - |v| u/\sigma`.
 
-    While the tyre slides, the deflection returns to its limit.
+    While the tire slides, the deflection returns to its limit.
     """
     beyond = x.u - ops.clip(x.u, -u.u_max, u.u_max)
     return u.v - u.v_wheel - ops.fabs(u.v) * x.u / par.sigma - beyond / par.tau_slide
 
 
 def sliding(x: State, u: Input) -> Annotated[float, Signal("1", "tyre slides")]:
-    """Return 1 where the tyre slides, 0 where it sticks to the road."""
+    """Return 1 where the tire slides, 0 where it sticks to the road."""
     return ops.where(ops.fabs(x.u) < u.u_max, 0.0, 1.0)
 
 
@@ -143,5 +143,5 @@ def output(x: State, u: Input, par: Parameters) -> Output:
 
 
 def work(x: State, u: Input, par: Parameters) -> Power:
-    """Return the power into the tyre: sliding, damping, and recoverable deflection."""
+    """Return the power into the tire: sliding, damping, and recoverable deflection."""
     return output(x, u, par).F * (u.v - u.v_wheel)

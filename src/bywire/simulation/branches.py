@@ -122,7 +122,7 @@ def _poor_atoms(
 
 # --- Branches and ramps
 # A selection computes both arms. If only one arm needs costly functions, such as the curve of a
-# sliding tyre, the processor skips them while the other arm is selected. Selections with the same
+# sliding tire, the processor skips them while the other arm is selected. Selections with the same
 # condition share common nodes of their arms: the first selection computes them for all others.
 # The values do not change.
 

@@ -1,4 +1,4 @@
-"""A quarter car with any disc brake: body, tyre, road, and the disc's heat.
+"""A quarter car with any disc brake: body, tire, road, and the disc's heat.
 
 A corner inherits from `Corner` and from its brake's assembly, whose disc turns with the wheel. Its
 method ``wheel`` returns the disc's speed. `tyre_torque` is the road's torque on the disc.
@@ -19,7 +19,7 @@ from bywire.vehicle.two_wheeler import BOOK, HEAT_BOOK, heat_sink, shown_slip
 
 
 class CornerParameters(ParameterSet):
-    """Body, wheel, tyre and road; the wheel's inertia belongs to the brake's disc."""
+    """Body, wheel, tire and road; the wheel's inertia belongs to the brake's disc."""
 
     body: corner_body.Parameters
     r: Length
@@ -36,7 +36,7 @@ class WheelSpeed(NamedTuple):
 
 
 class Corner(Assembly[ParT, MemoryT]):
-    """Body and tyre of a corner; their parameters are in ``corner``."""
+    """Body and tire of a corner; their parameters are in ``corner``."""
 
     corner = Part(corner_body, par="corner.body", outside=True, state={"v": "v_x"})
     tyre = Part(tyre, par="corner.tyre")
@@ -47,7 +47,7 @@ class Corner(Assembly[ParT, MemoryT]):
     W_slope = Integral("J", "work of gravity", role=Role("source", "slope", book=BOOK))
     t_locked = Integral("s", "time during which the wheel is locked")
 
-    F_x = Wire("N", "braking force of the tyre", 1e3)
+    F_x = Wire("N", "braking force of the tire", 1e3)
     N_x = Wire("N", "load of the wheel", 4e3)
     v_tread = Shown("m/s", "tread speed", 20.0)
     slip = Shown("1", "braking slip", 0.1)
@@ -60,7 +60,7 @@ class Corner(Assembly[ParT, MemoryT]):
         raise NotImplementedError
 
     def tyre_torque(self, w: Self) -> float:
-        """Wire body and tyre, and return the torque of the road on the wheel [N m]."""
+        """Wire body and tire, and return the torque of the road on the wheel [N m]."""
         par: CornerParameters = w.par.corner  # type: ignore[attr-defined]
         omega = self.wheel(w)
         ground = road.surface(w.corner.xe.s, par.road)

@@ -125,7 +125,7 @@ def tick(r: Readings, m: Any, M_set: float, par: Parameters) -> Any:
         rules, out = abs_rules.output(rules, view, par.T_s, par.rules)  # type: ignore[assignment]
         m = m._replace(**{f"{name}_x": value for name, value in rules._asdict().items()})
     left = ops.fmax(k * out.p, ops.fmin(par.M_least, m.M_most))
-    # Near standstill, the car rocks on its tyre, and the motors would follow this slip although the
+    # Near standstill, the car rocks on its tire, and the motors would follow this slip although the
     # disc is at rest. The lowered moment therefore stays, unless the demand is lower.
     holds = ops.where(m.v_hat < par.vehicle_speed.v_still, before.abs, 0.0)
     kept = ops.fmin(before.M_left, m.M_most)

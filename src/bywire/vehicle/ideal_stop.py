@@ -1,4 +1,4 @@
-"""Ideal stop for road, tyres and body: every wheel at its peak, without delay."""
+"""Ideal stop for road, tires and body: every wheel at its peak, without delay."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def ideal_deceleration(par: VehicleParameters, *, front_only: bool = False) -> f
 
     .. math:: a = g \frac{\mu_f^* (1 - l_f/L) + \mu_r^* l_f/L}{1 - (\mu_f^* - \mu_r^*) h/L}
 
-    which is :math:`\mu^* g` for tyres with the same curve. With :math:`\mu_r^* = 0` only the front
+    which is :math:`\mu^* g` for tires with the same curve. With :math:`\mu_r^* = 0` only the front
     wheel brakes. On a slope, gravity's share is added.
     """
     body, (mu, rear) = par.body, peak_adhesion(par)
@@ -54,7 +54,7 @@ def ideal_distance(v: float, par: VehicleParameters, *, front_only: bool = False
 
     .. math:: x = \frac{\ln(1 + k v^2/a)}{2 k}, \quad k = \frac{\rho\, C_d A}{2 m}
 
-    The distance is infinite if the tyres cannot hold the vehicle on the slope.
+    The distance is infinite if the tires cannot hold the vehicle on the slope.
     """
     a, body = ideal_deceleration(par, front_only=front_only), par.body
     if a <= 0:

@@ -33,7 +33,7 @@ def far_from_peak(
     parameter
         Name of its parameter, for instance ``"ecu.slip.slip_set"``.
     curve, ways
-        Parameters of tyre and road.
+        Parameters of tire and road.
 
     Returns
     -------

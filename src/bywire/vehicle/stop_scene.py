@@ -48,7 +48,7 @@ class Wheel:
     r
         Radius [m].
     omega, sliding, load, force
-        Signals of its speed, sliding of its tyre, load and braking force.
+        Signals of its speed, sliding of its tire, load and braking force.
     """
 
     behind: float
@@ -159,7 +159,7 @@ def _road(ways: road.Parameters, far: float) -> Iterator[str]:
 
 
 def _marks(run: xr.Dataset, wheel: Wheel, place: str, row: int) -> str:
-    """Return the marks of a sliding tyre, darker for a locked wheel."""
+    """Return the marks of a sliding tire, darker for a locked wheel."""
     at: Array = np.maximum.accumulate(run[place].values) - wheel.behind
     slides = (run[wheel.sliding].values > 0.5) & (run[wheel.load].values > _LOADED)
     stands = slides & (run[wheel.omega].values == 0)

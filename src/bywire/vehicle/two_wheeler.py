@@ -2,7 +2,7 @@
 
 A vehicle inherits from `TwoWheeler` and from its brakes' assemblies. Its method ``brake_torques``
 returns the torques that the brakes can hold. Standstill needs no special treatment: brake and
-rolling resistance form one dry friction on each wheel, the tyre is a spring, and the road acts at
+rolling resistance form one dry friction on each wheel, the tire is a spring, and the road acts at
 every speed.
 """
 
@@ -19,11 +19,11 @@ from bywire.core.signals import Role
 from bywire.plant import disc_heat, ground_support, road, road_wheel, two_wheeler_body, tyre
 
 BOOK = "vehicle"
-_CRAWL = 0.05  # share of the tyre's low speed below which slip fades to zero
+_CRAWL = 0.05  # share of the tire's low speed below which slip fades to zero
 
 
 class VehicleParameters(ParameterSet):
-    """Body, wheels, tyres and the road below them."""
+    """Body, wheels, tires and the road below them."""
 
     body: two_wheeler_body.Parameters
     ground: ground_support.Parameters
@@ -39,12 +39,12 @@ def _sink(label: str) -> Role:
 
 
 def _tyre(label: str) -> Role:
-    """Return the role of a tyre, whose deflection energy returns."""
+    """Return the role of a tire, whose deflection energy returns."""
     return Role("sink", label, book=BOOK, returns="taken")
 
 
 class TwoWheeler(Assembly[ParT, MemoryT]):
-    """Body, two wheels with tyres, and a road; their parameters are in ``vehicle``."""
+    """Body, two wheels with tires, and a road; their parameters are in ``vehicle``."""
 
     frictions: ClassVar[tuple[str, ...]] = ("omega_f", "omega_r")
 
@@ -65,8 +65,8 @@ class TwoWheeler(Assembly[ParT, MemoryT]):
     E_brake_f = Integral("J", "heat of the front brake", role=_sink("front brake"))
     E_brake_r = Integral("J", "heat of the rear brake", role=_sink("rear brake"))
     E_roll = Integral("J", "rolling resistance", role=_sink("rolling resistance"))
-    E_tyre_f = Integral("J", "front tyre: slip and deflection", role=_tyre("front tyre"))
-    E_tyre_r = Integral("J", "rear tyre: slip and deflection", role=_tyre("rear tyre"))
+    E_tyre_f = Integral("J", "front tire: slip and deflection", role=_tyre("front tire"))
+    E_tyre_r = Integral("J", "rear tire: slip and deflection", role=_tyre("rear tire"))
     W_slope = Integral("J", "work of gravity", role=Role("source", "slope", book=BOOK))
     W_pitch = Integral(
         "J", "work of the braking forces on pitching", role=Role("source", "pitching", book=BOOK)
@@ -74,8 +74,8 @@ class TwoWheeler(Assembly[ParT, MemoryT]):
     t_locked_f = Integral("s", "time during which the front wheel is locked")
     t_locked_r = Integral("s", "time during which the rear wheel is locked")
 
-    F_f = Wire("N", "braking force of the front tyre", 1e3)
-    F_r = Wire("N", "braking force of the rear tyre", 1e3)
+    F_f = Wire("N", "braking force of the front tire", 1e3)
+    F_r = Wire("N", "braking force of the rear tire", 1e3)
     N_f = Wire("N", "load of the front wheel", 1e3)
     N_r = Wire("N", "load of the rear wheel", 1e3)
     T_f = Wire("N*m", "torque that the front brake can hold", 300.0)
@@ -84,8 +84,8 @@ class TwoWheeler(Assembly[ParT, MemoryT]):
     v_r = Shown("m/s", "rear tread speed", 20.0)
     slip_f = Shown("1", "front braking slip")
     slip_r = Shown("1", "rear braking slip")
-    sliding_f = Shown("1", "front tyre slides")
-    sliding_r = Shown("1", "rear tyre slides")
+    sliding_f = Shown("1", "front tire slides")
+    sliding_r = Shown("1", "rear tire slides")
     mu_f = Shown("1", "front braking force over load")
     mu_r = Shown("1", "rear braking force over load")
     a = Shown("m/s**2", "deceleration", 10.0)
@@ -98,7 +98,7 @@ class TwoWheeler(Assembly[ParT, MemoryT]):
         raise NotImplementedError
 
     def wire(self, w: Self) -> None:
-        """Connect wheels, tyres and body."""
+        """Connect wheels, tires and body."""
         super().wire(w)
         par = w.body.par
         w.T_f, w.T_r = self.brake_torques(w)
@@ -180,7 +180,7 @@ def rolling_start(v: float, par: VehicleParameters) -> dict[str, Any]:
 
 
 def _felt(w: Any, wheel: Any, rubber: Any, place: float) -> tyre.Input:
-    """Return the input of a tyre, without its load."""
+    """Return the input of a tire, without its load."""
     ground, speed, tread = road.surface(place, w.road.par), w.body.x.v, wheel.par
     seen = tyre.Contact(w.body.xe.v, road_wheel.tread_speed(wheel.xe, tread), *ground)
     limits = tyre.limits(seen, rubber.par)

@@ -54,5 +54,5 @@ def test_what_never_repeats_is_counted_and_measured() -> None:
 
 def test_power_beside_a_sine_is_no_lack_of_coherence() -> None:
     found = response([1.0], [0.0])
-    assert "output's power at the sine's frequency: 0.250" in purity(found)
+    assert "output power at the sine's frequency: 0.250" in purity(found)
     assert "coherence" in purity(found.assign_attrs(excitation="multisine"))

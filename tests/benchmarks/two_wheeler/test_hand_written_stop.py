@@ -68,7 +68,7 @@ def test_every_output_agrees(case: str) -> None:
 
 
 def test_cases_meet_what_is_rare() -> None:
-    """The comparison is worth something where wheels stand, tyres slide, and one lifts."""
+    """The comparison is worth something where wheels stand, tires slide, and one lifts."""
     standing, locked, lifted, _ = (simulate(stop(case)) for case in CASES)
     assert abs(standing["v"][-1]) < 0.1
     assert standing.repeated > 3

@@ -82,7 +82,7 @@ def test_the_cheapest_frequency_within_all_limits_is_chosen() -> None:
     assert found[2].gain == pytest.approx(1.8)
     assert found[2].decisive == 1
     assert found[0].verdict == "ripple at the caliper"
-    assert "no gain is enough" in found[3].verdict
+    assert "every gain is too low" in found[3].verdict
     assert best_of(found[3:]) is None
 
 

@@ -192,7 +192,7 @@ def test_the_limit_falls_between_two_temperatures(T: float, left: float) -> None
         ("ecu.derating.T_derate=150 degC", "T_derate = 150 degC must be < T_limit = 145 degC"),
         (
             "motor_heat.a_K=0.02 1/K",
-            "zero or negative at T_most = 155 degC",
+            "not positive at T_most = 155 degC",
         ),
         ("motor_heat.C_w=0", "must be > 0"),
         ("motor_heat.T_a=20", "cannot be converted to K"),

@@ -19,7 +19,7 @@ SLIPS = np.linspace(0.01, 0.45, 30)
 def growth(par, road, v, slip):
     """Return the largest real part of a single corner's poles [1/s].
 
-    Slip, pressure and its rate, filtered deceleration, integral; the tyre at once.
+    Slip, pressure and its rate, filtered deceleration, integral; the tire at once.
     """
     vehicle, gains, mix = par.vehicle, par.ecu.front_slip, par.ecu.mix
     body, wheel, circuit = vehicle.body, vehicle.front_wheel, par.front.circuit

@@ -44,7 +44,7 @@ def test_the_plant_has_the_gain_and_the_pole_of_a_single_corner(curve):
         gain = k / (slope * par.drum.N * wheel.r)
         low = model.response(np.array([1e-3]))[0, 0, 0]
         assert low.real == pytest.approx(gain, rel=1e-3)
-        # Wheel on a tyre that relaxes: s^2 + s v/sigma + mu' N r^2/(J sigma) = 0.
+        # Wheel on a tire that relaxes: s^2 + s v/sigma + mu' N r^2/(J sigma) = 0.
         sigma = par.tyre.sigma
         corner = np.roots([1.0, v / sigma, slope * par.drum.N * wheel.r**2 / (wheel.J * sigma)])
         for root in corner:
@@ -68,7 +68,7 @@ def test_points_that_do_not_stay_are_refused(changes, v, valid):
 def climbed(eager, slip, building_up=False):
     """Return how long slip control takes from a slip to within 5 % of its set slip, 0.105.
 
-    On a tyre that is a spring, 15 kN m per unit slip at once; or how far it gets in 0.2 s while
+    On a tire that is a spring, 15 kN m per unit slip at once; or how far it gets in 0.2 s while
     the demand still builds up.
     """
     par = bywire.parameters("sport600").ecu.front_slip.replace({"eager": eager, "T_t": 1e9})
@@ -79,7 +79,7 @@ def climbed(eager, slip, building_up=False):
         p_most = p_rider - 1.0 if building_up else p_rider
         seen = slip_pi.Input(20.0, par.slip_set, slip, p_rider, p_most, p_most)
         x, out = slip_pi.output(x, seen, T, par)
-        # the slip follows a moment later, as the tyre does
+        # the slip follows a moment later, as the tire does
         slip, t = slip + 0.2 * (out.p / stiff - slip), t + T
     return slip if building_up else t
 

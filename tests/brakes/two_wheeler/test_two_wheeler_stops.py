@@ -250,7 +250,7 @@ def test_lift_control_keeps_the_rear_wheel_on_the_ground():
     lifted = stop("rear-lift", {"ecu.lift": "off"})
     kept = stop("rear-lift")
     assert lifted.kpi("peak_pitch").value > math.radians(5.0)
-    # The tyres' share of the deceleration at lift: what drag takes does not pitch.
+    # The tires' share of the deceleration at lift: what drag takes does not pitch.
     run = lifted.recording
     k = int(np.argmax(run["support"].values <= 0))
     force = float(run["F_f"][k] + run["F_r"][k])

@@ -38,7 +38,7 @@ def test_the_standing_wheel_holds_the_car_that_rocks_back(stop):
     assert stop.kpi("rebound_speed").value > 0.05
     held = run.sel(time=slice(end + 0.02, 5.4))
     assert not held["Omega"].values.any()
-    assert stop.kpi("force_change").value == 0.0  # no motor acts on a moment that is the tyre's
+    assert stop.kpi("force_change").value == 0.0  # no motor acts on a moment that is the tire's
     assert stop.kpi("creep_speed").value < 1e-2
 
 
@@ -78,7 +78,7 @@ def test_slip_control_stands_over_the_moment_control(panic):
 
 
 def test_motors_rest_where_the_wheel_stands(panic):
-    # The sensor shows the tyre's moment then, and the car rocks: neither moves the motors much.
+    # The sensor shows the tire's moment then, and the car rocks: neither moves the motors much.
     run = panic.recording
     stands = run.sel(time=slice(float(run["time"][run["Omega"] == 0].min()), None))
     assert float(abs(stands["i_1"]).max()) < 11.0

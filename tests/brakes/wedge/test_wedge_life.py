@@ -38,7 +38,7 @@ def test_without_an_adjuster_the_travel_ends_after_280_stops(life):
     energy = 0.5 * par.corner.body.m * (100.0 / 3.6) ** 2
     each = 2.0 * energy * wear.pads.kappa_0 / (2.0 * wear.pads.A_pad)
     assert int(made.left["travel"][0] / each) == 278
-    # The wheel's energy, tyres that slip, and a caliper that gets stiffer change it by 1 %.
+    # The wheel's energy, tires that slip, and a caliper that gets stiffer change it by 1 %.
     assert (made.ended_by, made.error) == ("travel", 0.0)
     assert made.stops == pytest.approx(278, abs=3)
     assert made.states["work"][-1] / made.stops == pytest.approx(energy, rel=0.02)

@@ -1,4 +1,4 @@
-"""Residuals of the moment sensor: against the angle, and by the ripple of the disc's run-out."""
+"""Residuals of the moment sensor: against the angle, and by the ripple of the disc's runout."""
 
 from __future__ import annotations
 

@@ -194,7 +194,7 @@ def test_free_play_at_the_neutral_point():
     """A limit cycle without preload, 96 changes of contact in 0.6 s; with it, a single one.
 
     The trial counted 351 and 2. Here the cycle turns 36 times a second, with four changes each;
-    step, moment, run-out, cogging and encoder leave it as it is, a faster position control gives
+    step, moment, runout, cogging and encoder leave it as it is, a faster position control gives
     more: 126 changes at 100 Hz.
     """
     loose = contact_changes(0.0)

@@ -121,5 +121,5 @@ def test_without_its_compiler_nothing_is_written(
 
 
 def test_one_run_is_exported(tmp_path: Path) -> None:
-    with pytest.raises(ParameterError, match="makes 9 runs"):
+    with pytest.raises(ParameterError, match="has 9 runs"):
         export_wasm("friction-sweep", tmp_path)

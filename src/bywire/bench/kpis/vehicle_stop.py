@@ -104,7 +104,7 @@ def braking_efficiency(stop: Stop, x: Samples, setting: Setting) -> float | Unde
         return Undefined(_NO_STOP)
     if not isfinite(setting.ideal):
         return Undefined(
-            "the tyres cannot hold the vehicle on this road, so there is no ideal stop"
+            "the tires cannot hold the vehicle on this road, so there is no ideal stop"
         )
     distance = _distance(stop, x)
     return 100.0 * setting.ideal / distance if distance > 0.0 else Undefined(_NO_WAY)

@@ -1,4 +1,4 @@
-"""Figure: speeds along the road, its surfaces, and tyre marks."""
+"""Figure: speeds along the road, its surfaces, and tire marks."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _LOADED = 1.0  # N; an unloaded wheel leaves no mark
 def road_marks(run: xr.Dataset, par: VehicleParameters) -> Figure:
     """Draw the speeds of a two-wheeler and of its treads over the road, and the marks on it.
 
-    Surfaces are bands with their names. A sliding tyre leaves a mark at its contact, black for a
+    Surfaces are bands with their names. A sliding tire leaves a mark at its contact, black for a
     locked wheel. The x axis is the front wheel's position, which is zero at t = 0. On a single
     surface, the figure also shows the end of the ideal stop.
 
@@ -105,7 +105,7 @@ def _draw_surfaces(axes: Axes, par: VehicleParameters, span: tuple[float, float]
 
 
 def _draw_marks(axes: Axes, run: xr.Dataset, place: Array, wheel: str, row: int) -> None:
-    """Mark where a tyre slides, and where its wheel is locked."""
+    """Mark where a tire slides, and where its wheel is locked."""
     slides = (run[f"sliding_{wheel}"].values > 0.5) & (run[f"N_{wheel}"].values > _LOADED)
     stands = slides & (run[f"omega_{wheel}"].values == 0)
     marks = (
@@ -131,7 +131,7 @@ def _of_runs(result: Result) -> list[Shown]:
         Shown(
             f"road-marks-{label}" if several else "road-marks",
             road_marks(run, vehicle_of(run)),
-            f"The road{f', {label}' if several else ''}, and where tyres slide on it.",
+            f"The road{f', {label}' if several else ''}, and where tires slide on it.",
         )
         for label, run in result.recordings.items()
     ]

@@ -66,7 +66,7 @@ class WedgeBrake(Assembly[WedgeParameters, control.Memory]):
         "J", "electrical energy into the motors", role=Role("source", "electrical")
     )
     W_disc = Integral("J", "work of the disc on the wedge", role=Role("source", "disc on wedge"))
-    W_runout = Integral("J", "work of the run-out on the caliper", role=Role("source", "run-out"))
+    W_runout = Integral("J", "work of the runout on the caliper", role=Role("source", "run-out"))
     W_adjuster = Integral(
         "J", "work of the adjuster on the caliper", role=Role("source", "adjuster")
     )
@@ -110,7 +110,7 @@ class WedgeBrake(Assembly[WedgeParameters, control.Memory]):
     stuck = Shown("1", "shafts and wedge stuck")
     P_in = Shown("W", "power at the drives' input", 50.0)
     P_meas = Shown("W", "power at the drives' input, filtered", 50.0)
-    E_source = Shown("J", "energy in: electrical, disc on wedge, run-out")
+    E_source = Shown("J", "energy in: electrical, disc on wedge, runout")
     U_caliper = Shown("J", "energy of the caliper")
     clearance = Shown("m", "clearance of both pads, wedge centered", 2e-4)
     E_warming = Shown("J", "copper loss of the motors that warm up", role=motor_heat.COPPER)
@@ -368,7 +368,7 @@ def _contact_number(forces: brake_heart.Forces) -> float:
 
 
 def travel_for(F_N: float, par: Par) -> float:
-    """Return the wedge travel [m] at a normal force [N], without run-out."""
+    """Return the wedge travel [m] at a normal force [N], without runout."""
     return (par.caliper.clearance + wedge_caliper.travel(F_N, par.caliper)) / wedge.slope(par.wedge)
 
 

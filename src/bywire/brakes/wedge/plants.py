@@ -46,7 +46,7 @@ def point(par: Par, F_N: float, speed: float = 0.0) -> Point:
     Parameters
     ----------
     par
-        Parameters; the model neglects cogging and run-out, and the disc keeps its speed.
+        Parameters; the model neglects cogging and runout, and the disc keeps its speed.
     F_N
         Normal force [N], > 0; the wedge is on the side to which the disc turns.
     speed

@@ -37,7 +37,12 @@ def test_lag_is_found(lag):
 
 @pytest.mark.parametrize(
     ("lag", "reason"),
-    [(0.4, "not below 0.3 s"), (0.3, "not below 0.3 s"), (-0.1, "no delay"), (0.0, "no delay")],
+    [
+        (0.4, "not below 0.3 s"),
+        (0.3, "not below 0.3 s"),
+        (-0.1, "a delay of zero"),
+        (0.0, "a delay of zero"),
+    ],
 )
 def test_lag_on_the_edge_of_the_search_is_none(lag, reason):
     found = judged(lag)

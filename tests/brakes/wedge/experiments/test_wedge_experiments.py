@@ -70,7 +70,7 @@ def test_variants_brake_and_let_go(parameters):
 
 def test_release_frees_the_disc(results):
     kpi = values(results["moment-release"])
-    assert kpi["moment_start"] == pytest.approx(500.0, rel=0.03)  # the run-out's ripple
+    assert kpi["moment_start"] == pytest.approx(500.0, rel=0.03)  # the runout's ripple
     assert 0.0 < kpi["time_to_5"] < kpi["release_time"] < kpi["parking_time"] < 0.12
     assert kpi["drag_moment"] == 0.0
     # The free-plays are all that may be missing.
@@ -80,7 +80,7 @@ def test_release_frees_the_disc(results):
 
 
 def test_drag_of_a_warped_disc_shows():
-    """A run-out above the clearance touches the parked pads once per revolution."""
+    """A runout above the clearance touches the parked pads once per revolution."""
     kpi = values(run("moment-release", flywheel__runout=0.25e-3))
     overlap = 0.25e-3 - kpi["clearance_regained"]
     par = bywire.parameters("roberts2003")

@@ -37,7 +37,7 @@ class Options(ParameterSet):
     p_rate: PressureRate
     """build-up rate of the front pressure; if too fast, the wheel locks before it is loaded"""
     grip: Factor
-    """factor on the road's adhesion: sport tyres have more than the surfaces' car tyres"""
+    """factor on the road's adhesion: sport tires have more than the surfaces' car tires"""
     duration: Duration
     """recorded time"""
 

@@ -58,7 +58,7 @@ SLOW_FIGURES = Figures(
     stopping_time=("s", "Time until the first standstill."),
     rebound_speed=(
         "m/s",
-        "Largest backward speed after the standstill, from the tyres' elasticity.",
+        "Largest backward speed after the standstill, from the tires' elasticity.",
     ),
     rollback=("m", "Distance from the farthest position to the final position."),
     ringing_time=("s", f"Time from the standstill until the speed stays below {_QUIET:g} m/s."),

@@ -32,7 +32,7 @@ class DrumParameters(ParameterSet):
 
 
 class WheelOnDrumParameters(ParameterSet):
-    """Wheel, tyre, brake, drum and slip control."""
+    """Wheel, tire, brake, drum and slip control."""
 
     wheel: road_wheel.Parameters
     tyre: tyre.Parameters
@@ -82,12 +82,12 @@ class WheelOnDrum(Assembly[WheelOnDrumParameters, Memory]):
     W_drum = Integral("J", "work of the drum", role=Role("source", "drum"))
     E_brake = Integral("J", "brake and rolling resistance", role=Role("sink", "brake"))
 
-    F = Wire("N", "braking force of the tyre", 1e3)
+    F = Wire("N", "braking force of the tire", 1e3)
     T = Wire("N*m", "torque that brake and rolling resistance can hold", 300.0)
     slip = Shown("1", "braking slip", 0.1)
 
     def wire(self, w: Self) -> None:
-        """Connect wheel, tyre and brake."""
+        """Connect wheel, tire and brake."""
         drum, surface = w.par.drum, adhesion.surface_of(w.par.drum.surface)
         limits = tyre.limits(
             tyre.Contact(drum.v, road_wheel.tread_speed(w.wheel.xe, w.wheel.par), *surface),

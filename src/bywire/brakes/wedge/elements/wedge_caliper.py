@@ -1,4 +1,4 @@
-"""Floating caliper over the wedge: clearance, run-out of the disc, stiffness or force table."""
+"""Floating caliper over the wedge: clearance, runout of the disc, stiffness or force table."""
 
 from __future__ import annotations
 
@@ -88,14 +88,14 @@ def _require_rising(name: str, unit: str, nodes: Nodes) -> None:
 
 
 class Input(NamedTuple):
-    """Wedge, its slope and side, the disc's run-out, and the adjuster's travel."""
+    """Wedge, its slope and side, the disc's runout, and the adjuster's travel."""
 
     x: Annotated[float, Signal("m", "wedge travel", 5e-3)]
     v: Annotated[float, Signal("m/s", "wedge velocity", 0.02)]
     side: Annotated[float, Signal("1", "side of the wedge, +1 or -1")]
     tan_alpha: Annotated[float, Signal("1", "slope of the wedge", 0.4)]
     runout: Annotated[float, Signal("m", "run-out", 4e-6)]
-    runout_rate: Annotated[float, Signal("m/s", "rate of the run-out", 2e-4)]
+    runout_rate: Annotated[float, Signal("m/s", "rate of the runout", 2e-4)]
     taken: Annotated[float, Signal("m", "clearance removed by an adjuster", 1e-4)]
     taking: Annotated[float, Signal("m/s", "speed of the adjuster", 2e-4)]
 
@@ -106,7 +106,7 @@ class InputRate(NamedTuple):
     x: Annotated[float, Signal("m/s", "wedge velocity", 0.02)]
     side: Annotated[float, Signal("1/s", "rate of the side")]
     tan_alpha: Annotated[float, Signal("1/s", "rate of the slope")]
-    runout: Annotated[float, Signal("m/s", "rate of the run-out", 2e-4)]
+    runout: Annotated[float, Signal("m/s", "rate of the runout", 2e-4)]
     taken: Annotated[float, Signal("m/s", "speed of the adjuster", 2e-4)]
 
 
@@ -119,7 +119,7 @@ class Forces(NamedTuple):
 def depth(u: Input, par: Parameters) -> Overlap:
     r"""Return the overlap; negative in the gap.
 
-    .. math:: n = |x| \tan\alpha - (c - c_{taken}) + \text{run-out}
+    .. math:: n = |x| \tan\alpha - (c - c_{taken}) + \text{runout}
     """
     return u.side * u.x * u.tan_alpha - par.clearance + u.runout + u.taken
 
@@ -171,7 +171,7 @@ def forces(u: Input, par: Parameters) -> Forces:
 
     References
     ----------
-    Roberts et al. (2003), section "Wedge and calliper", with clearance, run-out and damping.
+    Roberts et al. (2003), section "Wedge and calliper", with clearance, runout and damping.
     """
     return Forces(F_N=_elastic_force(ops.fmax(overlaps(u, par), 0.0), par))
 
@@ -214,7 +214,7 @@ def energy(u: Input, par: Parameters) -> Energy:
 
 
 def power_in(u: Input, f: Forces) -> Work:
-    """Return the work of wedge, run-out and adjuster on the caliper."""
+    """Return the work of wedge, runout and adjuster on the caliper."""
     return f.F_N * closing(u)
 
 

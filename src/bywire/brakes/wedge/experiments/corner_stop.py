@@ -58,9 +58,9 @@ def _stop_case(
     )
 
 
-# --- Stop, hold and release: the tyre rocks back, and so does the wheel as far as the pads allow
+# --- Stop, hold and release: the tire rocks back, and so does the wheel as far as the pads allow
 
-_CALM = 1.0  # s after the stop, for tyre and brake to come to rest
+_CALM = 1.0  # s after the stop, for tire and brake to come to rest
 
 STOP_FIGURES = Figures(
     undefined="the vehicle does not stop before the release",
@@ -217,7 +217,7 @@ def _at_the_end(run: xr.Dataset, end: float, v_0: float) -> dict[str, float]:
 
 
 def _ideal(v_0: float, par: WedgeCornerParameters) -> float:
-    """Return the shortest stopping distance [m]: the tyre at its peak from the demand on."""
+    """Return the shortest stopping distance [m]: the tire at its peak from the demand on."""
     corner = par.corner
     ground, slope = road.surface(0.0, corner.road), road.slope(0.0, corner.road)
     mu = adhesion.adhesion(adhesion.peak_slip(ground, corner.tyre), ground, corner.tyre)

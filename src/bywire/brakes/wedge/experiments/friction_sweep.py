@@ -77,7 +77,7 @@ class Options(ParameterSet):
 
 
 def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Case, ...]:
-    """Return one run for each friction coefficient, without run-out, which would hide the rest."""
+    """Return one run for each friction coefficient, without runout, which would hide the rest."""
     levels = {0.0: options.M_step}
     changes: dict[str, Any] = {"flywheel.runout": 0.0}
     if options.friction == "none":

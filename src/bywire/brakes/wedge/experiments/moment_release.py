@@ -53,7 +53,7 @@ FREEDOM = Figures(
     travel_left=("m", "Distance of the wedge from the middle at the end."),
     clearance_regained=(
         "m",
-        "Clearance at the end, sum of both pads, without run-out; negative if they are applied.",
+        "Clearance at the end, sum of both pads, without runout; negative if they are applied.",
     ),
     clearance_nominal=("m", "The same clearance with the wedge centered."),
     travel_beyond=("m", "Largest travel of the wedge past the middle, toward the other side."),
@@ -109,7 +109,7 @@ def judge_release(recordings: Recordings, options: ReleaseOptions) -> tuple[Kpi,
 
 
 def _clearance(x: float, par: WedgeParameters) -> float:
-    """Return the clearance of the pads [m] at a wedge travel [m], without run-out."""
+    """Return the clearance of the pads [m] at a wedge travel [m], without runout."""
     return par.caliper.clearance - abs(x) * wedge.slope(par.wedge)
 
 
@@ -151,7 +151,7 @@ POWER_OFF_FIGURES = Figures(
     drift=("m", "Largest change of the wedge's travel after that instant."),
     relaxation=("m", "Change of the wedge's travel before that instant."),
     moment_start=("N*m", "Moment at power off."),
-    moment_end=("N*m", "Moment at the end, including run-out."),
+    moment_end=("N*m", "Moment at the end, including runout."),
     preload_end=("N", "Wedge preload at the end."),
     end_stop_force=("N", "Largest force of an end stop."),
     undefined="the brake does not come to rest in the recorded time",

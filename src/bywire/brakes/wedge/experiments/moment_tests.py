@@ -100,7 +100,7 @@ def _too_coarse(run: xr.Dataset, begin: float, end: float, rows: int = 1) -> str
     ----------
     rows
         Smallest number of rows in that time. A revolution of the disc needs five rows; with fewer,
-        the run-out's oscillation would alias.
+        the runout's oscillation would alias.
     """
     t = run["time"].values
     apart = float(np.diff(t).max()) if t.size > 1 else math.inf
@@ -125,7 +125,7 @@ PULSES_FIGURES = Figures(
         "%",
         "Relative error of that moment; far below 0 if the demand exceeds the brake's capability.",
     ),
-    hold_ripple=("N*m", f"Peak-to-peak moment {_OVER}, due to the disc's run-out."),
+    hold_ripple=("N*m", f"Peak-to-peak moment {_OVER}, due to the disc's runout."),
     hold_power=("W", f"Mean input power {_OVER}, including standby."),
     brake_power=("W", f"Mean braking power {_OVER}."),
     pulse_moment=(
@@ -195,7 +195,7 @@ def judge_pulses(recordings: Recordings, options: PulsesOptions) -> tuple[Kpi, .
 def _turn(run: xr.Dataset, begin: float, end: float, last: float) -> tuple[float, float]:
     """Return the evaluated part of an interval [s], without the rows at its ends.
 
-    It is the disc's last revolution, over which the run-out averages out. If the interval is
+    It is the disc's last revolution, over which the runout averages out. If the interval is
     shorter than a revolution, it is the ``last`` share of the interval.
     """
     nearest = int(np.abs(run["time"].values - end).argmin())
@@ -206,7 +206,7 @@ def _turn(run: xr.Dataset, begin: float, end: float, last: float) -> tuple[float
 
 
 def _pulse(run: xr.Dataset, options: PulsesOptions) -> tuple[float, str]:
-    """Return the first pulse's moment, averaged over a revolution to remove the run-out."""
+    """Return the first pulse's moment, averaged over a revolution to remove the runout."""
     begin, end = _turn(run, options.t_hold, options.t_hold + options.t_low, 0.2)
     problem = _too_coarse(run, begin, end)
     return math.nan if problem else mean(run, "M_B", begin, end), problem
@@ -235,7 +235,7 @@ RAMP_FIGURES = Figures(
     ramp_error_mean=("N*m", "Mean of demand minus moment on the ramp."),
     ramp_error_rms=(
         "N*m",
-        "Root mean square of demand minus moment on the ramp, including run-out.",
+        "Root mean square of demand minus moment on the ramp, including runout.",
     ),
     ramp_slope=("N*m/s", "Slope of a line through the moment on the ramp."),
 )

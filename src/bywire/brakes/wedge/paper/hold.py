@@ -36,7 +36,7 @@ def part(runs: Runs) -> Part:
     exhibit = Exhibit(
         "power-off-hold",
         lambda: stacked(run),
-        "Power off at 500 Nm: only the run-out's ripple remains.",
+        "Power off at 500 Nm: only the runout's ripple remains.",
     )
     return Part("Holding", text, tuple(items), (exhibit,), {"power-off-hold": run})
 
@@ -55,14 +55,14 @@ def _power_off(runs: Runs) -> list[Item]:
             "hold.neutral",
             FACTS["remains"],
             _share(kept),
-            note="moment 2 s after power off in % of that before; run-out off, friction on",
+            note="moment 2 s after power off in % of that before; runout off, friction on",
         ),
         compared(
             "hold.drift",
             still,
             usual["drift"],
             "<=",
-            "change of the wedge's travel in 2 s after all stuck; run-out on",
+            "change of the wedge's travel in 2 s after all stuck; runout on",
         ),
         found(
             "hold.relaxation",

@@ -94,27 +94,27 @@ def _oscillation(runs: Runs) -> list[Item]:
             "fig7.ripple_order",
             FACTS["once"],
             float(spectrum["order"][strongest]),
-            note="strongest wave over the disc's angle; the model's run-out is one wave per "
+            note="strongest wave over the disc's angle; the model's runout is one wave per "
             "revolution, so that this only shows that no other oscillation is larger",
         ),
         compared(
             "fig7.ripple_without_runout",
             FACTS["runout"],
             100.0 * swing(plain, "M_B", _FROM, end) / ripple,
-            note="peak to peak in % of that with run-out: the loop does not hunt",
+            note="peak to peak in % of that with runout: the loop does not hunt",
         ),
         found(
             "fig7.ripple",
             "N*m",
             ripple,
             "peak to peak of the moment during the hold, from "
-            f"{1e6 * parameters().flywheel.runout:g} um of run-out, our choice",
+            f"{1e6 * parameters().flywheel.runout:g} um of runout, our choice",
         ),
         found(
             "fig7.ripple_passive",
             "N*m",
             2.0 * parameters().flywheel.runout * _stiffness(),
-            "ripple by the run-out with a fixed wedge: at this frequency, near its "
+            "ripple by the runout with a fixed wedge: at this frequency, near its "
             "crossover, the moment control adds to it",
         ),
         found(
@@ -253,12 +253,12 @@ def fig8(runs: Runs) -> Part:
             "fig8.ramp_error_rms.without_runout",
             "N*m",
             plain["ramp_error_rms"],
-            "the same without run-out: tracking error of the controller itself",
+            "the same without runout: tracking error of the controller itself",
         ),
     ]
     text = (
         "Length and slope of the ramp are ours; we read 'slow' as 1 s. The comparison uses means "
-        "over a revolution of the disc, because the run-out averages out over it."
+        "over a revolution of the disc, because the runout averages out over it."
     )
     exhibit = Exhibit(
         "fig8",
@@ -314,7 +314,7 @@ def _items(result: Result) -> list[Item]:
             "fig8.ramp_error_rms",
             "N*m",
             values["ramp_error_rms"],
-            "root mean square on the ramp; mostly run-out",
+            "root mean square on the ramp; mostly runout",
         ),
     ]
 

@@ -1,6 +1,6 @@
 """A quarter car with the wedge brake: its disc turns with a wheel on the road.
 
-At the end of a stop, the tyre rocks back and the wheel tends to turn with it. The pads' friction on
+At the end of a stop, the tire rocks back and the wheel tends to turn with it. The pads' friction on
 the wedge then changes its sign, and self-reinforcement becomes release.
 """
 

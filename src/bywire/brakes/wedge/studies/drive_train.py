@@ -91,7 +91,7 @@ class Demand:
 class Answer:
     """Response of a design, per friction coefficient, shape (cases,); the worst of all phases.
 
-    The phase of the disc's run-out at the stop is random: the study tries several.
+    The phase of the disc's runout at the stop is random: the study tries several.
 
     Parameters
     ----------
@@ -352,7 +352,7 @@ _ASSUMPTIONS = (
     "Power is the power at the drives' input, including standby, during build-up and hold, and "
     "optionally during the release.",
     "Each case runs with the disc at four angles, a quarter turn apart, and the worst counts: "
-    "the phase of the run-out at the stop is random, and holding the moment against it takes "
+    "the phase of the runout at the stop is random, and holding the moment against it takes "
     "power.",
 )
 
