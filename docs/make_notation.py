@@ -250,8 +250,8 @@ def bench_reference() -> str:
         "## Generic experiments",
         "",
         "These experiments work with any brake. Options select signals by name. A unit such as "
-        "`input` or `output` is that of the signal that the option of that name selects. By default, levels are multiples of "
-        "the signal's nominal magnitude.",
+        "`input` or `output` is that of the signal that the option of that name selects. By "
+        "default, levels are multiples of the signal's nominal magnitude.",
         "",
     ]
     for g in GENERIC_EXPERIMENTS.all().values():

@@ -43,8 +43,8 @@ if TYPE_CHECKING:
 LEGEND = (
     "Linear sampled loop without dry friction. The gain margins are the factors to which the loop "
     "gain may rise and fall. The delay margin is the additional dead time that the loop tolerates. "
-    "The best disk margin is 2, and the worst is 0. S and T are the sensitivity and the complementary "
-    "sensitivity. Unstable loops and loops without gain have no margins."
+    "The best disk margin is 2, and the worst is 0. S and T are the sensitivity and the "
+    "complementary sensitivity. Unstable loops and loops without gain have no margins."
 )
 """caption that explains the headings"""
 _CAPTIONS = {

@@ -1,4 +1,4 @@
-"""The wedge brake on a car's corner warms up and fades: books, closed forms, what fading costs."""
+"""The wedge brake on a quarter car warms up and fades: books, closed forms, what fading costs."""
 
 from __future__ import annotations
 

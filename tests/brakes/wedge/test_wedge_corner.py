@@ -1,4 +1,4 @@
-"""The wedge brake on a car's corner: it stops, and holds what rocks back."""
+"""The wedge brake on a quarter car: it stops, and holds what rocks back."""
 
 import math
 
