@@ -87,7 +87,7 @@ TOPICS = {
         "Names for the key `experiment` of a bench file, with options and key figures.",
         {
             "experiment": lambda: EXPERIMENTS.all(),
-            "experiment of any brake": lambda: GENERIC_EXPERIMENTS.all(),
+            "experiment for any brake": lambda: GENERIC_EXPERIMENTS.all(),
         },
         are_apart=True,
         command=_experiment,

@@ -123,9 +123,9 @@ def test_a_package_keeps_each_kind_in_its_own_module(write: Write) -> None:
             "json.py",
             declared("json"),
             ModelError,
-            ["the module name 'json' is used already"],
+            ["the module name 'json' is already in use"],
         ),
-        ("numpy.py", declared("numpy"), ModelError, ["the module name 'numpy' is used already"]),
+        ("numpy.py", declared("numpy"), ModelError, ["the module name 'numpy' is already in use"]),
         (
             "my-brake.py",
             declared("my-brake"),

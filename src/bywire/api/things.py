@@ -109,7 +109,7 @@ def thing_kinds() -> tuple[ThingKind, ...]:
             has_assembly=True,
         ),
         ThingKind(
-            "experiment of any brake",
+            "experiment for any brake",
             GENERIC_EXPERIMENTS.all,
             _generic_experiment,
             "generic_experiments",

@@ -34,7 +34,7 @@ class Element:
     Parameters
     ----------
     name
-        Dotted name of its module, for instance ``"plant.dc_motor"``.
+        Dotted name of its module, for example ``"plant.dc_motor"``.
     module
         Its functions, ``Parameters`` and signal tuples.
     """

@@ -41,7 +41,7 @@ class Start:
     state, memory, stimulus
         Start of the run, at rest if a rest is declared.
     known
-        Source of the start, for instance ``"loop pressure"``.
+        Source of the start, for example ``"loop pressure"``.
     """
 
     model: Model

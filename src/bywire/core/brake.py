@@ -221,7 +221,7 @@ def _imported(place: Path, source: Path) -> ModuleType:
         there.__file__ = origin
     if there is not None and Path(getattr(there, "__file__", None) or "").resolve() != source:
         raise ModelError(
-            f"{place}: the module name {name!r} is used already ({_origin(there)}): rename it",
+            f"{place}: the module name {name!r} is already in use ({_origin(there)}): rename it",
             name=str(place),
             value=name,
         )
@@ -288,7 +288,7 @@ def modules_of(brake: Brake, names: tuple[str, ...]) -> Iterator[ModuleType]:
     Parameters
     ----------
     names
-        Modules or folders of its package, for instance ``("loops",)``.
+        Modules or folders of its package, for example ``("loops",)``.
 
     Raises
     ------

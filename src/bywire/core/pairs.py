@@ -9,13 +9,13 @@ from bywire.core.errors import ParameterError
 DIGITS = 9
 """largest number of digits of a count"""
 _INPUT = ("--input", "Inputs")  # in commands and in forms
-_CHANGE = "KEY=VALUE, for instance motor.R_m=0.4ohm"
+_CHANGE = "KEY=VALUE, for example motor.R_m=0.4ohm"
 _FORMS = {
     **dict.fromkeys(
         _INPUT, "STIMULUS=SIGNAL, a stimulus of the model and the measured signal: p_set=p_ref"
     ),
     "--option": "NAME=VALUE, an option of the method ('bywire list METHOD')",
-    "--prior": "NAME=VALUE +- DEVIATION, for instance 'motor.R_m=0.35 +- 0.02 ohm'",
+    "--prior": "NAME=VALUE +- DEVIATION, for example 'motor.R_m=0.35 +- 0.02 ohm'",
 }
 
 

@@ -59,7 +59,7 @@ class Leaf:
 
     @property
     def range_text(self) -> str:
-        """Valid range as text, for instance ``> 0 ohm``."""
+        """Valid range as text, for example ``> 0 ohm``."""
         return self.range_in(self.unit.symbol)
 
     def range_in(self, symbol: str) -> str:

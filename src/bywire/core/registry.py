@@ -104,7 +104,7 @@ class Kind(Generic[T]):
     Parameters
     ----------
     name
-        Name of the kind in messages, for instance ``"experiment"``.
+        Name of the kind in messages, for example ``"experiment"``.
     folders
         Modules or folders of a brake's package that declare things of this kind.
     read
@@ -112,7 +112,7 @@ class Kind(Generic[T]):
     home
         Dotted name of the package of general things; empty if all belong to brakes.
     declared
-        Object that declares such a thing, for instance ``"a Loop"``. The error for an unknown name
+        Object that declares such a thing, for example ``"a Loop"``. The error for an unknown name
         contains it if a brake has no such thing.
 
     Notes
@@ -355,7 +355,7 @@ def _require_new(
     new: tuple[tuple[Any, ModuleType], ...],
     known: Mapping[str, tuple[Any, str, ModuleType]],
 ) -> None:
-    """Reject things whose name is used already, in the same brake or in an earlier one."""
+    """Reject things whose name is already in use, in the same brake or in an earlier one."""
     seen = {name: (thing, module) for name, (thing, _, module) in known.items()}
     for thing, module in new:
         first, place = seen.setdefault(thing.name, (thing, module))

@@ -265,7 +265,7 @@ class Scale:
 
     @property
     def symbol(self) -> str:
-        """SI unit of the same quantity, for instance ``V/(N*m)``."""
+        """SI unit of the same quantity, for example ``V/(N*m)``."""
         above = "*".join(_raised(name, power) for name, power in self.terms if power > 0)
         below = [_raised(name, -power) for name, power in self.terms if power < 0]
         under = below[0] if len(below) == 1 else f"({'*'.join(below)})"

@@ -96,7 +96,7 @@ def bode(
     gain_unit
         Unit of 0 dB, in common spelling (``"bar/A"``); ``"1"`` for a pure number.
     marks
-        Frequencies [Hz] to mark by their label, for instance the crossover.
+        Frequencies [Hz] to mark by their label, for example the crossover.
     depth
         Depth below the largest magnitude [dB]; responses further below are left out.
 

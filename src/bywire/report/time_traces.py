@@ -156,7 +156,7 @@ def time_traces(
     limits
         Step that judges the first trace of the first panel: its band and limit are drawn.
     measured
-        Recording for comparison, for instance of a test rig, with the names and units of
+        Recording for comparison, for example of a test rig, with the names and units of
         ``recording``; it may lack variables, and have other sample times. It is solid blue, with
         ``recording`` dashed red on top. Then only the first trace and the set points of every panel
         are drawn.

@@ -248,7 +248,7 @@ def _readable(number: float, value: float, symbol: str) -> tuple[float, str]:
 
 
 def range_text(leaf: Leaf) -> str:
-    """Return the valid range of a parameter in its display unit, for instance ``> 0 mm``."""
+    """Return the valid range of a parameter in its display unit, for example ``> 0 mm``."""
     if leaf.low == leaf.high:
         return f"exactly {amount(leaf.low, leaf.unit.symbol, 6)}"
     limits = []

@@ -71,7 +71,7 @@ def cuda_binary(source: str, capability: int, entry: str) -> bytes:
         CUDA C of the kernel.
     capability
         The processor's compute capability: ten times the major number plus the minor number, for
-        instance 90.
+        example 90.
     entry
         Name of the kernel's function.
 

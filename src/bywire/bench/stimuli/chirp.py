@@ -27,7 +27,7 @@ class Parameters(ParameterSet):
     t_sweep: Duration
     """duration of the sweep; afterward the sine continues at ``f_end``"""
     t_start: TimeConstant = 0.0
-    """instant at which the sweep begins, with phase zero"""
+    """time at which the sweep begins, with phase zero"""
     sweep: Literal["linear", "logarithmic"]
     """variation of the frequency: linear in time, or logarithmic"""
 

@@ -28,7 +28,7 @@ class Parameters(ParameterSet):
     n: Count
     """number n of harmonics: 1, 2, ..., n times the base frequency"""
     t_start: TimeConstant = 0.0
-    """instant at which the first period begins; the signal jumps there"""
+    """time at which the first period begins; the signal jumps there"""
 
     @model_validator(mode="before")
     @classmethod

@@ -26,7 +26,7 @@ class Parameters(ParameterSet):
     slope: LevelRate
     """magnitude of the slope, in both directions"""
     t_start: TimeConstant = 0.0
-    """instant at which the ramp begins"""
+    """time at which the ramp begins"""
     t_hold: TimeConstant
     """time at ``end`` before the return ramp"""
     after: Literal["stay", "return"]

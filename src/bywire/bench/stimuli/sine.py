@@ -28,7 +28,7 @@ class Parameters(ParameterSet):
     phase: Phase = 0.0
     """phase at ``t_start``; the signal jumps there unless the phase is a multiple of pi"""
     t_start: TimeConstant = 0.0
-    """instant at which the oscillation begins"""
+    """time at which the oscillation begins"""
 
 
 def sample(t: NDArray[np.float64], par: Parameters) -> NDArray[np.float64]:

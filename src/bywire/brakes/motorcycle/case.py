@@ -82,7 +82,7 @@ def settled_start(p: float, par: MotorcycleParameters, settle: float) -> float:
     Raises
     ------
     SolverError
-        When no current holds the pressure within 0.2 %, for instance when the piston sticks.
+        When no current holds the pressure within 0.2 %, for example when the piston sticks.
     """
     start = p
     for _ in range(_ROUNDS):

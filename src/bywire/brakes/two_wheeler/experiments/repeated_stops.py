@@ -167,7 +167,7 @@ class Options(ParameterSet):
     v_pause: Annotated[float, Unit("m/s", 28.0), Field(ge=0, allow_inf_nan=False)]
     """speed during the driving time"""
     parked: Duration
-    """parked time after the last stop"""
+    """time parked after the last stop"""
 
 
 class _Stop(NamedTuple):

@@ -65,7 +65,7 @@ class Options(ParameterSet):
     M_step: SomeMoment
     """demanded moment"""
     t_hold: Duration
-    """recorded time after the step"""
+    """recording time after the step"""
     mu_B: Coefficients
     """friction coefficients of the pads"""
     slope: Literal["known", "fixed"]
@@ -73,7 +73,7 @@ class Options(ParameterSet):
     friction: Literal["kept", "none"]
     """whether the brake has dry friction"""
     settle: Duration
-    """parked time before the step"""
+    """time parked before the step"""
 
 
 def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Case, ...]:
