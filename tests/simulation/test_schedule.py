@@ -55,7 +55,7 @@ def test_a_step_that_does_not_divide(
         (0.1234567891234567, 1e-9, "does not divide .* for example, use 0.00099999"),
         (365.9670339332694, 20e-6, "does not divide .* for example, use 19.99999"),
         (365.967033933, 20e-6, "does not divide .* use for example"),
-        (1.3e19, 20e-6, "too short for the drive interval of 1.3e[+]19 s, .*: use a shorter"),
+        (1.3e19, 20e-6, "too short for the drive interval of 1.3e[+]19 s, .*[.] Use a shorter"),
         (1e300, 1e-9, "too short for the drive interval"),
     ],
 )

@@ -134,7 +134,7 @@ def start_of_a_rig(model: Model, sets: Iterable[ParameterSet], module: str) -> S
             return start
     raise ParameterError(
         f"there is no parameter set for a {model.name}, and no experiment starts one with the sets "
-        "of its brake: declare a bywire.CitedSet of that assembly",
+        "of its brake. Declare a bywire.CitedSet of that assembly",
         name=model.name,
     )
 

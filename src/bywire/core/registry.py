@@ -165,7 +165,7 @@ class Kind(Generic[T]):
             first=[n for kind in kinds for module in loaded for n in kind.of(module)],
         )
         hints = [
-            f"the brake {brake.name!r} declares no {title}: declare {self.declared} in a module or "
+            f"the brake {brake.name!r} declares no {title}. Declare {self.declared} in a module or "
             f"folder {' or '.join(self.folders)} of its package, or in its file (see "
             "docs/modeling.md)"
             for brake in brakes().values()
@@ -362,7 +362,7 @@ def _require_new(
         if first is not thing:
             raise ModelError(
                 f"{_declared_at(module, thing)}: the {kind.name} {thing.name!r} is declared in "
-                f"{_declared_at(place, first)} already: rename it",
+                f"{_declared_at(place, first)} already. Rename it",
                 name=kind.name,
                 value=thing.name,
             )

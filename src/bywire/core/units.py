@@ -130,7 +130,7 @@ def _number(text: str, symbol: str, name: str, nominal: float) -> float:
     if scale.reference == "absolute":
         raise UnitError(
             f"{name} = {text!r}: bywire cannot determine whether {name} is absolute or relative to "
-            f"ambient pressure: convert it to the kind that the bench needs, and {write}",
+            f"ambient pressure. Convert it to the kind that the bench needs, and {write}",
             **fields,
             valid=valid,
         )

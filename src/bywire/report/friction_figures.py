@@ -54,7 +54,7 @@ def hysteresis_loop(
     from matplotlib.lines import Line2D
 
     if not recordings:
-        raise ParameterError("hysteresis_loop: no recording given: give at least one")
+        raise ParameterError("hysteresis_loop: no recording was passed. Pass at least one")
     figure, (axes,) = style.new_figure(4.2)
     for k, (label, recording) in enumerate(recordings.items()):
         color = style.SEQUENCE[k % len(style.SEQUENCE)]

@@ -739,7 +739,7 @@ def overlaid_traces(recordings: Mapping[str, xr.Dataset], variables: Mapping[str
     if not shown:
         raise ParameterError(
             f"overlaid_traces: the {len(recordings)} recordings have none of the variables "
-            f"{', '.join(variables)}: name others"
+            f"{', '.join(variables)}. Choose others"
         )
     figure, rows = style.new_figure(0.5 + 1.7 * len(shown), [1.0] * len(shown))
     for axes, name in zip(rows, shown, strict=True):

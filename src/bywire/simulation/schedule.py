@@ -135,7 +135,7 @@ def _require_few(name: str, length: float, step: float) -> None:
     if length / step > _MOST:
         raise StepError(
             f"step = {step * 1e6:g} us is too short for the {name} interval of {length:g} s, which "
-            f"would contain more than {_MOST:.2g} steps: use a shorter interval",
+            f"would contain more than {_MOST:.2g} steps. Use a shorter interval",
             name="step",
             value=f"{step * 1e6:g} us",
             valid=f"{_MOST:.2g} steps",

@@ -45,7 +45,7 @@ class Course(ParameterSet):
     @model_validator(mode="after")
     def _comes_and_goes(self) -> Course:
         if self.every > 0 and self.ramp > 0:
-            raise ValueError("ramp and every contradict each other: set only one of them")
+            raise ValueError("ramp and every contradict each other. Set only one of them")
         if self.share < 1 and not self.every > 0:
             raise ValueError("share needs the period of the fault: also set every")
         return self

@@ -318,7 +318,7 @@ def _set_items(name: str, suffix: str, loops: _Loops) -> list[Item]:
             f"fig5.i_max.dither{suffix}",
             FACTS["fig5_current"],
             peak(loops.result.recordings[_WITH], "i_filtered"),
-            note="measured current after the 20 Hz low-pass filter: the ripple from eq. (20)'s dither "
+            note="measured current after the 20 Hz low-pass: the ripple from eq. (20)'s dither "
             "exceeds the range of the figure",
         ),
         found(f"fig5.jumps{suffix}", "1", float(jumps.size), f"ending at {levels} bar"),

@@ -148,7 +148,7 @@ CORNER_STOP = Experiment(
 # --- Panic stop: the demand exceeds the road's adhesion
 
 PANIC_FIGURES = Figures(
-    undefined="the vehicle does not stop within the recording: increase options.duration",
+    undefined="the vehicle does not stop within the recording. Increase options.duration",
     stopping_distance=("m", "Distance from the demand to the first standstill."),
     stopping_time=("s", "Time from the demand to the first standstill."),
     braking_efficiency=("%", "Ideal stopping distance on this road over the actual distance."),

@@ -34,7 +34,7 @@ from bywire.core.quantities import Duration
 
 _BAND = 0.05  # share of the step: half width of a stable loop's final band
 _LAST = 0.2  # share of the hold
-_NO_ROW = "the recording has no row in this time: record more often"
+_NO_ROW = "the recording has no row in this time. Record more often"
 
 EACH = Figures(
     stable=(

@@ -57,7 +57,7 @@ STIFFNESS_FIGURES = Figures(
     K_W_true=("N/m", "True value."),
     free_play=("m", "Travel between the compression and tension lines at zero force."),
     free_play_true=("m", "True value."),
-    undefined="no travel under load: set a larger current",
+    undefined="no travel under load. Set a larger current",
 )
 
 
@@ -200,7 +200,7 @@ FORCE_CYCLE_FIGURES = Figures(
     peak_current_sensor=("A", "Largest mean current of both motors, with the sensor."),
     peak_current_heart=("A", "Largest mean current of both motors, in the brake heart."),
     hysteresis=("N*m", "Friction torque: half the loop's width, mean over the cycle."),
-    undefined="no travel: set larger options",
+    undefined="no travel. Set larger options",
 )
 
 
@@ -222,7 +222,7 @@ def force_cycle(
 ) -> tuple[Case, ...]:
     """Return both stages; the wedge stays in its clearance.
 
-    Steadily turning motors do not stick. So force versus current shows the friction's hysteresis, and
+    Steadily turning motors do not stick. Force versus current shows the friction's hysteresis, and
     force over travel shows the stiffness, in both directions and through the free play.
     """
     modes = {"rig.mode_1": "position", "rig.mode_2": "position"}

@@ -260,7 +260,7 @@ def identify(
     orders = _standing_out(turning.angle, turning.leveled, options.highest)
     if not orders:
         raise ParameterError(
-            f"no order up to {options.highest} exceeds the noise: turn slower or by more "
+            f"no order up to {options.highest} exceeds the noise. Turn slower or by more "
             "revolutions, or raise options.highest",
             name="options.highest",
             value=str(options.highest),

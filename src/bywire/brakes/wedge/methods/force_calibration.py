@@ -217,7 +217,7 @@ def squeeze(
     if not (np.any(ways > 0) and np.any(ways < 0)):
         raise ParameterError(
             f"{where}: the screws do not move both toward each other and apart at more than "
-            f"{options.slowest:g} rad/s, so friction and force cannot be separated: squeeze "
+            f"{options.slowest:g} rad/s, so friction and force cannot be separated. Squeeze "
             "and release slowly, as 'bywire run force-cycle' does",
             name=where,
         )

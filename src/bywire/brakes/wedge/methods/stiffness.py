@@ -85,7 +85,7 @@ def started(par: WedgeParameters, sensor: Squeeze, heart: Squeeze, advice: str) 
         loading = (heart.way == way) & (level > _SHARE * np.abs(sensor.i).max())
         if int(loading.sum()) < 3 or not np.ptp(heart.d[loading]) > 0.0:
             raise ParameterError(
-                f"record heart: the screws do not load each other {what}: travel further; {advice}",
+                f"record heart: the screws do not load each other {what}. Travel further; {advice}",
                 name="record heart",
             )
         slope, start = np.polyfit(heart.d[loading], level[loading], 1)

@@ -423,7 +423,7 @@ DEFAULTS = Options(
 )
 """the pulse of Fig. 9 in Roberts et al. (2003), around the catalog's design"""
 
-_NONE_FEASIBLE = "no design is feasible: increase t_90 or t_hold, or compare other designs"
+_NONE_FEASIBLE = "no design is feasible. Increase t_90 or t_hold, or compare other designs"
 _NEAR = 1.05
 """designs within this factor of the smallest power count as equally good"""
 _ROUNDS = 2  # of the optimum's refinement; each halves the spacing
