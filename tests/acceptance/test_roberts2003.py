@@ -264,7 +264,7 @@ def test_friction_holds_less_under_more_load(items: Items) -> None:
 
 
 def test_what_the_paper_explains_changes_when_its_cause_does(items: Items) -> None:
-    """Free-play without preload, a pulse that ends at once, a disc that sticks to the pads."""
+    """Free play without preload, a pulse that ends at once, a disc that sticks to the pads."""
     free_play = items["stability.contact_changes.free_play"]["computed"]
     assert free_play > 3.0 * (items["stability.contact_changes"]["computed"] + 1.0)
     assert items["fig9.lowest_power.short"]["computed"] > items["fig9.lowest_power"]["stated"]

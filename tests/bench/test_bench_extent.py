@@ -52,7 +52,7 @@ def test_recording_intervals_that_the_step_does_not_divide(record):
     ("record", "text"),
     [
         ("1.21 s", r"1\.2 s cannot have rows every .*record more often"),
-        ("1e300 s", r"the recording interval of 1e[+]300 s, .*: use a shorter interval"),
+        ("1e300 s", r"the recording interval of 1e[+]300 s, .*[.] Use a shorter interval"),
     ],
 )
 def test_recording_interval_longer_than_the_run(record, text):

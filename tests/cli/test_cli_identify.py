@@ -79,7 +79,7 @@ def test_a_bench_file_says_what_failed_and_what_it_cannot_do(
             "frequency=p_mc",
             ("unknown stimulus 'frequency': valid names are p_set, pedal_force, i_set",),
         ),
-        ("p_set=", ("--input p_set=: write STIMULUS=SIGNAL", "p_set=p_ref")),
+        ("p_set=", ("--input p_set= is not valid. Write STIMULUS=SIGNAL", "p_set=p_ref")),
     ],
 )
 def test_an_input_that_is_none_is_refused_with_those_that_are(

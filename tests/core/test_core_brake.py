@@ -123,16 +123,16 @@ def test_a_package_keeps_each_kind_in_its_own_module(write: Write) -> None:
             "json.py",
             declared("json"),
             ModelError,
-            ["the module name 'json' is used already"],
+            ["the module name 'json' is already in use"],
         ),
-        ("numpy.py", declared("numpy"), ModelError, ["the module name 'numpy' is used already"]),
+        ("numpy.py", declared("numpy"), ModelError, ["the module name 'numpy' is already in use"]),
         (
             "my-brake.py",
             declared("my-brake"),
             ModelError,
             ["a name that Python can import"],
         ),
-        ("brake.txt", declared("txt"), FileError, ["does not declare a brake: use a Python file"]),
+        ("brake.txt", declared("txt"), FileError, ["does not declare a brake. Use a Python file"]),
         (
             "half_typed.py",
             f"{HEAD}from typing import NamedTuple\nfrom bywire.core.signals import "
@@ -161,7 +161,7 @@ def test_a_package_keeps_each_kind_in_its_own_module(write: Write) -> None:
             "    t_hold: Duration\n    t_rest: Duration\n\n\nOPTIONS = Options()\n",
             ModelError,
             [
-                "valueless.py, line 11: t_hold, t_rest: set a value here, or a default in the "
+                "valueless.py, line 11: t_hold, t_rest. Set a value here, or a default in the "
                 "class Options",
             ],
         ),

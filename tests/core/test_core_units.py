@@ -167,13 +167,13 @@ def test_wrong_unit(text, symbol, message):
 
 @pytest.mark.parametrize("text", UNKNOWN)
 def test_unknown_unit(text):
-    with pytest.raises(UnitError, match=r"is not known.*; write for instance"):
+    with pytest.raises(UnitError, match=r"is not known.*; write for example"):
         units.parse(text, "m", "x")
 
 
 @pytest.mark.parametrize("text", NO_QUANTITY)
 def test_no_quantity(text):
-    with pytest.raises(UnitError, match=r"is not a quantity: write for instance '1\.5 mm'"):
+    with pytest.raises(UnitError, match=r"is not a quantity: for example, write '1\.5 mm'"):
         units.parse(text, "m", "x")
 
 
@@ -187,7 +187,7 @@ def test_not_finite(value):
 
 @pytest.mark.parametrize("value", [True, None, [1], (1, 2), {"a": 1}, b"9 mm", 1j, object()])
 def test_neither_text_nor_number(value):
-    with pytest.raises(UnitError, match=r"must be one number, for instance '1\.5 mm'"):
+    with pytest.raises(UnitError, match=r"must be one number, for example '1\.5 mm'"):
         units.parse(value, "m", "x")
 
 

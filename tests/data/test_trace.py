@@ -89,7 +89,7 @@ def test_refused_files(tmp_path, content, text):
     [
         (
             "pedal",
-            r"the column .pedal. has no unit. Write .* for instance .pedal \[mm\]",
+            r"the column .pedal. has no unit. Write .* for example .pedal \[mm\]",
         ),
         ("pedal [N]", "'N' cannot be converted to m"),
         ("pedal [furlongs per beat]", "the unit 'furlongs' in .* is not known"),

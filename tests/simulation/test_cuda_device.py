@@ -39,7 +39,7 @@ def test_one_that_is_not_there_is_refused(wanted, driver, monkeypatch):
     [
         (RuntimeError("no library"), 1, "the driver's library is missing"),
         (Status.CUDA_ERROR_NO_DEVICE, 1, "CUDA_ERROR_NO_DEVICE"),
-        (Status.CUDA_SUCCESS, 0, "no NVIDIA graphics processor: check that nvidia-smi lists one"),
+        (Status.CUDA_SUCCESS, 0, "no NVIDIA graphics processor. Check that nvidia-smi lists one"),
     ],
 )
 def test_a_machine_without_one_is_told(started, count, said, driver):

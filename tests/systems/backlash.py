@@ -1,4 +1,4 @@
-"""Free-play between a driver and a follower that friction holds, with its describing function."""
+"""Free play between a driver and a follower that friction holds, with its describing function."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class BacklashParameters(ParameterSet):
 
 
 class Backlash(System):
-    """Contacts with free-play; friction holds the follower while neither touches."""
+    """Contacts with free play; friction holds the follower while neither touches."""
 
     name = "backlash"
     State = Pair

@@ -44,7 +44,7 @@ class Parameters(ParameterSet):
     K_W: Stiffness
     K_C: Stiffness
     g: Length
-    """free-play between a screw and the wedge"""
+    """free play between a screw and the wedge"""
     g_12: Length
     tau: TimeConstant
     F_S0: Force

@@ -48,7 +48,7 @@ class Parameters(ParameterSet):
     n_max: Length
     """largest measured overlap; the curve rises up to it"""
     tau: TimeConstant
-    """damping over stiffness"""
+    """ratio of damping to stiffness"""
     clearance: Clearance
     """running clearance, both sides of the disc together"""
 

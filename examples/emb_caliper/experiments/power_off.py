@@ -54,7 +54,7 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     rests = bool(stuck[-1])
     moving = np.flatnonzero(~stuck)
     t_rest = float(time[moving[-1] + 1] if moving.size else 0.0) if rests else float("nan")
-    note = "" if rests else "the shaft does not come to rest in the recorded time"
+    note = "" if rests else "the shaft does not come to rest within the recording"
     return (
         Kpi("residual_force", float(run["F_cl"].values[-1]), "N", "Clamp force at the end."),
         Kpi("time_to_rest", t_rest, "s", "Time until the shaft rests permanently.", note),

@@ -39,7 +39,7 @@ class Saturation:
     Parameters
     ----------
     name
-        Name of its share of the time, for instance ``"sat_current"``.
+        Name of its share of the time, for example ``"sat_current"``.
     signals
         Limited outputs; one at its limit suffices.
     limits
@@ -151,7 +151,7 @@ class Quantity:
     Parameters
     ----------
     name, unit
-        Name and SI unit, for instance ``"pressure"`` in ``"Pa"``.
+        Name and SI unit, for example ``"pressure"`` in ``"Pa"``.
     default
         Usual value.
     """
@@ -213,7 +213,7 @@ class Loop:
         these sample times can implement as designed, by dotted name; both ends are equal for a
         required value. A design observes them unless the user disables that.
     sustained
-        Parameters that allow long excitation, for instance a disc that does not slow down; a
+        Parameters that allow long excitation, for example a disc that does not slow down; a
         design's trial with sines applies them.
     proof
         Experiment that tests the loop in the whole brake.

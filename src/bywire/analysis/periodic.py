@@ -311,7 +311,7 @@ def find_orbit(stroboscope: Stroboscope, run: Run) -> PeriodicOrbit:
     .. math:: (I - A) \Delta z = P(z) - z
 
     and keeps a step that brings the motion closer to a repetition. A slow loop would need minutes
-    to settle; the iteration needs a few periods. Directions without restoring action (for instance
+    to settle; the iteration needs a few periods. Directions without restoring action (for example
     the amount of fluid enclosed) keep their simulated values.
 
     Parameters
@@ -346,7 +346,7 @@ def find_orbit(stroboscope: Stroboscope, run: Run) -> PeriodicOrbit:
         f"{run.model.name}: no motion repeats with the period {run.duration * 1e3:g} ms. After "
         f"{periods} periods, {stroboscope.names[int(np.argmax(apart))]} still changes by "
         f"{apart.max():.2g} of its usual magnitude per period. The loop hunts or drifts, for "
-        "instance because its dither is too weak. Increase the dither's gain, or move the "
+        "example because its dither is too weak. Increase the dither's gain, or move the "
         "operating point",
         name=stroboscope.names[int(np.argmax(apart))],
     )

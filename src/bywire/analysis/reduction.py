@@ -299,7 +299,7 @@ def residualized(
     UnknownNameError
         When a state is unknown.
     ParameterError
-        When the dropped states have no steady state, for instance an integrator.
+        When the dropped states have no steady state, for example an integrator.
 
     References
     ----------
@@ -433,7 +433,7 @@ def reduce(
     high, n = _band(full, band), len(acting)
     if not acting:
         raise ParameterError(
-            f"{full.name} cannot be reduced because no input affects an output, for instance "
+            f"{full.name} cannot be reduced because no input affects an output, for example "
             "because of stiction",
             name=full.name,
         )

@@ -138,7 +138,7 @@ _TABLES = ("drives", "signals", "found in", "values", "estimates", "kpis")
 
 
 def described(name: str) -> list[Object]:
-    """Return an object for each thing with this name, for instance a method and an experiment.
+    """Return an object for each thing with this name, for example a method and an experiment.
 
     Raises
     ------

@@ -46,7 +46,7 @@ class LoopCase:
 
     @property
     def point(self) -> str:
-        """Operating point as text, for instance ``"pressure = 20 bar"``."""
+        """Operating point as text, for example ``"pressure = 20 bar"``."""
         from bywire.report.wording import amount
 
         return f"{self.loop.at.name} = {amount(self.value, self.loop.at.unit)}"

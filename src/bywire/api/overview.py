@@ -84,7 +84,7 @@ def overview(topic: str = "") -> Overview:
     Parameters
     ----------
     topic
-        The kind of things to show, for instance ``"experiments"``; all if empty.
+        The kind of things to show, for example ``"experiments"``; all if empty.
 
     Returns
     -------

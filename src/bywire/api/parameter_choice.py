@@ -45,7 +45,7 @@ def parameters_for(
     Parameters
     ----------
     subject
-        Subject of the use case, for instance ``"loop 'moment'"``.
+        Subject of the use case, for example ``"loop 'moment'"``.
     assembly
         Brake to which the subject belongs.
     name

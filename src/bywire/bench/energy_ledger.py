@@ -133,7 +133,7 @@ def deliveries(recording: xr.Dataset, among: Collection[str] | None = None) -> l
 def actuator_ledger(recording: xr.Dataset, is_split: bool = True) -> Ledger:
     """Return the energy balance of an actuator or rig, between the ends of a recording.
 
-    ``recording``: recording with energies [J]. If there is no such balance, for instance for a
+    ``recording``: recording with energies [J]. If there is no such balance, for example for a
     vehicle without actuators, the result is the first of the other balances. ``is_split``: whether
     to split sinks into moving and holding where declared, which needs all rows.
     """

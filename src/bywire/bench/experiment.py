@@ -156,7 +156,7 @@ class Case:
     Parameters
     ----------
     label
-        Name of the run within its experiment, for instance ``"with-dither"``.
+        Name of the run within its experiment, for example ``"with-dither"``.
     model, par
         The system and its parameters, drive mode included.
     state, memory
@@ -167,7 +167,7 @@ class Case:
     duration
         Length of the recording after time zero [s].
     settle
-        Time before zero in which the run settles [s], for instance into a periodic orbit.
+        Time before zero in which the run settles [s], for example into a periodic orbit.
     keep
         Part of the settling time that the recording keeps [s].
     record

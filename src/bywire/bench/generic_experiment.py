@@ -427,7 +427,7 @@ def _former(
     example = next(iter(generic.signals))
     raise ParameterError(
         f"experiment {name!r} is for any brake, and the experiment of the {system} is now called "
-        f"{former.name!r}. Write {former.name}, or specify the signal for {name}, for instance "
+        f"{former.name!r}. Write {former.name}, or specify the signal for {name}, for example "
         f"{option('overrides', {f'options.{example}': 'NAME'})}",
         name="experiment",
         value=name,

@@ -320,7 +320,7 @@ class Rows:
     def of(cls, recording: xr.Dataset) -> xr.Dataset:
         """Return rows in place of a recording, which are faster, or the recording itself.
 
-        A static characteristic, for instance, has no rows over time.
+        A static characteristic, for example, has no rows over time.
         """
         if set(recording.dims) != {TIME} or set(recording.coords) != {TIME}:
             return recording

@@ -40,7 +40,7 @@ class Limit:
     compare, bound, unit
         The comparison, and the bound in the figure's unit: SI, ``"%"`` or another one.
     text
-        The user's text, for instance ``"<= 15 %"``.
+        The user's text, for example ``"<= 15 %"``.
     probability
         Required probability of meeting the limit; None if every case has to meet it.
     of_magnitude

@@ -66,7 +66,7 @@ class StatedLevel:
 @checked
 @dataclass(frozen=True)
 class StatedRange:
-    """Range of a signal that a source states, for instance by the axes of a figure.
+    """Range of a signal that a source states, for example by the axes of a figure.
 
     Parameters
     ----------

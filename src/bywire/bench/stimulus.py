@@ -103,12 +103,12 @@ def create(kind: str, values: Mapping[str, Value], level_unit: str) -> Stimulus:
     Parameters
     ----------
     kind
-        Name of the stimulus, for instance ``"ramp"``.
+        Name of the stimulus, for example ``"ramp"``.
     values
         Its parameters by name. The nodes of a table are a sequence, or one text with commas in
         which each node has its unit: ``"0 s, 0.2 s, 1 s"``.
     level_unit
-        SI unit of the driven signal, for instance ``"A"`` or ``"Pa"``.
+        SI unit of the driven signal, for example ``"A"`` or ``"Pa"``.
 
     Raises
     ------

@@ -62,7 +62,7 @@ class Criterion:
     lasting
         Uninterrupted duration [s] of a violation.
     severity
-        Severity class from the user, for instance ``"S3"``.
+        Severity class from the user, for example ``"S3"``.
     """
 
     name: str

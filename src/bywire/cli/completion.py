@@ -16,9 +16,9 @@ def names_of(*kinds: str, ending: str = "") -> Callable[[str], Completed]:
     Parameters
     ----------
     kinds
-        Topics, for instance ``"experiments"`` (see `bywire.overview`). Default: all.
+        Topics, for example ``"experiments"`` (see `bywire.overview`). Default: all.
     ending
-        Suffix of files, for instance ``".toml"``. If empty, no files are completed.
+        Suffix of files, for example ``".toml"``. If empty, no files are completed.
     """
 
     def completed(incomplete: str) -> Completed:

@@ -31,7 +31,7 @@ def result(text: str) -> None:
     Raises
     ------
     FileError
-        If writing fails, for instance on a full disk.
+        If writing fails, for example on a full disk.
     """
     try:
         print(text, flush=True)

@@ -101,7 +101,7 @@ class Dimensioned:
             x, y, powers = _alike(*args)
             return Dimensioned.of(max(x, y) if name == "fmax" else min(x, y), powers)
         raise TypeError(
-            f"ops.{name} has no rule for dimensions: define it in Dimensioned._bywire_op"
+            f"ops.{name} has no rule for dimensions. Define it in Dimensioned._bywire_op"
         )
 
 
@@ -112,7 +112,7 @@ class Condition:
         self.holds = bool(compare(*_alike(left, right)[:2]))
 
     def __bool__(self) -> bool:
-        raise TypeError("an equation must not branch on a value: use ops.where")
+        raise TypeError("an equation must not branch on a value. Use ops.where")
 
     def _bywire_op(self, name: str, *args: Any) -> Any:
         condition, then, otherwise = args  # of ops.where, the only function that takes a condition

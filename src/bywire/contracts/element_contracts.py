@@ -335,7 +335,7 @@ def refuses_outside(
         if message is None:
             text = f"{name} = {value!r} was accepted, but it must be {leaf.range_text}"
             if not math.isfinite(value):
-                text += ": write allow_inf_nan=False in its Field"
+                text += ". Write allow_inf_nan=False in its Field"
             yield Evidence(False, text, place=place)
             continue
         lacking = [part for part in expected(leaf, value) if part not in message]

@@ -34,7 +34,7 @@ class Element:
     Parameters
     ----------
     name
-        Dotted name of its module, for instance ``"plant.dc_motor"``.
+        Dotted name of its module, for example ``"plant.dc_motor"``.
     module
         Its functions, ``Parameters`` and signal tuples.
     """
@@ -179,7 +179,7 @@ def numbers(name: str, annotation: Any) -> dict[str, Number]:
 def _signal(name: str, annotation: Any) -> Number:
     signal = signal_in(annotation)
     if signal is None:
-        raise TypeError(f"{name}: {annotation} has no unit: use Annotated[float, Signal(...)]")
+        raise TypeError(f"{name}: {annotation} has no unit. Use Annotated[float, Signal(...)]")
     return Number(signal.unit, signal.nominal, signal.low, signal.high)
 
 

@@ -159,9 +159,9 @@ class Finding:
     Parameters
     ----------
     subject
-        Function, class, parameter set or model, for instance ``"plant.dc_motor.balance"``.
+        Function, class, parameter set or model, for example ``"plant.dc_motor.balance"``.
     contract
-        Name of the contract, for instance ``"units"``.
+        Name of the contract, for example ``"units"``.
     outcome
         ``holds``, ``broken``, or ``not checked``.
     text
@@ -220,7 +220,7 @@ class Demand:
 def one_by_cause(findings: Iterable[Finding]) -> Iterator[Finding]:
     """Yield findings in order; report each error once, and mark other contracts as not checked.
 
-    For instance, a renamed parameter prevents all checks of a model at the same line.
+    For example, a renamed parameter prevents all checks of a model at the same line.
     """
     seen: dict[tuple[str, Place], Finding] = {}
     for each in findings:

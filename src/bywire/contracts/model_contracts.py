@@ -110,7 +110,7 @@ def hides_no_friction(trial: Trial) -> Iterator[Evidence]:
         sooner = max(share - r for share, r in zip(shares, SLOW, strict=True))
         text = f"the smooth force against {name} comes {sooner:.2g} sooner than with its speed"
         if sooner > HIDDEN:
-            text += ": declare this friction in frictions and bounds to prevent creep"
+            text += ". Declare this friction in frictions and bounds to prevent creep"
         yield measured(sooner, HIDDEN, text, place)
 
 
@@ -318,7 +318,7 @@ def has_its_derivatives(trial: Trial) -> Iterator[Evidence]:
     do not.
     """
     if find_compiler() is None:
-        raise NotCheckedError("there is no C compiler: install the extra bywire[compiler]")
+        raise NotCheckedError("there is no C compiler. Install the extra bywire[compiler]")
     run = trial.large_run(frictions=False)
     names = [f"x_{name}" for name in trial.model.State._fields]
     chosen = _strongest(trial, run)
@@ -472,7 +472,7 @@ def _observed(errors: Array) -> tuple[float, float]:
 def has_agreeing_engines(trial: Trial) -> Iterator[Evidence]:
     """Check that the compiled kernel and the virtual machine compute the same run."""
     if find_compiler() is None:
-        raise NotCheckedError("there is no C compiler: install the extra bywire[compiler]")
+        raise NotCheckedError("there is no C compiler. Install the extra bywire[compiler]")
     run = trial.start.run(LARGE, duration=_duration(trial.start))
     compiled = simulate(run, engine="compiled")
     virtual = simulate(run, engine="virtual-machine")
@@ -484,7 +484,7 @@ def has_agreeing_engines(trial: Trial) -> Iterator[Evidence]:
 def has_agreeing_lanes(trial: Trial) -> Iterator[Evidence]:
     """Check that an ensemble's lanes compute the same as the single run."""
     if find_compiler() is None:
-        raise NotCheckedError("there is no C compiler: install the extra bywire[compiler]")
+        raise NotCheckedError("there is no C compiler. Install the extra bywire[compiler]")
     run = trial.large_run(frictions=True)
     name, value = next(iter(constants(run)))
     lane = lanes(run, {name: [value]})[0]

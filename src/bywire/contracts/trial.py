@@ -41,7 +41,7 @@ class Start:
     state, memory, stimulus
         Start of the run, at rest if a rest is declared.
     known
-        Source of the start, for instance ``"loop pressure"``.
+        Source of the start, for example ``"loop pressure"``.
     """
 
     model: Model
@@ -134,7 +134,7 @@ def start_of_a_rig(model: Model, sets: Iterable[ParameterSet], module: str) -> S
             return start
     raise ParameterError(
         f"there is no parameter set for a {model.name}, and no experiment starts one with the sets "
-        "of its brake: declare a bywire.CitedSet of that assembly",
+        "of its brake. Declare a bywire.CitedSet of that assembly",
         name=model.name,
     )
 

@@ -30,7 +30,7 @@ class Parameters(ParameterSet):
     f_dit: Frequency
     """frequency: above the pressure loop's band, inside the current loop's"""
     gain: Gain
-    """amplitude over the assumed breakaway current"""
+    """amplitude relative to the assumed breakaway current"""
 
 
 class Believed(ParameterSet):
@@ -43,7 +43,7 @@ class Believed(ParameterSet):
     f_cfr_p: TorquePerPressure
     """growth of the Coulomb torque with pressure, apply direction"""
     k_brk_p: BreakawayFactor
-    """breakaway torque over Coulomb torque, apply direction"""
+    """ratio of breakaway torque to Coulomb torque, apply direction"""
 
 
 _ROUNDING = 1e-9  # share of the period: far above the phase's rounding, far below a sample

@@ -23,7 +23,7 @@ class Parameters(ParameterSet):
     """
 
     f_c: Frequency
-    """cut-off frequency"""
+    """cutoff frequency"""
     zeta: Factor
     """damping ratio; 1/sqrt(2) puts -3 dB at the cut-off"""
     place: Literal["after-dither", "before-dither"]
@@ -53,7 +53,7 @@ def output(
 
     .. math:: \frac{\omega_c^2}{s^2 + 2 \zeta \omega_c s + \omega_c^2}
 
-    by the trapezoidal rule with a prewarped cut-off frequency, which keeps it at f_c; valid for
+    by the trapezoidal rule with a prewarped cutoff frequency, which keeps it at f_c; valid for
     f_c T < 0.5.
     """
     angle = math.pi * par.f_c * T

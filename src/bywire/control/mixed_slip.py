@@ -25,7 +25,7 @@ class Parameters(ParameterSet):
     alpha: Weight
     """share of the slip"""
     eta_set: Annotated[float, Unit("1", 0.5), Field(ge=0, allow_inf_nan=False)]
-    """set point of the wheel's deceleration over gravity"""
+    """set point of the wheel's deceleration relative to gravity"""
     tau: TimeConstant
     """time constant of the deceleration's filter"""
     g: Annotated[float, Unit("m/s**2", 9.81), Field(gt=0, allow_inf_nan=False)]
@@ -36,7 +36,7 @@ class State(NamedTuple):
     """Speed of the tread at the last sample, and the filtered deceleration over gravity."""
 
     v_last: Annotated[float, Signal("m/s", "tread speed at the last sample", 20.0)]
-    eta: Annotated[float, Signal("1", "deceleration of the wheel over gravity", 1.0)]
+    eta: Annotated[float, Signal("1", "deceleration of the wheel relative to gravity", 1.0)]
 
 
 class Input(NamedTuple):

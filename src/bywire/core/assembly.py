@@ -550,7 +550,7 @@ def _gather(cls: type[Any]) -> None:
     for part in _stores(cls):
         if part.has("balance") and not part.has("mass"):
             raise ModelError(
-                f"{part.where}: {part.kind} has states and a balance, but no mass: define mass "
+                f"{part.where}: {part.kind} has states and a balance, but no mass. Define mass "
                 "there, or rename the function to rate if it returns derivatives",
                 name=part.where,
                 valid="mass",
@@ -564,7 +564,7 @@ def _gather(cls: type[Any]) -> None:
         for name, signal in part.states().items():
             if name in states:
                 raise ModelError(
-                    f"{part.where}: another part has a state {name!r} too: add a suffix or another "
+                    f"{part.where}: another part has a state {name!r} too. Add a suffix or another "
                     "name, Part(..., suffix='_2') or Part(..., state={...})",
                     name=part.where,
                     value=name,
@@ -589,7 +589,7 @@ def _gather(cls: type[Any]) -> None:
         if name in states or name in flows or name in shown:
             raise ModelError(
                 f"{cls.__name__}.Memory has a field {name!r}, but a part or a wire already records "
-                "a signal of that name: rename the field",
+                "a signal of that name. Rename the field",
                 name=f"{cls.__name__}.Memory",
                 value=name,
             )
@@ -622,7 +622,7 @@ def _take_over(
             for name in new:
                 if name in taken:
                     raise ModelError(
-                        f"{sub.where}: there is already a signal {name!r}: use another prefix",
+                        f"{sub.where}: there is already a signal {name!r}. Use another prefix",
                         name=sub.where,
                         value=name,
                     )

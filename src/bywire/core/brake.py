@@ -182,7 +182,7 @@ def load_system(path: str | Path) -> Brake:
     source = place / "__init__.py" if place.is_dir() else place
     if not source.is_file() or source.suffix != ".py":
         raise FileError(
-            f"{path} does not declare a brake: use a Python file, a folder with an __init__.py, "
+            f"{path} does not declare a brake. Use a Python file, a folder with an __init__.py, "
             "or a project with one such folder in src, that contains BRAKE = bywire.Brake(...)",
             name=str(path),
             valid="BRAKE = bywire.Brake(...)",
@@ -221,7 +221,7 @@ def _imported(place: Path, source: Path) -> ModuleType:
         there.__file__ = origin
     if there is not None and Path(getattr(there, "__file__", None) or "").resolve() != source:
         raise ModelError(
-            f"{place}: the module name {name!r} is used already ({_origin(there)}): rename it",
+            f"{place}: the module name {name!r} is already in use ({_origin(there)}). Rename it",
             name=str(place),
             value=name,
         )
@@ -251,7 +251,7 @@ def _declared(module: ModuleType, where: str) -> Brake:
     if not isinstance(brake, Brake):
         has = "no BRAKE" if brake is None else f"a BRAKE that is a {type(brake).__name__}"
         raise ModelError(
-            f"{where} declares {has}: write BRAKE = bywire.Brake(name, summary, __name__) in "
+            f"{where} declares {has}. Write BRAKE = bywire.Brake(name, summary, __name__) in "
             f"{module.__file__}",
             name="BRAKE",
             value=has,
@@ -259,7 +259,7 @@ def _declared(module: ModuleType, where: str) -> Brake:
         )
     if brake.module != module.__name__:
         raise ModelError(
-            f"{module.__file__}: BRAKE is declared for the module {brake.module!r}: write "
+            f"{module.__file__}: BRAKE is declared for the module {brake.module!r}. Write "
             f"Brake({brake.name!r}, ..., __name__)",
             name="BRAKE",
             value=brake.module,
@@ -288,7 +288,7 @@ def modules_of(brake: Brake, names: tuple[str, ...]) -> Iterator[ModuleType]:
     Parameters
     ----------
     names
-        Modules or folders of its package, for instance ``("loops",)``.
+        Modules or folders of its package, for example ``("loops",)``.
 
     Raises
     ------
@@ -363,7 +363,7 @@ def _of_pydantic(error: Any) -> str:
     ]
     if lacking:
         names = ", ".join(lacking)
-        wrong.insert(0, f"{names}: set a value here, or a default in the class {error.title}")
+        wrong.insert(0, f"{names}. Set a value here, or a default in the class {error.title}")
     return "; ".join(wrong)
 
 

@@ -301,7 +301,7 @@ def main_set(assembly: str, beside: type | None = None) -> str:
             if cited.assembly == assembly:
                 return name
     raise ModelError(
-        f"there is no parameter set for a {assembly}: declare a bywire.CitedSet for that assembly",
+        f"there is no parameter set for a {assembly}. Declare a bywire.CitedSet for that assembly",
         name=assembly,
         valid="a bywire.CitedSet",
     )

@@ -324,7 +324,7 @@ class _Source:
     """Syntax tree of a file's current content, with its functions and classes."""
 
     def __init__(self, file: str, names: Mapping[str, Any]) -> None:
-        if file.startswith("<"):  # typed into a notebook, for instance
+        if file.startswith("<"):  # typed into a notebook, for example
             linecache.lazycache(file, dict(names))
         else:
             linecache.checkcache(file)

@@ -59,7 +59,7 @@ class Dimension:
 
     @classmethod
     def of(cls, unit: str) -> Dimension:
-        """Return a unit's dimension, for instance of ``"N*m"``.
+        """Return a unit's dimension, for example of ``"N*m"``.
 
         Raises
         ------

@@ -188,7 +188,7 @@ def unknown_name(
     Parameters
     ----------
     kind
-        Kind of the name, for instance ``"experiment"``.
+        Kind of the name, for example ``"experiment"``.
     name
         Name that the user wrote.
     known

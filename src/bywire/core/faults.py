@@ -24,7 +24,7 @@ class ParameterFault:
     Parameters
     ----------
     name
-        Name of the mode, for instance ``"demagnetized"``.
+        Name of the mode, for example ``"demagnetized"``.
     summary
         One-line description.
     scaled
@@ -93,7 +93,7 @@ class Fault:
     Parameters
     ----------
     name
-        Place and mode, for instance ``"battery.lost"``.
+        Place and mode, for example ``"battery.lost"``.
     summary
         One-line description.
     changes

@@ -9,13 +9,13 @@ from bywire.core.errors import ParameterError
 DIGITS = 9
 """largest number of digits of a count"""
 _INPUT = ("--input", "Inputs")  # in commands and in forms
-_CHANGE = "KEY=VALUE, for instance motor.R_m=0.4ohm"
+_CHANGE = "KEY=VALUE, for example motor.R_m=0.4ohm"
 _FORMS = {
     **dict.fromkeys(
         _INPUT, "STIMULUS=SIGNAL, a stimulus of the model and the measured signal: p_set=p_ref"
     ),
     "--option": "NAME=VALUE, an option of the method ('bywire list METHOD')",
-    "--prior": "NAME=VALUE +- DEVIATION, for instance 'motor.R_m=0.35 +- 0.02 ohm'",
+    "--prior": "NAME=VALUE +- DEVIATION, for example 'motor.R_m=0.35 +- 0.02 ohm'",
 }
 
 
@@ -32,14 +32,14 @@ def named(texts: Iterable[str] | None, flag: str) -> dict[str, str]:
         name, equals, value = (part.strip() for part in text.partition("="))
         if not name or (equals and not value):
             raise ParameterError(
-                f"{flag} {text}: write NAME, or NAME=TEXT",
+                f"{flag} {text} is not valid. Write NAME, or NAME=TEXT",
                 name=flag,
                 value=text,
                 valid="NAME, or NAME=TEXT",
             )
         if name in values:
             raise ParameterError(
-                f"{flag} {text}: {name} is given twice: remove one of them",
+                f"{flag} {text}: {name} is given twice. Remove one of them",
                 name=flag,
                 value=text,
             )
@@ -64,14 +64,14 @@ def changes(texts: Iterable[str] | None, flag: str = "--set") -> dict[str, str]:
             value = equals = key
         if not equals or not key or not value:
             raise ParameterError(
-                f"{flag} {text}: write {_FORMS.get(flag, _CHANGE)}",
+                f"{flag} {text} is not valid. Write {_FORMS.get(flag, _CHANGE)}",
                 name=flag,
                 value=text,
                 valid=_FORMS.get(flag, _CHANGE),
             )
         if key in values:
             raise ParameterError(
-                f"{flag} {text}: {key} is set twice: remove one of them", name=flag, value=text
+                f"{flag} {text}: {key} is set twice. Remove one of them", name=flag, value=text
             )
         values[key] = value
     return values

@@ -59,7 +59,7 @@ class Leaf:
 
     @property
     def range_text(self) -> str:
-        """Valid range as text, for instance ``> 0 ohm``."""
+        """Valid range as text, for example ``> 0 ohm``."""
         return self.range_in(self.unit.symbol)
 
     def range_in(self, symbol: str) -> str:
@@ -258,7 +258,7 @@ def _explain(
     name = ".".join(str(part) for part in detail["loc"])
     value, kind = detail["input"], detail["type"]
     if kind == "missing":
-        return ParameterError(f"{owner}: {name} is missing: add a value", name=name)
+        return ParameterError(f"{owner}: {name} is missing. Add a value", name=name)
     if kind == "literal_error":
         return _unknown_choice(name, value, detail["ctx"]["expected"])
     leaf = leaves.get(name) or leaves.get(name.rpartition(".")[0])
@@ -490,7 +490,7 @@ def require_units(cls: type[ParameterSet], prefix: str = "") -> None:
             require_units(inner, f"{prefix}{name}.")
         elif inner in (float, int) and not any(isinstance(m, Unit) for m in info.metadata):
             raise ModelError(
-                f"{place_of(cls)}: {cls.__qualname__}.{name} is a number without a unit: write "
+                f"{place_of(cls)}: {cls.__qualname__}.{name} is a number without a unit. Write "
                 f'{name}: Annotated[float, Unit("kg")], "1" for a pure number, or a quantity '
                 "of core.quantities",
                 name=f"{cls.__qualname__}.{name}",

@@ -118,7 +118,7 @@ def _parameters_at(path: str, par: Any, where: str, declaration: str) -> Any:
         value = getattr(value, name, None)
     if value is None:
         raise ModelError(
-            f"{where}: the parameters have no group {path!r}: specify it with {declaration}",
+            f"{where}: the parameters have no group {path!r}. Specify it with {declaration}",
             name=where,
             value=path,
         )
@@ -191,7 +191,7 @@ class Part(Generic[X, U, F, P]):
     def __set__(self, instance: Any, value: Any) -> None:
         valid = f"w.{self.name}.u"
         raise ModelError(
-            f"{self.where} is a part: assign its input, {valid}", name=self.where, valid=valid
+            f"{self.where} is a part. Assign its input, {valid}", name=self.where, valid=valid
         )
 
     def has(self, function: str) -> bool:
@@ -209,7 +209,7 @@ class Part(Generic[X, U, F, P]):
         value = getattr(self.element, name, None)
         if not callable(value):
             raise ModelError(
-                f"{self.where}: {self.kind} has no function {name}: define it there", name=name
+                f"{self.where}: {self.kind} has no function {name}. Define it there", name=name
             )
         return typing.cast(Callable[..., Any], value)
 
@@ -274,7 +274,7 @@ class Part(Generic[X, U, F, P]):
         power = signal_in(hints.get("return"))
         if power is None:
             raise ModelError(
-                f"{self.where}: {self.kind}.{function} has no unit: annotate its result with "
+                f"{self.where}: {self.kind}.{function} has no unit. Annotate its result with "
                 "Annotated[float, Signal('W', label)]",
                 name=f"{self.kind}.{function}",
                 valid="Annotated[float, Signal('W', label)]",
@@ -413,14 +413,14 @@ class Sub(Generic[A]):
         self.feeds = dict(feeds or {})
         if not hasattr(kind, "parts"):
             raise ModelError(
-                f"Sub({kind.__name__}): it is not an assembly with a memory: use a class that "
+                f"Sub({kind.__name__}): it is not an assembly with a memory. Use a class that "
                 "inherits from Assembly and declares Memory",
                 name=f"Sub({kind.__name__})",
                 valid="a class that inherits from Assembly and declares Memory",
             )
         if not f"{prefix}x".isidentifier() or prefix.startswith("_"):
             raise ModelError(
-                f"Sub({kind.__name__}): the prefix {prefix!r} is not valid: use a word and an "
+                f"Sub({kind.__name__}): the prefix {prefix!r} is not valid. Use a word and an "
                 "underscore, like 'rear_'",
                 name="prefix",
                 value=prefix,
@@ -452,7 +452,7 @@ class Sub(Generic[A]):
     def __set__(self, instance: Any, value: Any) -> None:
         valid = f"w.{self.name}.PORT = ..."
         raise ModelError(
-            f"{self.where} is an assembly: set its ports, {valid}", name=self.where, valid=valid
+            f"{self.where} is an assembly. Set its ports, {valid}", name=self.where, valid=valid
         )
 
     def _at(self, instant: Instant, holder: Any) -> Any:

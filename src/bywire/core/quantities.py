@@ -19,7 +19,7 @@ class Unit:
     Parameters
     ----------
     symbol
-        Unit, for instance ``"N*m/A"``; ``"1"`` for a pure number.
+        Unit, for example ``"N*m/A"``; ``"1"`` for a pure number.
     nominal
         Usual magnitude in that unit, which scales tolerances and the samples of contract tests.
     """

@@ -104,7 +104,7 @@ class Kind(Generic[T]):
     Parameters
     ----------
     name
-        Name of the kind in messages, for instance ``"experiment"``.
+        Name of the kind in messages, for example ``"experiment"``.
     folders
         Modules or folders of a brake's package that declare things of this kind.
     read
@@ -112,7 +112,7 @@ class Kind(Generic[T]):
     home
         Dotted name of the package of general things; empty if all belong to brakes.
     declared
-        Object that declares such a thing, for instance ``"a Loop"``. The error for an unknown name
+        Object that declares such a thing, for example ``"a Loop"``. The error for an unknown name
         contains it if a brake has no such thing.
 
     Notes
@@ -165,7 +165,7 @@ class Kind(Generic[T]):
             first=[n for kind in kinds for module in loaded for n in kind.of(module)],
         )
         hints = [
-            f"the brake {brake.name!r} declares no {title}: declare {self.declared} in a module or "
+            f"the brake {brake.name!r} declares no {title}. Declare {self.declared} in a module or "
             f"folder {' or '.join(self.folders)} of its package, or in its file (see "
             "docs/modeling.md)"
             for brake in brakes().values()
@@ -355,14 +355,14 @@ def _require_new(
     new: tuple[tuple[Any, ModuleType], ...],
     known: Mapping[str, tuple[Any, str, ModuleType]],
 ) -> None:
-    """Reject things whose name is used already, in the same brake or in an earlier one."""
+    """Reject things whose name is already in use, in the same brake or in an earlier one."""
     seen = {name: (thing, module) for name, (thing, _, module) in known.items()}
     for thing, module in new:
         first, place = seen.setdefault(thing.name, (thing, module))
         if first is not thing:
             raise ModelError(
                 f"{_declared_at(module, thing)}: the {kind.name} {thing.name!r} is declared in "
-                f"{_declared_at(place, first)} already: rename it",
+                f"{_declared_at(place, first)} already. Rename it",
                 name=kind.name,
                 value=thing.name,
             )

@@ -142,7 +142,7 @@ def process_folder() -> Path:
         return _folder_of(os.getpid())
     except OSError as error:
         raise FileError(
-            f"bywire cannot make a temporary folder ({error.strerror or error}): free some space "
+            f"bywire cannot create a temporary folder ({error.strerror or error}). Free some space "
             "there, or set TMPDIR to another folder",
             name="TMPDIR",
         ) from None

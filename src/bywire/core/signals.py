@@ -130,7 +130,7 @@ def signals_of(tuple_type: type[NamedTuple]) -> dict[str, Signal]:
         if signal is None:
             raise ModelError(
                 f"{place_of(tuple_type)}: {tuple_type.__qualname__}.{name} has no Signal annotation"
-                f': write {name}: Annotated[float, Signal("m", "what it is")]',
+                f'. Write {name}: Annotated[float, Signal("m", "what it is")]',
                 name=f"{tuple_type.__qualname__}.{name}",
                 valid='Annotated[float, Signal("m", "what it is")]',
             )

@@ -265,7 +265,7 @@ class Scale:
 
     @property
     def symbol(self) -> str:
-        """SI unit of the same quantity, for instance ``V/(N*m)``."""
+        """SI unit of the same quantity, for example ``V/(N*m)``."""
         above = "*".join(_raised(name, power) for name, power in self.terms if power > 0)
         below = [_raised(name, -power) for name, power in self.terms if power < 0]
         under = below[0] if len(below) == 1 else f"({'*'.join(below)})"
@@ -310,7 +310,7 @@ def scale_of(text: str) -> Scale:
         plain = _plain(text)
         two = next(names for key, names in _TWO_MEANINGS.items() if key in _names(plain))
         raise UnknownUnitError(
-            f"the unit {quoted(text)} has two meanings: write {two[0]!r} or {two[1]!r} in it",
+            f"the unit {quoted(text)} has two meanings. Write {two[0]!r} or {two[1]!r} in it",
             value=quoted(text),
             valid=f"{two[0]!r} or {two[1]!r}",
         )
@@ -466,7 +466,7 @@ class _Reader:
 
     def _ambiguous(self) -> UnknownUnitError:
         return UnknownUnitError(
-            f"the unit {quoted(self._text)} can be read in two ways: put the divisor in brackets, "
+            f"the unit {quoted(self._text)} can be read in two ways. Put the divisor in brackets, "
             "as in J/(kg*K), or write it last",
             value=quoted(self._text),
         )

@@ -42,7 +42,7 @@ class Written(float):
     value
         The number, SI.
     text
-        Original text, for instance ``"-0.02mm"``.
+        Original text, for example ``"-0.02mm"``.
     """
 
     text: str
@@ -87,7 +87,7 @@ def parse(value: str | float, symbol: str, name: str, nominal: float = 1.0) -> f
     """
     if isinstance(value, bool) or not isinstance(value, (str, int, float)):
         raise UnitError(
-            f"{name} = {quoted(value)} must be one number, for instance "
+            f"{name} = {quoted(value)} must be one number, for example "
             f"{example(symbol, nominal)!r}",
             name=name,
             value=quoted(value),
@@ -105,7 +105,7 @@ def parse(value: str | float, symbol: str, name: str, nominal: float = 1.0) -> f
 def _number(text: str, symbol: str, name: str, nominal: float) -> float:
     match = _NUMBER.fullmatch(text) if len(text) <= _LONGEST else None
     valid = repr(example(symbol, nominal))
-    write, fields = f"write for instance {valid}", {"name": name, "value": quoted(text)}
+    write, fields = f"for example, write {valid}", {"name": name, "value": quoted(text)}
     if match is None:
         raise UnitError(
             f"{name} = {quoted(text)} is not a quantity: {write}", **fields, valid=valid
@@ -130,7 +130,7 @@ def _number(text: str, symbol: str, name: str, nominal: float) -> float:
     if scale.reference == "absolute":
         raise UnitError(
             f"{name} = {text!r}: bywire cannot determine whether {name} is absolute or relative to "
-            f"ambient pressure: convert it to the kind that the bench needs, and {write}",
+            f"ambient pressure. Convert it to the kind that the bench needs, and {write}",
             **fields,
             valid=valid,
         )
@@ -223,7 +223,7 @@ def unit_text(symbol: str) -> str:
 
 
 def shown(value: float, symbol: str, unit: str = "") -> str:
-    """Return a value in its display unit, for instance ``25 bar``, or in another unit.
+    """Return a value in its display unit, for example ``25 bar``, or in another unit.
 
     Examples
     --------

@@ -82,7 +82,7 @@ class Wired(Generic[X, U, F, P]):
             self._instant.settle()
         if self._input is None:
             raise ModelError(
-                f"{self._part.where}: its input is read before it is wired: assign "
+                f"{self._part.where}: its input is read before it is wired. Assign "
                 f"w.{self._part.name}.u = {self._part.kind}.Input(...) in wire before that",
                 name=self._part.where,
                 valid=f"w.{self._part.name}.u = {self._part.kind}.Input(...)",
@@ -104,7 +104,7 @@ class Wired(Generic[X, U, F, P]):
             )
         if self._input is not None:
             raise ModelError(
-                f"{self._part.where}: {line()} assigns its input a second time: wire it once",
+                f"{self._part.where}: {line()} assigns its input a second time. Wire it once",
                 name=self._part.where,
             )
         self._input = self._instant.marked(f"{self._part.name}.u", value)
@@ -134,7 +134,7 @@ class Wired(Generic[X, U, F, P]):
         valid = "x, u, f, par"
         raise ModelError(
             f"{self._part.where}: {self._part.kind}.{function.__name__} has an argument {name!r}, "
-            f"which is not available: use {valid} or a group that the assembly lists in shared "
+            f"which is not available. Use {valid} or a group that the assembly lists in shared "
             f"({', '.join(self._instant.shared) or 'none so far'})",
             name=f"{self._part.kind}.{function.__name__}",
             value=name,
@@ -279,7 +279,7 @@ class Wire(_Named):
     def unset(self, instant: Instant) -> None:
         """Raise the error for a read before the assignment."""
         raise ModelError(
-            f"{self.where} is read before it is set: assign w.{self.name} = ... in wire before "
+            f"{self.where} is read before it is set. Assign w.{self.name} = ... in wire before "
             "that",
             name=self.where,
             valid=f"w.{self.name} = ...",
@@ -289,7 +289,7 @@ class Wire(_Named):
         instant = instant_of(instance, self.where)
         if self.name in instant.wires:
             raise ModelError(
-                f"{self.where}: {line()} sets it a second time: set a wire once", name=self.where
+                f"{self.where}: {line()} sets it a second time. Set a wire once", name=self.where
             )
         instant.wires[self.name] = instant.marked(self.name, value)
         instant.note(self.name)
@@ -305,7 +305,7 @@ class Port(Wire):
         """Use the default without a holder; raise the error with a holder."""
         if instant.is_held:
             raise ModelError(
-                f"{self.where} is read before the holder sets it: assign w.NAME.{self.name} = ... "
+                f"{self.where} is read before the holder sets it. Assign w.NAME.{self.name} = ... "
                 "in its wire before any read of wires or inputs of w.NAME",
                 name=self.where,
                 valid=f"w.NAME.{self.name} = ...",

@@ -86,7 +86,7 @@ class _Operands:
         """Return the dimension of a unit; an error contains the unit's owner."""
         try:
             if not unit:
-                raise UnitError("it has no unit: write '1' for a pure number")
+                raise UnitError("it has no unit. Write '1' for a pure number")
             return Dimension.of(unit)
         except UnitError as error:
             text = f"{_place(self.model)}: {what}: {error}"
@@ -116,7 +116,7 @@ class _Operands:
         except UnitError as error:
             where = _line_of(error, self.model)
             raise ModelError(
-                f"{type(self.model).__name__}.{method}, {where}: {error}: correct the equation or "
+                f"{type(self.model).__name__}.{method}, {where}: {error}. Correct the equation or "
                 "the declared unit of one of its quantities",
                 name=f"{type(self.model).__name__}.{method}",
                 value=error.value,
@@ -130,7 +130,7 @@ def _check_inputs(model: _AnyAssembly, at: _Operands, w: _AnyAssembly) -> None:
         at.dimension(wire.signal.unit, name)
         if name not in instant.wires:
             raise ModelError(
-                f"{_place(model)}: the wire {name} ({wire.signal.label}) is never set: assign "
+                f"{_place(model)}: the wire {name} ({wire.signal.label}) is never set. Assign "
                 f"w.{name} = ... [{wire.signal.unit}] in wire",
                 name=name,
                 valid=wire.signal.unit,
@@ -145,7 +145,7 @@ def _check_inputs(model: _AnyAssembly, at: _Operands, w: _AnyAssembly) -> None:
         if value is None:
             valid = f"{part.kind}.Input({', '.join(part.element.Input._fields)})"
             raise ModelError(
-                f"{_place(model)}: the input of {part.name} is never wired: assign w.{part.name}.u "
+                f"{_place(model)}: the input of {part.name} is never wired. Assign w.{part.name}.u "
                 f"= {valid} in wire",
                 name=part.name,
                 valid=valid,
@@ -177,7 +177,7 @@ def _check_held(model: _AnyAssembly, par: ParameterSet) -> None:
         missing = [task.name for task in sub.tasks(par) if task.name not in running]
         if missing:
             raise ModelError(
-                f"{_place(model, 'tasks')}: the task {missing[0]} of {sub.name} never runs: add "
+                f"{_place(model, 'tasks')}: the task {missing[0]} of {sub.name} never runs. Add "
                 "*super().tasks(par) to the return value of tasks",
                 name=missing[0],
             )
@@ -248,7 +248,7 @@ def _require(
     meaning = f" ({label})" if label else ""
     raise ModelError(
         f"{type(model).__name__}.{method}, {where or _place(model, method)}: {name}{meaning} is in "
-        f"{unit}, but its assigned value is in {shown}: correct the value or the declared unit",
+        f"{unit}, but its assigned value is in {shown}. Correct the value or the declared unit",
         name=name,
         value=str(shown),
         valid=unit,

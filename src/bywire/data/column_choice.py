@@ -77,8 +77,8 @@ def _missing_units(file: Path, signals: Mapping[str, str], clock: str = "") -> M
     for name, column in signals.items():
         title, inside = f"{column} [mm]", f"[signals.{name}] unit = 'mm'"
     text = (
-        f"{lacking}. Write the unit after the title, for instance '{title}', or in a mapping, for "
-        f"instance {inside}. The unit of a pure number is '1'"
+        f"{lacking}. Write the unit after the title, for example '{title}', or in a mapping, for "
+        f"example {inside}. The unit of a pure number is '1'"
     )
     return MissingUnitsError(text, lacking, signals, clock)
 
@@ -269,7 +269,7 @@ def _known_unit(unit: str, where: str) -> Scale:
         return unit_of(unit)
     except UnitError as error:
         raise UnitError(
-            f"{where}: {error}. Specify the unit in a mapping, for instance unit = 'bar', or '1' "
+            f"{where}: {error}. Specify the unit in a mapping, for example unit = 'bar', or '1' "
             "for a pure number",
             name="unit",
             value=unit,

@@ -318,14 +318,14 @@ def _clock(
     number, column = _numbered(time.column)
     if bool(column) == (rate is not None):
         raise ParameterError(
-            f"{where}needs either time or rate, for instance "
+            f"{where}needs either time or rate, for example "
             'time = { column = "t", unit = "ms" } or rate = "1 kHz"',
             name="time",
         )
     unit = _unit(time.unit, f"{where}time.")
     if unit and si_symbol(unit_of(unit)) != "s":
         raise UnitError(
-            f"{where}time.unit = {quoted(unit)} is not a unit of time. Use for instance 'ms'",
+            f"{where}time.unit = {quoted(unit)} is not a unit of time. For example, use 'ms'",
             name="time.unit",
             value=quoted(unit),
             valid="'ms'",
@@ -344,7 +344,7 @@ def _unit(text: str, where: str) -> str:
             unit_of(text.strip())
     except UnitError as error:
         raise UnitError(
-            f"{where}unit = {quoted(text)}: {error}. Use for instance 'bar', or '1' for a pure "
+            f"{where}unit = {quoted(text)}: {error}. For example, use 'bar', or '1' for a pure "
             "number",
             name="unit",
             value=quoted(text),

@@ -32,7 +32,7 @@ _DSPACE = re.compile(_SIGNAL.format("Y", "Data"))
 _SERIES = re.compile(r"(?P<scope>.+)\.(?:Data|data)(?P<column>\(:,[0-9]+\)|\([0-9]+,:\))?")
 OBJECT = (
     "it is a MATLAB object, such as a timeseries or a Dataset, which only MATLAB can read. Save "
-    "its times and values as arrays, for instance t = ts.Time and y = ts.Data"
+    "its times and values as arrays, for example t = ts.Time and y = ts.Data"
 )
 """reason to skip an object"""
 
@@ -71,7 +71,7 @@ class Found:
     parts
         Columns of its arrays by name.
     texts, scalars
-        Texts and single numbers in structs by dotted name, for instance ``units.p_mc``.
+        Texts and single numbers in structs by dotted name, for example ``units.p_mc``.
     left_out
         Skipped content with the reason.
     """

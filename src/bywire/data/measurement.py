@@ -84,7 +84,7 @@ def instants(
             raise FileError(
                 f"{file}: the time column {clock.column!r} has {column.size} instants, but its "
                 f"signals have {key.length} samples. Specify the right time column of each signal "
-                'in a mapping, for instance [signals.NAME] time = { column = "t" }',
+                'in a mapping, for example [signals.NAME] time = { column = "t" }',
                 name=clock.column,
                 value=str(column.size),
                 valid=str(key.length),
@@ -358,7 +358,7 @@ def _dimensions(chosen: Sequence[Chosen], keys: Sequence[_AxisKey]) -> dict[_Axi
     return dimensions
 
 
-# --- A single trace, for instance of a rider's pedal
+# --- A single trace, for example of a rider's pedal
 # A trace drives a model, so it must be complete: missing values and long pauses raise an error and
 # are never bridged silently. In a text table, a first row ``time [s], pedal [mm]`` contains names
 # and units; for other files, a mapping contains them.
@@ -383,7 +383,7 @@ def read_trace(
     path
         The file.
     signals
-        Required signals and their SI units, for instance ``{"pedal": "m"}``: signals of the
+        Required signals and their SI units, for example ``{"pedal": "m"}``: signals of the
         mapping, or columns, ignoring case. Without it all are read, each in the SI unit of its
         quantity.
     max_gap

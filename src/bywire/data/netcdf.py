@@ -50,7 +50,7 @@ def write_recording(recording: xr.Dataset, path: str | Path) -> Path:
     Raises
     ------
     FileError
-        When the file cannot be written, for instance because the disk is full.
+        When the file cannot be written, for example because the disk is full.
     """
     path = Path(path)
     encoding = {str(name): {"zlib": True, "complevel": 1} for name in recording.data_vars}

@@ -54,7 +54,7 @@ def filtered(
 
 
 def low_passed(x: Array, f_c: float, interval: float) -> Array:
-    """Filter samples by a first-order low-pass in steady state at the first one.
+    """Filter samples by a first-order low-pass filter in steady state at the first one.
 
     Parameters
     ----------

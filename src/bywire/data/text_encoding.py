@@ -95,7 +95,7 @@ def blocks_of(path: Path, encoding: str, size: int = _BLOCK) -> Iterator[bytes]:
                 line = lines + 1 + block[: error.start].count(b"\n")
                 raise FileError(
                     f"{path}, line {line} is not {encoding} text. Specify the right encoding in "
-                    "the mapping, for instance encoding = 'cp1252'",
+                    "the mapping, for example encoding = 'cp1252'",
                     name="encoding",
                     value=encoding,
                 ) from None
@@ -140,7 +140,7 @@ def head_text(path: Path, named: str, size: int) -> tuple[list[str], str, bool]:
 def not_utf8(path: Path, line: int) -> FileError:
     """Return the error for a line that is not UTF-8."""
     return FileError(
-        f"{path}, line {line} is not UTF-8 text. Specify the encoding in a mapping, for instance "
+        f"{path}, line {line} is not UTF-8 text. Specify the encoding in a mapping, for example "
         "encoding = 'cp1252' (Windows) or 'latin-1', or save the file as UTF-8 (in spreadsheets: "
         "'CSV UTF-8')",
         name="encoding",

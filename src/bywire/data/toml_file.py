@@ -37,7 +37,7 @@ def read_toml(
     file
         Path of the file.
     kind
-        Its name in errors, for instance ``"bench file"``.
+        Its name in errors, for example ``"bench file"``.
     missing
         Returns the next step for a missing file.
     too_large

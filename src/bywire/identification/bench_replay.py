@@ -64,7 +64,7 @@ def _compared_outputs(
     if not wanted:
         raise ParameterError(
             "no measured signal is an output of the model. Use the model's signal names "
-            f"({option('mapping')}), for instance {', '.join(list(signals)[:6])}. The measured "
+            f"({option('mapping')}), for example {', '.join(list(signals)[:6])}. The measured "
             f"signals are {nearest_first(there, signals)}",
             name="mapping",
             valid=", ".join(signals),
@@ -204,7 +204,7 @@ def measured_run(
         if missing.size:
             at = float(data["time"].values[missing[0]])
             raise ParameterError(
-                f"{signal} drives the model, but lacks {missing.size} samples, the first at "
+                f"{signal} drives the model, but is missing {missing.size} samples, the first at "
                 f"{at:.4g} s. Trim the record there",
                 name=signal,
             )

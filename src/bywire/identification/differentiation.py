@@ -1,4 +1,4 @@
-"""Derivatives of measured signals: zero-phase low-pass, then central differences."""
+"""Derivatives of measured signals: zero-phase low-pass filter, then central differences."""
 
 from __future__ import annotations
 
@@ -97,9 +97,9 @@ def differentiated(
     names
         Names of its first and further derivatives.
     cutoff
-        Corner of the low-pass [Hz].
+        Cutoff of the low-pass filter [Hz].
     held
-        Signals that a controller sets and holds for one interval, for instance a voltage: the mean
+        Signals that a controller sets and holds for one interval, for example a voltage: the mean
         of the values before and after a sample acts around it. Without this they are half an
         interval early and slightly too large.
 

@@ -342,7 +342,7 @@ class Parameters(ParameterSet):
 
     motor: dc_motor.Parameters
     f_aa: Frequency
-    """corner of the current measurement's filter"""
+    """cutoff of the current measurement's filter"""
     T: Duration
     """hold time of an input"""
 

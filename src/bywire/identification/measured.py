@@ -383,8 +383,8 @@ def _require_whole(data: xr.Dataset, where: str, gaps: bool) -> None:
         if missing.size:
             at = float(data["time"].values[missing[0]])
             raise ParameterError(
-                f"{where}: {name} lacks {missing.size} samples, the first at {at:.4g} s. Trim the "
-                "record there, or fill the gap with 'bywire convert --exclude nothing'",
+                f"{where}: {name} is missing {missing.size} samples, the first at {at:.4g} s. Trim "
+                "the record there, or fill the gap with 'bywire convert --exclude nothing'",
                 name=str(name),
             )
 

@@ -201,7 +201,7 @@ class Options(ParameterSet):
     """inputs between samples: held, as a controller's demand, or linear, for smooth inputs that
     act on the model faster than they were measured"""
     most_residual: Factor
-    """residual over noise above which the model does not explain the record"""
+    """ratio of residual to noise above which the model does not explain the record"""
     most_outliers: Share
     """largest share of residuals beyond four times the noise that a robust loss may exclude"""
     least_vaf: Share
@@ -244,7 +244,7 @@ def unknowns_of(case: Case, known: ParameterSet, question: Question) -> tuple[Un
     if not question.ranges:
         raise ParameterError(
             f"there is no unknown. Add {option('unknowns')} PARAMETER for each unknown, for "
-            f"instance {option('unknowns')} {next(iter(leaf_fields(type(case.par))))}",
+            f"example {option('unknowns')} {next(iter(leaf_fields(type(case.par))))}",
             name="unknowns",
         )
     for name in question.priors:
@@ -341,7 +341,7 @@ def _pair(
     low, high = _EXAMPLES[kind]
     if len(parts) != 2 or not all(part.strip() for part in parts):
         raise ParameterError(
-            f"{kind} of {unknown.name}: {quoted(text)} is not valid. Use for instance "
+            f"{kind} of {unknown.name}: {quoted(text)} is not valid. For example, use "
             f"'{shown(low * unknown.scale, unknown.unit)}{sign}"
             f"{shown(high * unknown.scale, _second_unit(unknown, kind))}'",
             name=f"{kind} of {unknown.name}",

@@ -97,7 +97,7 @@ def estimate_lag(
     for name, values in ((first, a), (second, b)):
         if np.isnan(values).any():
             raise ParameterError(
-                f"{name} has gaps or missing values. Select a part without them, for instance "
+                f"{name} has gaps or missing values. Select a part without them, for example "
                 "measurement.sel(time=slice(0, 10))",
                 name=name,
             )
@@ -209,7 +209,7 @@ _STEADY = 0.02  # of the demand's range: it holds while it moves less than this 
 _WINDOW = 0.1  # s
 _MOST = 60
 _Limits = Annotated[Mapping[str, str], Field(default_factory=dict), Hint("write a text, '<= 5 %'")]
-_Instant = Annotated[float, Unit("s"), Hint('write for instance start = "1 s", stop = "2 s"')]
+_Instant = Annotated[float, Unit("s"), Hint('for example, write start = "1 s", stop = "2 s"')]
 
 
 class SegmentSection(Section):
@@ -364,7 +364,7 @@ def read_tolerances(texts: Sequence[str]) -> dict[str, str]:
         name, compare, bound = parted(text)
         if compare is None or not name or not bound:
             raise ParameterError(
-                f"{option('tolerances')} {text!r} is not valid. Use for instance 'nrmse <= 5 %' or "
+                f"{option('tolerances')} {text!r} is not valid. For example, use 'nrmse <= 5 %' or "
                 "'p_mc.max_error <= 2 bar'",
                 name="tolerances",
                 value=text,

@@ -291,7 +291,7 @@ def likeliest(
     Parameters
     ----------
     least
-        Known part of the noise, for instance from the scatter within averaged blocks. Otherwise a
+        Known part of the noise, for example from the scatter within averaged blocks. Otherwise a
         walk with occasional jumps would explain all noise as drift.
 
     Raises

@@ -83,7 +83,7 @@ class Rising(NamedTuple):
 
 
 class Parameters(ParameterSet):
-    """Law of the adhesion over slip."""
+    """Law of adhesion versus slip."""
 
     curve: Curve
     """``"burckhardt"``, or ``"magic-formula"``, with B, C, D and E of the surface"""

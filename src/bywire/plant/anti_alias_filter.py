@@ -11,10 +11,10 @@ from bywire.core.signals import Signal
 
 
 class Parameters(ParameterSet):
-    """Analog low-pass of first order and unit gain."""
+    """Analog first-order low-pass filter with unity gain."""
 
     f_aa: Frequency
-    """cut-off frequency (-3 dB)"""
+    """cutoff frequency (-3 dB)"""
 
 
 class State(NamedTuple):

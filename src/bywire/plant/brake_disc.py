@@ -55,7 +55,7 @@ class Output(NamedTuple):
 
 def torque_per_pressure(
     par: Parameters,
-) -> Annotated[float, Signal("N*m/Pa", "brake torque over pressure", 3e-4)]:
+) -> Annotated[float, Signal("N*m/Pa", "brake torque per unit pressure", 3e-4)]:
     r"""Return :math:`k = z\, \mu_{pad} A_{cal} r_{eff}`."""
     return par.faces * par.mu_pad * par.A_cal * par.r_eff
 

@@ -24,7 +24,7 @@ class Parameters(ParameterSet):
     k_stop: Stiffness
     """stiffness of each stop"""
     tau_stop: TimeConstant
-    """damping over stiffness"""
+    """ratio of damping to stiffness"""
 
 
 class Input(NamedTuple):

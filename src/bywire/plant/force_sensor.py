@@ -24,7 +24,7 @@ class Parameters(ParameterSet):
     K_F: Stiffness
     """stiffness of the sensor with its adapters"""
     tau_F: TimeConstant
-    """damping over stiffness of sensor and screws"""
+    """ratio of damping to stiffness of sensor and screws"""
     f_F: Frequency
     """corner frequency of the amplifier's filter"""
 

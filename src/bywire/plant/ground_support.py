@@ -25,7 +25,7 @@ class Parameters(ParameterSet):
     k: Stiffness
     """stiffness"""
     tau: TimeConstant
-    """damping over stiffness"""
+    """ratio of damping to stiffness"""
 
 
 class Input(NamedTuple):

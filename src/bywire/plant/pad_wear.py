@@ -27,7 +27,7 @@ class Parameters(ParameterSet):
     T_hot: AbsoluteTemperature
     """temperature above which wear grows"""
     T_act: Activation
-    """activation energy over gas constant, which determines the growth of wear above T_hot"""
+    """activation energy / gas constant, which determines the growth of wear above T_hot"""
     n_pads: Count
     """number of pads that share the work"""
     A_pad: Area

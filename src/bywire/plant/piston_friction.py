@@ -74,8 +74,8 @@ class Overlaps(NamedTuple):
 class Thresholds(NamedTuple):
     """Pressure differences held by the friction."""
 
-    inward: Annotated[float, Signal("Pa", "friction over area, inward", 1e5)]
-    outward: Annotated[float, Signal("Pa", "friction over area, outward", 1e5)]
+    inward: Annotated[float, Signal("Pa", "friction per unit area, inward", 1e5)]
+    outward: Annotated[float, Signal("Pa", "friction per unit area, outward", 1e5)]
 
 
 def exists(par: Parameters) -> bool:

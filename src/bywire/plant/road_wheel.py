@@ -22,7 +22,7 @@ class Parameters(ParameterSet):
     r: Length
     """rolling radius"""
     C_rr: Annotated[float, Unit("1", 0.015), Field(ge=0, lt=1, allow_inf_nan=False)]
-    """rolling resistance over load"""
+    """rolling resistance relative to load"""
 
 
 class State(NamedTuple):

@@ -31,9 +31,9 @@ class Parameters(ParameterSet):
     f_cfr_n: TorquePerPressure
     """growth of the Coulomb torque with pressure, release direction"""
     k_brk_p: BreakawayFactor
-    """breakaway torque over Coulomb torque, apply direction"""
+    """ratio of breakaway torque to Coulomb torque, apply direction"""
     k_brk_n: BreakawayFactor
-    """breakaway torque over Coulomb torque, release direction"""
+    """ratio of breakaway torque to Coulomb torque, release direction"""
     c: InverseSpeed
     """decay of the Stribeck peak with speed"""
     mu_T: RotaryDamping

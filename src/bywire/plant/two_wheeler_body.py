@@ -147,8 +147,8 @@ def rear_load(
 
 
 def rigid_rear_load(
-    mu_f: Annotated[float, Signal("1", "front braking force over load", 1.0)],
-    mu_r: Annotated[float, Signal("1", "rear braking force over load", 1.0)],
+    mu_f: Annotated[float, Signal("1", "front braking force relative to load", 1.0)],
+    mu_r: Annotated[float, Signal("1", "rear braking force relative to load", 1.0)],
     F_d: Annotated[float, Signal("N", "air drag", 100.0)],
     cosine: Cosine,
     par: Parameters,

@@ -118,7 +118,7 @@ def sliding(x: State, u: Input) -> Annotated[float, Signal("1", "tyre slides")]:
 
 def force_over_load(
     x: State, u: Input, par: Parameters
-) -> Annotated[float, Signal("1", "braking force over load", 1.0)]:
+) -> Annotated[float, Signal("1", "braking force relative to load", 1.0)]:
     """Return force over load, from the limited deflection and damping near standstill.
 
     Damping does not raise the force's limit.

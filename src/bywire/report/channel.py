@@ -62,7 +62,7 @@ def channel(recording: xr.Dataset, name: str) -> Channel:
     if array.dims != ("time",):
         raise ParameterError(
             f"{name} has the dimensions {', '.join(map(str, array.dims)) or 'none'}: a figure "
-            "needs time only; select one case first, for instance recording.isel(case=0)",
+            "needs time only; select one case first, for example recording.isel(case=0)",
             name=name,
             value=", ".join(map(str, array.dims)),
             valid="time",

@@ -66,7 +66,7 @@ class FigureBlock:
     name
         File name in an output folder, without the ending; empty for no file.
     is_long
-        Whether it takes much longer to draw than most, for instance because it has many panels.
+        Whether it takes much longer to draw than most, for example because it has many panels.
         When figures are drawn in parallel, it is started first.
     """
 

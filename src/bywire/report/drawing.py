@@ -312,7 +312,9 @@ def figure_bytes(figure: Figure | Picture, kind: str = "png") -> bytes:
         For any other kind.
     """
     if kind not in _KINDS:
-        raise FileError(f"figures are not written as {kind!r}: change the ending to .png or .svg")
+        raise FileError(
+            f"figures are not written as {kind!r}. Change the extension to .png or .svg"
+        )
     if isinstance(figure, Picture):
         return figure.png if kind == "png" else figure.svg
     if figure.stale or figure not in _drawn:

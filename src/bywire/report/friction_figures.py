@@ -38,7 +38,7 @@ def hysteresis_loop(
     recordings
         Recordings of a ramp up and down again, by their label in the legend.
     response, drive
-        Variables, for instance a pressure and a current.
+        Variables, for example a pressure and a current.
     demand
         Variable whose maximum separates applying from releasing; if a recording does not have it,
         the drive.
@@ -54,7 +54,7 @@ def hysteresis_loop(
     from matplotlib.lines import Line2D
 
     if not recordings:
-        raise ParameterError("hysteresis_loop: no recording given: give at least one")
+        raise ParameterError("hysteresis_loop: no recording was passed. Pass at least one")
     figure, (axes,) = style.new_figure(4.2)
     for k, (label, recording) in enumerate(recordings.items()):
         color = style.SEQUENCE[k % len(style.SEQUENCE)]
@@ -149,7 +149,7 @@ def stribeck_curve(
     Parameters
     ----------
     curve
-        Dataset with the friction over two dimensions: the load, for instance a pressure, and
+        Dataset with the friction over two dimensions: the load, for example a pressure, and
         ascending speed, which contains 0 twice, once for each end of the interval at rest. All have
         units.
     friction

@@ -52,7 +52,7 @@ class Response:
         if np.shape(self.frequency) != np.shape(self.value):
             raise ParameterError(
                 f"response {self.label!r} has {np.size(self.value)} values for "
-                f"{np.size(self.frequency)} frequencies: give one per frequency",
+                f"{np.size(self.frequency)} frequencies. Pass one per frequency",
                 name=self.label,
                 value=str(np.size(self.value)),
                 valid=str(np.size(self.frequency)),
@@ -96,7 +96,7 @@ def bode(
     gain_unit
         Unit of 0 dB, in common spelling (``"bar/A"``); ``"1"`` for a pure number.
     marks
-        Frequencies [Hz] to mark by their label, for instance the crossover.
+        Frequencies [Hz] to mark by their label, for example the crossover.
     depth
         Depth below the largest magnitude [dB]; responses further below are left out.
 
@@ -106,7 +106,7 @@ def bode(
         Without a response.
     """
     if not responses:
-        raise ParameterError("bode: no response given: give at least one")
+        raise ParameterError("bode: no response was passed. Pass at least one")
     responses = [_above(response, depth) for response in responses]
     figure, (upper, lower) = style.new_figure(4.6, (1.0, 1.0))
     for k, response in enumerate(responses):
@@ -232,7 +232,7 @@ def differences(
         Without anything to draw.
     """
     if not sizes:
-        raise ParameterError("differences: nothing given: give at least one cause")
+        raise ParameterError("differences: no cause was passed. Pass at least one")
     figure, panels = style.new_figure(5.2, (1.0, 1.0))
     look = style.STROKES[Role.LIMIT]
     for n, (axes, label) in enumerate(zip(panels, ("gain [dB]", "phase [°]"), strict=True)):

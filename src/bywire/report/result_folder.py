@@ -48,7 +48,7 @@ class ResultFolder:
         for name in new:
             if (self.folder / name).is_dir():
                 raise FileError(
-                    f"cannot write {self.folder / name}: there is a folder of that name: remove "
+                    f"cannot write {self.folder / name}: a folder of that name already exists. Remove "
                     "it, or name another folder for the result",
                     name=str(self.folder / name),
                 )

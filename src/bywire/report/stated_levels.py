@@ -45,14 +45,14 @@ def draw_stated(axes: Axes, levels: Sequence[StatedLevel | StatedRange], shown: 
 
 
 def stated_level(level: StatedLevel | StatedRange, unit: str) -> str:
-    """Return the stated value of a signal in an SI unit, for instance ``200 N·m ± 10 N·m``."""
+    """Return the stated value of a signal in an SI unit, for example ``200 N·m ± 10 N·m``."""
     if len(level.levels) > 1:
         return f"{amount(level.low, unit)} to {amount(level.high, unit)}"
     return _within(level.levels[0], level.high - level.levels[0], unit)
 
 
 def stated_figure(figure: StatedFigure, unit: str) -> str:
-    """Return the stated limit of a key figure in its unit, for instance ``<= 15 %``."""
+    """Return the stated limit of a key figure in its unit, for example ``<= 15 %``."""
     written = _within(figure.value, figure.tolerance, unit)
     return f"{figure.bound} {written}".strip()
 

@@ -300,7 +300,7 @@ def tracking(recording: xr.Dataset, variable: str, set_point: str) -> Figure:
     shown, wanted = channel(recording, variable), channel(recording, set_point)
     if shown.unit != wanted.unit:
         raise ParameterError(
-            f"{variable} is in {shown.unit} but {set_point} in {wanted.unit}: name a set point "
+            f"{variable} is in {shown.unit} but {set_point} in {wanted.unit}. Choose a set point "
             f"of {variable}",
             name=set_point,
             value=wanted.unit,

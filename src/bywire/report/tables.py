@@ -102,7 +102,7 @@ class KpiRow:
     definition
         Definition of the figure.
     limit
-        The requirement as text, for instance ``"<= 15 %"``; empty for none.
+        The requirement as text, for example ``"<= 15 %"``; empty for none.
     outcome
         ``met``, ``missed`` or ``undecided``; empty without a requirement.
     error
@@ -145,7 +145,7 @@ class ReproductionRow:
     note
         Note for the reader.
     kind
-        Kind of the statement, for instance ``"requirement"``.
+        Kind of the statement, for example ``"requirement"``.
     """
 
     id: str
@@ -174,7 +174,7 @@ class ParameterRow:
     range
         Valid range as text.
     kind
-        Provenance, for instance ``"paper"`` or ``"chosen"``.
+        Provenance, for example ``"paper"`` or ``"chosen"``.
     where
         Place in the source, or the reason.
     """

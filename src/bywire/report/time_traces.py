@@ -156,7 +156,7 @@ def time_traces(
     limits
         Step that judges the first trace of the first panel: its band and limit are drawn.
     measured
-        Recording for comparison, for instance of a test rig, with the names and units of
+        Recording for comparison, for example of a test rig, with the names and units of
         ``recording``; it may lack variables, and have other sample times. It is solid blue, with
         ``recording`` dashed red on top. Then only the first trace and the set points of every panel
         are drawn.
@@ -739,7 +739,7 @@ def overlaid_traces(recordings: Mapping[str, xr.Dataset], variables: Mapping[str
     if not shown:
         raise ParameterError(
             f"overlaid_traces: the {len(recordings)} recordings have none of the variables "
-            f"{', '.join(variables)}: name others"
+            f"{', '.join(variables)}. Choose others"
         )
     figure, rows = style.new_figure(0.5 + 1.7 * len(shown), [1.0] * len(shown))
     for axes, name in zip(rows, shown, strict=True):

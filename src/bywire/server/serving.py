@@ -109,7 +109,7 @@ class Handler(BaseHTTPRequestHandler):
         guard.require_place(self.command, self.headers, port)
         try:
             address = urlsplit(self.path)
-        except ValueError:  # brackets without an address, for instance
+        except ValueError:  # brackets without an address, for example
             raise RefusedError(400, f"{quoted(self.path)} is not a valid address") from None
         query = dict(parse_qsl(address.query, keep_blank_values=True))
         guard.require_token(self.headers, query, port, self.service.token)

@@ -186,7 +186,7 @@ def require_unchanged(changes: Sequence[Change], what: str) -> None:
     """
     if changes:
         raise ParameterError(
-            f"{what} are not available for a run whose parameters change, for instance by a fault: "
+            f"{what} are not available for a run whose parameters change, for example by a fault: "
             "remove the change, or set the parameters from the start",
             name="changes",
         )

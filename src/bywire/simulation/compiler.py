@@ -55,7 +55,7 @@ def usable_folder() -> Path:
         if "BYWIRE_CACHE" in os.environ:
             raise CompilerError(
                 f"BYWIRE_CACHE = {folder} is relative, so bywire would run kernels from the "
-                f"working folder: set an absolute folder, such as {folder.absolute()}, or unset it",
+                f"working folder. Set an absolute folder, such as {folder.absolute()}, or unset it",
                 name="BYWIRE_CACHE",
                 value=str(folder),
                 valid="an absolute folder",
@@ -76,12 +76,12 @@ def usable_folder() -> Path:
     advice = f"other users can write to {place}, so they could put code there"
     if "BYWIRE_CACHE" in os.environ:
         raise CompilerError(
-            f"BYWIRE_CACHE = {folder}: {advice}: set it to a new folder within a folder that only "
+            f"BYWIRE_CACHE = {folder}: {advice}. Set it to a new folder within a folder that only "
             "you can write to, or unset it",
             name="BYWIRE_CACHE",
             value=str(folder),
         )
-    _warn_once(f"bywire does not cache kernels: {advice}: set BYWIRE_CACHE to your own folder")
+    _warn_once(f"bywire does not cache kernels: {advice}. Set BYWIRE_CACHE to your own folder")
     return process_folder()
 
 
@@ -191,7 +191,7 @@ def load(library: Path, entry: str) -> ctypes.CDLL:
         if place:
             raise CompilerError(
                 f"bywire does not load {library}: other users can write to {place}, so they could "
-                "put code there: set BYWIRE_CACHE to a new folder within a folder that only you "
+                "put code there. Set BYWIRE_CACHE to a new folder within a folder that only you "
                 "can write to",
                 name=str(library),
             )
@@ -409,7 +409,7 @@ def compile_library(
         _compiled_into(library, source, flags, compiler)
     except OSError as error:
         raise CompilerError(
-            f"bywire cannot write a compiled kernel to {folder} ({error.strerror}): free some "
+            f"bywire cannot write a compiled kernel to {folder} ({error.strerror}). Free some "
             "space there, or set BYWIRE_CACHE to another folder",
             name=str(folder),
         ) from None

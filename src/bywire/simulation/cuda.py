@@ -71,7 +71,7 @@ def cuda_binary(source: str, capability: int, entry: str) -> bytes:
         CUDA C of the kernel.
     capability
         The processor's compute capability: ten times the major number plus the minor number, for
-        instance 90.
+        example 90.
     entry
         Name of the kernel's function.
 
@@ -101,7 +101,7 @@ def cuda_binary(source: str, capability: int, entry: str) -> bytes:
     if not target:
         raise DeviceError(
             f"NVRTC {version[0]}.{version[1]} compiles for graphics processors of compute "
-            f"capability {min(known) / 10:.1f} and later, not for {capability / 10:.1f}: install "
+            f"capability {min(known) / 10:.1f} and later, not for {capability / 10:.1f}. Install "
             f"an older release of NVRTC, {OTHERWISE}",
             name="NVRTC",
             value=f"{capability / 10:.1f}",
@@ -333,7 +333,7 @@ def find_device() -> CudaDevice:
     if reason or not count:
         why = f" ({reason})" if reason else ""
         raise DeviceError(
-            f"engine 'cuda' finds no NVIDIA graphics processor{why}: check that nvidia-smi lists "
+            f"engine 'cuda' finds no NVIDIA graphics processor{why}. Check that nvidia-smi lists "
             f"one, {OTHERWISE}",
             name="engine",
             value="cuda",
@@ -448,7 +448,7 @@ class CudaKernel:
         if most < 1:
             raise DeviceError(
                 f"{self._device.label} has {free / 1e6:.3g} MB free, of which a case may use half, "
-                f"but a case needs {size / 1e6:.3g} MB: record fewer signals, or less often",
+                f"but a case needs {size / 1e6:.3g} MB. Record fewer signals, or less often",
                 name=self._device.label,
                 value=f"{size / 1e6:.3g} MB",
                 valid=f"{free / 1e6:.3g} MB free",

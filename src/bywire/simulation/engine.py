@@ -379,7 +379,7 @@ class Prepared:
             return engine
         if kind == "compiled" or make is not None:
             raise CompilerError(
-                "there is no C compiler: install one, or the extra bywire[compiler], or use "
+                "there is no C compiler. Install one, or the extra bywire[compiler], or use "
                 "engine = 'auto'",
                 name="engine",
                 value=kind,

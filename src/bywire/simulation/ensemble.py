@@ -186,7 +186,7 @@ def simulate_group(
     wanted = names if signals is None else tuple(signals)
     if ends and (engine == CUDA or any(run.changes for run in runs)):
         raise ParameterError(
-            "runs with changes or on a graphics processor record all rows: omit ends",
+            "runs with changes or on a graphics processor record all rows. Omit ends",
             name="ends",
         )
     selection = tuple(selected(names, (*wanted, *ends)).tolist())

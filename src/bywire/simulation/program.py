@@ -84,7 +84,7 @@ def _evaluated(model: Model, part: str, *arguments: Any) -> Any:
     except (AttributeError, NotImplementedError, RuntimeError, TypeError) as error:
         reason = str(error).splitlines()[-1] if str(error) else type(error).__name__
         raise ModelError(
-            f"{model.name}: {part} cannot be evaluated on symbols ({reason}): use core.ops for "
+            f"{model.name}: {part} cannot be evaluated on symbols ({reason}). Use core.ops for "
             "functions and core.ops.where instead of if, math and numpy",
             name=part,
         ) from error

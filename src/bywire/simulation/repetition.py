@@ -333,7 +333,7 @@ def window_schedule(run: Run) -> Schedule:
     if schedule.frames % common or abs(schedule.frames * schedule.frame / run.duration - 1) > 1e-9:
         raise StepError(
             f"a window of {run.duration:g} s is not a multiple of the common interval of all "
-            f"sample times, {common * schedule.frame:g} s: round it to a multiple",
+            f"sample times, {common * schedule.frame:g} s. Round it to a multiple",
             name="duration",
             value=f"{run.duration:g} s",
             valid=f"a multiple of {common * schedule.frame:g} s",

@@ -188,7 +188,7 @@ def simulate_with_sensitivities(
     compiler = find_compiler()
     if compiler is None:
         raise CompilerError(
-            "sensitivities need a C compiler: install the extra bywire[compiler]",
+            "sensitivities need a C compiler. Install the extra bywire[compiler]",
             valid="bywire[compiler]",
         )
     kernel = _tangent_kernel(prepared.program, directions.indices, compiler)

@@ -390,7 +390,7 @@ def midpoints(graph: Graph, order: Iterable[Node]) -> dict[Node, int]:
 
 
 def leaf_count(stages: Stages, kind: str) -> int:
-    """Return the number of inputs of a kind, for instance ``"u"`` for the stimulus."""
+    """Return the number of inputs of a kind, for example ``"u"`` for the stimulus."""
     return sum(1 for op in stages.graph.nodes if op.op == "leaf" and op.args[0] == kind)
 
 

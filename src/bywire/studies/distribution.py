@@ -218,7 +218,7 @@ class Distribution:
     kind
         Name of its kind in a study file.
     text
-        Description, for instance ``"normal, mean 0.39 ohm, sd 0.02 ohm"``.
+        Description, for example ``"normal, mean 0.39 ohm, sd 0.02 ohm"``.
     quantile
         ``quantile(u) -> values`` [SI], for probabilities in (0, 1), shape (n,) each; for choices,
         an array of texts.
@@ -347,7 +347,7 @@ def require_several(where: str, values: Sequence[Any], shown: Sequence[str]) -> 
     Parameters
     ----------
     where
-        Name of the entry in errors, for instance ``"[vary] motor.R_m"``.
+        Name of the entry in errors, for example ``"[vary] motor.R_m"``.
     values, shown
         Its values, and their texts in errors.
 
@@ -455,7 +455,7 @@ def admitted(where: str, made: Distribution, leaf: Leaf, advice: str = "") -> Di
     Parameters
     ----------
     where
-        Name of the entry in errors, for instance ``"[vary] motor.R_m"``.
+        Name of the entry in errors, for example ``"[vary] motor.R_m"``.
     made, leaf
         Its distribution, and the declaration of the number.
     advice
@@ -517,7 +517,7 @@ def _require_single_values(where: str, kind: str, leaf: Leaf, nominal: float) ->
     near = [x for x in (nominal - 1.0, nominal, nominal + 1.0) if leaf.admits(x)]
     raise ParameterError(
         f"{where} is a whole number, {leaf.range_text}, but kind {kind!r} has values in between. "
-        f"Use for example kind = '{DISCRETE}', values = [{', '.join(f'{x:g}' for x in near)}]",
+        f"For example, use kind = '{DISCRETE}', values = [{', '.join(f'{x:g}' for x in near)}]",
         name=where,
         value=kind,
         valid=f"'{DISCRETE}'",

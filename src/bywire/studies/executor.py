@@ -134,7 +134,7 @@ class Cluster:
     Parameters
     ----------
     address
-        Address of its scheduler, for instance ``tcp://host:8786``.
+        Address of its scheduler, for example ``tcp://host:8786``.
     """
 
     def __init__(self, address: str) -> None:

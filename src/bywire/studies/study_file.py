@@ -143,7 +143,7 @@ def _probability(kpi: str, text: str, given: str) -> float:
         example = f"{100.0 * float(given):.10g} %" if _SHARE.fullmatch(given) else _DEMAND
         raise ParameterError(
             f"requirement {kpi} = {quoted(text)}: the probability after 'with' must be in percent, "
-            f"not {quoted(given)}. Write for example 'with {example}'",
+            f"not {quoted(given)}. For example, write 'with {example}'",
             name=kpi,
             value=quoted(given),
             valid="in percent",
@@ -218,7 +218,7 @@ def _require_agreement(plan: StudyPlan) -> None:
         if not plan.demands:
             raise ParameterError(
                 f"[requirements] is empty, but {plan.design!r} searches for the worst case of each "
-                'requirement. Write for example overshoot = "<= 15 %"',
+                'requirement. For example, write overshoot = "<= 15 %"',
                 name="[requirements]",
                 value=plan.design,
             )
@@ -232,7 +232,7 @@ def _require_rare(plan: StudyPlan, design: SoughtDesign) -> None:
     if not plan.judged_demands:
         raise ParameterError(
             f"[requirements] contains no probability, but {plan.design!r} computes the probability "
-            'of missing a requirement. Write for example "<= 15 % with 99.99 %"',
+            'of missing a requirement. For example, write "<= 15 % with 99.99 %"',
             name="[requirements]",
             value=plan.design,
         )

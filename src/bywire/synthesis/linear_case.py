@@ -72,7 +72,7 @@ def read(texts: Sequence[str]) -> tuple[Limit, ...]:
     """
     if not texts:
         raise ParameterError(
-            "a design needs at least one requirement, for instance 'bandwidth >= 10 Hz'",
+            "a design needs at least one requirement, for example 'bandwidth >= 10 Hz'",
             name="requirement",
             valid="'bandwidth >= 10 Hz'",
         )
@@ -86,7 +86,7 @@ def _read(text: str) -> Limit:
     word, compare, written = parted(text) if isinstance(text, str) else ("", None, "")
     if not word or compare is None or not written:
         raise ParameterError(
-            f"requirement {quoted(text)} is not valid. Use for instance 'bandwidth >= 10 Hz'",
+            f"requirement {quoted(text)} is not valid. For example, use 'bandwidth >= 10 Hz'",
             name="requirement",
             value=text,
             valid="'bandwidth >= 10 Hz'",
@@ -164,13 +164,13 @@ class LinearCase:
     Parameters
     ----------
     label
-        Label of the case, for instance ``"motor.R_m = 0.2"``.
+        Label of the case, for example ``"motor.R_m = 0.2"``.
     build
         ``build(gains) -> (loop gain, closed loop)`` for gains by dotted name, with equal sample
         times.
     changes, at
         Differences of its parameters from the nominal model, and its operating point [SI]; None for
-        a model that is not a loop of the bench, for instance an identified one.
+        a model that is not a loop of the bench, for example an identified one.
     """
 
     label: str

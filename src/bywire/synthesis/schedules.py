@@ -92,7 +92,7 @@ def design_schedule(
 ) -> ScheduleDesign:
     """Design the gains of every region, the main one first, and check the loop across them.
 
-    The regions share parameters that only the main one chooses, for instance a filter. A region
+    The regions share parameters that only the main one chooses, for example a filter. A region
     starts with the gains of the main one. Models have frozen gains: they describe small motion
     about an equilibrium, and slow motion between equilibria.
 

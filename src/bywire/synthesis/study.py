@@ -51,7 +51,7 @@ class Map:
         Label -> variable, and the level at which it draws the border of the feasible region. Beyond
         it the variable is larger.
     curves
-        Label -> abscissas and ordinates [SI] of a line to compare with, for instance a closed form.
+        Label -> abscissas and ordinates [SI] of a line to compare with, for example a closed form.
     """
 
     values: str

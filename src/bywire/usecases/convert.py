@@ -64,16 +64,16 @@ def convert(
     time
         Time column, such as ``"Zeit [s]"``, or a sample rate. Default: as the file declares it.
     rate
-        Sample rate [Hz] of the common time axis, for instance ``"1 kHz"``. By default, each signal
+        Sample rate [Hz] of the common time axis, for example ``"1 kHz"``. By default, each signal
         keeps its time axis.
     method
         Resampling method: ``linear`` (default), ``previous``, ``nearest`` or ``average``.
     exclude
         Samples to exclude: ``gaps``, ``missing``, ``clipped``. Default: ``gaps`` and ``missing``.
     max_gap
-        Longest pause that is not a gap, for instance ``"50 ms"``. Default: 10 steps.
+        Longest pause that is not a gap, for example ``"50 ms"``. Default: 10 steps.
     format
-        Output format, for instance ``mat73``. Default: from the file name's suffix.
+        Output format, for example ``mat73``. Default: from the file name's suffix.
     force
         Whether to overwrite an existing file.
     progress

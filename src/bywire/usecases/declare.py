@@ -61,7 +61,7 @@ class Ask:
     known
         Topics of `bywire.overview` whose names are valid and complete in the shell.
     files
-        Suffix of files that are also valid, for instance ``".toml"``.
+        Suffix of files that are also valid, for example ``".toml"``.
     offered
         Parts of `bywire.server.contents.Contents` that the form offers.
     words

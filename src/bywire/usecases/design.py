@@ -103,7 +103,7 @@ def design(
         See `bywire.margins`. A parameter that you set is fixed. With ``schedule``, ``at`` lists
         one point for each region.
     require
-        Requirements, for instance ``"bandwidth >= 10 Hz"``.
+        Requirements, for example ``"bandwidth >= 10 Hz"``.
     requirements
         TOML file with a section ``requirements``.
     over
@@ -124,7 +124,7 @@ def design(
     drawn
         Number of models to draw for choosing the gains.
     probability
-        Required probability of meeting all requirements together, for instance ``"99 %"``.
+        Required probability of meeting all requirements together, for example ``"99 %"``.
     seed
         Random seed of the search.
     progress

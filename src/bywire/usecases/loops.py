@@ -54,11 +54,11 @@ def margins(
     parameters
         Parameter set. Default: the main one of the loop's brake.
     at
-        Operating point with its unit, for instance ``"20 bar"``. Default: the loop's nominal point.
+        Operating point with its unit, for example ``"20 bar"``. Default: the loop's nominal point.
     overrides
         Changes of parameters by dotted name, as SI numbers or texts with units.
     over
-        Range, for instance ``"motor.R_m=0.2 ohm:0.6 ohm:9"`` or ``"at=5 bar:35 bar:7"``.
+        Range, for example ``"motor.R_m=0.2 ohm:0.6 ohm:9"`` or ``"at=5 bar:35 bar:7"``.
     side
         Side of a kink to use if the operating point lies on one: ``"above"``, ``"below"``, or
         ``"FILE:LINE=above"`` for single operations, separated by commas. Without a side, bywire
@@ -172,7 +172,7 @@ def linearize(
     parameters
         Parameter set. Default: the main one of the loop's or plant's brake.
     at
-        Operating point with its unit, for instance ``"20 bar"``. Default: the loop's nominal point.
+        Operating point with its unit, for example ``"20 bar"``. Default: the loop's nominal point.
     overrides
         Changes of parameters by dotted name, as SI numbers or texts with units.
     locus

@@ -128,7 +128,7 @@ def replay(
         Segments to judge: ``"auto"`` for steps and holds, or a TOML file. Default: the whole
         record.
     track
-        Drifting parameters to track, for instance ``"mu_B"``.
+        Drifting parameters to track, for example ``"mu_B"``.
     progress
         Called with a label and the finished share, 0 to 1.
     estimate_error

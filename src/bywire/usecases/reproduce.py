@@ -28,7 +28,7 @@ def reproduce(source: SourceName, *, progress: "Progress | None" = None) -> "Rep
     Parameters
     ----------
     source
-        Name of the source, for instance ``"dardanelli2010"``.
+        Name of the source, for example ``"dardanelli2010"``.
     progress
         Called with the label of a table or figure and its finished share, 0 to 1.
 

@@ -99,10 +99,10 @@ def run(
     overrides
         Changes to a bench file or experiment, in the form of ``--set``.
     over
-        Range, for instance ``"motor.R_m=0.2 ohm:0.6 ohm:9"`` or ``"options.p_to=20 bar, 30 bar"``.
+        Range, for example ``"motor.R_m=0.2 ohm:0.6 ohm:9"`` or ``"options.p_to=20 bar, 30 bar"``.
         All values run side by side, and the result is a `BenchRange`.
     faults
-        Faults in addition to the bench's faults, in the form of ``--fault``, for instance
+        Faults in addition to the bench's faults, in the form of ``--fault``, for example
         ``"pressure.stuck=20 bar@1 s"``.
     progress
         Called with the run's label and its finished share, 0 to 1.

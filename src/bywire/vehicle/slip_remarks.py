@@ -31,7 +31,7 @@ def far_from_peak(
     slip_set
         Slip set point.
     parameter
-        Name of its parameter, for instance ``"ecu.slip.slip_set"``.
+        Name of its parameter, for example ``"ecu.slip.slip_set"``.
     curve, ways
         Parameters of tire and road.
 

@@ -86,8 +86,8 @@ class TwoWheeler(Assembly[ParT, MemoryT]):
     slip_r = Shown("1", "rear braking slip")
     sliding_f = Shown("1", "front tire slides")
     sliding_r = Shown("1", "rear tire slides")
-    mu_f = Shown("1", "front braking force over load")
-    mu_r = Shown("1", "rear braking force over load")
+    mu_f = Shown("1", "front braking force relative to load")
+    mu_r = Shown("1", "rear braking force relative to load")
     a = Shown("m/s**2", "deceleration", 10.0)
     E_vehicle = Shown(
         "J", "energy of the vehicle", role=Role("sink", "vehicle", book=BOOK, returns="any")

@@ -45,7 +45,7 @@ def test_play_keeps_a_rest_of_response_and_says_so():
     assert found["loop_width_mid"].value == pytest.approx(1.0, abs=1e-3)
     assert found["loop_width_max"].value == pytest.approx(1.0, abs=1e-3)
     assert found["loop_area"].value == pytest.approx(1e6 * (4.5 * 1.0 - 0.5**2 / 2), rel=1e-3)
-    assert "ends 5e+05 Pa away" in found["loop_area"].note
+    assert "ends 5 bar away" in found["loop_area"].note
 
 
 def test_dither_hardly_moves_the_smoothed_loop():

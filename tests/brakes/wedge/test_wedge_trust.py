@@ -1,4 +1,4 @@
-"""Whether the wedge brake's contacts can be trusted: forces, stiffness, free-play."""
+"""Whether the wedge brake's contacts can be trusted: forces, stiffness, free play."""
 
 from __future__ import annotations
 

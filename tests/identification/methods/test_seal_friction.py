@@ -1,4 +1,4 @@
-"""Seal friction over pressure: simulated strokes, and a measured O-ring."""
+"""Seal friction per unit pressure: simulated strokes, and a measured O-ring."""
 
 from __future__ import annotations
 

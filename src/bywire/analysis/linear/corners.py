@@ -91,7 +91,7 @@ def read_sides(text: str) -> Sides:
         if side not in (ABOVE, BELOW) or (equals and not (name and line.isdecimal())):
             raise ParameterError(
                 f"side = {quoted(part)} is not valid: it must be 'above' or 'below', optionally "
-                "for operations by file and line, for instance 'valve.py:42=below, above'",
+                "for operations by file and line, for example 'valve.py:42=below, above'",
                 name="side",
                 value=part,
                 valid="'above' or 'below'",

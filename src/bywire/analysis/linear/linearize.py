@@ -58,7 +58,7 @@ def linearize(
     state, memory
         Operating point: the model's State, and the Memory of the tasks.
     inputs
-        Fields of Memory that drive the continuous part, for instance ``("i_source",)``.
+        Fields of Memory that drive the continuous part, for example ``("i_source",)``.
     outputs
         Fields of Output or State; if both have the name, that of Output.
     friction
@@ -351,9 +351,9 @@ def equilibrium(
     inputs
         Fields of Memory that may change to hold the system there.
     running
-        States that keep their value and may have a rate, for instance a disc's angle.
+        States that keep their value and may have a rate, for example a disc's angle.
     tied
-        States of one unit that keep their differences, for instance two angles with a preload
+        States of one unit that keep their differences, for example two angles with a preload
         between them.
     friction
         As in `linearize`.

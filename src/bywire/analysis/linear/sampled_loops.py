@@ -209,7 +209,7 @@ def stepped(model: LinearModel, period: float, step: float) -> LinearModel:
     if count < 1 or abs(count * step - period) > _WHOLE * step:
         raise StepError(
             f"step = {step * 1e6:g} us does not divide the sample time of {period * 1e6:g} us. "
-            f"Use for instance {period * 1e6 / max(count, 1):.12g} us",
+            f"For example, use {period * 1e6 / max(count, 1):.12g} us",
             name="step",
             value=f"{step * 1e6:g} us",
             valid=f"{period * 1e6 / max(count, 1):.12g} us",
@@ -261,7 +261,7 @@ def closed_loop(
     outputs
         Fields of Output or State.
     locked
-        States held at the operating point, for instance angle and speed of a locked rotor.
+        States held at the operating point, for example angle and speed of a locked rotor.
     stimulus
         Stimulus at the operating point, needed if a limit of the controller depends on it; zero by
         default.
@@ -531,7 +531,7 @@ def analog_gain(
     model, par, state, memory, locked
         As in ``closed_loop``; dry friction is removed.
     cut
-        Field of State, for instance the reading of an analog controller's sensor.
+        Field of State, for example the reading of an analog controller's sensor.
 
     Returns
     -------

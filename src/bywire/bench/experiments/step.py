@@ -24,7 +24,7 @@ class Options(ParameterSet):
     start: InputLevel
     """input before the step"""
     end: InputLevel
-    """input from the step on"""
+    """input after the step"""
     duration: Duration
     """length of the recording after the step"""
     record: Duration

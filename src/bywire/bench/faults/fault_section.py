@@ -45,9 +45,9 @@ class Course(ParameterSet):
     @model_validator(mode="after")
     def _comes_and_goes(self) -> Course:
         if self.every > 0 and self.ramp > 0:
-            raise ValueError("ramp and every contradict each other: set only one of them")
+            raise ValueError("ramp and every contradict each other. Set only one of them")
         if self.share < 1 and not self.every > 0:
-            raise ValueError("share needs the period of the fault: set every, too")
+            raise ValueError("share needs the period of the fault: also set every")
         return self
 
     @property
@@ -154,7 +154,7 @@ def from_text(text: str) -> dict[str, Any]:
     if not name or (at and not onset) or (equals and not value):
         raise ParameterError(
             f"fault {quoted(text)} is not valid. Write NAME, NAME=VALUE, NAME@ONSET or "
-            "NAME=VALUE@ONSET, for instance 'pressure.stuck=20 bar@1.5 s'",
+            "NAME=VALUE@ONSET, for example 'pressure.stuck=20 bar@1.5 s'",
             name="fault",
             value=text,
             valid="NAME=VALUE@ONSET",
@@ -220,7 +220,7 @@ def _read(
     for choice, wanted in mode.lacks(par).items():
         raise ParameterError(
             f"fault {name} is impossible with {choice} = {par.value(choice)!r}. Set {choice} to "
-            f"{wanted!r}, for instance {option('overrides', {choice: str(wanted)})}",
+            f"{wanted!r}, for example {option('overrides', {choice: str(wanted)})}",
             name=choice,
             value=repr(par.value(choice)),
             valid=repr(wanted),

@@ -29,7 +29,7 @@ class Mode:
     Parameters
     ----------
     name
-        Place and mode, for instance ``"pressure.stuck"``.
+        Place and mode, for example ``"pressure.stuck"``.
     summary
         The effect, in one line.
     unit, value
@@ -88,7 +88,7 @@ _DRIVE = {
     "stuck": ("is stuck at a specified value", "level"),
     "stuck-at-last": ("is stuck at its last value", ""),
     "gain": ("is scaled by a factor", "factor"),
-    "late": ("arrives a number of ticks late", "ticks"),
+    "late": ("is delayed by a number of ticks", "ticks"),
 }
 _DEMAND = {
     "lost": ("is lost and holds its last value", ""),
@@ -97,7 +97,7 @@ _DEMAND = {
 }
 _TASK = {
     "frozen": ("misses every tick, and its outputs hold their last values", "", 0.0),
-    "dropped": ("runs only every n-th tick", "ticks", 2.0),
+    "dropped": ("runs only on every nth tick", "ticks", 2.0),
     "missed": ("misses ticks with a specified probability", "probability", 0.2),
     "dead": ("stops with its outputs at rest, and later restarts with empty memory", "", 0.0),
     "restarted": ("restarts with empty memory after a downtime", "duration", 0.05),

@@ -27,7 +27,7 @@ class Family:
     Parameters
     ----------
     name
-        Name of its module, for instance ``"step_response"``.
+        Name of its module, for example ``"step_response"``.
     summary
         One line for listings.
     setting_class
@@ -92,7 +92,7 @@ def units_of(*names: str, resolved: Mapping[str, str] = MappingProxyType({})) ->
     names
         Names of the families.
     resolved
-        SI unit of every placeholder that their figures declare, for instance
+        SI unit of every placeholder that their figures declare, for example
         ``{"level": "Pa"}``.
     """
     figures = (figure for name in names for figure in FAMILIES.find(name).measures.values())

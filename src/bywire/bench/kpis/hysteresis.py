@@ -1,6 +1,6 @@
 r"""Hysteresis of a brake: its loop of drive (current) and response (pressure).
 
-The loop is one slow cycle of the drive, for instance the ramp of eq. (17) of Dardanelli, Alli,
+The loop is one slow cycle of the drive, for example the ramp of eq. (17) of Dardanelli, Alli,
 Savaresi (2010). Its *apply* branch runs from the smallest to the largest response, its *release*
 branch back. At a given response the width is the drive of the apply branch minus that of the
 release branch: twice the friction, as a current. Widths and area are positive when friction
@@ -57,7 +57,7 @@ class Loop:
     t
         Times [s], increasing, shape ``(n,)``.
     drive, response
-        Current and pressure, for instance, shape ``(n,)`` each.
+        Current and pressure, for example, shape ``(n,)`` each.
     drive_unit, response_unit
         Their SI units.
     treatment

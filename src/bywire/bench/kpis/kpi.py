@@ -198,7 +198,7 @@ class Measure:
     Parameters
     ----------
     unit
-        SI unit, ``"%"``, or a placeholder that the data resolve, for instance ``"level"``.
+        SI unit, ``"%"``, or a placeholder that the data resolve, for example ``"level"``.
     function
         Returns the value, or an `Undefined`. Its name and the first line of its docstring are the
         figure's name and definition.

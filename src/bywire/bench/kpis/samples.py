@@ -123,7 +123,7 @@ def signal(recording: xr.Dataset, name: str) -> tuple[Array, str]:
     if variable.dims != ("time",):
         raise ParameterError(
             f"signal {name!r} has the dimensions {variable.dims}, but key figures need the "
-            "dimension time alone. Select one case first, for instance recording.isel(case=0)",
+            "dimension time alone. Select one case first, for example recording.isel(case=0)",
             name=name,
             value=str(variable.dims),
             valid="time",

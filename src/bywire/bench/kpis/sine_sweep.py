@@ -129,7 +129,7 @@ def select(recording: xr.Dataset, setting: Setting) -> Sweep:
 
 @measure("gain")
 def sweep_gain(data: Sweep) -> float | Undefined:
-    """Gain at the lowest frequency: amplitude of the output over amplitude of the input."""
+    """Gain at the lowest frequency: output amplitude divided by input amplitude."""
     return float(np.abs(data.values[0])) if data.moves[0] else _STILL
 
 

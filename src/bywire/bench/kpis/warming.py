@@ -21,7 +21,7 @@ class Setting:
     Parameters
     ----------
     output
-        Output that the motors produce, for instance a pressure.
+        Output that the motors produce, for example a pressure.
     winding
         Prefix of the names of the winding temperatures; the hottest motor counts.
     derated

@@ -16,7 +16,7 @@ class Parameters(ParameterSet):
     start: Level
     """value before the step"""
     end: Level
-    """value from the step on"""
+    """value after the step"""
     t_step: TimeConstant
     """time of the step"""
 

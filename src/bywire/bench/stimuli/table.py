@@ -1,4 +1,4 @@
-"""A table of times and values, for instance from a measured pedal."""
+"""A table of times and values, for example from a measured pedal."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Parameters(ParameterSet):
     """Nodes and interpolation."""
 
     times: Annotated[Numbers, Unit("s")]
-    """instants of the nodes, increasing"""
+    """times of the nodes, in increasing order"""
     values: Annotated[Numbers, Unit("level")]
     """values at these instants"""
     between: Literal["linear", "hold"]

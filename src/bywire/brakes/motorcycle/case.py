@@ -82,7 +82,7 @@ def settled_start(p: float, par: MotorcycleParameters, settle: float) -> float:
     Raises
     ------
     SolverError
-        When no current holds the pressure within 0.2 %, for instance when the piston sticks.
+        When no current holds the pressure within 0.2 %, for example when the piston sticks.
     """
     start = p
     for _ in range(_ROUNDS):
@@ -94,7 +94,7 @@ def settled_start(p: float, par: MotorcycleParameters, settle: float) -> float:
         start *= p / settled
     raise SolverError(
         f"no current lets the dithered pressure settle at p_start = {p / 1e5:g} bar (last: "
-        f"{settled / 1e5:.4g} bar): change p_start, increase settle, or set start = 'frictionless'",
+        f"{settled / 1e5:.4g} bar). Change p_start, increase settle, or set start = 'frictionless'",
         name="p_start",
         value=f"{p / 1e5:g} bar",
     )

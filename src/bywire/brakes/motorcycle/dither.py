@@ -60,7 +60,7 @@ def admissible_frequencies(par: Par, low: float, high: float, count: int) -> lis
     if not inside:
         raise ParameterError(
             f"no dither of {low:g} to {high:g} Hz has a period of an even number of sample times "
-            f"of {T * 1e3:g} ms: widen the range (f_min, f_max), or sample faster (ecu.T_s)",
+            f"of {T * 1e3:g} ms. Widen the range (f_min, f_max), or sample faster (ecu.T_s)",
             name="f_min",
             value=f"{low:g}",
         )
@@ -689,7 +689,7 @@ def dithered_plant(par: Par, p: float, step: float | None = None) -> DitheredPla
         i += (p - model.mean) / gain
     raise SolverError(
         f"no current demand near {i:.4g} A holds a mean pressure of {p / 1e5:g} bar under dither, "
-        "since the piston sticks: increase ecu.dither.gain",
+        "since the piston sticks. Increase ecu.dither.gain",
         name="ecu.dither.gain",
         value=f"{i:.4g} A",
     )

@@ -187,7 +187,7 @@ def coefficients(par: Par, p: float = 20e5, x: float | None = None) -> Coefficie
     """
     if par.caliper.leak == "leaking" or par.port.law == "leaking":
         raise ParameterError(
-            "eq. (14) does not include a leak, which has no equilibrium: set caliper.leak = "
+            "eq. (14) does not include a leak, which has no equilibrium. Set caliper.leak = "
             "'tight' and port.law = 'makeup', or use a simulation",
             name="caliper.leak" if par.caliper.leak == "leaking" else "port.law",
             value="'leaking'",

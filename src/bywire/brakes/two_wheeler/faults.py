@@ -13,8 +13,8 @@ NAME = TwoWheelerByWire.name
 WHOLE_REAR = TwoWheelerWholeRear.name
 
 _VEHICLE = (
-    Channel("encoder_f", "front wheel's encoder", "rad", "theta_f", offset=0.1),
-    Channel("encoder_r", "rear wheel's encoder", "rad", "theta_r", offset=0.1),
+    Channel("encoder_f", "front wheel encoder", "rad", "theta_f", offset=0.1),
+    Channel("encoder_r", "rear wheel encoder", "rad", "theta_r", offset=0.1),
     Channel("front", "front brake's demand", "Pa", "p_f_ref", "drive", task="ecu"),
 )
 CHANNELS = (

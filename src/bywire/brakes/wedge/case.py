@@ -163,7 +163,7 @@ def distinct(
         names = [name(value) for value in values]
         for k, value in enumerate(values):
             if names[k] in names[:k]:
-                raise ValueError(f"{value:g}{unit} is listed twice: remove one of them")
+                raise ValueError(f"{value:g}{unit} is listed twice. Remove one of them")
         return values
 
     return check

@@ -25,7 +25,7 @@ from bywire.core.typing import Array
 NAME = WedgeBrake.name
 Signals = Mapping[str, Array]
 _STEADY = 0.1  # s: length of the transient after a step of the demand
-_AVERAGE = 10e-3  # s: averaging window for contacts and free-play
+_AVERAGE = 10e-3  # s: averaging window for contacts and free play
 _TURN = 0.1  # s, about a turn of the disc, whose runout is in the moment
 _IN_MOMENT = 0.2  # s: length of a moment's build-up
 

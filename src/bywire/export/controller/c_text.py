@@ -106,7 +106,7 @@ def checked_name(name: str) -> str:
         fault = f"has {len(name)} characters, more than {_LONGEST_NAME}"
     else:
         return name
-    valid = "a letter, then letters, digits and underscores, for instance front_brake"
+    valid = "a letter, then letters, digits and underscores, for example front_brake"
     raise ParameterError(
         f"name = {quoted(name)} {fault}. Use {valid}", name="name", value=quoted(name), valid=valid
     )

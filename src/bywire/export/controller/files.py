@@ -449,7 +449,7 @@ def readme(program: Program, files: Iterable[str], count: int) -> str:
         *_instance(program),
         *_contract(program),
         f"All names in the headers begin with {name}_, and the headers also work in C++: ECUs with "
-        "other names link into one program, for instance this ECU in both precisions under two "
+        "other names link into one program, for example this ECU in both precisions under two "
         "names.",
         _plant(program),
         f"Compile with {' '.join(FLAGS)} or similar flags: fast math and fused multiply-add change "

@@ -26,7 +26,7 @@ from bywire.identification.method import Check, Curve, Effort, Identified, Metho
 from bywire.identification.model_choice import Candidate, Choice, choose
 from bywire.identification.unknown import Unknown
 
-_APART = 1.2  # ratio of pressures from which on friction over pressure can be told
+_APART = 1.2  # ratio of pressures from which on friction per unit pressure can be told
 _LEAST = 20  # samples each way
 
 
@@ -200,11 +200,11 @@ class Truth(ParameterSet):
     F_n: Size
     """Coulomb friction, backward"""
     f: Annotated[float, Unit("N/Pa", 1e-5), Field(ge=0)]
-    """friction over pressure"""
+    """friction per unit pressure"""
     d: Annotated[float, Unit("N*s/m", 10.0), Field(ge=0)]
     """viscous friction"""
     k: Annotated[float, Unit("1", 1.5), Field(ge=1)]
-    """breakaway over Coulomb friction"""
+    """ratio of breakaway friction to Coulomb friction"""
     v_s: Annotated[float, Unit("m/s", 0.01), Field(gt=0)]
     """Stribeck velocity"""
     noise: Size
@@ -427,9 +427,9 @@ METHOD = Method(
     truth=_known_values,
     further={
         "F_c": ("", "Coulomb friction (or F_p forward and F_n backward)"),
-        "f": ("", "friction over pressure"),
+        "f": ("", "friction per unit pressure"),
         "d": ("", "viscous friction"),
-        "k": ("1", "breakaway over Coulomb friction"),
+        "k": ("1", "ratio of breakaway friction to Coulomb friction"),
         "v_s": ("", "Stribeck velocity"),
     },
 )

@@ -143,7 +143,7 @@ def _require_known(case: Case, question: Question) -> None:
     if not question.noise:
         raise ParameterError(
             f"there is no output. Add {option('outputs')} SIGNAL for each output of the model in "
-            f"the record, for instance {', '.join(list(outputs)[:6])}",
+            f"the record, for example {', '.join(list(outputs)[:6])}",
             name="outputs",
             valid=", ".join(outputs),
         )

@@ -138,7 +138,7 @@ def _grouped(
     slowest
         Speed above which the piston slides [m/s].
     cutoff
-        Corner of the low-pass before the travel is differentiated [Hz].
+        Cutoff of the low-pass filter applied to the travel before differentiation [Hz].
     label
         Of the record.
     """
@@ -294,7 +294,7 @@ def _misfits(groups: Sequence[Group], W: Array, F: Array) -> tuple[str, ...]:
 
 
 def _friction_line(fit: Estimate, groups: Sequence[Group]) -> Curve:
-    """Return friction over pressure with its band, and the value of each group."""
+    """Return friction per unit pressure with its band, and the value of each group."""
     offset = fit["F_off"] if "F_off" in fit.names else 0.0
     seen = {g.p: g.direction * (g.F - fit["A"] * g.p - offset) for g in groups}
     p = np.union1d(np.linspace(0.0, 1.1 * max(seen), 60), list(seen))
@@ -393,7 +393,7 @@ class Truth(ParameterSet):
     F_0: Force
     """friction without pressure"""
     f: ForcePerPressure
-    """friction over pressure"""
+    """friction per unit pressure"""
     sigma_group: Force
     """scatter of the force from record to record and direction to direction"""
     sigma_stroke: Force
@@ -412,7 +412,7 @@ class Options(ParameterSet):
     slowest: Annotated[float, Unit("m/s", 5e-3), Field(gt=0)]
     """speed above which the piston slides"""
     cutoff: Frequency
-    """corner of the low-pass before the travel is differentiated"""
+    """cutoff of the low-pass filter applied to the travel before differentiation"""
     bore: Annotated[float, Unit("m", 0.025), Field(ge=0, allow_inf_nan=False)]
     """diameter of the cylinder, to check the area; 0 if unknown"""
     zero: Literal["known", "free"]
@@ -616,7 +616,7 @@ METHOD = Method(
     further={
         "A": ("m**2", "area"),
         "F_0": ("N", "friction without pressure"),
-        "f": ("N/Pa", "friction over pressure"),
+        "f": ("N/Pa", "friction per unit pressure"),
         "F_off": ("N", "zero of the force sensor, with zero=free"),
     },
 )

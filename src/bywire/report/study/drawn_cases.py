@@ -39,7 +39,7 @@ class DrawnCases:
     def caption(self, met: str, missed: str) -> str:
         """Return the number of drawn cases as text; empty if all are drawn.
 
-        ``met``, ``missed``: predicates of the two kinds, for instance ``"meet the limit"``.
+        ``met``, ``missed``: predicates of the two kinds, for example ``"meet the limit"``.
         """
         kinds = ((self.met.size, self.all_met, met), (self.missed.size, self.all_missed, missed))
         if all(drawn == count for drawn, count, _ in kinds):

@@ -24,7 +24,7 @@ def test_ideal_sensors_leave_no_error_of_the_model() -> None:
     assert isinstance(par, WedgeParameters)
     options = METHOD.defaults.replace({"sigma_i": 0.0, "sigma_F": 0.0})
     found = METHOD.identify(METHOD.synthetic(par, options, 1), par, options, Effort(starts=1))
-    estimate = found.estimates["stiffness and free-play"]
+    estimate = found.estimates["stiffness and free play"]
     assert set(estimate.names) == {*METHOD.unknowns, *METHOD.further}
     known = par.leaves() | truth(par, options)
     for label, error in IDEAL.items():

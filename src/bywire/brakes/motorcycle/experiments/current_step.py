@@ -19,7 +19,7 @@ class Options(ParameterSet):
     i_step: Current
     """current demand after the step"""
     duration: Duration
-    """recorded time after the step"""
+    """recording time after the step"""
     record: Duration
     """recording interval, finer than the ECU's sample time"""
 

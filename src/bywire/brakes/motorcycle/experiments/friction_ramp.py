@@ -34,7 +34,7 @@ class Options(ParameterSet):
     slope: CurrentRate
     """slope of the demand"""
     f_filter: Frequency
-    """cut-off frequency of the first-order low-pass for the measured current"""
+    """cutoff frequency of the first-order low-pass filter for the measured current"""
     smoothing: TimeConstant
     """moving average for the loop's KPIs; default: one dither period; 0: raw signals"""
 

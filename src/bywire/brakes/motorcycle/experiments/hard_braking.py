@@ -21,7 +21,7 @@ class Options(ParameterSet):
     p_to: Pressure
     """pressure demand after the step"""
     duration: Duration
-    """recorded time after the step"""
+    """recording time after the step"""
     settle: TimeConstant
     """time before the step during which dither and loop settle"""
     smoothing: TimeConstant

@@ -111,7 +111,7 @@ def _require_within_stop(ride: xr.Dataset, par: MotorcycleParameters, source: st
         if largest > limit * (1.0 + 1e-9):
             raise ParameterError(
                 f"{source}: {name} reaches {shown(largest, unit)}, but the pedal stop is at "
-                f"{shown(limit, unit)} (pedal.x_max = {shown(x_max, 'm')}): change one of them",
+                f"{shown(limit, unit)} (pedal.x_max = {shown(x_max, 'm')}). Change one of them",
                 name=name,
                 value=shown(largest, unit),
                 valid=shown(limit, unit),

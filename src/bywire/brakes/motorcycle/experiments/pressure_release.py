@@ -37,7 +37,7 @@ class Options(ParameterSet):
     p_empty: Pressure
     """caliper pressure below which the brake counts as empty"""
     duration: Duration
-    """recorded time after the release begins"""
+    """recording time after the release begins"""
     settle: TimeConstant
     """time before the release during which dither and loop settle"""
 

@@ -24,7 +24,7 @@ class Options(ParameterSet):
     i_step: Current
     """height of the step of the current demand"""
     duration: Duration
-    """recorded time after the step"""
+    """recording time after the step"""
     settle: TimeConstant
     """time before the step during which the dithered pressure settles"""
     smoothing: TimeConstant

@@ -1,4 +1,4 @@
-"""Stribeck curves: the seals' friction torque over speed at several pressures (2010, Fig. 4)."""
+"""Stribeck curves: the seals' friction torque versus speed at several pressures (2010, Fig. 4)."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ EXPERIMENT = Experiment(
     name="seal-stribeck",
     formerly="stribeck",
     assembly="motorcycle-brake",
-    summary="friction torque over speed at {pressures} (Fig. 4)",
+    summary="friction torque versus speed at {pressures} (Fig. 4)",
     options=Options,
     defaults=Options(pressures=(2e5, 20e5, 40e5), omega_max=2.0),
     cases=lambda *_: (),

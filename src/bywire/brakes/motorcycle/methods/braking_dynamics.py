@@ -378,7 +378,7 @@ def _without_pair(estimates: Mapping[str, Estimate]) -> tuple[str, ...]:
     if not names:
         return ()
     return (
-        f"the data show no slow pair at {' and '.join(names)} pressure: set model = 'eq-21', "
+        f"the data show no slow pair at {' and '.join(names)} pressure. Set model = 'eq-21', "
         "which determines T1 and T2 better",
     )
 
@@ -474,7 +474,7 @@ def truth(par: MotorcycleParameters, options: Options) -> Mapping[str, float]:
     """Return the true values of the linear synthetic brake; raise for the whole brake."""
     if options.plant == "brake":
         raise ParameterError(
-            "the whole brake has no true values of eq. (22): set plant = 'eq-22' to compare "
+            "the whole brake has no true values of eq. (22). Set plant = 'eq-22' to compare "
             "estimates with the values of the simulation",
             name="plant",
             valid="'eq-22'",

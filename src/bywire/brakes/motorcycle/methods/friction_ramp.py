@@ -382,7 +382,7 @@ def _fitted(
     best = estimate(_problem(data, par, options, unknowns, at), start=at)
     if not any(name.startswith("seal.") for name in best.names):
         raise ParameterError(
-            "the slips do not determine the seal friction with this current: check the units of "
+            "the slips do not determine the seal friction with this current. Check the units of "
             "i and p_mc, and the known parameters motor.K_e, gear and cylinder",
             name="i",
         )
@@ -432,7 +432,7 @@ def shots_of(data: xr.Dataset, options: Options) -> list[Shot]:
     if not slips:
         raise ParameterError(
             f"p_mc has no slip of more than least = {options.least / 1e5:g} bar, so it cannot "
-            "determine friction: ramp the current slowly, up and down, without dither",
+            "determine friction. Ramp the current slowly, up and down, without dither",
             name="p_mc",
         )
     return cut_out(t, p, i, slips, options.longest)

@@ -95,7 +95,7 @@ def identify(
     notes = (
         ()
         if turning
-        else ("the shaft does not turn, so K_e is undetermined: turn it, and measure its speed",)
+        else ("the shaft does not turn, so K_e is undetermined. Turn it, and measure its speed",)
     )
     return Identified(
         estimates={"winding": fit},
@@ -165,5 +165,5 @@ METHOD = Method(
     several=True,
     simulated=tuple(Options.model_fields),
     bench_note="the record comes from a voltage source, with the rotor locked or at a set speed. "
-    "The bench's shaft is free and cannot replay it: use only the values",
+    "The bench's shaft is free and cannot replay it. Use only the values",
 )

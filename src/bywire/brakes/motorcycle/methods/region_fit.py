@@ -264,7 +264,7 @@ def block_of(interval: float, f_dit: float | None) -> int:
             return round(samples)
     raise ParameterError(
         f"one or a few dither periods of {1.0 / f_dit:g} s must be a whole number of sample times "
-        f"of {interval:g} s, so that the ripple can be averaged: resample the record to 1 kHz",
+        f"of {interval:g} s, so that the ripple can be averaged. Resample the record to 1 kHz",
         name="sample time",
         value=f"{interval:g} s",
     )
@@ -305,7 +305,7 @@ def _step(label: str, i: Array, p: Array, interval: float, block: int, onset: in
         raise ParameterError(
             f"record {label or 'of the step'}: the rest before its step is "
             f"{max(rest, 0) * block * interval:g} s, but it must be {least} to show the "
-            "initial pressure: record more before the step",
+            "initial pressure. Record more before the step",
             name="rest",
             value=f"{max(rest, 0) * block * interval:g} s",
             valid=least,
@@ -345,7 +345,7 @@ def _sines(label: str, i: Array, p: Array, interval: float, f_dit: float | None)
     if not spectrum.size:
         raise ParameterError(
             f"the current of record {label} has neither a step nor a sine from {BAND[0]:g} to "
-            f"{BAND[1]:g} Hz, so it does not determine any unknown: apply a step or a sine to the "
+            f"{BAND[1]:g} Hz, so it does not determine any unknown. Apply a step or a sine to the "
             "current demand",
             name="i",
         )
@@ -863,7 +863,7 @@ def _require(region: Region, joint: bool) -> None:
     where = f"{region.name} pressure"
     if not region.steps:
         raise ParameterError(
-            f"no step response at {where}, so K, tau_L and T_L cannot be estimated: apply a step "
+            f"no step response at {where}, so K, tau_L and T_L cannot be estimated. Apply a step "
             "of the current demand from rest at that pressure, and record 4 s or more",
             name=where,
         )
@@ -873,7 +873,7 @@ def _require(region: Region, joint: bool) -> None:
             raise ParameterError(
                 f"the pressure hardly responds to the step at {where} (it changes by "
                 f"{change / 1e5:.2g} bar, its noise is {step.sigma / 1e5:.2g} bar), so none "
-                f"of {', '.join(NAMES)} can be estimated: use a larger step, with dither",
+                f"of {', '.join(NAMES)} can be estimated. Use a larger step, with dither",
                 name=where,
                 value=f"{change / 1e5:.2g} bar",
             )

@@ -274,7 +274,7 @@ def require_reachable(shots: Sequence[Shot], par: MotorcycleParameters) -> None:
     except ParameterError as error:
         raise ParameterError(
             f"the measured pressure rests at {highest / 1e5:.4g} bar, but this brake cannot "
-            f"hold it: check the unit of p_mc, and the parameters ({error})",
+            f"hold it. Check the unit of p_mc, and the parameters ({error})",
             name="p_mc",
             value=f"{highest / 1e5:.4g} bar",
             valid=error.valid,

@@ -346,7 +346,7 @@ def _runs(cases: Iterable[Case], signals: Sequence[str]) -> Sequence[Trajectory]
 
 
 def _low_passed(run: Trajectory, f: float) -> Array:
-    """Return the measured current after the first-order low-pass of Fig. 5."""
+    """Return the measured current after the first-order low-pass filter of Fig. 5."""
     return low_passed(run["i_meas"], f, float(run.time[1] - run.time[0]))
 
 

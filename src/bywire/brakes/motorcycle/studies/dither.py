@@ -384,9 +384,9 @@ def _warnings(
     texts = []
     f = grid.frequencies[best]
     if best in (0, len(each) - 1):
-        texts.append(f"the optimum is at the edge of the frequencies, {f:g} Hz: widen the range")
+        texts.append(f"the optimum is at the edge of the frequencies, {f:g} Hz. Widen the range")
     if math.isclose(each[best].gain, options.gain_min):
-        texts.append(f"the smallest gain, {options.gain_min:g}, is sufficient: widen the range")
+        texts.append(f"the smallest gain, {options.gain_min:g}, is sufficient. Widen the range")
     return tuple(texts)
 
 

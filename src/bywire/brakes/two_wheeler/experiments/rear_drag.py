@@ -42,7 +42,7 @@ class Options(ParameterSet):
     surface: SurfaceName
     """surface of the road"""
     duration: Duration
-    """recorded time"""
+    """recording time"""
 
 
 def cases(par: WholeRearParameters, options: Options, _: object = None) -> tuple[Case, ...]:
@@ -80,7 +80,7 @@ def left(run: xr.Dataset, options: Options) -> dict[str, float | tuple[float, st
     if not go or go >= t.size or not torque[go] > 0.0:
         figures["release_time"] = (np.nan, "the brake was not applied, or was not released")
     elif above[-1] + 1 == t.size:
-        figures["release_time"] = (np.nan, "the brake is not released within the recorded time")
+        figures["release_time"] = (np.nan, "the brake is not released within the recording")
     else:
         figures["release_time"] = float(t[above[-1] + 1] - options.hold)
     return figures

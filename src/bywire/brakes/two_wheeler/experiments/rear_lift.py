@@ -39,7 +39,7 @@ class Options(ParameterSet):
     grip: Factor
     """factor on the road's adhesion: sport tires have more than the surfaces' car tires"""
     duration: Duration
-    """recorded time"""
+    """recording time"""
 
 
 def cases(par: TwoWheelerParameters, options: Options, _: object = None) -> tuple[Case, ...]:

@@ -115,7 +115,7 @@ def peak_time(t: Array, T: Array) -> float | tuple[float, str]:
     """Return the time of the highest temperature [s], from a parabola through its highest rows."""
     k = int(T.argmax())
     if k + 1 == t.size:
-        return math.nan, "the fluid is still warming up at the end: increase options.parked"
+        return math.nan, "the fluid is still warming up at the end. Increase options.parked"
     if k == 0:
         return 0.0
     bend, slope, _ = np.polyfit(t[k - 1 : k + 2] - t[k], T[k - 1 : k + 2] - T[k], 2)
@@ -167,7 +167,7 @@ class Options(ParameterSet):
     v_pause: Annotated[float, Unit("m/s", 28.0), Field(ge=0, allow_inf_nan=False)]
     """speed during the driving time"""
     parked: Duration
-    """parked time after the last stop"""
+    """time parked after the last stop"""
 
 
 class _Stop(NamedTuple):

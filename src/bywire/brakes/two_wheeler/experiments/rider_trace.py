@@ -44,7 +44,7 @@ class Options(ParameterSet):
     surface: SurfaceName
     """surface of the road"""
     duration: Duration
-    """recorded time"""
+    """recording time"""
 
 
 def driven(_: Options) -> Mapping[str, str]:

@@ -53,7 +53,7 @@ def _uncontrolled(gradient: float) -> dict[str, float | str]:
 _QUIET = 1e-3  # m/s
 
 SLOW_FIGURES = Figures(
-    undefined="the vehicle does not stop in the recorded time",
+    undefined="the vehicle does not stop within the recording",
     stopping_distance=("m", "Distance from time zero to the first standstill."),
     stopping_time=("s", "Time until the first standstill."),
     rebound_speed=(
@@ -71,7 +71,7 @@ class SlowStopOptions(WalkingPaceOptions):
     """The stop, and the slope; slip and lift control are off."""
 
     duration: Duration
-    """recorded time"""
+    """recording time"""
 
 
 def slow_stop(
@@ -154,7 +154,7 @@ class SlopeHoldOptions(WalkingPaceOptions):
     t_release: Duration
     """time of the release"""
     duration: Duration
-    """recorded time"""
+    """recording time"""
 
 
 def slope_hold(

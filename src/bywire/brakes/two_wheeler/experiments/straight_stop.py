@@ -66,7 +66,7 @@ class StraightStopOptions(PanicOptions):
     surface: SurfaceName
     """surface of the road"""
     duration: TimeConstant
-    """recorded time; 0: the stopping time of locked wheels on this surface, with a margin"""
+    """recording time; 0: the stopping time of locked wheels on this surface, with a margin"""
 
 
 def straight_stop(
@@ -163,7 +163,7 @@ class BandwidthsOptions(PanicOptions):
     f_n: Annotated[Nodes, Unit("Hz", 10.0), Field(min_length=1)]
     """natural frequencies of the pressure loops, one run each"""
     duration: Duration
-    """recorded time"""
+    """recording time"""
 
 
 def _label(f: float) -> str:
@@ -259,7 +259,7 @@ class SurfaceJumpOptions(PanicOptions):
     x_change: Distance
     """position at which the second surface begins"""
     duration: Duration
-    """recorded time"""
+    """recording time"""
 
 
 def surface_jump(

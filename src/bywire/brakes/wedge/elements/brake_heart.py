@@ -38,16 +38,16 @@ class Parameters(ParameterSet):
     K_C: Stiffness
     """stiffness between the screws' tips"""
     g_1: FreePlay
-    """free-play between screw 1 and wedge"""
+    """free play between screw 1 and wedge"""
     g_2: FreePlay
-    """free-play between screw 2 and wedge"""
+    """free play between screw 2 and wedge"""
     g_12: FreePlay
-    """free-play between the screws"""
+    """free play between the screws"""
     tau_heart: TimeConstant
-    """damping over stiffness"""
+    """ratio of damping to stiffness"""
 
 
-FAULTS = (ParameterFault("worn", "larger free-play on both sides", ("g_1", "g_2"), 5.0),)
+FAULTS = (ParameterFault("worn", "larger free play on both sides", ("g_1", "g_2"), 5.0),)
 
 
 class Input(NamedTuple):

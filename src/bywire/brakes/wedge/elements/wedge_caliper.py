@@ -41,7 +41,7 @@ class Parameters(ParameterSet):
     F_table: Annotated[Nodes, Unit("N", 3e3)]
     """normal forces of the table, increasing from 0 (law "table")"""
     tau_cal: TimeConstant
-    """damping over stiffness"""
+    """ratio of damping to stiffness"""
     clearance: Clearance
     """running clearance, sum of both sides of the disc"""
     r_B: Length

@@ -85,7 +85,7 @@ class CornerStopOptions(StopOptions):
     t_hold: Duration
     """time until the demand falls to zero"""
     t_end: Duration
-    """recorded time after the release"""
+    """recording time after the release"""
 
 
 def corner_stop(
@@ -148,7 +148,7 @@ CORNER_STOP = Experiment(
 # --- Panic stop: the demand exceeds the road's adhesion
 
 PANIC_FIGURES = Figures(
-    undefined="the vehicle does not stop in the recorded time: increase options.duration",
+    undefined="the vehicle does not stop within the recording. Increase options.duration",
     stopping_distance=("m", "Distance from the demand to the first standstill."),
     stopping_time=("s", "Time from the demand to the first standstill."),
     braking_efficiency=("%", "Ideal stopping distance on this road over the actual distance."),
@@ -166,7 +166,7 @@ class CornerPanicOptions(StopOptions):
     """The stop; slip control is a parameter, ``ecu.abs``."""
 
     duration: Duration
-    """recorded time"""
+    """recording time"""
 
 
 def corner_panic(

@@ -41,7 +41,7 @@ class Options(ParameterSet):
     gains: ThreeFactors
     """current controller gains relative to the parameter set: soft, usual, sharp"""
     duration: Duration
-    """recorded time after the step"""
+    """recording time after the step"""
     record: Duration
     """recording interval"""
 

@@ -57,9 +57,9 @@ class Options(ParameterSet):
     t_hold: Duration
     """time from the start of braking until the demand falls to zero"""
     t_end: Duration
-    """recorded time after the release"""
+    """recording time after the release"""
     settle: Duration
-    """parked time before braking"""
+    """time parked before braking"""
 
 
 def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Case, ...]:

@@ -50,7 +50,7 @@ class Options(ParameterSet):
     more_D: Share
     """viscous damping of motor 2 relative to the parameter set, minus one"""
     duration: Duration
-    """recorded time of each motion"""
+    """recording time of each motion"""
     record: Duration
     """recording interval"""
 

@@ -34,7 +34,7 @@ from bywire.core.quantities import Duration
 
 _BAND = 0.05  # share of the step: half width of a stable loop's final band
 _LAST = 0.2  # share of the hold
-_NO_ROW = "the recording has no row in this time: record more often"
+_NO_ROW = "the recording has no row in this time. Record more often"
 
 EACH = Figures(
     stable=(
@@ -65,7 +65,7 @@ class Options(ParameterSet):
     M_step: SomeMoment
     """demanded moment"""
     t_hold: Duration
-    """recorded time after the step"""
+    """recording time after the step"""
     mu_B: Coefficients
     """friction coefficients of the pads"""
     slope: Literal["known", "fixed"]
@@ -73,7 +73,7 @@ class Options(ParameterSet):
     friction: Literal["kept", "none"]
     """whether the brake has dry friction"""
     settle: Duration
-    """parked time before the step"""
+    """time parked before the step"""
 
 
 def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Case, ...]:

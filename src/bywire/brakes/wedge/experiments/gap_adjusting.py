@@ -50,7 +50,7 @@ class Options(ParameterSet):
     t_pause: Duration
     """time between applications, and after the last one"""
     settle: Duration
-    """parked time before the first application"""
+    """time parked before the first application"""
 
 
 def _begins(options: Options) -> list[float]:

@@ -70,7 +70,7 @@ class ReleaseOptions(ParameterSet):
     settle: Duration
     """time of controlled braking before"""
     duration: Duration
-    """recorded time after the demand falls to zero"""
+    """recording time after the demand falls to zero"""
 
 
 def release(par: WedgeParameters, options: ReleaseOptions, _: object = None) -> tuple[Case, ...]:
@@ -127,7 +127,7 @@ def _fall(run: xr.Dataset) -> tuple[float, str]:
         return math.nan, "the moment at the release is zero"
     k = int(above[-1])
     if k + 1 == t.size:
-        return math.nan, "the moment does not fall to 5 % in the recorded time"
+        return math.nan, "the moment does not fall to 5 % within the recording"
     return float(t[k] + (t[k + 1] - t[k]) * (M[k] - level) / (M[k] - M[k + 1])), ""
 
 
@@ -154,7 +154,7 @@ POWER_OFF_FIGURES = Figures(
     moment_end=("N*m", "Moment at the end, including runout."),
     preload_end=("N", "Wedge preload at the end."),
     end_stop_force=("N", "Largest force of an end stop."),
-    undefined="the brake does not come to rest in the recorded time",
+    undefined="the brake does not come to rest within the recording",
 )
 
 
@@ -166,7 +166,7 @@ class PowerOffOptions(ParameterSet):
     settle: Duration
     """time of controlled braking before"""
     duration: Duration
-    """recorded time without power"""
+    """recording time without power"""
 
 
 def power_off(par: WedgeParameters, options: PowerOffOptions, _: object = None) -> tuple[Case, ...]:

@@ -29,7 +29,7 @@ from bywire.plant import roller_screw
 
 BRAKE, SCREWS, MOTORS = "brake", "screws", "motors"
 _BANDS = ("low", "high")
-_AWAY = 1.0  # free-play [m] that no motor crosses
+_AWAY = 1.0  # free play [m] that no motor crosses
 
 STEP = ("rise_time", "overshoot", "settling_time", "steady_state_error")
 CURRENT = Figures(
@@ -75,7 +75,7 @@ class Options(ParameterSet):
     delta: Position
     """offset of each screw, which preloads the wedge; default: the parameter set's value"""
     duration: Duration
-    """recorded time after each step"""
+    """recording time after each step"""
     settle: Duration
     """time at rest before each step"""
 

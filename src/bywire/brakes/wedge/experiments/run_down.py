@@ -57,7 +57,7 @@ class Options(ParameterSet):
     i_brake: Current
     """current against the motion in the third run; friction must hold its torque at rest"""
     duration: Duration
-    """recorded time after the end of the spin-up"""
+    """recording time after the end of the spin-up"""
     record: Duration
     """recording interval"""
 

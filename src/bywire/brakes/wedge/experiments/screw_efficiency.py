@@ -230,7 +230,7 @@ LOAD_SWEEP_FIGURES = Figures(
     eta_f_true=("1", "True value."),
     eta_b_slope=("1", "Inverse of that slope, motor 1 driven back."),
     eta_b_true=("1", "True value."),
-    undefined="the force does not grow with the current: set more levels",
+    undefined="the force does not grow with the current. Set more levels",
 )
 
 

@@ -51,7 +51,7 @@ class StepsOptions(ParameterSet):
     f_high: Frequency
     """natural frequency of the high-bandwidth controller"""
     duration: Duration
-    """recorded time after each step"""
+    """recording time after each step"""
     settle: Duration
     """time at rest before each step"""
     record: Duration

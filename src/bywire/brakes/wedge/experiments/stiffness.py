@@ -43,7 +43,7 @@ def _squeezing_current(run: xr.Dataset) -> Array:
 
 # --- In current control: ramps of opposite currents
 
-_UPPER = 0.35  # share of the largest current; below it, bearings and free-play bend the line
+_UPPER = 0.35  # share of the largest current; below it, bearings and free play bend the line
 _HOLD = 0.2  # share of the ramp's time, at the largest current and between the directions
 STIFFNESS_FIGURES = Figures(
     K_line_compression=("N/m", "Force over travel with the sensor, compression."),
@@ -57,7 +57,7 @@ STIFFNESS_FIGURES = Figures(
     K_W_true=("N/m", "True value."),
     free_play=("m", "Travel between the compression and tension lines at zero force."),
     free_play_true=("m", "True value."),
-    undefined="no travel under load: set a larger current",
+    undefined="no travel under load. Set a larger current",
 )
 
 
@@ -107,7 +107,7 @@ def stiffness(
 
 
 def judge_stiffness(recordings: Recordings, options: StiffnessOptions) -> tuple[Kpi, ...]:
-    """Return stiffnesses of screws and wedge and the free-play, with their true values."""
+    """Return stiffnesses of screws and wedge and the free play, with their true values."""
     sensor, heart = recordings["sensor"], recordings["heart"]
     par = parameters_of(sensor)
     lines, calibrations, loaded = [], [], []
@@ -180,7 +180,7 @@ def _line(x: Array, y: Array) -> Line:
 STIFFNESS = Experiment(
     name="stiffness",
     assembly="wedge-brake",
-    summary="stiffness of screws and wedge, and free-play, with motors against each other",
+    summary="stiffness of screws and wedge, and free play, with motors against each other",
     options=StiffnessOptions,
     defaults=StiffnessOptions(i_max=15.0, t_ramp=2.0),
     cases=stiffness,
@@ -200,7 +200,7 @@ FORCE_CYCLE_FIGURES = Figures(
     peak_current_sensor=("A", "Largest mean current of both motors, with the sensor."),
     peak_current_heart=("A", "Largest mean current of both motors, in the brake heart."),
     hysteresis=("N*m", "Friction torque: half the loop's width, mean over the cycle."),
-    undefined="no travel: set larger options",
+    undefined="no travel. Set larger options",
 )
 
 
@@ -222,8 +222,8 @@ def force_cycle(
 ) -> tuple[Case, ...]:
     """Return both stages; the wedge stays in its clearance.
 
-    Steadily turning motors do not stick. So force over current shows the friction's hysteresis, and
-    force over travel shows the stiffness, in both directions and through the free-play.
+    Steadily turning motors do not stick. Force versus current shows the friction's hysteresis, and
+    force over travel shows the stiffness, in both directions and through the free play.
     """
     modes = {"rig.mode_1": "position", "rig.mode_2": "position"}
     squeeze, t_sensor = _cycle(par, options.c_sensor, options.c_sensor, options)
@@ -269,7 +269,7 @@ def judge_force_cycle(recordings: Recordings, options: ForceCycleOptions) -> tup
 FORCE_CYCLE = Experiment(
     name="force-cycle",
     assembly="wedge-brake",
-    summary="two motors squeeze and pull by position: stiffness, free-play, force over current",
+    summary="two motors squeeze and pull by position: stiffness, free play, force versus current",
     options=ForceCycleOptions,
     defaults=ForceCycleOptions(c_sensor=1.5e-4, c_close=1.4e-4, c_apart=3e-4, omega_slow=0.3),
     cases=force_cycle,

@@ -217,7 +217,7 @@ class Options(ParameterSet):
     """Filters, orders, and the synthetic noise."""
 
     cutoff: Frequency
-    """low-pass of torque and angle; it must pass the cogging"""
+    """low-pass filter for torque and angle; must pass the cogging"""
     slowest: AngularSpeed
     """speed below which the shaft counts as reversing"""
     margin: Duration
@@ -260,7 +260,7 @@ def identify(
     orders = _standing_out(turning.angle, turning.leveled, options.highest)
     if not orders:
         raise ParameterError(
-            f"no order up to {options.highest} exceeds the noise: turn slower or by more "
+            f"no order up to {options.highest} exceeds the noise. Turn slower or by more "
             "revolutions, or raise options.highest",
             name="options.highest",
             value=str(options.highest),
@@ -293,7 +293,7 @@ def _require_braking(turning: Turning) -> None:
 
 
 def _slope(par: WedgeParameters, turning: Turning) -> float:
-    """Return the slope of the known friction over speed, at the speed of the test."""
+    """Return the slope of the known friction versus speed, at the test speed."""
     speed = float(turning.speed.mean())
     friction = [
         axial_bearing.friction(axial_bearing.Input(0.0, share * speed), par.bearing)
@@ -342,8 +342,8 @@ def _turning(data: xr.Dataset, par: WedgeParameters, options: Options) -> Turnin
     passes = 2.0 * np.pi * options.cutoff / fastest
     if options.highest > passes:
         advice = (
-            f"the highest order that a low-pass of {options.cutoff:g} Hz passes at {fastest:.3g} "
-            "rad/s; turn slower, or raise options.cutoff"
+            f"the highest order that a low-pass filter of {options.cutoff:g} Hz passes at "
+            f"{fastest:.3g} rad/s; turn slower, or raise options.cutoff"
         )
         raise not_valid("options.highest", str(options.highest), f"<= {passes:.0f}", advice)
     angle = data["q_1"].values
@@ -423,6 +423,6 @@ METHOD = Method(
         "amplitude.N": ("N*m", "of a weaker order N, with its phase.N"),
         "T_forward": ("N*m", "dry friction forward"),
         "T_backward": ("N*m", "dry friction backward"),
-        "friction_slope": ("N*m*s/rad", "friction over speed, at the speed of the test"),
+        "friction_slope": ("N*m*s/rad", "friction versus speed, at the test speed"),
     },
 )

@@ -46,7 +46,7 @@ class RigOptions(ParameterSet):
     """Part of the motion that counts, and the synthetic noise."""
 
     cutoff: Frequency
-    """low-pass of the speed"""
+    """low-pass filter for the speed"""
     slowest: AngularSpeed
     """speed of one motor toward the other that counts as motion"""
     margin: Duration
@@ -217,7 +217,7 @@ def squeeze(
     if not (np.any(ways > 0) and np.any(ways < 0)):
         raise ParameterError(
             f"{where}: the screws do not move both toward each other and apart at more than "
-            f"{options.slowest:g} rad/s, so friction and force cannot be separated: squeeze "
+            f"{options.slowest:g} rad/s, so friction and force cannot be separated. Squeeze "
             "and release slowly, as 'bywire run force-cycle' does",
             name=where,
         )
@@ -328,7 +328,7 @@ _LAW = len(LAW_NAMES)
 def identify(
     data: xr.Dataset, par: WedgeParameters, options: RigOptions, effort: Effort
 ) -> Identified:
-    r"""Return the line of force over current and the friction around it.
+    r"""Return the line of force versus current and the friction around it.
 
     .. math:: i = i_0 + F/c \pm (w_0 + w_1 |F| + w_2 F^2)
 
@@ -364,7 +364,7 @@ def identify(
     )
     values = np.array([estimates[u.label] for u in unknowns])
     return Identified(
-        estimates={"force over current": best},
+        estimates={"force versus current": best},
         parameters={},
         figures=_figures(values, cycle, par),
         checks=(
@@ -449,7 +449,7 @@ def truth(par: WedgeParameters, options: RigOptions) -> dict[str, float]:
 METHOD = Method(
     name="force-calibration",
     assembly="wedge-brake",
-    summary="force over current of the screw drive: line, friction to either side, offset",
+    summary="force versus current of the screw drive: line, friction to either side, offset",
     experiment="force-cycle",
     signals=SIGNALS,
     options=RigOptions,

@@ -154,7 +154,7 @@ class Options(ParameterSet):
     window: Duration
     """time over which the torque balance is averaged"""
     cutoff: Frequency
-    """low-pass before the angle is differentiated"""
+    """low-pass filter applied to the angle before differentiation"""
     sigma_i: Annotated[float, Unit("A", 0.02), Field(ge=0)]
     """noise of the measured current in synthetic measurements"""
     sigma_q: Annotated[float, Unit("rad", 1e-4), Field(ge=0)]

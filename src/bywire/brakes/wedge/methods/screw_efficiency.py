@@ -104,7 +104,7 @@ class Options(RigOptions):
     """Strokes that count, and the synthetic noise."""
 
     slowest: AngularSpeed
-    """least speed of a stroke"""
+    """minimum speed of a stroke"""
 
 
 def identify(

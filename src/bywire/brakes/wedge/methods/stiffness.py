@@ -1,4 +1,4 @@
-"""Stiffnesses and free-play of the drive train from the two-stage test (Roberts 2003).
+"""Stiffnesses and free play of the drive train from the two-stage test (Roberts 2003).
 
 First the screws squeeze and pull a force sensor, which gives their stiffness and the force per
 current. Then they work in the brake heart, where the current gives the force: tip to tip while they
@@ -85,7 +85,7 @@ def started(par: WedgeParameters, sensor: Squeeze, heart: Squeeze, advice: str) 
         loading = (heart.way == way) & (level > _SHARE * np.abs(sensor.i).max())
         if int(loading.sum()) < 3 or not np.ptp(heart.d[loading]) > 0.0:
             raise ParameterError(
-                f"record heart: the screws do not load each other {what}: travel further; {advice}",
+                f"record heart: the screws do not load each other {what}. Travel further; {advice}",
                 name="record heart",
             )
         slope, start = np.polyfit(heart.d[loading], level[loading], 1)
@@ -93,7 +93,7 @@ def started(par: WedgeParameters, sensor: Squeeze, heart: Squeeze, advice: str) 
     if not unknowns[0] > unknowns[1]:
         raise ParameterError(
             "record heart: closing and opening load the screws at the same travel: they have no "
-            "free-play, or the currents' signs are wrong",
+            "free play, or the currents' signs are wrong",
             name="record heart",
         )
     return Contacts(*unknowns)
@@ -126,7 +126,7 @@ class TwoStages:
 
     @cached_property
     def unknowns(self) -> tuple[Unknown, ...]:
-        """Stiffnesses, zeros of travel, free-play, law of the current, cogging, encoders' lag."""
+        """Stiffnesses, zeros of travel, free play, law of the current, cogging, encoders' lag."""
         play = self.contacts.closed - self.contacts.apart
         return (
             *parameters_of(self.par, _STIFFNESS),
@@ -239,14 +239,14 @@ _ADVICE = "squeeze and pull with and without the brake heart, as 'bywire run for
 def identify(
     data: xr.Dataset, par: WedgeParameters, options: RigOptions, effort: Effort
 ) -> Identified:
-    r"""Return stiffnesses of screws, interfaces and tips, and the free-play.
+    r"""Return stiffnesses of screws, interfaces and tips, and the free play.
 
     .. math::
         F = \frac{d - d_0}{2/K_S + 1/K_F}, \qquad
         F = \frac{\max(0, d - d_c)}{2/K_S + 1/K_C} - \frac{\max(0, d_t - d)}{2/K_S + 2/K_W}, \qquad
         d = d_q \pm h
 
-    on the sensor and in the heart, with the travel d of one nut toward the other; the free-play is
+    on the sensor and in the heart, with the travel d of one nut toward the other; the free play is
     :math:`d_c - d_t`. The encoders' :math:`d_q` lags behind the motion by h; the damping of screws
     and sensor adds to h. In the heart F is the force by the current, by the law of
     ``methods.force_calibration``, which is fitted to both stages at once. Windows in which a
@@ -281,7 +281,7 @@ def identify(
     stages, best, values, heart = _fitted(par, sensor, heart)
     F = stages.heart_force(values, stages.heart)[0]
     return Identified(
-        estimates={"stiffness and free-play": best},
+        estimates={"stiffness and free play": best},
         parameters={k: v for k, v in best.parameters().items() if k.startswith("heart.")},
         figures={
             "stiffness_tip_to_tip": (stages.slopes(values)[0], "N/m"),
@@ -292,7 +292,7 @@ def identify(
         checks=(stages.fits(values, len(best.values)),),
         curves=(_curve(replace(stages, heart=heart), values),),
         notes=(
-            "the data determine the whole free-play, g_1 + g_2 + g_12, but not its parts",
+            "the data determine the whole free play, g_1 + g_2 + g_12, but not its parts",
             f"the sensor's stiffness is assumed as {par.rig.sensor.K_F / 1e6:g} N/um",
         ),
     )
@@ -358,7 +358,7 @@ def synthetic(par: WedgeParameters, options: RigOptions, seed: int) -> xr.Datase
 
 
 def truth(par: WedgeParameters, options: RigOptions) -> dict[str, float]:
-    """Return the true free-play and calibration of ``synthetic``."""
+    """Return the true free play and calibration of ``synthetic``."""
     known = {u.label: u.start for u in force_calibration.law_unknowns(par)}
     heart = par.heart
     return {
@@ -370,7 +370,7 @@ def truth(par: WedgeParameters, options: RigOptions) -> dict[str, float]:
 METHOD = Method(
     name="stiffness",
     assembly="wedge-brake",
-    summary="stiffness of screws, interfaces, tips, and free-play, on a sensor and in the heart",
+    summary="stiffness of screws, interfaces, tips, and free play, on a sensor and in the heart",
     experiment="force-cycle",
     signals=SIGNALS,
     options=RigOptions,

@@ -108,7 +108,7 @@ def efficiency(runs: Runs) -> Part:
 
 
 def stiffness(runs: Runs) -> Part:
-    """Return stiffnesses and free-play as the two stages of the test measure them."""
+    """Return stiffnesses and free play as the two stages of the test measure them."""
     result = runs.bench("stiffness", MAIN)
     values = kpis(result)
     items = [

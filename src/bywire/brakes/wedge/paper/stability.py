@@ -217,7 +217,7 @@ def _closed_loop(runs: Runs) -> list[Item]:
 
 
 def _free_play(runs: Runs) -> list[Item]:
-    """Return the changes of contact at the neutral point, with preload and with free-play."""
+    """Return the changes of contact at the neutral point, with preload and with free play."""
     shaking = {"flywheel.runout": parameters().flywheel.runout}
     held = {}
     for name, preload in (("preload", {}), ("free_play", _FREE)):

@@ -137,7 +137,7 @@ class Answer:
 # --- One design
 
 Efficiency = Literal["friction-angle", "as-given"]
-"""constant property of the screw over the lead: the friction angle, or the efficiency"""
+"""screw property that stays constant as the lead varies: the friction angle, or the efficiency"""
 _SPEEDS = ("omega_gap", "a_gap", "omega_creep", "rate_max")
 """parameters of the moment control that set the speed of the reference"""
 _SIGNALS = (
@@ -379,7 +379,7 @@ class Options(ParameterSet):
     response: Literal["enforced", "as-scaled"]
     """whether the time is enforced, or the pads close as fast as with the given drive train"""
     efficiency: Efficiency
-    """constant property of the screw over the lead: its friction angle, or its efficiency"""
+    """screw property held constant as the lead varies: friction angle, or efficiency"""
     power: Literal["filtered", "instantaneous"]
     """power to minimize: with the rig's filter, or without"""
     tan_alpha_min: Slope
@@ -423,7 +423,7 @@ DEFAULTS = Options(
 )
 """the pulse of Fig. 9 in Roberts et al. (2003), around the catalog's design"""
 
-_NONE_FEASIBLE = "no design is feasible: increase t_90 or t_hold, or compare other designs"
+_NONE_FEASIBLE = "no design is feasible. Increase t_90 or t_hold, or compare other designs"
 _NEAR = 1.05
 """designs within this factor of the smallest power count as equally good"""
 _ROUNDS = 2  # of the optimum's refinement; each halves the spacing
@@ -850,7 +850,7 @@ def _listed(values: Array) -> str:
 STUDY = Study(
     name="drive-train",
     assembly="wedge-brake",
-    summary="peak power of a large stop over wedge slope and screw lead, at equal response",
+    summary="peak power of a hard stop versus wedge slope and screw lead, at equal response",
     options=Options,
     defaults=DEFAULTS,
     compute=compute,

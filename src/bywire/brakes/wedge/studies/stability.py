@@ -395,7 +395,7 @@ def _controlled(par: WedgeParameters, data: xr.Dataset, options: Options) -> tup
 STUDY = Study(
     name="stability",
     assembly="wedge-brake",
-    summary="stability over friction coefficient and wedge slope, with and without control",
+    summary="stability versus friction coefficient and wedge slope, with and without control",
     options=Options,
     defaults=DEFAULTS,
     compute=compute,
