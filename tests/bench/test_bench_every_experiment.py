@@ -93,7 +93,9 @@ def test_two_lines_are_enough(results, name):
 @pytest.mark.parametrize("name", NAMES)
 def test_kpis_are_those_declared(results, name):
     declared = EXPERIMENTS.all()[name].kpis_with(results[name].bench.chosen_options)
-    assert {kpi.name: kpi.unit for kpi in results[name].kpis} == declared
+    found = {kpi.name: kpi.unit for kpi in results[name].kpis}
+    differ = {key for key, _ in found.items() ^ declared.items()}
+    assert not differ, f"the experiment's fields judge and kpis differ in {differ}"
     for kpi in results[name].kpis:
         assert kpi.definition.endswith(".")
         assert math.isfinite(kpi.value) or kpi.note

@@ -55,7 +55,7 @@ class Check(Answer):
         """Return all contracts with outcome, figure, limit and source line."""
         kept = len(self._with("holds"))
         counts = [f"{kept} of {len(self.findings)} contracts hold"]
-        counts += [f"{len(self.broken)} are broken"] if self.broken else []
+        counts += [f"{len(self.broken)} broken"] if self.broken else []
         counts += [f"{len(self.not_checked)} could not be checked"] if self.not_checked else []
         summary = f"{self.subject}: {', '.join(counts)}"
         if not self.findings:

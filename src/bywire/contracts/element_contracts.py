@@ -549,7 +549,10 @@ def keeps_energy(module: ModuleType) -> Iterator[Evidence]:
         compiled = ca.Function("E", [column], [ca.vertcat(*terms), ca.vertcat(0.0, *unmoved)])
         powers, hidden = (out.full() for out in compiled(samples))
         if hidden.any():
-            text = f"the energy depends on inputs without input_rate{described(choices)}"
+            text = (
+                "the energy depends on inputs: write input_rate(u), which returns their "
+                f"derivatives{described(choices)}"
+            )
             yield Evidence(False, text, place=place)
             return
         off, scale = np.abs(powers.sum(axis=0)), np.abs(powers).sum(axis=0)

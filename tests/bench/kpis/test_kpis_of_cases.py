@@ -44,6 +44,23 @@ SETTINGS = {
     "gain": ("static_gain", static_gain.Setting("y", 0.01, 0.35, "A", smoothing=0.03)),
 }
 
+DRAWN = {
+    "effort": lambda random: (name if random.random() < 0.7 else "nothing" for name in "yyy"),
+    "extremes": lambda _: ("y",),
+    "release": lambda random: ("y", float(random.choice([0.0, 0.5, 1.0]))),
+    "occupation": lambda random: ("mode", str(random.choice(["mode", "none"])), "y", "none"),
+}
+"""``DRAWN[family](random)``: arguments of its ``Setting`` for the signals y (unit m), mode"""
+REASONS = {
+    "step_response": 6,
+    "vehicle_stop": 4,
+    "effort": 2,
+    "occupation": 2,
+    "release": 2,
+    "static_gain": 2,
+}
+"""least number of different reasons, where a family has others than samples that are no numbers"""
+
 
 @pytest.fixture(scope="module")
 def rows() -> Rows:
@@ -72,7 +89,7 @@ def test_each_case_is_as_if_it_were_alone_for_every_family(rows):
     told = set()
     tried = {family for family, _ in SETTINGS.values()} | {"vehicle_stop"}
     loops = {name for name, family in FAMILIES.all().items() if family.loops is not None}
-    assert tried >= loops, "add a setting of each family to SETTINGS"
+    assert tried >= loops, f"add a setting of {loops - tried} to SETTINGS"
     for family, setting in SETTINGS.values():
         together = evaluate_cases(family, rows, [setting] * CASES)
         assert list(together) == list(FAMILIES.find(family).measures)
@@ -107,8 +124,8 @@ def test_c_gives_the_bits_and_texts_of_python_on_any_samples(family):
                 )
                 every |= {by_python.note}
     assert NO_NUMBER not in every  # divisions are guarded
-    least = {"step_response": 6, "vehicle_stop": 4, "extremes": 1}.get(family, 2)
-    assert len({" ".join(note.split()[:2]) for note in every if note}) >= least
+    told = {" ".join(note.split()[:2]) for note in every if note}
+    assert len(told) >= REASONS.get(family, 1), f"the samples give too few reasons: {told}"
 
 
 def test_a_step_is_judged_as_numpy_does():
@@ -189,16 +206,8 @@ def _drawn(random: np.random.Generator, family: str) -> tuple[Rows, object]:
     mode[4, 0] += random.choice([0.0, 0.5])
     rows = Rows(t, {"y": y, "mode": mode}, {"y": {"units": "m"}, "mode": {"units": "1"}})
     if family not in ("step_response", "static_gain"):
-        names = {
-            "effort": ("y", "mode", "nothing"),
-            "extremes": ("y",),
-            "release": ("y",),
-            "occupation": ("mode", random.choice(["mode", "none"]), "y", "none"),
-        }
-        names["effort"] = tuple(name if random.random() < 0.7 else "nothing" for name in "yyy")
-        assert family in names, "add what the new family takes"
-        further = [float(random.choice([0.0, 0.5, 1.0]))] if family == "release" else []
-        return rows, FAMILIES.find(family).setting_class(*map(str, names[family]), *further)
+        assert family in DRAWN, f"add the arguments of {family}.Setting to DRAWN"
+        return rows, FAMILIES.find(family).setting_class(*DRAWN[family](random))
     levels = random.choice([None, 0.0, 1.0], 2, p=[0.2, 0.4, 0.4])
     window = sorted(random.uniform(t[0], t[-1], 2)) if random.random() < 0.3 else None
     at = float(random.choice([*t[:-1], random.uniform(t[0], t[-1])]))
