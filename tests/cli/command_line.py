@@ -48,7 +48,7 @@ def refused(outcome: Outcome, *texts: str, status: int = 2) -> None:
     assert outcome.out == ""
     assert len(outcome.lines) == 1
     for text in ("bywire: error: ", *texts):
-        assert text in outcome.err
+        assert text in outcome.err, outcome.err
 
 
 def no_half_files(folder: Path) -> None:

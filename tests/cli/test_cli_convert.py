@@ -74,10 +74,10 @@ def test_there_and_back(bywire, run, tmp_path, out):
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        (("run.csv", "out.nc"), "'p', 'x', 't': they have no unit: type --signals"),
+        (("run.csv", "out.nc"), '--signals "p [UNIT], x [UNIT]" --time "t [s]"'),
         (("none.csv", "out.nc"), "none.csv cannot be read (No such file"),
-        (("run.csv", "out.xyz"), "the ending '.xyz' belongs to no format"),
-        (("run.csv", "run.csv", "--map", "map.toml"), "exists already"),
+        (("run.csv", "out.xyz"), "'.xyz'"),
+        (("run.csv", "run.csv", "--map", "map.toml"), "run.csv already exists"),
         (("run.csv", "out.csv", "--map", "map.toml"), "different instants"),
         (("run.csv", "out.nc", "--map", "map.toml", "--signals", "p_cm"), "did you mean 'p_mc'"),
         (("run.csv", "out.nc", "--map", "map.toml", "--rate", "5 ms"), "cannot be converted to Hz"),

@@ -19,17 +19,18 @@ COMMANDS = {
     "life": ("life",),
     "campaign": ("faults",),
 }
-WORDS = {kind: f"a {kind}" for kind in FILES} | {"campaign": "a campaign of faults"}
+WORDS = {kind: f"a {kind}" for kind in FILES} | {"campaign": "a fault campaign"}
 
 
 @pytest.mark.parametrize(("given", "wanted"), [*permutations(FILES, 2)])
 def test_a_file_of_another_kind_is_named(bywire, bench, tmp_path, monkeypatch, given, wanted):
     monkeypatch.chdir(tmp_path)
     path = bench(FILES[given], "some.toml")
-    takes = f"use 'bywire {' '.join(COMMANDS[given])} {path}'"
+    takes = f"'bywire {' '.join(COMMANDS[given])} {path}'"
     refused(
         bywire(*COMMANDS[wanted], path),
-        f"{path}: this is {WORDS[given]}, not {WORDS[wanted]}: {takes}",
+        f"{path}: this is {WORDS[given]}, not {WORDS[wanted]}",
+        takes,
     )
     assert [each.name for each in tmp_path.iterdir()] == ["some.toml"]
 

@@ -103,7 +103,7 @@ def test_a_refusal_lists_what_resembles_the_input_first_and_not_all(
     head = ",".join(["time [s]", *(f"{name} [1]" for name in names)])
     path.write_text("\n".join([head, *rows]) + "\n")
     (line,) = bywire("replay", path, "--bench", "hard-braking").lines
-    listed = line.partition("v_set and one of ")[2]
+    listed = line.partition("the signal one of ")[2]
     assert set(listed.split(", ")[:2]) == {"pressure_set", "i_setpoint"}
     assert listed.endswith(" and 20 more")
 
@@ -118,5 +118,5 @@ def test_refusals(bywire: Bywire, stop: Path) -> None:
     refused(bywire(*moment, "--tolerance", "nmrse <= 5 %"), "nrmse")
     refused(bywire(*moment, "--track", "alpha"), "wedge.mu_B")
     refused(bywire(*base, "motor-open-loop"), "no measured signal drives the model")
-    refused(bywire(*base, "hard-braking"), "i_set, v_set and one of M_set, ")
+    refused(bywire(*base, "hard-braking"), "i_set, v_set and the signal one of M_set, ")
     refused(bywire("replay", "none.csv", "--bench", "moment-pulses"), "none.csv")

@@ -273,9 +273,8 @@ def require_checkable(check: int, plan: LifePlan) -> None:
     whole_number("check", check, 0, _MOST)
     if 0 < check < plan.count:
         raise ParameterError(
-            f"check = {check} is not valid: it must be 0 or >= {plan.count}, the size of the "
-            "sample "
-            "that represents the population",
+            f"check = {check} is not valid: it must be 0 or >= {plan.count}, the number of "
+            "stops in the sample that represents the population",
             name="check",
             value=f"{check}",
             valid=f"0 or >= {plan.count}",

@@ -106,7 +106,7 @@ def test_design_meets_what_is_required_from_low_to_high_force(command: Any) -> N
             "at=2 kN:30 kN:2",
         )
     assert code == 0, err
-    assert "linear design met" in out
+    assert "requirements met on the linear model" in out
 
 
 def test_identification_recovers_the_friction_within_its_intervals(
