@@ -124,7 +124,7 @@ def mean_deceleration(stop: Stop, x: Samples) -> float | Undefined:
 
 @measure("m/s**3")
 def jerk(stop: Stop, a: Samples) -> float:
-    """Largest rate of change of the deceleration (0.02 s average), after 0.3 s, above 2.5 m/s."""
+    """Maximum rate of change of the deceleration (0.02 s average), after 0.3 s, above 2.5 m/s."""
     t = stop.t
     mean = moving_average(t, a, _FILTER)
     last = len(t) - 1
@@ -147,7 +147,7 @@ def jerk(stop: Stop, a: Samples) -> float:
 
 @measure("rad")
 def peak_pitch(stop: Stop, phi: Samples) -> float:
-    """Largest nose-down pitch, relative to the pitch at time zero."""
+    """Maximum nose-down pitch, relative to the pitch at time zero."""
     return max(phi[stop.begin : stop.until]) - value_at(stop.t, phi, 0.0)
 
 
@@ -169,25 +169,25 @@ def disc_energy(stop: Stop, heat_front: Samples, heat_rear: Samples) -> float:
 
 @measure("1")
 def peak_slip_front(stop: Stop, slip_front: Samples) -> float:
-    """Largest slip above 2.5 m/s."""
+    """Maximum slip above 2.5 m/s."""
     return _peak_slip(stop, slip_front)
 
 
 @measure("1")
 def peak_slip_rear(stop: Stop, slip_rear: Samples) -> float:
-    """Largest slip above 2.5 m/s."""
+    """Maximum slip above 2.5 m/s."""
     return _peak_slip(stop, slip_rear)
 
 
 @measure("s")
 def excess_slip_time_front(stop: Stop, slip_front: Samples, setting: Setting) -> float:
-    """Time with more than twice the slip of largest adhesion, above 2.5 m/s."""
+    """Time during which slip exceeds twice the slip at peak adhesion, above 2.5 m/s."""
     return _excess_slip_time(stop, slip_front, setting.peak_slip)
 
 
 @measure("s")
 def excess_slip_time_rear(stop: Stop, slip_rear: Samples, setting: Setting) -> float:
-    """Time with more than twice the slip of largest adhesion, above 2.5 m/s."""
+    """Time during which slip exceeds twice the slip at peak adhesion, above 2.5 m/s."""
     return _excess_slip_time(stop, slip_rear, setting.peak_slip)
 
 
@@ -217,13 +217,13 @@ def longest_lock_rear(stop: Stop, omega_rear: Samples) -> float:
 
 @measure("%")
 def disc_share_front(stop: Stop, heat_front: Samples, heat_rear: Samples) -> float | Undefined:
-    """Share of the disc heat that goes into this wheel's discs."""
+    """Fraction of the disc heat that goes into this wheel's discs."""
     return _share(_heat(stop, heat_front), _heat(stop, heat_rear))
 
 
 @measure("%")
 def disc_share_rear(stop: Stop, heat_front: Samples, heat_rear: Samples) -> float | Undefined:
-    """Share of the disc heat that goes into this wheel's discs."""
+    """Fraction of the disc heat that goes into this wheel's discs."""
     return _share(_heat(stop, heat_rear), _heat(stop, heat_front))
 
 
