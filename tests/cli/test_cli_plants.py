@@ -39,7 +39,7 @@ def test_texts_and_figures(bywire, tmp_path):
     figure = "motorcycle-plant-p_mc.png"
     assert names >= {"motorcycle-plant-linear-model.json", figure, "report.html"}
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
-    for text in ("largest error up to", "other poles: 1 at 0", "Settings"):
+    for text in ("maximum error up to", "other poles: 1 at 0", "Settings"):
         assert text in page
     assert "other poles: 1 at 0" in outcome.out
 

@@ -28,7 +28,7 @@ def cases(par, options, _=None):
 
 
 def judge(recordings, options):
-    return (Kpi("farthest", float(recordings["run"]["x"].max()), "m", "largest travel"),)
+    return (Kpi("farthest", float(recordings["run"]["x"].max()), "m", "maximum travel"),)
 
 
 PUSH = Experiment("push", "spring-axis", "a push", Options, Options(), cases, judge,

@@ -50,9 +50,9 @@ def test_cut_files(tmp_path, name):
 @pytest.mark.parametrize(
     ("number", "mark", "lost", "text"),
     [
-        ("{:.4f}", ".", 1, "'4.812' without a line end, .* have more decimals"),
-        ("{:.4f}", ",", 2, "'4,81' without a line end, .* have more decimals"),
-        ("{!r}", ".", 9, "without a line end, but all numbers above it are longer"),
+        ("{:.4f}", ".", 1, "'4.812' without a line ending, .* have more decimals"),
+        ("{:.4f}", ",", 2, "'4,81' without a line ending, .* have more decimals"),
+        ("{!r}", ".", 9, "without a line ending, but all numbers above it are longer"),
         ("{:.5e}", ".", 4, "'4.81260' without a line end"),
     ],
 )

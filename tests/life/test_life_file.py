@@ -62,7 +62,7 @@ def test_stops_that_differ_in_pauses_alone_are_simulated_once(plan_of):
         ("life = 3", "life", ""),
         ('life = "wedge-pads"\nset = 1', "set", ""),
         ('life = "wedge-pads"\n[set]\nwear.h_ne = "1 mm"', "name behind 'wear.'", "h_new"),
-        ('life = "wedge-pads"\n[set]\nwear.h_new = 9', "wear.h_new", "a text with its unit"),
+        ('life = "wedge-pads"\n[set]\nwear.h_new = 9', "wear.h_new", "a string with its unit"),
         ('life = "wedge-pads"\n[set]\nwear.h_new = "9"', "h_new", ""),
         ('life = "wedge-pads"\n[set]\nwear.h_new = "-9 mm"', "h_new", "> 0 m"),
         ('life = "wedge-pads"\n[set]\nstop.pauses = "9 s"', "name behind 'stop.'", "pause"),

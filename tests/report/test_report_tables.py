@@ -28,7 +28,7 @@ from bywire.report.terminal import table_text
 KPIS = kpi_table(
     [
         KpiRow("steady_state_error", 1.2e4, "Pa", "mean of the last 0.2 s", "<= 0.1 bar", "missed"),
-        KpiRow("overshoot", 0.034, "1", "share of the step", "<= 0.15", "met"),
+        KpiRow("overshoot", 0.034, "1", "fraction of the step", "<= 0.15", "met"),
         KpiRow("settling_time", float("nan"), "s", "never settles"),
     ]
 )
@@ -42,7 +42,7 @@ class Wire(ParameterSet):
     L: Length
     """length"""
     fill: Fraction
-    """share of copper"""
+    """fraction of copper"""
     law: str
     """which law holds"""
 
@@ -54,7 +54,7 @@ def texts(table: Table) -> list[list[str]]:
 def test_key_figures_are_shown_with_unit_limit_and_result() -> None:
     assert texts(KPIS) == [
         ["steady_state_error", "0.12 bar", "<= 0.1 bar", "missed", "mean of the last 0.2 s"],
-        ["overshoot", "0.034", "<= 0.15", "met", "share of the step"],
+        ["overshoot", "0.034", "<= 0.15", "met", "fraction of the step"],
         ["settling_time", "not defined", "-", "-", "never settles"],
     ]
 

@@ -35,7 +35,7 @@ def found(study):
         columns[FAILURE] = np.where(np.isnan(peaks), "it left the numbers", "")
         said = [json.dumps(["far out; cold", f"hot: {20 + k} degC"]) for k in range(peaks.size)]
         columns[WARNINGS] = np.array(said, dtype=object)
-        kpi = Kpi("peak_current", float(peaks[0]), "A", "Largest current.", error=error)
+        kpi = Kpi("peak_current", float(peaks[0]), "A", "Maximum current.", error=error)
         return Findings(plan, pd.DataFrame(columns), (kpi,))
 
     return make

@@ -191,7 +191,7 @@ def test_an_experiment_needs_no_bench_file(tmp_path):
             'of = ["motor.R_m", "motor.K_e"]\nvalue = 1.0',
             ["[[correlation]] value = 1.0 must be > -1 and < 1"],
         ),
-        ('[vary]\n"motor.R_m" = "+-5 %"\n[set]\n"motor.K_e" = 0.3', ["a text with its unit"]),
+        ('[vary]\n"motor.R_m" = "+-5 %"\n[set]\n"motor.K_e" = 0.3', ["a string with its unit"]),
         ('[vary]\n"motor.R_m" = "+-5 %"\n[design]\nlevels = 3', ["levels", "'monte-carlo'"]),
         (
             '[vary]\n"motor.R_m" = "+-5 %"\n[design]\nkind = "grid"\ncases = 9',

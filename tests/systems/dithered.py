@@ -24,7 +24,7 @@ class Driven(NamedTuple):
     """Force held over a sample, the dither's phase, and the rate at which it moves on."""
 
     u: Annotated[float, Signal("N", "source", 5.0)]
-    phase: Annotated[float, Signal("1", "share of the dither's period")]
+    phase: Annotated[float, Signal("1", "fraction of the dither's period")]
     rate: Annotated[float, Signal("N/s", "rate of the dither", 3e5)]
 
 

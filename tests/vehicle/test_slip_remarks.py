@@ -54,7 +54,7 @@ def test_a_stop_by_pi_on_cobble_says_so_above_its_figures():
     result = bywire.run(
         bywire.Bench("straight-stop", "sport600", options=options), estimate_error=False
     )
-    told = [text for text in result.document().data["remarks"] if "largest adhesion at 0.4" in text]
+    told = [text for text in result.document().data["remarks"] if "maximum adhesion at 0.4" in text]
     assert ["ecu.front_slip.slip_set" in text for text in told] == [True, False]
     run, par = result.recording, result.bench.par.replace(laid("vehicle.road", "dry-cobble"))
     assert TwoWheelerByWire().remarks(run, par) == told

@@ -17,7 +17,7 @@ from bywire.core.typing import Array, Complex, Progress
 
 _PATIENCE = 12  # largest number of windows for loops with friction, which may never repeat exactly
 GAIN, PHASE = 0.01, 0.1
-"""largest difference of gain [dB] and phase [degree] that counts as agreement"""
+"""maximum difference of gain [dB] and phase [degree] that counts as agreement"""
 NOTHING, LIMITS, EVERYTHING = "", "limits", "all"
 """active nonlinearities: none, at a small amplitude; only limits of currents, voltages and rates,
 which act at a large amplitude; all"""

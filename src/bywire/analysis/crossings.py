@@ -20,7 +20,7 @@ Response = Callable[[Array], Complex]
 """``response(frequencies [Hz]) -> complex``, shape (n,) each"""
 
 DROP = math.sqrt(0.5)
-"""share of the start to which a response has fallen at its bandwidth: -3 dB"""
+"""fraction of the start to which a response has fallen at its bandwidth: -3 dB"""
 NEARLY_ZERO = 1.0
 """phase [degree] at the lower end that still counts as 0: a loop of finite gain"""
 _BRACKETS = 4000  # points of the grid that brackets crossings of a function of frequency

@@ -25,7 +25,7 @@ from bywire.analysis.linear.linear_model import LinearModel
 from bywire.core.typing import Array, Complex
 
 NO_LOOP = 1e-9
-"""largest loop gain of a loop without effective feedback"""
+"""maximum loop gain of a loop without effective feedback"""
 _SLOWEST, _SLOW_POINTS = 1e-6, 40  # below the grid, where the loop gain is real, Hz
 _BEYOND = 100.0  # times the fastest pole: where a grid without sampling ends
 _LOWEST = 1e-2  # lower end of the frequencies looked at, Hz
@@ -96,7 +96,7 @@ LOOP_FIGURES: Mapping[str, LoopFigure] = {
         LoopFigure(
             "phase_margin",
             "deg",
-            "smallest phase margin of all gain crossovers",
+            "minimum phase margin of all gain crossovers",
             high=180.0,
             margin="phase",
         ),
@@ -124,7 +124,7 @@ LOOP_FIGURES: Mapping[str, LoopFigure] = {
         LoopFigure(
             "sensitivity_peak",
             "1",
-            "largest magnitude of 1/(1 + L)",
+            "maximum magnitude of 1/(1 + L)",
             low=1.0,
             is_less_better=True,
             margin="sensitivity",
@@ -133,7 +133,7 @@ LOOP_FIGURES: Mapping[str, LoopFigure] = {
         LoopFigure(
             "complementary_peak",
             "1",
-            "largest magnitude of L/(1 + L)",
+            "maximum magnitude of L/(1 + L)",
             is_less_better=True,
             margin="complementary",
             title="max |T|",
@@ -236,7 +236,7 @@ class LoopFigures:
 
     @cached_property
     def growth(self) -> float:
-        """Largest magnitude of the closed loop's poles, integrators without effect left out."""
+        """Maximum magnitude of the closed loop's poles, integrators without effect left out."""
         kept = self.closed.effective()
         poles = np.linalg.eigvals(self.closed.A[np.ix_(kept, kept)])
         return float(np.max(np.abs(poles), initial=0.0))
@@ -274,7 +274,7 @@ class LoopFigures:
     @property
     @_of_a_loop
     def phase_margin(self) -> float:
-        """Smallest phase margin of all gain crossovers [degree]; 180 if there is none."""
+        """Minimum phase margin of all gain crossovers [degree]; 180 if there is none."""
         return min((at.distance for at in self.crossings), default=180.0)
 
     @property
@@ -320,13 +320,13 @@ class LoopFigures:
     @property
     @_of_a_loop
     def sensitivity_peak(self) -> float:
-        """Largest magnitude of 1/(1 + L)."""
+        """Maximum magnitude of 1/(1 + L)."""
         return float(np.max(1.0 / np.abs(1.0 + self.L)))
 
     @property
     @_of_a_loop
     def complementary_peak(self) -> float:
-        """Largest magnitude of L/(1 + L)."""
+        """Maximum magnitude of L/(1 + L)."""
         return float(np.max(np.abs(self.L / (1.0 + self.L))))
 
     @cached_property

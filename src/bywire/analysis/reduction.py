@@ -146,7 +146,7 @@ _NOTHING = 1e-12  # of the largest response: a channel below it has no gain to c
 
 @dataclass(frozen=True)
 class ReductionError:
-    r"""Largest differences of two models over a band, in the worst of all channels.
+    r"""Maximum differences of two models over a band, in the worst of all channels.
 
     Parameters
     ----------
@@ -455,7 +455,7 @@ def reduce(
         best = min(best, error.relative)
     raise ParameterError(
         f"{full.name}: no order has an error below {100.0 * tolerance:g} % up to {high:g} Hz (the "
-        f"smallest error is {100.0 * best:.2g} %). Increase the tolerance, or use a lower band",
+        f"minimum error is {100.0 * best:.2g} %). Increase the tolerance, or use a lower band",
         name="tolerance",
         value=f"{100.0 * tolerance:g} %",
         valid=f">= {100.0 * best:.2g} %",

@@ -266,7 +266,7 @@ class Compared:
 
     @property
     def largest(self) -> float:
-        """Largest magnitude of a key figure, which determines the unit of all its values."""
+        """Maximum magnitude of a key figure, which determines the unit of all its values."""
         known = (abs(v) for v in self.values if v is not None and math.isfinite(v))
         return max(known, default=0.0)
 

@@ -329,7 +329,7 @@ def _for_ecu(
     """Return a case, its changes, and the spans of gains that an ECU can implement.
 
     Parameters that the user has set have no span. If a parameter's span is a single value, the case
-    gets this value, and the changes get it as a text with its unit. ``free`` removes all limits.
+    gets this value, and the changes get it as a string with its unit. ``free`` removes all limits.
     """
     if free:
         return case, dict(changes), {}
@@ -376,7 +376,7 @@ def _from_file(path: Path | None) -> list[str]:
         for limit in limits if isinstance(limits, list) else [limits]:
             if not isinstance(limit, str):
                 raise ParameterError(
-                    f'{path}: {figure} = {limit} is not a text such as ">= 10 Hz"',
+                    f'{path}: {figure} = {limit} is not a string such as ">= 10 Hz"',
                     name=figure,
                     value=str(limit),
                     valid='a text such as ">= 10 Hz"',

@@ -121,7 +121,7 @@ def purity(response: xr.Dataset) -> str:
     shares = ", ".join("-" if np.isnan(share) else f"{share:.3f}" for share in lowest)
     if response.attrs["excitation"] == "sine":
         return (
-            f"smallest share of output power at the sine's frequency: {shares} (the rest is "
+            f"minimum share of output power at the sine's frequency: {shares} (the rest is "
             "harmonics, dither and ripple)"
         )
     return f"lowest coherence of set point and output: {shares}"

@@ -217,7 +217,7 @@ def error_object(error: ReductionError) -> dict[str, Any]:
 def error_line(error: ReductionError) -> str:
     """Return a line on a reduction error over a band."""
     return (
-        f"largest error up to {error.high:.4g} Hz: {_percent(error.relative)} "
+        f"maximum error up to {error.high:.4g} Hz: {_percent(error.relative)} "
         f"({error.gain:.2g} dB, {error.phase:.2g} degrees), at {error.at:.3g} Hz"
         + (f" from {error.channel[1]} to {error.channel[0]}" if error.channel[0] else "")
         + ("" if math.isnan(error.poles) else f", error of its poles there {_percent(error.poles)}")

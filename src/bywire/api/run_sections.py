@@ -212,7 +212,7 @@ def energy_table(books: Ledger) -> Table:
     rows = [row("from", posting.label, posting.energy) for posting in books.sources]
     rows += [row("to", posting.label, posting.energy) for posting in books.sinks]
     rows.append(row("", "closing error", books.closing_error))
-    return text_table(["", "place", "energy", "share of what was given"], rows)
+    return text_table(["", "place", "energy", "fraction of what was given"], rows)
 
 
 def _signal_errors(errors: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> list[Details]:

@@ -331,7 +331,7 @@ def _alike_once(each: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
 
 _POINTS = 200  # of a curve
 _CAPTIONS = {
-    "sobol-indices": "Share of each quantity in each key figure's variance, alone and with all "
+    "sobol-indices": "Fraction of each quantity in each key figure's variance, alone and with all "
     "others, with intervals. Pale bars are not distinct from zero.",
     "morris": "Mean size (with its interval) and standard deviation of each quantity's elementary "
     "effects. Pale bars are not distinct from zero.",

@@ -89,7 +89,7 @@ class StudySurrogates(Answer):
         )
 
     def _table(self) -> Table:
-        heads = ["variance told", "rms error", "largest error", "degree", "terms", "cases"]
+        heads = ["variance told", "rms error", "maximum error", "degree", "terms", "cases"]
         at = ["at these values"] if self.at else []
         rows = []
         for s in self.surrogates.values():

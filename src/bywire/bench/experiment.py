@@ -434,7 +434,7 @@ EXPERIMENTS = Kind("experiment", ("experiments",), instances(Experiment))
 SHORTEST_STEP = 1e-9
 """shortest substep [s]: below it, a single tick of an ECU would take seconds to compute"""
 LARGEST_SEED = 2**63 - 1
-"""largest seed that a recording's file can store"""
+"""maximum seed that a recording's file can store"""
 
 _COPIES = 3  # of the recorded rows in memory, while they become a dataset and a file
 _GIGA = 1e9

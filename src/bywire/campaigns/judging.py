@@ -23,7 +23,7 @@ from bywire.simulation.run import Run, Trajectory, simulate
 from bywire.simulation.tapped import rests
 
 LANES = 64
-"""largest number of runs in one batch, to limit the size of their recordings"""
+"""maximum number of runs in one batch, to limit the size of their recordings"""
 _MOST = 250e6  # largest number of values in memory: 2 GB
 
 

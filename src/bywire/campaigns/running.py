@@ -184,7 +184,7 @@ class CampaignFindings:
 
     @property
     def coverage(self) -> float:
-        """Share of dangerous runs detected in time, weighted by rates; NaN without any."""
+        """Fraction of dangerous runs detected in time, weighted by rates; NaN without any."""
         rows = [(self.plan.rate(f.failing) / f.cases, f.in_time, f.dangerous) for f in self.faults]
         total = sum(weight * dangerous for weight, _, dangerous in rows)
         return sum(weight * seen for weight, seen, _ in rows) / total if total else math.nan

@@ -23,7 +23,7 @@ class Parameters(ParameterSet):
     """
 
     alpha: Weight
-    """share of the slip"""
+    """fraction of the slip"""
     eta_set: Annotated[float, Unit("1", 0.5), Field(ge=0, allow_inf_nan=False)]
     """set point of the wheel's deceleration relative to gravity"""
     tau: TimeConstant

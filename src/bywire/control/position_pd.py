@@ -26,7 +26,7 @@ class Parameters(ParameterSet):
     zeta: Factor
     """damping ratio"""
     c: Weight
-    """share of the reference's speed that is exempt from damping; 0 damps the whole speed"""
+    """fraction of the reference's speed that is exempt from damping; 0 damps the whole speed"""
     f_speed: Frequency
     """corner frequency of the filter for the encoder's differences"""
     i_max: Current

@@ -27,7 +27,7 @@ QUARTER = (
 """2/pi, and pi/2 in three parts; the first two times a whole number are exact"""
 
 SMALL = 0.78
-"""largest angle [rad] without a quarter turn to subtract"""
+"""maximum angle [rad] without a quarter turn to subtract"""
 FAR = 1e5
 """beyond this angle [rad], full turns are subtracted first"""
 FAR_PARTS = (102943.70806884766, 3.982688587811367e-06, 1.3253124088109142e-16)

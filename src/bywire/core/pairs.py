@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from bywire.core.errors import ParameterError
 
 DIGITS = 9
-"""largest number of digits of a count"""
+"""maximum number of digits of a count"""
 _INPUT = ("--input", "Inputs")  # in commands and in forms
 _CHANGE = "KEY=VALUE, for example motor.R_m=0.4ohm"
 _FORMS = {

@@ -68,7 +68,7 @@ def format_to_read(path: Path, name: str = "") -> FileFormat:
             name=str(path),
             valid=_names(),
         )
-    said = f"format = {name!r}" if name else f"its ending {path.suffix!r}"
+    said = f"format = {name!r}" if name else f"its extension {path.suffix!r}"
     if holds:
         content, hint = holds[0].title, f"Rename it, or specify format = {holds[0].name!r}"
     else:
@@ -111,7 +111,7 @@ def format_to_write(path: Path, name: str = "") -> FileFormat:
         return kind
     endings = ", ".join(dict.fromkeys(e for kind in FORMATS.all().values() for e in kind.endings))
     raise FileError(
-        f"{path}: {path.suffix!r} is not the ending of a known format. Use {endings}",
+        f"{path}: {path.suffix!r} is not a known file extension. Use {endings}",
         name=str(path),
         value=path.suffix,
         valid=endings,

@@ -332,7 +332,7 @@ def _clock(
         )
     if column and start is not None:
         raise ParameterError(
-            f"{where}start is valid only with a rate, as a time column defines its own instants",
+            f"{where}start is valid only with a rate, as a time column defines its own times",
             name="start",
         )
     return Clock(column, unit, rate or 0.0, start or 0.0, number)

@@ -127,7 +127,7 @@ def head_text(path: Path, named: str, size: int) -> tuple[list[str], str, bool]:
             )
     if b"\r" in content and b"\n" not in content:
         raise FileError(
-            f"{path}: lines end with CR alone. Save the file with LF line ends", name=str(path)
+            f"{path}: lines end with CR alone. Save the file with LF line endings", name=str(path)
         )
     raw = content.splitlines(keepends=True)
     try:

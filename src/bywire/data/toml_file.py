@@ -14,7 +14,7 @@ from bywire.core.errors import FileError, ParameterError, quoted
 from bywire.core.scratch import NULL_CHARACTER
 
 LARGEST = 1_000_000
-"""largest file size in bytes, checked before parsing"""
+"""maximum file size in bytes, checked before parsing"""
 
 # The time to read a dotted key grows with the square of its parts, so long ones are not read.
 _KEY_PARTS = 16

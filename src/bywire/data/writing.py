@@ -135,7 +135,7 @@ def _require_fit(dataset: xr.Dataset, target: Path, kind: FileFormat) -> None:
         unit = dataset[signal.dims[0]].attrs.get("units", "s")
         if unit != "s":
             raise FileError(
-                f"cannot write {target}: the instants of {name} are in {unit!r}, not s",
+                f"cannot write {target}: the times of {name} are in {unit!r}, not s",
                 name=str(name),
                 value=unit,
                 valid="s",
@@ -151,7 +151,7 @@ def _require_fit(dataset: xr.Dataset, target: Path, kind: FileFormat) -> None:
             valid="time",
         )
     raise FileError(
-        f"cannot write {target}: the signals were measured at different instants "
+        f"cannot write {target}: the signals were measured at different times "
         f"({', '.join(axes)}), but a {kind.name} file has only one time axis. Resample them "
         "(bywire convert --rate, or resample), or use mat, mdf4 or netcdf",
         name=str(target),

@@ -127,7 +127,7 @@ def computed(
 
 _EXPLAINED = 0.5  # of the variance: more than the residual
 _BETWEEN = (
-    ". Outputs were measured at uneven instants and interpolated, which adds errors if they "
+    ". Outputs were measured at uneven times and interpolated, which adds errors if they "
     "change fast from sample to sample"
 )
 _FEW = 0.02  # largest share of residuals that may be outliers
@@ -209,7 +209,7 @@ def _checks_of(
             explained(trials, fit, counted),
             limit=_EXPLAINED,
             at_least=True,
-            note="share of the outputs' variance, over their noise, that the model predicts",
+            note="fraction of the outputs' variance, over their noise, that the model predicts",
             next_step=f"check that {option('inputs')} drove the record, and check its unit and "
             "sign ('bywire replay' plots both)",
         ),

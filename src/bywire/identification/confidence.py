@@ -304,7 +304,7 @@ def misfit(estimate: Estimate) -> str:
 def least_determined(estimate: Estimate, J: Array) -> tuple[int, str] | None:
     """Return the unknown that the data do not determine, with the reason; None if there is none."""
     share = estimate.singular_values[-1] / max(estimate.singular_values[0], 1e-300)
-    reason = f"smallest singular value {share:.1e} of the largest"
+    reason = f"minimum singular value {share:.1e} of the largest"
     silent = np.flatnonzero(~J.any(axis=0))
     if silent.size:
         return int(silent[0]), "no measured signal depends on it"

@@ -161,7 +161,7 @@ def checks_of(trials: Sequence[Trial], fit: Estimate) -> tuple[Check, ...]:
             explained(trials, fit),
             limit=_EXPLAINED,
             at_least=True,
-            note="share of the current's variance that the model predicts. A low share may mean "
+            note="fraction of the current's variance that the model predicts. A low share may mean "
             "that demand and current do not belong together",
         ),
         Check(

@@ -370,7 +370,7 @@ def _said(report: AlignmentReport) -> str:
     missing = max(channel.excluded for channel in report.channels)
     left_out = f", of which {missing} are in gaps and not used" if missing else ""
     return (
-        f"resampled, because its instants are not evenly spaced, to {report.samples} samples every "
+        f"resampled, because its samples are not evenly spaced, to {report.samples} samples every "
         f"{1e3 * report.interval:.6g} ms{left_out}"
     )
 

@@ -203,7 +203,7 @@ class Options(ParameterSet):
     most_residual: Factor
     """ratio of residual to noise above which the model does not explain the record"""
     most_outliers: Share
-    """largest share of residuals beyond four times the noise that a robust loss may exclude"""
+    """maximum share of residuals beyond four times the noise that a robust loss may exclude"""
     least_vaf: Share
     """least variance accounted for in the held-out record, for each signal"""
     noise: Share

@@ -208,7 +208,7 @@ def _correlation(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
 _STEADY = 0.02  # of the demand's range: it holds while it moves less than this over a window
 _WINDOW = 0.1  # s
 _MOST = 60
-_Limits = Annotated[Mapping[str, str], Field(default_factory=dict), Hint("write a text, '<= 5 %'")]
+_Limits = Annotated[Mapping[str, str], Field(default_factory=dict), Hint("write text, '<= 5 %'")]
 _Instant = Annotated[float, Unit("s"), Hint('for example, write start = "1 s", stop = "2 s"')]
 
 
@@ -522,7 +522,7 @@ def fit_figures(pair: xr.Dataset, segment: Segment) -> tuple[Kpi, ...]:
             "Variance accounted for: 1 minus the ratio of error variance to measured variance.",
             "" if variance else still,
         ),
-        Kpi("max_error", float(np.abs(error).max()), unit, "Largest magnitude of the error."),
+        Kpi("max_error", float(np.abs(error).max()), unit, "Maximum magnitude of the error."),
         Kpi("bias", float(error.mean()), unit, "Mean of modeled minus measured."),
         Kpi(
             "lag", lag, "s", "Delay of the model behind the measurement, by correlation.", lag_note

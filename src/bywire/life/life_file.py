@@ -202,7 +202,7 @@ def _is_of_life(name: str) -> bool:
 def _texts(changes: Mapping[str, Any]) -> dict[str, str]:
     for key, value in changes.items():
         if not isinstance(value, str):
-            valid = f"a text with its unit, in the form of {option('overrides')}"
+            valid = f"a string with its unit, in the form of {option('overrides')}"
             raise not_valid(f"[set] {key}", quoted(value), valid)
     return dict(changes)
 

@@ -23,7 +23,7 @@ C2 = Annotated[float, Signal("1", "adhesion coefficient c2", 30.0), Ge(10)]
 C3 = Annotated[float, Signal("1", "adhesion coefficient c3", 0.5), Gt(0)]
 Stiffness = Annotated[float, Signal("1", "stiffness factor", 10.0), Ge(8), Le(40)]
 Shape = Annotated[float, Signal("1", "shape factor", 1.6), Ge(1.5), Le(1.9)]
-Largest = Annotated[float, Signal("1", "largest adhesion", 1.0), Gt(0)]
+Largest = Annotated[float, Signal("1", "maximum adhesion", 1.0), Gt(0)]
 Curvature = Annotated[float, Signal("1", "curvature factor", 0.5), Ge(0), Le(0.9)]
 _NEWTON, _LEVEL, _LEAST = 3, 1e-4, 1e-16  # steps; smallest slope, in slip; floor of roots
 _MAGIC_NEWTON = 6  # steps, from the tangent at zero; enough up to E = 1 and a peak at 6/B
@@ -43,7 +43,7 @@ class SurfaceParameters(ParameterSet):
     C: Annotated[float, Unit("1", 1.6), Field(gt=1, lt=4, allow_inf_nan=False)]
     """shape factor of the Magic Formula: decrease of the adhesion beyond its peak"""
     D: Coefficient
-    """largest adhesion of the Magic Formula"""
+    """maximum adhesion of the Magic Formula"""
     E: Annotated[float, Unit("1", 0.5), Field(ge=-100, le=1, allow_inf_nan=False)]
     """curvature factor of the Magic Formula: position of the peak"""
 

@@ -50,7 +50,7 @@ class Input(NamedTuple):
 class Output(NamedTuple):
     """Torque that the discs can hold."""
 
-    torque: Annotated[float, Signal("N*m", "largest brake torque", 300.0)]
+    torque: Annotated[float, Signal("N*m", "maximum brake torque", 300.0)]
 
 
 def torque_per_pressure(

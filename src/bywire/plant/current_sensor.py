@@ -1,4 +1,4 @@
-"""Hall-effect current sensor: current as a share of its span."""
+"""Hall-effect current sensor: current as a fraction of its span."""
 
 from __future__ import annotations
 

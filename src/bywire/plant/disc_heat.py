@@ -38,7 +38,7 @@ class Parameters(ParameterSet):
     C_f: HeatCapacity
     """heat capacity of the calipers with their fluid"""
     psi: Weight
-    """share of the friction's heat that goes into the discs"""
+    """fraction of the friction's heat that goes into the discs"""
     A: Area
     """surface of the discs that the air cools"""
     h_0: Convection

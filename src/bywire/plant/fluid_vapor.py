@@ -22,13 +22,13 @@ class Parameters(ParameterSet):
     """Boiling points according to FMVSS 116, at atmospheric pressure, and growth of vapor."""
 
     water: Share
-    """share of water in the fluid, by mass"""
+    """fraction of water in the fluid, by mass"""
     T_dry: Temperature
     """boiling point of fluid without water"""
     T_wet: Temperature
     """boiling point with ``water_wet``"""
     water_wet: Annotated[float, Unit("1", 0.037), Field(gt=0, lt=1, allow_inf_nan=False)]
-    """share of water in wet fluid, up to which these values are valid"""
+    """fraction of water in wet fluid, up to which these values are valid"""
     V: Volume
     """volume of the hot fluid"""
     growth: Growth

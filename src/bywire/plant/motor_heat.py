@@ -1,4 +1,4 @@
-"""Heat of a motor: copper loss heats the winding, the winding the housing, the housing the air.
+"""Motor heat: copper loss heats the winding, which heats the housing, which heats the air.
 
 The resistance of copper grows with temperature, and magnets become weaker. The motor's resistance
 and torque constant follow from `warmth`.

@@ -36,7 +36,7 @@ class Parameters(ParameterSet):
     F_fr: Force
     """friction force on the piston"""
     rollback: Weight
-    """share of the friction with which the deformed seal retracts the piston; 0 if seized"""
+    """fraction of the friction with which the deformed seal retracts the piston; 0 if seized"""
 
 
 FAULTS = (

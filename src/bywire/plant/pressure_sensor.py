@@ -1,4 +1,4 @@
-"""Piezoresistive pressure sensor: absolute pressure as a share of its span."""
+"""Piezoresistive pressure sensor: absolute pressure as a fraction of its span."""
 
 from __future__ import annotations
 

@@ -52,8 +52,8 @@ class Contact(NamedTuple):
 class Limits(NamedTuple):
     """Limits of a tire's force at its slip."""
 
-    mu: Annotated[float, Signal("1", "largest adhesion", 1.0)]
-    u: Annotated[float, Signal("m", "largest deflection", 1e-2)]
+    mu: Annotated[float, Signal("1", "maximum adhesion", 1.0)]
+    u: Annotated[float, Signal("m", "maximum deflection", 1e-2)]
 
 
 class Input(NamedTuple):
@@ -69,8 +69,8 @@ class Input(NamedTuple):
     C: adhesion.Shape
     D: adhesion.Largest
     E: adhesion.Curvature
-    mu_max: Annotated[float, Signal("1", "largest adhesion", 1.0), Ge(0)]
-    u_max: Annotated[float, Signal("m", "largest deflection", 1e-2), Gt(0)]
+    mu_max: Annotated[float, Signal("1", "maximum adhesion", 1.0), Ge(0)]
+    u_max: Annotated[float, Signal("m", "maximum deflection", 1e-2), Gt(0)]
 
 
 class Output(NamedTuple):

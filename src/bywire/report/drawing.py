@@ -365,7 +365,7 @@ _DECIMALS = re.compile(r"(\.\d)\d+")  # of a coordinate; what is kept of them
 _SECONDS = {"s": 1.0, "ms": 1e-3}
 
 BUDGET = 2_000_000
-"""largest total size of vector graphics on a page [byte]"""
+"""maximum total size of vector graphics on a page [byte]"""
 
 
 def inline_figures(

@@ -37,7 +37,7 @@ COLORS = {
 """fixed colors of energies in every figure; others use the remaining colors"""
 SOURCE_COLORS = ("#4A4A4A", "#9A9A9A", "#C4C4C4")
 SMALL = 1e-3
-"""share of the total energy below which entries are merged into the rest"""
+"""fraction of the total energy below which entries are merged into the rest"""
 NEGLIGIBLE = 1e-9
 """share below which the rest is not drawn"""
 REST_COLOR = "#E4E4E4"

@@ -48,8 +48,8 @@ class ResultFolder:
         for name in new:
             if (self.folder / name).is_dir():
                 raise FileError(
-                    f"cannot write {self.folder / name}: a folder of that name already exists. "
-                    "Remove it, or use another folder for the result",
+                    f"cannot write {self.folder / name}: a folder of that name already "
+                    "exists. Remove it, or choose another folder for the result",
                     name=str(self.folder / name),
                 )
         old = earlier_files(self.folder)

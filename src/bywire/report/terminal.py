@@ -21,14 +21,14 @@ from bywire.report.document import (
 from bywire.report.tables import Table
 
 WIDTH = 120
-"""largest number of characters in a line of prose"""
+"""maximum number of characters in a line of prose"""
 GAP = "  "
 NARROWEST = 12
 """least width of a column that is wrapped"""
 LONGEST_WORD = 40
 """length of the longest word that is never broken"""
 LONGEST_VALUE = 60
-"""largest number of characters of a value, such as a table, in a sentence on changes"""
+"""maximum number of characters of a value, such as a table, in a sentence on changes"""
 
 
 def terminal_text(document: Document, verbose: bool = False) -> str:

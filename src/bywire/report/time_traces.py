@@ -127,7 +127,7 @@ def _spans(recording: xr.Dataset, variable: str) -> list[tuple[float, float]]:
 # --- Traces
 
 _NEAR = 0.5
-"""share of a limit above which its lines are drawn"""
+"""fraction of a limit above which its lines are drawn"""
 _LASTING = 0.9  # share of a phase above which short breaks are ignored
 
 
@@ -643,7 +643,7 @@ def _factor(recordings: Sequence[xr.Dataset]) -> tuple[float, str]:
 # --- Differences: each minus the first, at the first one's times
 
 _LEAST = 1e-9
-"""share of a signal's largest magnitude below which a difference counts as rounding"""
+"""fraction of a signal's largest magnitude below which a difference counts as rounding"""
 
 
 def difference_figure(recordings: Mapping[str, xr.Dataset]) -> Figure | None:

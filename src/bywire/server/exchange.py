@@ -31,7 +31,7 @@ class RefusedError(Exception):
 # --- Requests and answers
 
 LARGEST_FORM = 200_000
-"""largest form, in bytes"""
+"""maximum form, in bytes"""
 PAGES = (
     "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; "
     "frame-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"

@@ -73,7 +73,7 @@ class Field:
             return bool(self.default) if given is None else given
         text = "" if given is None else given
         if not isinstance(text, str) or len(text) > _LONGEST or "\0" in text:
-            raise not_valid(self.name, quoted(given), f"a text of at most {_LONGEST:,} characters")
+            raise not_valid(self.name, quoted(given), f"text of at most {_LONGEST:,} characters")
         lines = [line.strip() for line in text.splitlines() if line.strip()]
         if self.is_required and not lines:
             raise ParameterError(f"{self.label} is required. Fill it in", name=self.label)

@@ -54,7 +54,7 @@ def _signal(process: subprocess.Popen[bytes], number: int) -> None:
 TOGETHER = 2
 """number of jobs that compute at the same time"""
 MOST = 100
-"""largest number of jobs that wait or compute"""
+"""maximum number of jobs that wait or compute"""
 _KEPT = 200  # jobs in the list
 _PATIENCE = 5.0  # s that a job has to end after an interrupt
 _ENDED = ("done", "failed", "canceled")

@@ -60,8 +60,8 @@ def uploaded(place: Place, request: Request, name: str, largest: int) -> Path:
 def _unknown_format(name: str) -> RefusedError:
     return RefusedError(
         415,
-        f"{name[:100]!r} does not have the ending of a measurement format. Valid endings "
-        f"are {', '.join(endings())}",
+        f"{name[:100]!r} does not have the extension of a measurement file. Valid extensions are "
+        f"{', '.join(endings())}",
     )
 
 

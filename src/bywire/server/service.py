@@ -15,7 +15,7 @@ from bywire.server.live_pages import LivePages
 from bywire.server.place import Place
 
 LARGEST_FILE = 1_000_000_000
-"""largest uploaded measurement, in bytes"""
+"""maximum uploaded measurement, in bytes"""
 
 
 @dataclass(frozen=True)

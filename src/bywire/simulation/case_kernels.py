@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from bywire.simulation.program import Program
 
 PAIRED = 32
-"""smallest number of cases for kernels that alternate two vectors; fewer would leave lanes idle"""
+"""minimum number of cases for kernels that alternate two vectors; fewer would leave lanes idle"""
 
 
 class CaseKernel(Protocol):

@@ -27,7 +27,7 @@ SAMPLED = ("monte-carlo", "latin-hypercube", "sobol")
 SPANNED = ("grid", "corners", "one-at-a-time")
 """designs that visit the ends: they show what can happen, not how often"""
 MOST = 10_000_000
-"""largest number of cases of a study"""
+"""maximum number of cases of a study"""
 _INSIDE = (2.0**-53, 1.0 - 2.0**-53)  # probabilities that have a finite quantile
 _CORNERS = 16  # quantities of which all corners are visited
 

@@ -71,12 +71,12 @@ class Effect:
 
     @property
     def largest(self) -> float:
-        """Largest value, including that of the bench itself."""
+        """Maximum value, including that of the bench itself."""
         return float(np.nanmax([*self.figures, self.nominal]))
 
     @property
     def swing(self) -> float:
-        """Largest minus least value."""
+        """Maximum minus least value."""
         return self.largest - self.least
 
     @property
@@ -317,7 +317,7 @@ class Findings:
 
     @cached_property
     def _sizes(self) -> Mapping[str, float]:
-        """Largest magnitude of every key figure, kept because every cell of a table needs it."""
+        """Maximum magnitude of every key figure, kept because every cell of a table needs it."""
         return {s.name: max(abs(s.least), abs(s.largest)) for s in self.spreads}
 
     @cached_property

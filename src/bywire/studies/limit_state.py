@@ -317,7 +317,7 @@ def _design_point(search: Trail, quantities: int) -> Array:
             form.run()
             point = np.array(form.getResult().getStandardSpaceDesignPoint())
     except RuntimeError:  # messages of OpenTURNS for zero derivatives, and for no convergence
-        raise _NoDesignPointError("the figure does not lead to its limit") from None
+        raise _NoDesignPointError("the search did not reach the key figure's limit") from None
     if not np.isfinite(point).all() or abs(float(scaled(point[None, :])[0])) > 0.1:
         raise _NoDesignPointError(f"{_ITERATIONS} steps did not come to the limit")
     return point

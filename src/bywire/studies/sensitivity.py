@@ -35,7 +35,7 @@ class Estimate:
 
 @dataclass(frozen=True)
 class VarianceShares:
-    """Share of a quantity in the variance of a figure.
+    """Fraction of a quantity in the variance of a figure.
 
     Parameters
     ----------

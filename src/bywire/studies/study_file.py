@@ -415,11 +415,11 @@ def read_bench(
     for key, value in flat.items():
         if not isinstance(value, str):
             raise ParameterError(
-                f"[set] {key} = {quoted(value)} is not valid: it must be a text with its unit, in "
-                f"the form of {option('overrides')}",
+                f"[set] {key} = {quoted(value)} is not valid: it must be a string with its unit, "
+                f"in the form of {option('overrides')}",
                 name=f"[set] {key}",
                 value=quoted(value),
-                valid="a text with its unit",
+                valid="a string with its unit",
             )
     there = source if names_experiment(source) else folder / source
     return bench_file.read(there, {**flat, **overrides})

@@ -295,7 +295,7 @@ def starts_of(problem: Problem, given: Sequence[Array], seed: int) -> list[Array
 DISK = 0.5
 """least disk margin: gain by a factor of 1.67, phase by 28 degree"""
 ERROR = 5.0
-"""largest steady-state error [%]"""
+"""maximum steady-state error [%]"""
 _WORSE = 1.5  # largest factor by which kept figures of the start may worsen
 _TRACKS = 50.0  # error above which an output does not track the set point by design, %
 

@@ -237,7 +237,7 @@ _ENOUGH = 0.02  # worst slack at which the search ends
 _NEAR = 0.03  # distance to the best worst slack below which all is measured
 _MEMBERS = 36
 GENERATIONS = 60
-"""largest number of generations of a search"""
+"""maximum number of generations of a search"""
 _REACH = 0.5  # of the linear ranges (logarithmic), around the linear design
 
 
@@ -425,7 +425,7 @@ def _candidates(
 # --- Verification
 
 MOST = 8
-"""largest number of tried corners"""
+"""maximum number of tried corners"""
 
 
 @dataclass(frozen=True)

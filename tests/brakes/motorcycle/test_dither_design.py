@@ -159,7 +159,7 @@ def test_a_small_study_finds_a_dither_that_holds_on_the_bench() -> None:
     assert kpis["optimum_copper"] < 1.05 * kpis["given_copper"]
     assert kpis["given_gain"] == 1.0
     assert 0.7 < kpis["given_plant_gain"] / 10.1e5 < 0.8
-    assert any("share of the time stuck at 20 bar" in text for text in found.limits)
+    assert any("fraction of the time stuck at 20 bar" in text for text in found.limits)
     row = found.cuts[1].data.isel(pressure=0)
     assert float(row["torque"]) == pytest.approx(float(row["breakaway"]), rel=0.1)  # eq. (18)
     assert set(found.data.dims) == {"pressure", "gain", "frequency"}

@@ -35,7 +35,7 @@ from bywire.simulation.run import Run
 HARMONICS = 9
 """highest harmonic that counts as distortion"""
 STILL = 1e-12
-"""largest peak-to-peak value of an output at rest, as a share of its usual magnitude"""
+"""maximum peak-to-peak value of an output at rest, as a share of its usual magnitude"""
 
 
 def require_stable(closed: LinearModel) -> None:

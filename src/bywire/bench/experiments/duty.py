@@ -32,7 +32,7 @@ class Options(ParameterSet):
     period: Duration
     """time from one application to the next"""
     share: Share
-    """share of the period in which the input is applied; 1 applies it continuously"""
+    """fraction of the period in which the input is applied; 1 applies it continuously"""
     duration: Duration
     """length of the recording"""
     record: Duration

@@ -43,7 +43,7 @@ class Options(ParameterSet):
     levels: Levels
     """levels of that state"""
     speed_max: Speed
-    """largest speed, both directions"""
+    """maximum speed, both directions"""
 
 
 def build(tested: TestedModel) -> Experiment:
@@ -54,15 +54,15 @@ def build(tested: TestedModel) -> Experiment:
     figures = Figures(
         breakaway_forward=(
             force,
-            "Largest breakaway friction toward positive speeds, over all levels.",
+            "Maximum breakaway friction toward positive speeds, over all levels.",
         ),
         breakaway_backward=(
             force,
-            "Largest breakaway friction toward negative speeds, over all levels.",
+            "Maximum breakaway friction toward negative speeds, over all levels.",
         ),
         least_friction=(
             force,
-            "Smallest friction in either direction, over all speeds and levels.",
+            "Minimum friction in either direction, over all speeds and levels.",
         ),
     )
 

@@ -24,7 +24,7 @@ Instant = Annotated[float, Unit("s", 1.0), Field(ge=-1e6, le=1e6, allow_inf_nan=
 Share = Annotated[float, Unit("1", 0.5), Field(gt=0, le=1, allow_inf_nan=False)]
 STAGES = 50  # number of steps in which a parameter follows a ramp
 MOST = 10_000
-"""largest number of an intermittent fault's periods in a run"""
+"""maximum number of an intermittent fault's periods in a run"""
 _EDGE = 1e-9  # s, within which an instant counts as reached
 
 
@@ -40,7 +40,7 @@ class Course(ParameterSet):
     every: TimeConstant
     """period of an intermittent fault; 0: not intermittent"""
     share: Share
-    """share of the period ``every`` in which the fault is present"""
+    """fraction of the period ``every`` in which the fault is present"""
 
     @model_validator(mode="after")
     def _comes_and_goes(self) -> Course:

@@ -30,7 +30,7 @@ class Setting:
 
 @measure("A")
 def peak_current(current: Samples | None) -> float | Undefined:
-    """Largest magnitude of the motor current.
+    """Maximum magnitude of the motor current.
 
     Evaluated at the recorded samples, including dither and ripple.
     """
@@ -53,7 +53,7 @@ def mean_current(t: Samples, current: Samples | None) -> float | Undefined:
 
 @measure("W")
 def peak_power(power: Samples | None) -> float | Undefined:
-    """Largest electrical power drawn from the battery or source.
+    """Maximum electrical power drawn from the battery or source.
 
     Power that is fed back is negative. Evaluated at the recorded samples, including dither and
     ripple.

@@ -1,4 +1,4 @@
-"""Largest and smallest value of a signal."""
+"""Maximum and smallest value of a signal."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ class Setting:
 
 @measure("level")
 def output_max(signal: Samples) -> float:
-    """Largest recorded value of the output."""
+    """Maximum recorded value of the output."""
     return max(signal)
 
 
 @measure("level")
 def output_min(signal: Samples) -> float:
-    """Smallest recorded value of the output."""
+    """Minimum recorded value of the output."""
     return min(signal)

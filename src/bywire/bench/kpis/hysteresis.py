@@ -160,7 +160,7 @@ def loop_width_mid(loop: Loop) -> float | Undefined:
 
 @measure("drive")
 def loop_width_max(loop: Loop) -> float | Undefined:
-    """Largest width of the loop, in units of the drive.
+    """Maximum width of the loop, in units of the drive.
 
     The width of largest magnitude at 401 evenly spaced levels within the response's range, each as
     in `loop_width_mid`. Levels that the release does not reach are left out. Ripple widens the loop

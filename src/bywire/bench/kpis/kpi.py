@@ -87,7 +87,7 @@ class Figures:
 
     Examples
     --------
-    >>> figures = Figures(force=("N", "Largest force."), undefined="nothing presses")
+    >>> figures = Figures(force=("N", "Maximum force."), undefined="nothing presses")
     >>> figures.units
     {'force': 'N'}
     >>> figures(force=math.nan)[0].note

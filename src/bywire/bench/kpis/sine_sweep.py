@@ -135,7 +135,7 @@ def sweep_gain(data: Sweep) -> float | Undefined:
 
 @measure("1")
 def sweep_peak(data: Sweep) -> float | Undefined:
-    """Largest gain, relative to the gain at the lowest frequency."""
+    """Maximum gain, relative to the gain at the lowest frequency."""
     gains = np.abs(data.values)
     return float(np.max(gains) / gains[0]) if data.moves[0] else _STILL
 

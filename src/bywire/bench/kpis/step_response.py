@@ -211,7 +211,7 @@ def settling_time(response: Response) -> float | Undefined:
 
 @measure("%")
 def overshoot(response: Response) -> float | Undefined:
-    """Largest excess of the response over the end level, in % of the step height.
+    """Maximum excess of the response over the end level, in % of the step height.
 
     The largest sample counts. The figure is 0 if the response never exceeds the end level. If the
     response does not settle, it is unknown whether it would overshoot.

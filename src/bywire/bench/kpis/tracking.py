@@ -118,7 +118,7 @@ def tracking_rms(data: Tracking) -> float | Undefined:
 
 @measure("level")
 def tracking_max(data: Tracking) -> float | Undefined:
-    """Largest magnitude of the signal minus its set point."""
+    """Maximum magnitude of the signal minus its set point."""
     return float(np.max(np.abs(data.y - data.demand)))
 
 

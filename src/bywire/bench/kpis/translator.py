@@ -51,7 +51,7 @@ _OPERATORS: dict[type, str] = {
     ast.NotEq: "!=",
 }
 _MOST_NUMBERS = 3
-"""largest number of numbers in the text of an undefined figure, as in `bw_undefined` of loops.h"""
+"""maximum number of numbers in the text of an undefined figure, as in `bw_undefined` of loops.h"""
 _C_WORDS = (
     "auto case char const default do double enum extern float goto inline int long register "
     "restrict short signed sizeof static struct switch typedef union unsigned void volatile"

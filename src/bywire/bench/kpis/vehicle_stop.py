@@ -147,7 +147,7 @@ def jerk(stop: Stop, a: Samples) -> float:
 
 @measure("rad")
 def peak_pitch(stop: Stop, phi: Samples) -> float:
-    """Largest nose-down pitch, relative to the pitch at time zero."""
+    """Maximum nose-down pitch, relative to the pitch at time zero."""
     return max(phi[stop.begin : stop.until]) - value_at(stop.t, phi, 0.0)
 
 
@@ -217,13 +217,13 @@ def longest_lock_rear(stop: Stop, omega_rear: Samples) -> float:
 
 @measure("%")
 def disc_share_front(stop: Stop, heat_front: Samples, heat_rear: Samples) -> float | Undefined:
-    """Share of the disc heat that goes into this wheel's discs."""
+    """Fraction of the disc heat that goes into this wheel's discs."""
     return _share(_heat(stop, heat_front), _heat(stop, heat_rear))
 
 
 @measure("%")
 def disc_share_rear(stop: Stop, heat_front: Samples, heat_rear: Samples) -> float | Undefined:
-    """Share of the disc heat that goes into this wheel's discs."""
+    """Fraction of the disc heat that goes into this wheel's discs."""
     return _share(_heat(stop, heat_rear), _heat(stop, heat_front))
 
 

@@ -139,7 +139,7 @@ def _efficiency(par: Par) -> float:
 # --- Trials
 
 FIGURES = {
-    "stuck": ("1", "share of the time stuck"),
+    "stuck": ("1", "fraction of the time stuck"),
     "band": ("1", "remaining dead band"),
     "ripple_sensor": ("Pa", "ripple at the sensor, p-p"),
     "ripple_caliper": ("Pa", "ripple at the caliper, p-p"),
@@ -299,7 +299,7 @@ COSTS = ("ripple_caliper", "current_share", "duty_share")
 """figures that increase with the amplitude"""
 
 NAMES = {
-    "stuck": "share of the time stuck",
+    "stuck": "fraction of the time stuck",
     "band": "remaining dead band",
     "ripple_caliper": "ripple at the caliper",
     "current_share": "current limit",

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FARTHEST = 60.0
-"""largest brake factor on the y axis; the factor is unbounded at the neutral point"""
+"""maximum brake factor on the y axis; the factor is unbounded at the neutral point"""
 
 
 @dataclass(frozen=True)

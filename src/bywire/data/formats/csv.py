@@ -256,9 +256,9 @@ def _require_whole_end(path: Path, block: bytes, last_line: int, dialect: Dialec
         few = f"all but {as_short}" if as_short else "all"
         cell = quoted(cells[-1].decode("utf-8", "replace"))
         raise FileError(
-            f"{path}, line {last_line} ends with {cell} without a line end, but {few} numbers "
+            f"{path}, line {last_line} ends with {cell} without a line ending, but {few} numbers "
             f"above it {more}. Remove the row if the recording was interrupted here, or add a "
-            "line end if the row is complete",
+            "line ending if the row is complete",
             name=str(path),
             value=cell,
         )

@@ -183,7 +183,7 @@ def _open(path: Path, options: ReadOptions) -> Iterator[Mat73Source]:
     with h5py.File(path, "r") as file:
         if _NETCDF in file.attrs:
             raise FileError(
-                f"{path} is a NetCDF file. Rename it with the ending .nc, or specify "
+                f"{path} is a NetCDF file. Rename it with the extension .nc, or specify "
                 "format = 'netcdf'",
                 name=str(path),
                 valid="'netcdf'",

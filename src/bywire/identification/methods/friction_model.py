@@ -226,7 +226,7 @@ class Options(ParameterSet):
     ]
     """one of the laws, or a comparison of all on held-out data"""
     slowest: Share
-    """share of the fastest speed; slower samples stick or reverse, and are not used"""
+    """fraction of the fastest speed; slower samples stick or reverse, and are not used"""
     pressures: Annotated[Nodes, Unit("Pa", 2e6), Field(min_length=1)]
     """pressures of simulated records, one per record"""
     v_max: Annotated[float, Unit("m/s", 0.1), Field(gt=0)]

@@ -121,7 +121,7 @@ def sensitivity_bars(
         scale = difference_scale(sizes[name], units[name])
         _draw_indices(axes, each, 1.0 if is_share else scale.factor)
         axes.set_xlabel(
-            "share of the variance [-]" if is_share else scale.label("elementary effect")
+            "fraction of the variance [-]" if is_share else scale.label("elementary effect")
         )
     labels = _LABELS[type(next(iter(shown.values()))[0])]
     colors = (style.BLUE, style.ORANGE)

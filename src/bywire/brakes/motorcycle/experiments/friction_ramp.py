@@ -20,7 +20,7 @@ from bywire.data.recursive_filter import low_passed
 
 WITHOUT, WITH = "without-dither", "with-dither"
 
-PEAK = Figures(p_max=("Pa", "Largest master-cylinder pressure."))
+PEAK = Figures(p_max=("Pa", "Maximum master-cylinder pressure."))
 RATIO = Figures(
     loop_area_ratio=("1", "Loop area with dither, relative to the area without dither.")
 )

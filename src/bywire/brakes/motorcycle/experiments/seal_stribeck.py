@@ -17,8 +17,8 @@ from bywire.data.labeled import labeled
 from bywire.plant import seal_friction
 
 FIGURES = Figures(
-    breakaway_apply=("N*m", "Largest friction torque while applying, at the highest pressure."),
-    breakaway_release=("N*m", "Largest friction torque while releasing, at the highest pressure."),
+    breakaway_apply=("N*m", "Maximum friction torque while applying, at the highest pressure."),
+    breakaway_release=("N*m", "Maximum friction torque while releasing, at the highest pressure."),
 )
 
 
@@ -28,7 +28,7 @@ class Options(ParameterSet):
     pressures: Annotated[Nodes, Unit("Pa", 2e6), Field(min_length=1)]
     """master-cylinder pressures, one curve each"""
     omega_max: Annotated[float, Unit("rad/s", 2.0), Field(gt=0, allow_inf_nan=False)]
-    """largest motor speed, in both directions"""
+    """maximum motor speed, in both directions"""
 
 
 def static(par: MotorcycleParameters, options: Options) -> dict[str, xr.Dataset]:

@@ -295,9 +295,9 @@ class Options(ParameterSet):
     fit: Literal["two-step", "joint"]
     """alternate K, tau_L, T_L from steps and T1, T2 from sines, or fit all to all records"""
     turns: Annotated[int, Unit("1", 20), Field(ge=1, le=200)]
-    """largest number of turns of the two steps; the paper uses 1"""
+    """maximum number of turns of the two steps; the paper uses 1"""
     plant: Literal["brake", "eq-22"]
-    """synthetic: the whole brake with friction, or a linear one, exactly eq. (22)"""
+    """synthetic: the whole brake with friction, or a linear model exactly as in eq. (22)"""
     p_low: Pressure
     """synthetic: mean pressure of the low region"""
     p_medium: Pressure

@@ -30,9 +30,9 @@ class Options(LoopOptions):
     p_start: Pressure
     """synthetic: pressure that the stuck piston holds"""
     i_low: Current
-    """synthetic: depth of the steps below the holding current, within breakaway"""
+    """synthetic: size of the steps below the holding current, within breakaway"""
     i_high: Current
-    """synthetic: height of the steps above the holding current, within breakaway"""
+    """synthetic: size of the steps above the holding current, within breakaway"""
     sigma_i: Annotated[float, Unit("A", 5e-3), Field(ge=0)]
     """synthetic: noise of the measured current, upstream of the converter"""
 

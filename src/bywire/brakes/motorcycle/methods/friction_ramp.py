@@ -262,7 +262,7 @@ class Options(ParameterSet):
     """Definition of a slip, and noise of the measurements."""
 
     least: Pressure
-    """smallest change of pressure that counts as a slip"""
+    """minimum change of pressure that counts as a slip"""
     longest: Duration
     """longest part of a slip that the fit compares"""
     scatter: Current

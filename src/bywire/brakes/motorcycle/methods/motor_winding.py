@@ -44,9 +44,9 @@ class Options(ParameterSet):
     p_start: Pressure
     """pressure that the stuck piston holds"""
     i_low: Current
-    """stuck: depth of the steps below the holding current, within breakaway"""
+    """stuck: size of the steps below the holding current, within breakaway"""
     i_high: Current
-    """stuck: height of the steps above the holding current, within breakaway"""
+    """stuck: size of the steps above the holding current, within breakaway"""
     v_high: Voltage
     """turning: highest voltage"""
     dwell: Duration

@@ -253,21 +253,21 @@ def sine_figures(label: str, par: Par, top: float, amplitude: float, f: float) -
             f"{label}_bench_current",
             float(run["i"].max()) / float(calculated.current.max()),
             "1",
-            f"Largest current of that sine {text}.",
+            f"Maximum current of that sine {text}.",
             note,
         ),
         Kpi(
             f"{label}_bench_speed",
             float(np.abs(run["omega"]).max()) / float(np.abs(calculated.omega).max()),
             "1",
-            f"Largest speed of that sine {text}.",
+            f"Maximum speed of that sine {text}.",
             note,
         ),
         Kpi(
             f"{label}_bench_power",
             float(power.max()) / float(calculated.electrical.max()),
             "1",
-            f"Largest electrical power of that sine {text}.",
+            f"Maximum electrical power of that sine {text}.",
             note,
         ),
     ]
@@ -354,7 +354,7 @@ class Options(ParameterSet):
     bandwidth: Frequency
     """required bandwidth: frequency of the sine, or bandwidth of the step response"""
     p_peak: Pressure
-    """largest pressure: crest of the sine, end of the step"""
+    """maximum pressure: crest of the sine, end of the step"""
     amplitude: Pressure
     """amplitude of the sine"""
     p_from: Pressure
@@ -362,9 +362,9 @@ class Options(ParameterSet):
     demand: Literal["sine", "step"]
     """demand that sizes the actuator"""
     k_g_min: GearRatio
-    """smallest gear ratio"""
+    """minimum gear ratio"""
     k_g_max: GearRatio
-    """largest gear ratio"""
+    """maximum gear ratio"""
     ratios: Count
     """number of gear ratios, logarithmically spaced"""
     f_min: Frequency
@@ -389,11 +389,11 @@ class Options(ParameterSet):
 
 
 SIZES = {
-    "electrical": ("W", "largest electrical power"),
-    "mechanical": ("W", "largest mechanical power"),
-    "torque": ("N*m", "largest torque"),
-    "speed": ("rad/s", "largest speed"),
-    "current": ("A", "largest current"),
+    "electrical": ("W", "maximum electrical power"),
+    "mechanical": ("W", "maximum mechanical power"),
+    "torque": ("N*m", "maximum torque"),
+    "speed": ("rad/s", "maximum speed"),
+    "current": ("A", "maximum current"),
     "inertia_share": ("1", "inertia's torque over the total"),
     "current_share": ("1", "current over its limit"),
     "voltage_share": ("1", "voltage over the available voltage"),
@@ -519,13 +519,13 @@ def fastest(par: Par, options: Options, demand: str) -> float:
 def _figures(label: str, par: Par, options: Options) -> list[Kpi]:
     sizes = _at(par, options, options.bandwidth)
     texts = {
-        "electrical": "Largest electrical motor power, including copper loss.",
-        "mechanical": "Largest mechanical power, which rates the motor.",
-        "torque": "Largest torque, including breakaway at the peak pressure.",
-        "speed": "Largest speed.",
-        "current": "Largest current, including breakaway at the peak pressure.",
-        "inertia_share": "Largest torque of rotor and piston inertia over the largest torque.",
-        "voltage_share": "Largest voltage over the bridge's voltage at that current.",
+        "electrical": "Maximum electrical motor power, including copper loss.",
+        "mechanical": "Maximum mechanical power, which rates the motor.",
+        "torque": "Maximum torque, including breakaway at the peak pressure.",
+        "speed": "Maximum speed.",
+        "current": "Maximum current, including breakaway at the peak pressure.",
+        "inertia_share": "Maximum torque of rotor and piston inertia over the largest torque.",
+        "voltage_share": "Maximum voltage over the bridge's voltage at that current.",
     }
     current = motion(par, course(par, options, options.bandwidth)).current
     copper = par.motor.R_m * np.mean(current**2)

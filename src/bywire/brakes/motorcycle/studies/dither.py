@@ -65,9 +65,9 @@ class Options(ParameterSet):
     pressures: Pressures
     """pressures at which dither must overcome friction"""
     gain_min: Factor
-    """smallest gain of the dither's law"""
+    """minimum gain of the dither's law"""
     gain_max: Factor
-    """largest gain of the dither's law"""
+    """maximum gain of the dither's law"""
     gains: Count
     """number of gains, evenly spaced"""
     f_min: Frequency
@@ -77,11 +77,11 @@ class Options(ParameterSet):
     frequencies: Count
     """number of frequencies, about logarithmically spaced"""
     stuck_max: Fraction
-    """largest share of the time stuck"""
+    """maximum fraction of the time stuck"""
     band_max: Fraction
-    """largest share of the dead band that may remain"""
+    """maximum fraction of the dead band that may remain"""
     ripple_max: Pressure
-    """largest ripple of the caliper's pressure, peak to peak"""
+    """maximum ripple of the caliper's pressure, peak to peak"""
     approach: Pressure
     """distance from which the pressure loop approaches each pressure"""
     settle: Duration
@@ -341,7 +341,7 @@ def _maps(
             "worst_stuck",
             "gain",
             "frequency",
-            f"Share of the time in which the piston sticks, {where}.",
+            f"Fraction of the time in which the piston sticks, {where}.",
             marks,
             limits,
         ),

@@ -21,7 +21,7 @@ FIGURES = Figures(
     lift_deceleration=("m/s**2", "Deceleration at the lift."),
     flat_limit=("m/s**2", "Static lift limit of the level body, g l_f/h."),
     time_to_5_deg=("s", "Time from lift to 5 degrees of pitch."),
-    peak_pitch=("rad", "Largest pitch, nose down."),
+    peak_pitch=("rad", "Maximum pitch, nose down."),
     air_time=("s", "Time during which the rear wheel is off the ground."),
 )
 _FIVE = math.radians(5.0)

@@ -157,7 +157,7 @@ class Options(ParameterSet):
     deceleration: Annotated[float, Unit("m/s**2", 8.0), Field(gt=0, allow_inf_nan=False)]
     """deceleration due to cold brakes, without drag and rolling resistance"""
     share: Weight
-    """share of the braking force from the front brake"""
+    """fraction of the braking force from the front brake"""
     hold: Literal["pressure", "deceleration"]
     """quantity that the rider keeps constant from stop to stop"""
     stops: Annotated[float, Unit("1", 10.0), Field(ge=1, le=200, multiple_of=1)]

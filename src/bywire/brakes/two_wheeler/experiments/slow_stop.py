@@ -58,11 +58,11 @@ SLOW_FIGURES = Figures(
     stopping_time=("s", "Time until the first standstill."),
     rebound_speed=(
         "m/s",
-        "Largest backward speed after the standstill, from the tires' elasticity.",
+        "Maximum backward speed after the standstill, from the tires' elasticity.",
     ),
     rollback=("m", "Distance from the farthest position to the final position."),
     ringing_time=("s", f"Time from the standstill until the speed stays below {_QUIET:g} m/s."),
-    creep_speed=("m/s", f"Largest speed later than {_CALM:g} s after the first standstill."),
+    creep_speed=("m/s", f"Maximum speed later than {_CALM:g} s after the first standstill."),
     creep=("m", "Distance in that time."),
 )
 
@@ -134,7 +134,7 @@ _OPENED, _ROLLS = 0.5, 1.5  # s from the release to free rolling, and its longes
 HOLD_FIGURES = Figures(
     undefined="the vehicle does not stop before the release",
     stopping_time=("s", "Time until the first standstill."),
-    creep_speed=("m/s", f"Largest speed from {_CALM:g} s after the standstill to the release."),
+    creep_speed=("m/s", f"Maximum speed from {_CALM:g} s after the standstill to the release."),
     creep=("m", "Distance in that time."),
     held_time=("s", "Length of that time."),
     roll_off=(

@@ -97,7 +97,7 @@ STRAIGHT_STOP = Experiment(
 
 ACTUATOR_FIGURES = Figures(
     rear_energy=("J", "Energy drawn by the rear brake until standstill."),
-    rear_current=("A", "Largest magnitude of the rear motor current until standstill."),
+    rear_current=("A", "Maximum magnitude of the rear motor current until standstill."),
     rear_pressure_error=(
         "Pa",
         "Root mean square of the rear demand minus the pressure at the pads.",

@@ -23,11 +23,11 @@ SomeSpeed = Annotated[float, Unit("rad/s", 50.0), Field(gt=0, allow_inf_nan=Fals
 _MOTIONS = ("step", "ramp", "sine")
 _LABELS = tuple(f"{motion}_{pair}" for motion in _MOTIONS for pair in ("equal", "unequal"))
 _PAIRS = tuple(f"_{pair}" for pair in ("equal", "unequal"))
-PEAK = Figures(peak_force=("N", "Largest magnitude of the measured force."))
+PEAK = Figures(peak_force=("N", "Maximum magnitude of the measured force."))
 HELD = Figures(
     static_force=("N", "Magnitude of the mean force in the last tenth of the time after the step."),
 )
-APART = Figures(peak_difference=("rad", "Largest difference between the encoders."))
+APART = Figures(peak_difference=("rad", "Maximum difference between the encoders."))
 
 
 class Options(ParameterSet):

@@ -46,10 +46,10 @@ EACH = Figures(
 )
 ALL = Figures(
     unstable=("1", "Number of friction coefficients at which the loop is not stable."),
-    overshoot_max=("%", "Largest overshoot."),
-    settling_time_max=("s", "Largest settling time (2 %)."),
-    hold_power_min=("W", "Smallest hold power."),
-    hold_power_max=("W", "Largest hold power."),
+    overshoot_max=("%", "Maximum overshoot."),
+    settling_time_max=("s", "Maximum settling time (2 %)."),
+    hold_power_min=("W", "Minimum hold power."),
+    hold_power_max=("W", "Maximum hold power."),
     undefined=_NO_ROW,
 )
 

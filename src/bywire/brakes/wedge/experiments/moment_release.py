@@ -56,8 +56,8 @@ FREEDOM = Figures(
         "Clearance at the end, sum of both pads, without runout; negative if they are applied.",
     ),
     clearance_nominal=("m", "The same clearance with the wedge centered."),
-    travel_beyond=("m", "Largest travel of the wedge past the middle, toward the other side."),
-    peak_current=("A", "Largest motor current during the release."),
+    travel_beyond=("m", "Maximum travel of the wedge past the middle, toward the other side."),
+    peak_current=("A", "Maximum motor current during the release."),
     energy_in=("J", "Energy at the drives' input until the brake is parked, including standby."),
 )
 
@@ -148,12 +148,12 @@ MOMENT_RELEASE = Experiment(
 
 POWER_OFF_FIGURES = Figures(
     time_to_rest=("s", "Time from power off until shafts and wedge stick permanently."),
-    drift=("m", "Largest change of the wedge's travel after that instant."),
+    drift=("m", "Maximum change of the wedge's travel after that instant."),
     relaxation=("m", "Change of the wedge's travel before that instant."),
     moment_start=("N*m", "Moment at power off."),
     moment_end=("N*m", "Moment at the end, including runout."),
     preload_end=("N", "Wedge preload at the end."),
-    end_stop_force=("N", "Largest force of an end stop."),
+    end_stop_force=("N", "Maximum force of an end stop."),
     undefined="the brake does not come to rest within the recording",
 )
 

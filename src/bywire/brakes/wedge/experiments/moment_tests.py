@@ -39,16 +39,16 @@ Count = Annotated[int, Unit("1", 3.0), Field(ge=1, le=100)]
 BRAKING_FIGURES = Figures(
     contact_time=("s", "Time to pad contact."),
     time_to_90=("s", "Time until the measured moment first reaches 90 % of the demand."),
-    peak_power=("W", "Largest power at the drives' input."),
-    peak_power_filtered=("W", "Largest power at the drives' input, with the rig's filter."),
-    peak_normal_force=("N", "Largest normal force."),
-    caliper_energy=("J", "Largest energy stored in the caliper before the demand changes."),
-    disc_share=("%", "Share of that energy supplied by the disc (self-reinforcement)."),
-    rate_limited=("%", "Share of the time at the software rate limit, until the demand changes."),
-    peak_speed=("rad/s", "Largest speed of motor 1."),
+    peak_power=("W", "Maximum power at the drives' input."),
+    peak_power_filtered=("W", "Maximum power at the drives' input, with the rig's filter."),
+    peak_normal_force=("N", "Maximum normal force."),
+    caliper_energy=("J", "Maximum energy stored in the caliper before the demand changes."),
+    disc_share=("%", "Fraction of that energy supplied by the disc (self-reinforcement)."),
+    rate_limited=("%", "Fraction of time at the software rate limit, until the demand changes."),
+    peak_speed=("rad/s", "Maximum speed of motor 1."),
     energy_in=("J", "Energy at the drives' input, including standby."),
     energy_braked=("J", "Energy taken from the disc."),
-    energy_left=("J", "Largest residual of the energy balance: the numerical error."),
+    energy_left=("J", "Maximum residual of the energy balance: the numerical error."),
     undefined="the signal does not reach the level in this time",
 )
 """key figures of braking"""
@@ -142,7 +142,7 @@ class PulsesOptions(ParameterSet):
     M_high: SomeMoment
     """moment demanded"""
     low: Fraction
-    """share of the moment to which the pulses fall"""
+    """fraction of the moment to which the pulses fall"""
     t_hold: Duration
     """time from the step to the first pulse"""
     t_low: Duration
@@ -331,8 +331,8 @@ MOMENT_RAMP = Experiment(
 # --- A pulse up to 950 N m and back to the parking position (Fig. 9)
 
 LARGE_PULSE_FIGURES = Figures(
-    peak_moment=("N*m", "Largest moment."),
-    peak_angle=("rad", "Largest common reference of both motors, from the parking position."),
+    peak_moment=("N*m", "Maximum moment."),
+    peak_angle=("rad", "Maximum common reference of both motors, from the parking position."),
 )
 
 
@@ -346,7 +346,7 @@ class LargePulseOptions(ParameterSet):
     t_end: Duration
     """time recorded after it"""
     omega_gap: SpeedLimit
-    """largest speed during gap crossing, lower than in Figs. 7 and 8"""
+    """maximum speed during gap crossing, lower than in Figs. 7 and 8"""
     settle: Duration
     """time parked before the pulse"""
 

@@ -33,10 +33,10 @@ _AWAY = 1.0  # free play [m] that no motor crosses
 
 STEP = ("rise_time", "overshoot", "settling_time", "steady_state_error")
 CURRENT = Figures(
-    peak_current=("A", "Largest motor current."),
-    current_limited=("%", "Share of the time after the step at the current limit."),
+    peak_current=("A", "Maximum motor current."),
+    current_limited=("%", "Fraction of the time after the step at the current limit."),
 )
-_REST = "largest value over time and amplitudes, in % of the step."
+_REST = "maximum value over time and amplitudes, in % of the step."
 OVERALL = Figures(
     difference_screws=(
         "%",
@@ -46,7 +46,7 @@ OVERALL = Figures(
         "%",
         f"Difference of the mean angle from motors with free screws; {_REST}",
     ),
-    normal_force=("N", "Largest normal force: 0 while the steps stay within the clearance."),
+    normal_force=("N", "Maximum normal force: 0 while the steps stay within the clearance."),
 )
 
 

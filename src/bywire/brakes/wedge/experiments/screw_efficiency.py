@@ -224,8 +224,8 @@ _TURN = 0.2  # share of a stroke's time at rest after it, while the current chan
 _RAMP = 0.2  # share of a stroke's time in which the speed rises, and in which it falls
 _SWEEP_SETTLED = 0.4  # share of a stroke that means omit
 LOAD_SWEEP_FIGURES = Figures(
-    force_max=("N", "Largest mean force of a stroke."),
-    force_min=("N", "Smallest mean force of a stroke."),
+    force_max=("N", "Maximum mean force of a stroke."),
+    force_min=("N", "Minimum mean force of a stroke."),
     eta_f_slope=("1", "Slope of force torque over motor torque, motor 1 driving."),
     eta_f_true=("1", "True value."),
     eta_b_slope=("1", "Inverse of that slope, motor 1 driven back."),
@@ -238,9 +238,9 @@ class LoadSweepOptions(ParameterSet):
     """Strokes of motor 2 forward and back, at currents of motor 1 that grow from pair to pair."""
 
     i_drive: Current
-    """largest current of motor 1 while it drives"""
+    """maximum current of motor 1 while it drives"""
     i_back: Current
-    """largest current while motor 2 pushes motor 1 back; must be small enough for motor 2"""
+    """maximum current while motor 2 pushes motor 1 back; must be small enough for motor 2"""
     levels: Levels
     """number of currents, evenly spaced up to the largest"""
     omega_slow: SlowSpeed

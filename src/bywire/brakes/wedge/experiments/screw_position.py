@@ -25,8 +25,8 @@ SomeAngle = Annotated[float, Unit("rad", 0.5), Field(gt=0, le=100, allow_inf_nan
 
 STEP = ("rise_time", "overshoot", "settling_time", "steady_state_error")
 CURRENT = Figures(
-    peak_current=("A", "Largest motor current."),
-    current_limit=("%", "Share of the time after the step with the current demand at its limit."),
+    peak_current=("A", "Maximum motor current."),
+    current_limit=("%", "Fraction of time after the step with the current demand at its limit."),
 )
 _EACH = {name: units_of("step_response", resolved={"level": "rad"})[name] for name in STEP}
 _LOOPS, _SIZES = ("low", "high"), ("small", "medium", "large")
@@ -41,11 +41,11 @@ class StepsOptions(ParameterSet):
     """Steps of three amplitudes with a low and a high bandwidth."""
 
     a_small: SomeAngle
-    """smallest step"""
+    """minimum step"""
     a_medium: SomeAngle
     """middle step"""
     a_large: SomeAngle
-    """largest step"""
+    """maximum step"""
     f_low: Frequency
     """natural frequency of the low-bandwidth controller"""
     f_high: Frequency

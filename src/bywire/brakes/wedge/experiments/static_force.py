@@ -48,10 +48,10 @@ EACH = Figures(
     C_star_falling=("1", "With friction: brake factor while the moment falls."),
 )
 ALL = Figures(
-    F_M_error=("N", "Largest difference between force and closed form, without friction."),
+    F_M_error=("N", "Maximum difference between force and closed form, without friction."),
     C_star_error=(
         "%",
-        "Largest difference between brake factor and closed form, without friction.",
+        "Maximum difference between brake factor and closed form, without friction.",
     ),
     neutral_mu=("1", "Coefficient with zero actuation force, without friction."),
     neutral_mu_closed=("1", "Closed form of neutral_mu, tan(alpha)."),

@@ -65,7 +65,7 @@ class StiffnessOptions(ParameterSet):
     """Ramps of the current, up and down: first compression, then tension."""
 
     i_max: Current
-    """largest current, with opposite signs in both motors"""
+    """maximum current, with opposite signs in both motors"""
     t_ramp: Duration
     """time from zero to the largest current"""
 
@@ -194,11 +194,11 @@ STIFFNESS = Experiment(
 
 LABELS = ("sensor", "heart")
 FORCE_CYCLE_FIGURES = Figures(
-    force_compression=("N", "Largest force on the sensor."),
-    force_tension=("N", "Largest tension on the sensor."),
+    force_compression=("N", "Maximum force on the sensor."),
+    force_tension=("N", "Maximum tension on the sensor."),
     stiffness=("N/m", "Slope of force over travel with the sensor."),
-    peak_current_sensor=("A", "Largest mean current of both motors, with the sensor."),
-    peak_current_heart=("A", "Largest mean current of both motors, in the brake heart."),
+    peak_current_sensor=("A", "Maximum mean current of both motors, with the sensor."),
+    peak_current_heart=("A", "Maximum mean current of both motors, in the brake heart."),
     hysteresis=("N*m", "Friction torque: half the loop's width, mean over the cycle."),
     undefined="no travel. Set larger options",
 )

@@ -40,15 +40,15 @@ class Parameters(ParameterSet):
     rate_max: SpeedLimit
     """software rate limit of the moment mode"""
     omega_gap: SpeedLimit
-    """largest speed while crossing the gap"""
+    """maximum speed while crossing the gap"""
     a_gap: Acceleration
     """acceleration while crossing the gap"""
     omega_creep: SpeedLimit
     """speed from the estimated contact position until contact is detected"""
     M_on: SomeMoment
-    """smallest moment demand for which the brake leaves its parking position"""
+    """minimum moment demand for which the brake leaves its parking position"""
     M_contact: SomeMoment
-    """smallest measured moment that counts as contact: threshold of the gap mode"""
+    """minimum measured moment that counts as contact: threshold of the gap mode"""
     Omega_still: SpeedLimit
     """disc speed below which the control does not use the moment sensor"""
 

@@ -326,7 +326,7 @@ def _turning(data: xr.Dataset, par: WedgeParameters, options: Options) -> Turnin
     strokes = windows(omega, interval, options.slowest, options.margin, every * interval)
     if not strokes:
         raise ParameterError(
-            f"by q_1 the shaft never turns faster than {options.slowest:g} rad/s: {_ADVICE}",
+            f"from q_1, the shaft never turns faster than {options.slowest:g} rad/s: {_ADVICE}",
             name="q_1",
             valid=f"{options.slowest:g} rad/s",
         )
@@ -334,7 +334,7 @@ def _turning(data: xr.Dataset, par: WedgeParameters, options: Options) -> Turnin
     ways = np.sign(omega[rows])
     if np.all(ways > 0) or np.all(ways < 0):
         raise ParameterError(
-            "by q_1 the shaft turns in one direction only, so that dry friction and an offset of "
+            "from q_1, the shaft turns in one direction only, so dry friction and an offset of "
             f"the current cannot be separated: {_ADVICE}",
             name="q_1",
         )

@@ -140,8 +140,8 @@ def identify(
     for side, shaft in zip(("1", "2"), shafts, strict=True):
         if not shaft.windows:
             raise ParameterError(
-                f"by q_{side}, motor {side} never keeps above {options.slowest:g} rad/s for long: "
-                f"{_ADVICE}",
+                f"from q_{side}, motor {side} never stays above {options.slowest:g} rad/s "
+                f"long enough: {_ADVICE}",
                 name=f"q_{side}",
                 valid=f"above {options.slowest:g} rad/s",
             )

@@ -371,7 +371,7 @@ class Options(ParameterSet):
     counted: Literal["build-up-and-hold", "whole-pulse"]
     """whether the power of the release also counts"""
     omega_gap: SpeedLimit
-    """largest speed of the given drive train while crossing the gap, scaled with all others"""
+    """maximum speed of the given drive train while crossing the gap, scaled with all others"""
     mu_B: Coefficients
     """friction coefficients of the pads; the worst case counts"""
     believed: Literal["known", "as-given"]
@@ -383,15 +383,15 @@ class Options(ParameterSet):
     power: Literal["filtered", "instantaneous"]
     """power to minimize: with the rig's filter, or without"""
     tan_alpha_min: Slope
-    """smallest slope of the wedge"""
+    """minimum slope of the wedge"""
     tan_alpha_max: Slope
-    """largest slope of the wedge"""
+    """maximum slope of the wedge"""
     slopes: Count
     """number of slopes"""
     lead_min: Length
-    """smallest lead of the screws"""
+    """minimum lead of the screws"""
     lead_max: Length
-    """largest lead of the screws"""
+    """maximum lead of the screws"""
     leads: Count
     """number of leads"""
 
@@ -541,7 +541,7 @@ def _optimum(best: _Best, grids: Sequence[xr.Dataset], options: Options) -> tupl
             "optimum_release",
             float(best.at["release"].max()),
             "W",
-            "Largest power during its release, filtered.",
+            "Maximum power during its release, filtered.",
         ),
         Kpi(
             "optimum_t_90",
@@ -553,13 +553,13 @@ def _optimum(best: _Best, grids: Sequence[xr.Dataset], options: Options) -> tupl
             "optimum_closing_speed",
             float(best.at["closing_speed"]),
             "m/s",
-            "Largest speed at which its reference closes the pads.",
+            "Maximum speed at which its reference closes the pads.",
         ),
-        Kpi("optimum_current", float(best.at["current"].max()), "A", "Largest current demand."),
-        Kpi("flat_tan_alpha_min", min(slopes), "1", f"Smallest slope {share}."),
-        Kpi("flat_tan_alpha_max", max(slopes), "1", f"Largest slope {share}."),
-        Kpi("flat_lead_min", min(leads), "m", f"Smallest lead {share}."),
-        Kpi("flat_lead_max", max(leads), "m", f"Largest lead {share}."),
+        Kpi("optimum_current", float(best.at["current"].max()), "A", "Maximum current demand."),
+        Kpi("flat_tan_alpha_min", min(slopes), "1", f"Minimum slope {share}."),
+        Kpi("flat_tan_alpha_max", max(slopes), "1", f"Maximum slope {share}."),
+        Kpi("flat_lead_min", min(leads), "m", f"Minimum lead {share}."),
+        Kpi("flat_lead_max", max(leads), "m", f"Maximum lead {share}."),
         Kpi(
             "other_tan_alpha",
             other.tan_alpha,
@@ -599,7 +599,7 @@ def _given(given: Answer, options: Options) -> tuple[Kpi, ...]:
             "given_release",
             float(given.release.max()),
             "W",
-            "Largest power during its release, filtered.",
+            "Maximum power during its release, filtered.",
         ),
         Kpi(
             "given_t_90",
@@ -612,7 +612,7 @@ def _given(given: Answer, options: Options) -> tuple[Kpi, ...]:
             "given_closing_speed",
             given.closing_speed,
             "m/s",
-            "Largest speed at which its reference closes the pads.",
+            "Maximum speed at which its reference closes the pads.",
         ),
     )
 
@@ -648,15 +648,15 @@ def _edges(best: _Best, options: Options) -> tuple[str, ...]:
 # --- Many drive trains as a dataset
 
 _LATE = 1.02
-"""share of the demanded time up to which a design counts as equally fast"""
+"""fraction of the demanded time up to which a design counts as equally fast"""
 
 
 _HELD = 0.95
-"""share of the demand that counts as held"""
+"""fraction of the demand that counts as held"""
 
 
 _LEFT = 0.05
-"""share of the demand below which the brake counts as released"""
+"""fraction of the demand below which the brake counts as released"""
 
 
 _NEVER = 10.0  # lateness of a moment that is never reached
@@ -664,11 +664,11 @@ _NEVER = 10.0  # lateness of a moment that is never reached
 
 _PER_CASE = {
     "t_90": ("s", "time to 90 % of the demand"),
-    "filtered": ("W", "largest power, filtered"),
-    "instantaneous": ("W", "largest power"),
-    "release": ("W", "largest power of the release, filtered"),
-    "current": ("A", "largest current demand"),
-    "speed": ("rad/s", "largest motor speed"),
+    "filtered": ("W", "maximum power, filtered"),
+    "instantaneous": ("W", "maximum power"),
+    "release": ("W", "maximum power of the release, filtered"),
+    "current": ("A", "maximum current demand"),
+    "speed": ("rad/s", "maximum motor speed"),
     "copper": ("J", "copper loss"),
     "friction": ("J", "friction of bearings and screws"),
     "held": ("N*m", "mean moment at the end of the stop"),

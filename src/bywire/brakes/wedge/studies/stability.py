@@ -192,7 +192,7 @@ _ASSUMPTIONS = (
     "The end stops of the wedge allow the same travel of the pads as before.",
 )
 _HIGHEST = 5.0
-"""largest friction coefficient in the search for the moment loop's stability limit"""
+"""maximum friction coefficient in the search for the moment loop's stability limit"""
 _SEARCHED = 40
 _PLANES = {
     "growth_open": ("1/s", "growth rate, motors at constant currents"),
@@ -209,15 +209,15 @@ class Options(ParameterSet):
     """The designs to compare, and their operating points."""
 
     mu_B_min: Coefficient
-    """smallest friction coefficient of the pads"""
+    """minimum friction coefficient of the pads"""
     mu_B_max: Coefficient
-    """largest friction coefficient of the pads"""
+    """maximum friction coefficient of the pads"""
     coefficients: Count
     """number of friction coefficients"""
     tan_alpha_min: Slope
-    """smallest slope of the wedge"""
+    """minimum slope of the wedge"""
     tan_alpha_max: Slope
-    """largest slope of the wedge"""
+    """maximum slope of the wedge"""
     slopes: Count
     """number of slopes"""
     force: Force
@@ -298,7 +298,7 @@ def _maps(data: xr.Dataset, given: Mark) -> dict[str, Map]:
             "growth_open",
             "mu_B",
             "tan_alpha",
-            "Largest growth rate of the wedge without control, motors at constant currents; "
+            "Maximum growth rate of the wedge without control, motors at constant currents; "
             "dashed: closed form of the neutral point. The hatched boundary is computed. Colors "
             "are interpolated between designs, although the rate jumps at the boundary.",
             (given,),
@@ -340,20 +340,20 @@ def _uncontrolled(par: WedgeParameters, data: xr.Dataset, options: Options) -> t
             "neutral_deviation",
             float(apart.max()),
             "1",
-            "Largest distance between the neutral point and its closed form tan(alpha).",
+            "Maximum distance between the neutral point and its closed form tan(alpha).",
         ),
-        Kpi("growth_max", float(growth.max()), "1/s", "Largest growth rate without control."),
+        Kpi("growth_max", float(growth.max()), "1/s", "Maximum growth rate without control."),
         Kpi(
             "rigid_error",
             100.0 * error,
             "%",
-            f"Largest deviation of rates above {_FAST:g} 1/s from the closed form.",
+            f"Maximum deviation of rates above {_FAST:g} 1/s from the closed form.",
         ),
         Kpi(
             "locked_growth_max",
             float(data["growth_locked"].max()),
             "1/s",
-            "Largest growth rate with locked motors; negative if they hold the wedge.",
+            "Maximum growth rate with locked motors; negative if they hold the wedge.",
         ),
     )
 
@@ -374,7 +374,7 @@ def _controlled(par: WedgeParameters, data: xr.Dataset, options: Options) -> tup
     ]
     note = "" if border else f"stable up to {_HIGHEST:g}"
     return (
-        Kpi("moment_disk_min", least, "1", "Smallest disk margin of the moment loop.", where),
+        Kpi("moment_disk_min", least, "1", "Minimum disk margin of the moment loop.", where),
         Kpi(
             "moment_unstable",
             float(np.nansum(unstable)),

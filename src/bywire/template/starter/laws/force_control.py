@@ -16,13 +16,13 @@ class Parameters(ParameterSet):
     k_F: Annotated[float, Unit("rad/(s*N)", 0.05), Field(ge=0, allow_inf_nan=False)]
     """speed per force error"""
     omega_max: Annotated[float, Unit("rad/s", 200.0), Field(gt=0, allow_inf_nan=False)]
-    """largest speed demand"""
+    """maximum speed demand"""
     k_p: Annotated[float, Unit("V*s/rad", 0.05), Field(ge=0, allow_inf_nan=False)]
     """voltage per speed error"""
     k_i: Annotated[float, Unit("V/rad", 2.0), Field(ge=0, allow_inf_nan=False)]
     """voltage per integrated speed error"""
     v_max: Voltage
-    """largest magnitude of the voltage"""
+    """maximum magnitude of the voltage"""
 
 
 class State(NamedTuple):
