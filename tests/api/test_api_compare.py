@@ -119,6 +119,15 @@ def test_verdicts_stand_beside_each_other(folders):
     assert frame.loc["peak_current", "warm"] == "missed"
 
 
+def test_a_run_without_requirements_is_not_part_of_a_good_verdict():
+    judged = bywire.run("hard-braking", {**QUICK, "requirements.peak_current": "<= 50 A"})
+    banner = bywire.compare(judged, judged).document().banner
+    assert banner.verdict == "good"
+    banner = bywire.compare(judged, bywire.run("hard-braking", QUICK)).document().banner
+    assert banner.verdict == "none"
+    assert "has no requirements" in banner.text
+
+
 def test_a_verdict_that_the_step_leaves_open_stays_open(folders, tmp_path):
     """A folder says what its run could not decide; so does the comparison."""
     near = tmp_path / "near"

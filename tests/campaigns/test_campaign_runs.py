@@ -411,7 +411,8 @@ def test_harm_done_by_the_reaction_is_counted_run_by_run(campaign):
     assert str(shown).startswith("The reaction, bridge.open-phase, is harmful: ")
     assert next(iter(shown.as_object())) == "headline"
     banner = shown.document().banner
-    assert banner.text.startswith("The reaction, bridge.open-phase, is harmful: ")
+    assert banner.text.startswith("0 of 3 dangerous faults are undetected or detected too late. ")
+    assert " The reaction, bridge.open-phase, is harmful: " in banner.text
     calm = FaultCampaign(CampaignFindings(plan, campaign.findings.healthy, faults[1:3]))
     assert not calm.warnings
     assert "headline" not in calm.as_object()

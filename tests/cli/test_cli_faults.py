@@ -50,7 +50,7 @@ def test_a_campaign_is_written_and_shown(bywire, tmp_path):
         "alarm-curves.png",
     }
     page = (out / "report.html").read_text(encoding="utf-8")
-    assert all(text in page for text in ("diagnostic coverage", "still-pressure", "unweighted"))
+    assert all(text in page for text in ("Diagnostic coverage", "still-pressure", "unweighted"))
     no_half_files(out)
 
 

@@ -63,6 +63,9 @@ def test_failed_run_is_3(bywire, bench):
     [
         (["run"], "missing argument"),
         (["run", "a", "b"], "unexpected extra argument"),
+        (["run", "a", "--set", "motor.R_m=0.5", "ohm"], 'in quotation marks, as in "0.5 ohm"'),
+        (["run", "hard_braking"], "did you mean hard-braking?"),
+        (["run", "a", "--require", "b"], 'Use --set "requirements.NAME=<= LIMIT"'),
         (["run", "a", "--sett", "b"], "--set"),
         (["run", "a", "--set"], "requires an argument"),
         (["lst"], "Did you mean 'list'?"),

@@ -10,6 +10,7 @@ import pytest
 import xarray as xr
 
 import bywire
+from bywire.api.study import StudyResult
 from bywire.brakes.motorcycle.studies import actuator_sizing
 from bywire.brakes.wedge.studies import drive_train
 from bywire.brakes.wedge.studies.drive_train import Demand, answer, closing_speed, redesigned
@@ -133,6 +134,8 @@ def test_a_response_that_no_design_reaches_gives_no_optimum() -> None:
     found = drive_train.compute(WEDGE, options, silent)
     assert not found.maps
     assert any("no design is feasible" in text for text in found.warnings)
+    shown = StudyResult(drive_train.STUDY, "roberts2003", WEDGE, options, found)
+    assert "No design is feasible" in shown.document().banner.text
 
 
 @pytest.mark.parametrize("kind", ["sine", "step"])

@@ -492,6 +492,8 @@ class Comparison(Answer):
             met = f"{len(each.verdicts) - len(open_)} of {len(each.verdicts)} requirements"
             missed = f" ({', '.join(open_)})" if open_ else ""
             parts.append(f"{each.label} meets {met}{missed}")
+        unjudged = [each.label for each in self.runs if not each.verdicts] if judged else []
+        parts += [f"{label} has no requirements" for label in unjudged]
         distinct = [each for each in self.figures if each.differs and each.is_distinct]
         count = f"{len(distinct)} of {len(self.figures)} key figures differ"
         most = max(distinct, key=lambda each: each.ratio, default=None)
@@ -505,7 +507,9 @@ class Comparison(Answer):
         outcomes = {v.outcome for each in self.runs for v in each.verdicts}
         if "missed" in outcomes:
             return "bad"
-        return "none" if not outcomes else "open" if "undecided" in outcomes else "good"
+        if "undecided" in outcomes:
+            return "open"
+        return "good" if all(each.verdicts for each in self.runs) else "none"
 
     def _changed(self) -> list[str]:
         """Return the changes of the runs, except settings that differ between the runs."""

@@ -211,12 +211,17 @@ class FaultCampaign(Answer):
 
     def _banner(self) -> Banner:
         coverage, harm = self.findings.coverage, self.findings.harm_of_reaction()
-        text = (
-            "no fault is dangerous in this maneuver"
-            if math.isnan(coverage)
-            else f"diagnostic coverage {100 * coverage:.3g} % ({_coverage_class(coverage)})"
-        )
-        return Banner(_sentences([*harm, text]) if harm else text, "bad" if harm else "none")
+        if math.isnan(coverage):
+            texts = ["no fault is dangerous in this maneuver"]
+        else:
+            faults = self.findings.faults
+            missed = sum(each.kind in _RANK[:2] for each in faults)
+            texts = [
+                f"{missed} of {sum(each.dangerous > 0 for each in faults)} dangerous faults are "
+                "undetected or detected too late",
+                f"diagnostic coverage {100 * coverage:.3g} % ({_coverage_class(coverage)})",
+            ]
+        return Banner(_sentences([*texts, *harm]), "bad" if harm else "none")
 
     @cached_property
     def _quantities(self) -> dict[str, Quantity[FaultFinding]]:

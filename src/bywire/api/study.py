@@ -17,6 +17,7 @@ from bywire.core.parameters import ParameterSet
 from bywire.core.values import parsed
 from bywire.report.answer import Answer
 from bywire.report.document import (
+    Banner,
     Details,
     Document,
     FigureBlock,
@@ -28,11 +29,13 @@ from bywire.report.document import (
 )
 from bywire.report.subject import Subject, defaults_of, parameter_rows, value_changes
 from bywire.report.tables import Cell, KpiRow, Table, kpi_table, parameter_table, text_table
-from bywire.report.wording import in_display_unit, unit_text
+from bywire.report.wording import in_display_unit, measured_amount, unit_text
 from bywire.synthesis.study import STUDIES, Cut, Findings, Map, Study
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+_MOST_IN_BANNER = 3  # key figures; a study's first ones describe its best design
 
 
 @dataclass(frozen=True)
@@ -112,9 +115,19 @@ class StudyResult(Answer):
                 Listing(findings.assumptions, "assumptions"),
             ],
             data=self._data(),
+            banner=self._banner(),
             attachments=[recording_file(f"{study.name}.nc", findings.data)],
             changes=subject.changes,
         )
+
+    def _banner(self) -> Banner:
+        """Return the warnings, and the first key figures in words."""
+        texts = [f"{text[:1].upper()}{text[1:]}" for text in self.findings.warnings]
+        texts += [
+            f"{row.definition.rstrip('.')}: {measured_amount(row.value, row.unit, row.error)}"
+            for row in self._rows()[:_MOST_IN_BANNER]
+        ]
+        return Banner(". ".join(texts))
 
     def _rows(self) -> list[KpiRow]:
         """Return the key figures as rows of a table, each with its note."""

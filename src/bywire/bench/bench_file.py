@@ -145,7 +145,10 @@ class BenchFile(Section):
     """Keys and sections of a bench file."""
 
     experiment: Annotated[str, Hint(f'write experiment = "..." in quotation marks {_LIST}')]
-    parameters: Annotated[str, Hint(f'write parameters = "..." in quotation marks {_LIST}')]
+    parameters: Annotated[
+        str,
+        Hint(f'write parameters = "..." in quotation marks, with a parameter set\'s name {_LIST}'),
+    ]
     assembly: _Quoted = ""
     name: _Quoted = ""
     options: Table
@@ -397,8 +400,9 @@ def _near(file: Path) -> Iterator[tuple[float, str]]:
     kinds = ("", BENCH)
     files = near_files(file, kinds, [file.parent], _NEAR, with_ending=True)
     yield from ((likeness, str(path)) for likeness, path in files)
-    if _NAME.fullmatch(file.name):
+    written = file.name.replace("_", "-")  # a file's name for an experiment's
+    if _NAME.fullmatch(written):
         for name in {**EXPERIMENTS.all(), **GENERIC_EXPERIMENTS.all()}:
-            likeness = SequenceMatcher(None, name, file.name).ratio()
+            likeness = SequenceMatcher(None, name, written).ratio()
             if likeness >= _NEAR_EXPERIMENT:
                 yield likeness, name

@@ -185,6 +185,10 @@ def _misused(error: Any) -> int:
         context = getattr(error, "ctx", None)
         command = context.command_path if context is not None else "bywire"
         name = f"{words}: " if (words := command.partition(" ")[2]) else ""
+        if "unexpected extra argument" in text:
+            text += '. Put a value that contains a space in quotation marks, as in "0.5 ohm"'
+        if text.startswith("No such option: --require") and command.endswith(" run"):
+            text += '. Use --set "requirements.NAME=<= LIMIT"'
         message(f"error: {name}{text[0].lower()}{text[1:]}. For help, type '{command} -h'")
     return int(error.exit_code)
 
