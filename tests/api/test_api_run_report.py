@@ -57,3 +57,9 @@ def test_a_figure_of_the_report_is_drawn_by_its_name():
     with raises(UnknownNameError, name="figure", value="nyquist", valid="time-traces"):
         result.plot("nyquist")
     assert bywire.margins("pressure").plot("pressure-nyquist").axes
+
+
+def test_a_run_without_requirements_counts_the_undefined_key_figures():
+    changes = {"motor.R_m": "+50 %", "ecu.dither.waveform": "off"}
+    banner = bywire.run("hard-braking", changes).document().banner
+    assert banner.text == "done, no requirements; 3 of 14 key figures not defined"

@@ -297,7 +297,11 @@ class BenchResult(Result, Answer):
 
     def _banner(self) -> Banner:
         if not self.verdicts:
-            return Banner("done, no requirements")
+            missing = sum(math.isnan(kpi.value) for kpi in self.kpis)
+            return Banner(
+                "done, no requirements"
+                + (f"; {missing} of {len(self.kpis)} key figures not defined" if missing else "")
+            )
         met = sum(v.met for v in self.verdicts)
         text = f"{met} of {len(self.verdicts)} requirements met"
         if open_ := sum(not v.is_decided for v in self.verdicts):
