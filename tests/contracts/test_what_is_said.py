@@ -96,4 +96,4 @@ def test_a_fault_of_an_unknown_signal_is_found(tmp_path: Path) -> None:
         trial = next(demand.on for demand in demands_on("unheard-actuator", ()))
         found = examine(OF_A_MODEL["faults"], trial, trial.place())
     assert not found.holds
-    assert "the channel 'angle' names 'fi', which is not a signal" in found.text
+    assert "the channel 'angle' refers to 'fi', which is not a signal" in found.text

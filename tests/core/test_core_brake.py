@@ -140,7 +140,7 @@ def test_a_package_keeps_each_kind_in_its_own_module(write: Write) -> None:
             ModelError,
             [
                 "half_typed.py, line 6: State.x has no Signal annotation",
-                'write x: Annotated[float, Signal("m", "what it is")]',
+                'Write x: Annotated[float, Signal("m", "what it is")]',
             ],
         ),
         (
@@ -226,8 +226,8 @@ def test_a_file_that_was_mended_loads(write: Write) -> None:
             'S = CitedSet("s", "a", "", "", ParameterSet, {})\n'
             'T = CitedSet("s", "b", "", "", ParameterSet, {})',
             PARAMETER_SETS,
-            r"twice.py, line 7: the parameter set 's' is declared in .*twice.py, line 6 already: "
-            "rename it",
+            r"twice.py, line 7: the parameter set 's' is already declared in .*twice.py, line 6[.] "
+            "Rename it",
         ),
         (
             "same_test",
@@ -264,7 +264,7 @@ def test_what_a_brake_does_not_declare_is_said_with_how_it_is_declared() -> None
     load_system(SPRING_AXIS)
     with pytest.raises(UnknownNameError) as caught:
         LOOPS.find("travel")
-    for words in ("the brake 'spring-axis' declares no loop", "declare a Loop", "docs/modeling.md"):
+    for words in ("the brake 'spring-axis' declares no loop", "Declare a Loop", "docs/modeling.md"):
         assert words in str(caught.value)
 
 

@@ -15,11 +15,12 @@ WHOLE_REAR = TwoWheelerWholeRear.name
 _VEHICLE = (
     Channel("encoder_f", "front wheel encoder", "rad", "theta_f", offset=0.1),
     Channel("encoder_r", "rear wheel encoder", "rad", "theta_r", offset=0.1),
-    Channel("front", "front brake", "Pa", "p_f_ref", "drive", task="ecu"),
+    Channel("front", "front brake command", "Pa", "p_f_ref", "drive", task="ecu"),
 )
 CHANNELS = (
     Channels(
-        NAME, (*_VEHICLE, Channel("rear", "rear brake", "Pa", "p_r_ref", "drive", task="ecu"))
+        NAME,
+        (*_VEHICLE, Channel("rear", "rear brake command", "Pa", "p_r_ref", "drive", task="ecu")),
     ),
     Channels(WHOLE_REAR, _VEHICLE),
 )
