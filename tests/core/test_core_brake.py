@@ -234,8 +234,8 @@ def test_a_file_that_was_mended_loads(write: Write) -> None:
             'E = Experiment("hard-braking", "a", "", ParameterSet, ParameterSet(), '
             "None, None, {}, ())",
             EXPERIMENTS,
-            r"same_test.py, line 6: the experiment 'hard-braking' is declared in "
-            r".*hard_braking.py, line \d\d already",
+            r"same_test.py, line 6: the experiment 'hard-braking' is already declared in "
+            r".*hard_braking.py, line \d\d",
         ),
     ],
 )
