@@ -306,7 +306,7 @@ def test_one_name_is_one_experiment(tmp_path) -> None:
         "from bywire.bench.experiment import EXPERIMENTS\n"
         'TAKEN = replace(EXPERIMENTS.find("hard-braking"), name="ramp", assembly="axis-twice")\n'
     )
-    taken = r"axis_twice\.py, line \d+: the experiment 'ramp' is declared in .*ramp\.py.* already"
+    taken = r"axis_twice\.py, line \d+: the experiment 'ramp' is already declared in .*ramp\.py"
     with forgotten():
         load_system(file)
         with pytest.raises(ModelError, match=taken):

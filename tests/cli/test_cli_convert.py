@@ -78,7 +78,7 @@ def test_there_and_back(bywire, run, tmp_path, out):
         (("none.csv", "out.nc"), "none.csv cannot be read (No such file"),
         (("run.csv", "out.xyz"), "'.xyz'"),
         (("run.csv", "run.csv", "--map", "map.toml"), "run.csv already exists"),
-        (("run.csv", "out.csv", "--map", "map.toml"), "different instants"),
+        (("run.csv", "out.csv", "--map", "map.toml"), "different times"),
         (("run.csv", "out.nc", "--map", "map.toml", "--signals", "p_cm"), "did you mean 'p_mc'"),
         (("run.csv", "out.nc", "--map", "map.toml", "--rate", "5 ms"), "cannot be converted to Hz"),
         (("run.csv", "out.nc", "--map", "map.toml", "--rate", "0 Hz"), "must be > 0 Hz"),

@@ -140,7 +140,7 @@ def test_a_package_keeps_each_kind_in_its_own_module(write: Write) -> None:
             ModelError,
             [
                 "half_typed.py, line 6: State.x has no Signal annotation",
-                'write x: Annotated[float, Signal("m", "what it is")]',
+                'Write x: Annotated[float, Signal("m", "what it is")]',
             ],
         ),
         (
@@ -219,23 +219,23 @@ def test_a_file_that_was_mended_loads(write: Write) -> None:
             "same_set",
             'S = CitedSet("roberts2003", "a", "", "", ParameterSet, {})',
             PARAMETER_SETS,
-            r"same_set.py, line 6: the parameter set 'roberts2003' is declared in .*roberts2003",
+            r"same_set.py, line 6: the parameter set 'roberts2003' is already declared in .*roberts2003",
         ),
         (
             "twice",
             'S = CitedSet("s", "a", "", "", ParameterSet, {})\n'
             'T = CitedSet("s", "b", "", "", ParameterSet, {})',
             PARAMETER_SETS,
-            r"twice.py, line 7: the parameter set 's' is declared in .*twice.py, line 6 already: "
-            "rename it",
+            r"twice.py, line 7: the parameter set 's' is already declared in .*twice.py, line 6[.] "
+            "Rename it",
         ),
         (
             "same_test",
             'E = Experiment("hard-braking", "a", "", ParameterSet, ParameterSet(), '
             "None, None, {}, ())",
             EXPERIMENTS,
-            r"same_test.py, line 6: the experiment 'hard-braking' is declared in "
-            r".*hard_braking.py, line \d\d already",
+            r"same_test.py, line 6: the experiment 'hard-braking' is already declared in "
+            r".*hard_braking.py, line \d\d",
         ),
     ],
 )
@@ -264,7 +264,7 @@ def test_what_a_brake_does_not_declare_is_said_with_how_it_is_declared() -> None
     load_system(SPRING_AXIS)
     with pytest.raises(UnknownNameError) as caught:
         LOOPS.find("travel")
-    for words in ("the brake 'spring-axis' declares no loop", "declare a Loop", "docs/modeling.md"):
+    for words in ("the brake 'spring-axis' declares no loop", "Declare a Loop", "docs/modeling.md"):
         assert words in str(caught.value)
 
 

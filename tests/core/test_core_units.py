@@ -167,7 +167,7 @@ def test_wrong_unit(text, symbol, message):
 
 @pytest.mark.parametrize("text", UNKNOWN)
 def test_unknown_unit(text):
-    with pytest.raises(UnitError, match=r"is not known.*; write for example"):
+    with pytest.raises(UnitError, match=r"is not known.*; for example, write"):
         units.parse(text, "m", "x")
 
 

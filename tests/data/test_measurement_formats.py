@@ -53,7 +53,7 @@ def test_signals_on_other_instants(tmp_path, name):
     if KNOWN.all()[name].has_many_axes:
         same(read_measurement(file_of(tmp_path, name, dataset)), dataset)
     else:
-        with pytest.raises(FileError, match=r"different instants \(time, time_T\)"):
+        with pytest.raises(FileError, match=r"different times \(time, time_T\)"):
             file_of(tmp_path, name, dataset)
         assert not list(tmp_path.iterdir())
 
@@ -98,7 +98,7 @@ def test_files_are_not_replaced_unasked(tmp_path):
     path = file_of(tmp_path, "csv")
     with pytest.raises(FileError, match="already exists"):
         write_measurement(measurement(), path)
-    with pytest.raises(FileError, match=r"not the ending of a known format. Use \.csv"):
+    with pytest.raises(FileError, match=r"not a known file extension. Use \.csv"):
         write_measurement(measurement(), tmp_path / "a.xyz")
     with pytest.raises(UnknownNameError, match="did you mean 'mdf4'"):
         write_measurement(measurement(), tmp_path / "a.x", format="mdf")
@@ -114,7 +114,7 @@ def test_signals_without_units_are_pure_numbers_over_seconds(tmp_path, name):
     assert found["n"].attrs["units"] == "1"
     assert "units" not in bare["n"].attrs
     hours = bare.assign_coords(time=("time", TIME, {"units": "h"}))
-    with pytest.raises(FileError, match="instants of n are in 'h', not s"):
+    with pytest.raises(FileError, match="times of n are in 'h', not s"):
         file_of(tmp_path, name, hours)
 
 

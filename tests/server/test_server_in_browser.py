@@ -52,7 +52,7 @@ def test_forms_files_and_jobs(visit, chromium, tmp_path):
     page.wait_for_selector("text=large.csv has 4 MB, but the limit is 3 MB")
     (tmp_path / "text.docx").write_text("x")
     page.set_input_files(upload, tmp_path / "text.docx")
-    page.wait_for_selector("text='text.docx' does not have the ending of a measurement format")
+    page.wait_for_selector("text='text.docx' does not have the extension of a measurement file")
     assert [path.name for path in (visit.folder / "measurements").iterdir()] == ["a-rig.csv"]
     here = visit.server.link.partition("/?")[0]
     assert [url for url in asked if not url.startswith(here)] == []

@@ -52,9 +52,9 @@ def test_a_step_that_does_not_divide(
 @pytest.mark.parametrize(
     ("period", "step", "text"),
     [
-        (0.1234567891234567, 1e-9, "does not divide .* for example, use 0.00099999"),
-        (365.9670339332694, 20e-6, "does not divide .* for example, use 19.99999"),
-        (365.967033933, 20e-6, "does not divide .* use for example"),
+        (0.1234567891234567, 1e-9, "does not divide .* For example, use 0.00099999"),
+        (365.9670339332694, 20e-6, "does not divide .* For example, use 19.99999"),
+        (365.967033933, 20e-6, "does not divide .* For example, use"),
         (1.3e19, 20e-6, "too short for the drive interval of 1.3e[+]19 s, .*[.] Use a shorter"),
         (1e300, 1e-9, "too short for the drive interval"),
     ],
@@ -66,7 +66,7 @@ def test_a_step_far_from_any_divisor_is_refused_at_once(
     with pytest.raises(StepError, match=text) as caught:
         plan(0.1, step, {"drive": period}, 0.1)
     assert time.process_time() - started < 0.1
-    if "use for example" in text:
+    if "For example, use" in text:
         proposed = float(str(caught.value).split()[-2]) * 1e-6
         assert proposed <= step
         plan(0.1, proposed, {"drive": period}, 1e4 * proposed)

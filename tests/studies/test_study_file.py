@@ -161,7 +161,7 @@ def test_an_experiment_needs_no_bench_file(tmp_path):
         ('[vary]\n"motor.R_m" = "+-5 %"\n[[correlation]]\nvalue = 0.5', ["of is missing"]),
         (
             '[vary]\n"motor.R_m" = "+-5 %"\n[[correlation]]\nof = [["a"], "b"]\nvalue = 0.5',
-            ["of = [['a'], 'b']: write for example of = "],
+            ["of = [['a'], 'b']: for example, write of = "],
         ),
         (
             '[vary]\n"motor.R_m" = "+-5 %"\n[simulation]\nstep = "10 us"',

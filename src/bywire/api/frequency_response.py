@@ -92,7 +92,7 @@ def response_warnings(
             scatter = float(np.nanmax(row["scatter"].values[shaken]))
             cases = _cases(response, shaken)
             texts.append(
-                f"{label}: successive windows do not agree within {100 * tolerance:g} % at "
+                f"{label}: successive windows do not agree to within {100 * tolerance:g} % at "
                 f"{cases} (limit cycle, drift, or encoder resolution). Results are means of the "
                 "last "
                 "windows. The windows' root-mean-square deviation from the mean is up to "

@@ -1,4 +1,4 @@
-"""Anti-lock control of one wheel by rules: build, dump, hold, stepped build."""
+"""Rule-based anti-lock control of one wheel: build, dump, hold, stepped build."""
 
 from __future__ import annotations
 

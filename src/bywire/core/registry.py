@@ -361,8 +361,8 @@ def _require_new(
         first, place = seen.setdefault(thing.name, (thing, module))
         if first is not thing:
             raise ModelError(
-                f"{_declared_at(module, thing)}: the {kind.name} {thing.name!r} is declared in "
-                f"{_declared_at(place, first)} already. Rename it",
+                f"{_declared_at(module, thing)}: the {kind.name} {thing.name!r} is already "
+                f"declared in {_declared_at(place, first)}. Rename it",
                 name=kind.name,
                 value=thing.name,
             )

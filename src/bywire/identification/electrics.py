@@ -201,7 +201,7 @@ class LoopOptions(ParameterSet):
     unknowns: Literal["gains", "all"]
     """gains only (with a known winding), or gains and winding"""
     lead: Duration
-    """excluded beginning of a record, since the loop's earlier state is unknown"""
+    """initial part of a record to exclude, because the loop's earlier state is unknown"""
     dwell: Duration
     """synthetic: time from one step to the next"""
     duration: Duration

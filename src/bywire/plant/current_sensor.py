@@ -23,7 +23,7 @@ class Parameters(ParameterSet):
     i_low: SignedCurrent
     """lowest current of the range"""
     i_high: SignedCurrent
-    """highest current of the range"""
+    """maximum current of the range"""
 
     @model_validator(mode="after")
     def _ordered(self) -> Parameters:

@@ -105,8 +105,7 @@ def _sized(model: Model, part: str, value: Any, count: int, meaning: str) -> Non
     length = value.shape[0] if isinstance(value, ca.SX) else len(value) if value is not None else -1
     if length != count:
         raise ModelError(
-            f"{model.name}: {part} returns {max(length, 0)} values: it must return {count} "
-            f"({meaning})",
+            f"{model.name}: {part} returns {max(length, 0)} values: expected {count} ({meaning})",
             name=part,
             value=str(max(length, 0)),
             valid=str(count),

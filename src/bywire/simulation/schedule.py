@@ -150,7 +150,7 @@ def _whole(period: float, step: float, name: str) -> int:
     if count < 1 or rest > min(_TOLERANCE * period, rounding):
         raise StepError(
             f"step = {step * 1e6:g} us does not divide the {name} interval of "
-            f"{period * 1e6:.12g} us: for example, use {_divisor(period, step):.16g} us",
+            f"{period * 1e6:.12g} us. For example, use {_divisor(period, step):.16g} us",
             name="step",
             value=f"{step * 1e6:g} us",
             valid=f"{_divisor(period, step):.16g} us",

@@ -39,7 +39,7 @@ from bywire.studies.distribution import rising
 from bywire.studies.plan import StudiedBench, StudyPlan, Varied, correlation_factor
 from bywire.studies.vary_section import MeasuredSection, read_all_varied
 
-_CORRELATION = Hint("write for example of = ['motor.R_m', 'motor.K_e'] and value = 0.5")
+_CORRELATION = Hint("for example, write of = ['motor.R_m', 'motor.K_e'] and value = 0.5")
 
 
 class CorrelationSection(Section):

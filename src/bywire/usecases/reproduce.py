@@ -23,7 +23,7 @@ SourceName = Annotated[str, Ask("Published source, e.g. dardanelli2010.", "Sourc
 @use_case("reproduce", form=Form("Reproduce a source", "Reproduce", "source"))
 @on_one_thread()
 def reproduce(source: SourceName, *, progress: "Progress | None" = None) -> "Reproduction":
-    """Reproduce a paper's tables and figures, and compare published with computed values.
+    """Reproduce a paper's tables and figures, and compare computed values with the published ones.
 
     Parameters
     ----------

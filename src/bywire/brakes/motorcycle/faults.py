@@ -28,7 +28,7 @@ CHANNELS = Channels(
     (
         Channel("pressure", "pressure sensor", "Pa", "y_p", seen=_pressure, stuck=20e5, offset=2e5),
         Channel("current", "current sensor", "A", "y_i", seen=_current, offset=1.0),
-        Channel("bridge", "bridge's duty cycle", "1", "duty", "drive", stuck=1.0, task="ecu"),
+        Channel("bridge", "bridge duty cycle", "1", "duty", "drive", stuck=1.0, task="ecu"),
     ),
 )
 

@@ -15,12 +15,12 @@ WHOLE_REAR = TwoWheelerWholeRear.name
 _VEHICLE = (
     Channel("encoder_f", "front wheel encoder", "rad", "theta_f", offset=0.1),
     Channel("encoder_r", "rear wheel encoder", "rad", "theta_r", offset=0.1),
-    Channel("front", "front brake's demand", "Pa", "p_f_ref", "drive", task="ecu"),
+    Channel("front", "front brake demand", "Pa", "p_f_ref", "drive", task="ecu"),
 )
 CHANNELS = (
     Channels(
         NAME,
-        (*_VEHICLE, Channel("rear", "rear brake's demand", "Pa", "p_r_ref", "drive", task="ecu")),
+        (*_VEHICLE, Channel("rear", "rear brake demand", "Pa", "p_r_ref", "drive", task="ecu")),
     ),
     Channels(WHOLE_REAR, _VEHICLE),
 )

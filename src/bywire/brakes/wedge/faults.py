@@ -13,8 +13,8 @@ _SIGNALS = (
     Channel("moment", "moment sensor", "N*m", "y_M", offset=50.0),
     Channel("encoder_1", "encoder 1", "rad", "theta_1", offset=0.1),
     Channel("encoder_2", "encoder 2", "rad", "theta_2", offset=0.1),
-    Channel("drive_1", "demand of motor 1", "A", "i_1_ref", "drive", task="position"),
-    Channel("drive_2", "demand of motor 2", "A", "i_2_ref", "drive", task="position"),
+    Channel("drive_1", "motor 1 demand", "A", "i_1_ref", "drive", task="position"),
+    Channel("drive_2", "motor 2 demand", "A", "i_2_ref", "drive", task="position"),
     Channel("power", "power-stage switch", "1", "power_off", "demand", stuck=1.0),
 )
 

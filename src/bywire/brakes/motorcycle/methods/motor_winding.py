@@ -48,7 +48,7 @@ class Options(ParameterSet):
     i_high: Current
     """stuck: size of the steps above the holding current, within breakaway"""
     v_high: Voltage
-    """turning: highest voltage"""
+    """turning: maximum voltage"""
     dwell: Duration
     """time from one step of the voltage to the next"""
     duration: Duration

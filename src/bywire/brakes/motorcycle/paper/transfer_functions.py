@@ -52,7 +52,7 @@ from bywire.reproduction.reproduction import Exhibit, Part, kpis, peak, selected
 P_NOMINAL = 20e5
 """assumed pressure at the nominal position x_mc [Pa]; the paper does not state it"""
 _P_HARD = 37e5
-"""highest pressure of Fig. 7a [Pa]"""
+"""maximum pressure of Fig. 7a [Pa]"""
 
 
 def table1(runs: Runs) -> Part:

@@ -223,7 +223,7 @@ class Options(ParameterSet):
     margin: Duration
     """time omitted at either end of a motion"""
     highest: Annotated[int, Unit("1", 400.0), Field(ge=1, le=10000)]
-    """highest order of a revolution in the search"""
+    """maximum order of a revolution in the search"""
     sigma_i: Annotated[float, Unit("A", 0.02), Field(ge=0)]
     """noise of the measured current in synthetic measurements"""
 
