@@ -241,7 +241,8 @@ def _missing(fit: Estimate) -> str:
         f"{option('unknowns')} offset.{name}. If they differ at the beginning, use "
         f"{option('states')}. If another parameter explains the residual, add it with "
         f"{option('unknowns')}. If the residual only scatters, specify its noise with "
-        f"{option('outputs')} '{name}=...'"
+        f"{option('outputs')} '{name}=...'. If single samples are wrong, such as spikes, use "
+        f"{option('loss', 'huber')}"
     )
 
 
