@@ -146,6 +146,7 @@ def test_a_check_that_fails_says_what_to_try_next(bywire: Bywire, rig: Path) -> 
     assert done.status == 1
     assert "check failed: residual_over_noise" in done.err
     assert "x, which has the largest residual" in done.err
+    assert "such as spikes, use --loss huber" in done.err
 
 
 def test_convert_names_columns(bywire: Bywire, rig: Path) -> None:

@@ -61,6 +61,14 @@ LAYOUTS = {
     "comment as titles": ("# t [s],p [bar]\n" + rows(), None),
     "comments within": (HEADER + rows().replace("0.200,", "# brake released\n0.200,"), None),
     "preamble": ("Rig 3\nby night; hot\n\n" + HEADER + rows(), None),
+    "preamble as wide as the table": (
+        "Rig 3;27.11.2026\nt [s];p [bar]\n" + rows(";").replace(".", ","),
+        None,
+    ),
+    "preamble as wide as the table, units below": (
+        "Rig 3;27.11.2026\nt;p\ns;bar\n" + rows(";").replace(".", ","),
+        None,
+    ),
     "preamble of pairs": ("Operator;X\nRig;A\nt [s];p [bar]\n" + rows(";"), None),
     "sep line": ("sep=;\nt [s];p [bar]\n" + rows(";").replace(".", ","), None),
     "blanks": ("t [s]   p [bar]\n" + rows("    "), None),

@@ -276,16 +276,18 @@ def _known_unit(unit: str, where: str) -> Scale:
         ) from None
 
 
-def _require_same(signal: SignalMapping, column: Column, where: str) -> None:
+def _require_same(signal: SignalMapping, column: Column, where: str, is_time: bool = False) -> None:
     """Reject a mapping whose unit differs from the file's."""
     unit = _known_unit(column.unit, where)
     said = unit_of(signal.unit)
     if (unit.factor, unit.zero, unit.powers) == (said.factor, said.zero, said.powers):
         return
+    scale = f"set signals.{signal.name}.scale in the mapping to the value of the number 1 in"
+    wrong = "correct it" if is_time else f"{scale} {signal.unit}"
     raise UnitError(
-        f"{where}: the unit is {column.unit!r} in the file but {signal.unit!r} in the mapping. "
-        f"Remove signals.{signal.name}.unit, or set signals.{signal.name}.scale to the value of "
-        f"the number 1 in {signal.unit}",
+        f"{where}: the unit is {column.unit!r} in the file but {signal.unit!r} in the brackets or "
+        f"the mapping. Remove {signal.unit!r}, because bywire converts {column.unit!r}. If the "
+        f"file's unit is wrong, {wrong}",
         name=signal.name,
         value=str(signal.unit),
         valid=column.unit,
@@ -325,7 +327,7 @@ def _clock(file: Path, source: Source, column: Column, given: Clock | None) -> C
             value=unit,
         )
     if given is not None and given.unit and clock.unit:
-        _require_same(SignalMapping("time", clock.name, given.unit), clock, where)
+        _require_same(SignalMapping("time", clock.name, given.unit), clock, where, is_time=True)
     return Clock(clock.name, unit)
 
 

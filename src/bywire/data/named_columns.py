@@ -173,7 +173,11 @@ def _shown_units(named: NamedColumns | None) -> Iterator[None]:
         raise UnitError(f"{error.lacking}. Use {typed}, {_BRACKETS}", name="unit") from None
     except NoClockError as error:
         typed = _options(error.signals, "COLUMN", named)
-        raise FileError(f"{error}. Or use {typed}, {_BRACKETS}", name="time") from None
+        rate = '--time "1 kHz"' if is_command_line() else "time='1 kHz'"
+        raise FileError(
+            f"{error}. Or use {typed}, {_BRACKETS}. For a constant sample rate, use {rate}",
+            name="time",
+        ) from None
 
 
 def _options(signals: Mapping[str, str], clock: str, named: NamedColumns | None) -> str:

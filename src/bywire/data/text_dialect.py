@@ -355,6 +355,13 @@ def _from_numbers(
         notes += _doubtful_titles(titles, start)
         if _is_comment(head.plain(start)):
             notes.append(f"bywire reads the comment in line {start + 1} as titles")
+    elif above and _has_decimal_commas(head, first, separator, width, rows[above[-1]]):
+        raise FileError(
+            f"{head.path}, line {first + 1}: commas separate the columns and are also decimal "
+            f"marks, because the {len(rows[above[-1]])} titles above have {width} cells below. "
+            "Export the table with semicolons or decimal points",
+            name=str(head.path),
+        )
     elif above and above[-1] == begin:
         return None, begin  # a header that does not match the rows
     elif above and start > begin:
@@ -365,10 +372,25 @@ def _from_numbers(
     # Sentences contain blanks too; with this separator, a row must start with its number.
     first_ones = 1 if separator == " " else None
     mixed = (k for k in above if len(rows[k]) == len(row) and _has_number(rows[k][:first_ones]))
-    if any(k < start or k == start != begin for k in mixed):
+    has_titles = sum(bool(unit) and _is_unit(unit) for unit in units) > width / 2
+    if any((k < start and not has_titles) or k == start != begin for k in mixed):
         return None, begin
     dialect = head.table(separator, titles, units, first, len(row))
     return replace(dialect, notes=tuple(notes)), start
+
+
+def _has_decimal_commas(
+    head: Head, first: int, separator: str, width: int, titles: list[str]
+) -> bool:
+    """Return whether each number has two cells, because commas are also its decimal mark."""
+    if separator != "," or 2 * len(titles) != width or _has_number(titles):
+        return False
+    rows = (head.cells(k, ",") for k in range(first, min(first + _ROWS, len(head.lines))))
+    return all(
+        len(cells) == width and all(cell.isdecimal() for cell in cells[1::2])
+        for cells in rows
+        if cells
+    )
 
 
 def _loose_cells(head: Head, line: int, separator: str) -> list[str]:

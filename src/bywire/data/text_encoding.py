@@ -6,6 +6,7 @@ import codecs
 from collections.abc import Iterator
 from pathlib import Path
 
+from bywire.core.callers import option
 from bywire.core.errors import FileError
 
 ENCODINGS = (
@@ -140,9 +141,9 @@ def head_text(path: Path, named: str, size: int) -> tuple[list[str], str, bool]:
 def not_utf8(path: Path, line: int) -> FileError:
     """Return the error for a line that is not UTF-8."""
     return FileError(
-        f"{path}, line {line} is not UTF-8 text. Specify the encoding in a mapping, for example "
-        "encoding = 'cp1252' (Windows) or 'latin-1', or save the file as UTF-8 (in spreadsheets: "
-        "'CSV UTF-8')",
+        f"{path}, line {line} is not UTF-8 text. Save it as UTF-8 (in spreadsheets: 'CSV "
+        f"UTF-8'). Or add the line encoding = 'cp1252' (Windows) or 'latin-1' to the mapping, a "
+        f"TOML file ({option('mapping')})",
         name="encoding",
         valid="'cp1252' (Windows) or 'latin-1'",
     )

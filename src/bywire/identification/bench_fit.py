@@ -201,7 +201,7 @@ def _checks_of(
             note="1 if only the sensors' noise remains"
             + _few(fit.residuals, far, robust)
             + (_BETWEEN if resampled else ""),
-            next_step=_missing(fit),
+            next_step=_missing(fit, robust),
         ),
         *((_outliers(far, options),) if robust else ()),
         Check(
@@ -229,19 +229,20 @@ def _checks_of(
     )
 
 
-def _missing(fit: Estimate) -> str:
+def _missing(fit: Estimate, robust: bool) -> str:
     """Return the next step for the output with the largest residual."""
     left = [each for each in fit.leftovers() if each.noise]
     if not left:
         return ""
     worst = max(left, key=lambda each: each.rms / (each.noise or 1.0))
     name = worst.label.rpartition(":")[2]
+    spikes = f". If single samples are wrong, such as spikes, use {option('loss', 'huber')}"
     return (
         f"check {worst.label}, which has the largest residual. If its curves are shifted, add "
         f"{option('unknowns')} offset.{name}. If they differ at the beginning, use "
         f"{option('states')}. If another parameter explains the residual, add it with "
         f"{option('unknowns')}. If the residual only scatters, specify its noise with "
-        f"{option('outputs')} '{name}=...'"
+        f"{option('outputs')} '{name}=...'{'' if robust else spikes}"
     )
 
 

@@ -102,7 +102,9 @@ def _require_measured(data: xr.Dataset, name: str, signal: Signal) -> None:
     unit = str(data[name].attrs.get("units", "1"))
     if unit != signal.unit and not measures(unit_of_symbol(unit), signal.unit):
         raise UnitError(
-            f"{name} is in {unit}, but must be in {signal.unit}. Check the mapping",
+            f"{name} is in {unit}, but must be in {signal.unit}. Choose another column. "
+            "If this column contains a scaled value, set its scale and unit with "
+            f"{option('mapping')}",
             name=name,
             value=unit,
             valid=signal.unit,
@@ -204,8 +206,9 @@ def measured_run(
         if missing.size:
             at = float(data["time"].values[missing[0]])
             raise ParameterError(
-                f"{signal} drives the model, but is missing {missing.size} samples, the first at "
-                f"{at:.4g} s. Trim the record there",
+                f"{signal} drives the model, but lacks {missing.size} samples, the first at "
+                f"{at:.4g} s. Cut the record before the gap. Or fill the gap by interpolation with "
+                "'bywire convert IN OUT --rate RATE --exclude nothing', and use the converted file",
                 name=signal,
             )
     run = _run(bench, chosen, data, driven, between)

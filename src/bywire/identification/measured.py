@@ -321,7 +321,9 @@ def require(data: xr.Dataset, signals: Mapping[str, str], where: str) -> tuple[s
         given = str(data[name].attrs.get("units", "1"))
         if unit not in ("", given) and not measures(unit_of_symbol(given), unit):
             raise UnitError(
-                f"{where}: {name} is in {given}, but must be in {unit}. Check the mapping",
+                f"{where}: {name} is in {given}, but must be in {unit}. Choose another "
+                "column. If this column contains a scaled value, set its scale and unit with "
+                f"{option('mapping')}",
                 name=name,
                 value=given,
                 valid=unit,
