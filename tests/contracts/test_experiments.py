@@ -68,7 +68,7 @@ def test_experiments_of_ours_name_what_there_is(name: str) -> None:
             "key figures fartest",
             "PUSH = ",
         ),
-        ("key figures", '"m", "largest', '"mm", "largest', "farthest in mm", "PUSH = "),
+        ("key figures", '"m", "maximum', '"mm", "maximum', "farthest in mm", "PUSH = "),
     ],
 )
 def test_what_an_experiment_names_and_nobody_has(

@@ -88,7 +88,7 @@ def test_tracking_shows_the_error(recording: xr.Dataset) -> None:
     error = heights(tracking(recording, "p_mc", "p_ref").axes[1])[0]
     wanted = (recording["p_ref"] - recording["p_mc"]).values / 1e5
     assert np.allclose(error, wanted)
-    with pytest.raises(ParameterError, match="name a set point"):
+    with pytest.raises(ParameterError, match="Choose a set point"):
         tracking(recording, "p_mc", "i_ref")
 
 

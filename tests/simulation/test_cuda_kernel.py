@@ -147,7 +147,7 @@ def test_a_bench_says_that_its_cases_go_there(driver):
 
 def test_memory_that_is_too_small_is_said(runs, driver):
     driver.capacity = 10_000
-    with pytest.raises(DeviceError, match=r"emulated 0 has 0\.01 MB free.*needs .* MB: record"):
+    with pytest.raises(DeviceError, match=r"emulated 0 has 0\.01 MB free.*needs .* MB\. Record"):
         simulate_group(runs, engine="cuda")
 
 

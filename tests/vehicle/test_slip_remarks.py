@@ -1,4 +1,4 @@
-"""Remarks on slip control that holds far less slip than that of the largest adhesion."""
+"""Remarks on slip control that holds far less slip than that of the maximum adhesion."""
 
 import numpy as np
 import pytest
@@ -28,7 +28,7 @@ def test_dry_cobble_is_told_and_where_it_comes_from(curve):
         "burckhardt": 1.3713 * (1 - np.exp(-6.4565 * 0.105)) - 0.6691 * 0.105,
         "magic-formula": np.sin(2.117 * np.arctan(Bs - 0.4782 * (Bs - np.arctan(Bs)))),
     }[curve]
-    assert "slip set point of 0.105 (slip_set), but dry-cobble has its largest adhesion" in text
+    assert "slip set point of 0.105 (slip_set), but dry-cobble has its maximum adhesion" in text
     assert f"at {peak:.3g}: the wheel uses {100 * share / 0.9999:.0f} % of it" in text
 
 

@@ -20,7 +20,7 @@ def far_from_peak(
     curve: adhesion.Parameters,
     ways: road.Parameters,
 ) -> list[str]:
-    """Return remarks on surfaces whose largest adhesion needs far more slip than the set point.
+    """Return remarks on surfaces whose maximum adhesion needs far more slip than the set point.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def far_from_peak(
         surface = "the road" if name == "own" else name
         texts[
             f"slip control uses a slip set point of {slip_set:.3g} ({parameter}), but {surface} "
-            f"has its largest adhesion at {peak:.3g}: the wheel uses {100.0 * held / most:.0f} % "
+            f"has its maximum adhesion at {peak:.3g}. The wheel uses {100.0 * held / most:.0f} % "
             "of it. A larger set point, or rules (abs=rules), brake harder there"
         ] = None
     return list(texts)

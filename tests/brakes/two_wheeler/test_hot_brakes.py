@@ -204,7 +204,7 @@ def test_the_time_of_the_peak_is_that_of_the_fluid_and_not_of_a_row():
         for parked in ("900 s", "2000 s", "30 s")
     )
     assert short.value == pytest.approx(long.value, abs=0.02)
-    assert "increase options.parked" in brief.note
+    assert "Increase options.parked" in brief.note
 
 
 @pytest.mark.parametrize(

@@ -113,7 +113,7 @@ class TwoWheelerByWire(HotBrakes[TwoWheelerParameters, ecu.Memory]):
         return (Task("ecu", par.ecu.T_s, tick),)
 
     def remarks(self, recording: Any, par: Par) -> list[str]:
-        """Return remarks on a slip far below the slip of the largest adhesion."""
+        """Return remarks on a slip far below the slip of the maximum adhesion."""
         if par.ecu.abs != "pi" or par.ecu.mix.alpha < 1.0:
             return []
         ways, x = par.vehicle.road, recording["x"].values
