@@ -29,7 +29,7 @@ def test_dry_cobble_is_told_and_where_it_comes_from(curve):
         "magic-formula": np.sin(2.117 * np.arctan(Bs - 0.4782 * (Bs - np.arctan(Bs)))),
     }[curve]
     assert "slip set point of 0.105 (slip_set), but dry-cobble has its maximum adhesion" in text
-    assert f"at {peak:.3g}: the wheel uses {100 * share / 0.9999:.0f} % of it" in text
+    assert f"at {peak:.3g}. The wheel uses {100 * share / 0.9999:.0f} % of it" in text
 
 
 def test_surfaces_whose_peak_is_near_are_not():
