@@ -273,7 +273,7 @@ def test_ranges_priors_and_starts() -> None:
             {"unknowns": {"motor.R_m": "0.1..1"}},
             "range of motor.R_m = '0.1' has the wrong unit",
         ),
-        ({"unknowns": {"motor.R_m": "0.1 ohm"}}, "for example '0.175 ohm..0.7 ohm'"),
+        ({"unknowns": {"motor.R_m": "0.1 ohm"}}, "use '0.175 ohm..0.7 ohm'"),
         ({"unknowns": {"motor.R_m": "1..0.1 ohm"}}, "is empty"),
         (
             {"unknowns": {"motor.R_m": "-1..1 ohm"}},
