@@ -53,7 +53,7 @@ def sliders(
         Returns the result with changed parameters.
     """
     widgets = library("ipywidgets", "sliders in a notebook", "notebook")
-    made = {name: _slider(widgets, par, name) for name in parameters}
+    controls = {name: _slider(widgets, par, name) for name in parameters}
     image, table, message = widgets.Image(format="png"), widgets.HTML(), widgets.HTML()
 
     def show(shown: Shown) -> None:
@@ -62,16 +62,16 @@ def sliders(
         message.value = ""
 
     def rerun(_: Any) -> None:
-        changes = {name: value() for name, (_, value) in made.items()}
+        changes = {name: value() for name, (_, value) in controls.items()}
         try:
             show(run(changes))
         except BywireError as error:  # the sliders stay usable
             message.value = f"<b>{escape(str(error))}</b>"
 
     show(result)
-    for slider, _ in made.values():
+    for slider, _ in controls.values():
         slider.observe(rerun, names="value")
-    return widgets.VBox([*(slider for slider, _ in made.values()), message, image, table])
+    return widgets.VBox([*(slider for slider, _ in controls.values()), message, image, table])
 
 
 def _slider(widgets: Any, par: ParameterSet, name: str) -> tuple[Any, Any]:

@@ -49,6 +49,44 @@ def display_unit(symbol: str) -> str:
     return DISPLAY_UNITS.get(symbol, symbol)
 
 
+BY_SIZE: dict[str, tuple[tuple[float, str], ...]] = {
+    "s": ((0.0, "ms"), (1.0, "s")),
+    "m": ((0.0, "um"), (1e-4, "mm"), (1.0, "m")),
+    "N": ((0.0, "N"), (1e3, "kN")),
+    "Pa": ((0.0, "Pa"), (1e2, "bar")),
+    "J": ((0.0, "J"), (1e3, "kJ"), (1e6, "MJ")),
+    "W": ((0.0, "W"), (1e3, "kW")),
+}
+"""units by SI unit, each with the least magnitude in the SI unit from which it is used"""
+_OF_NOTHING = {"s": "ms"}  # units of zero, where it is not the display unit
+
+
+def readable_unit(size: float, symbol: str) -> str:
+    """Return the most readable unit for a number of a given size.
+
+    This is the one rule for terminals, reports, pages and figures: see `BY_SIZE`. Other quantities
+    have one unit for all sizes, see `DISPLAY_UNITS`.
+
+    Parameters
+    ----------
+    size
+        Largest magnitude to write, in ``symbol``.
+    symbol
+        SI unit, or ``"%"``.
+
+    Examples
+    --------
+    >>> readable_unit(0.06, "s"), readable_unit(41.0, "m"), readable_unit(0.002, "m")
+    ('ms', 'm', 'mm')
+    >>> readable_unit(12500.0, "N"), readable_unit(2e6, "Pa"), readable_unit(2e-5, "m")
+    ('kN', 'bar', 'um')
+    """
+    if not size or symbol not in BY_SIZE:
+        return _OF_NOTHING.get(symbol, display_unit(symbol))
+    # A hair's breadth below a boundary is the boundary: 0.9999999 s is not 1000 ms.
+    return next(u for least, u in reversed(BY_SIZE[symbol]) if abs(size) * (1 + 1e-6) >= least)
+
+
 _POSITIVE = Field(gt=0, allow_inf_nan=False)
 _NOT_NEGATIVE = Field(ge=0, allow_inf_nan=False)
 _FINITE = Field(allow_inf_nan=False)

@@ -12,10 +12,11 @@ from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.ticker import FixedLocator, MaxNLocator, ScalarFormatter
 
+from bywire.core.quantities import readable_unit
 from bywire.core.typing import Array
 from bywire.core.units import convert, difference_unit
 from bywire.report import style
-from bywire.report.wording import amount, readable_unit, unit_text
+from bywire.report.wording import amount, unit_text
 
 CHARACTER = 0.62 * style.TEXT_SIZE / 72.0
 """width of a digit [inch], rounded"""

@@ -146,7 +146,7 @@ def _signals_of_bench(bench: Path) -> tuple[list[dict[str, str]], list[dict[str,
         model: Model = case_of(driven_bench(bench, {}), "").model
     except BywireError:  # the form shows the error when it is sent
         return [], []
-    inputs, outputs = (_told(signals_of(kind)) for kind in (model.Stimulus, model.Output))
+    inputs, outputs = (_described(signals_of(kind)) for kind in (model.Stimulus, model.Output))
     return [each for each in inputs if not each["name"].startswith("noise_")], outputs
 
 
@@ -154,11 +154,11 @@ def _signals_of_method(method: str) -> list[dict[str, str]]:
     from bywire.identification.method import METHODS
 
     known = METHODS.all().get(method)
-    wanted = {} if known is None else {**known.signals, **known.optional}
-    return [{"name": name, "label": "", "symbol": unit} for name, unit in wanted.items()]
+    signals = {} if known is None else {**known.signals, **known.optional}
+    return [{"name": name, "label": "", "symbol": unit} for name, unit in signals.items()]
 
 
-def _told(signals: Mapping[str, Signal]) -> list[dict[str, str]]:
+def _described(signals: Mapping[str, Signal]) -> list[dict[str, str]]:
     return [
         {"name": name, "label": each.label, "symbol": each.unit}
         for name, each in signals.items()

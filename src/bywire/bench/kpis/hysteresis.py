@@ -20,6 +20,7 @@ import xarray as xr
 
 from bywire.bench.kpis.kpi import Undefined, measure
 from bywire.bench.kpis.samples import defect, signal, smoothed, treatment
+from bywire.core.quantities import readable_unit
 from bywire.core.typing import Array
 from bywire.core.units import shown
 
@@ -111,9 +112,11 @@ class Loop:
         left = abs(float(self.response[-1] - self.response[0]))
         parts = [self.treatment] if self.treatment else []
         if left > _LEFT * float(np.ptp(self.response)):
+            unit = readable_unit(left, self.response_unit)
+            distance = shown(float(f"{left:.3g}"), self.response_unit, unit)
             parts.append(
-                f"the response ends {shown(float(f'{left:.3g}'), self.response_unit)} away from "
-                "its start, so a straight line closes the loop"
+                f"the response ends {distance} away from its start, so a straight line closes the "
+                "loop"
             )
         return "; ".join(parts)
 

@@ -14,6 +14,7 @@ import xarray as xr
 
 from bywire.bench.kpis.kpi import Undefined
 from bywire.core.errors import ParameterError, unknown_name
+from bywire.core.quantities import readable_unit
 from bywire.core.typing import Array
 from bywire.core.units import shown
 
@@ -204,5 +205,6 @@ def smoothed(t: Array, y: Array, period: float) -> Array:
 
 def treatment(period: float) -> str:
     """Return the note on figures of a smoothed signal; empty for the raw one."""
-    unit = "ms" if period < 1.0 else "s"
-    return f"moving average over {shown(period, 's', unit)}" if period > 0 else ""
+    if not period > 0:
+        return ""
+    return f"moving average over {shown(period, 's', readable_unit(period, 's'))}"

@@ -32,7 +32,7 @@ from bywire.bench.running import Result
 from bywire.bench.stated import StatedLevel, StatedRange, stated_figures, stated_for
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.errors import BywireError, InputError
-from bywire.core.quantities import display_unit
+from bywire.core.quantities import BY_SIZE, display_unit
 from bywire.core.typing import Array
 from bywire.core.units import convert, parse
 from bywire.core.version import __version__
@@ -45,7 +45,7 @@ from bywire.report.panels import Panel, Trace
 from bywire.report.stated_levels import stated_figure
 from bywire.report.subject import bench_changes, parameter_rows
 from bywire.report.terminal import change_texts
-from bywire.report.wording import BY_SIZE, amount, unit_text
+from bywire.report.wording import amount, unit_text
 from bywire.simulation.c_runtime import SCALAR
 
 if TYPE_CHECKING:
