@@ -7,6 +7,7 @@ and needs no other code of the model. A model has:
 * dry *frictions*: a velocity state whose equation carries a set-valued force between two bounds
   while it is exactly zero;
 * one-sided *limits*: a state that cannot fall below zero (a check valve, a stop);
+* *stop operators*: a massless state that follows a motion within a width (Maxwell slip);
 * *contact groups*: unilateral contacts whose compliances couple them;
 * *tasks*: the sampled controllers, each with its own period, which share one memory;
 * *powers*, integrated along with the states, for the energy balance.
@@ -53,7 +54,7 @@ class Task:
 class Model(Protocol):
     """A system that the engine integrates. All methods are pure and accept symbols.
 
-    A model may inherit from this class; frictions, limits and contacts then default to none.
+    A model may inherit from this class; frictions, limits, stops and contacts then default to none.
     """
 
     @property
@@ -97,6 +98,14 @@ class Model(Protocol):
         return ()
 
     @property
+    def stops(self) -> tuple[str, ...]:
+        """States that are stop operators: a state follows its rate, but stays within its width.
+
+        Their rates, and the overlaps of contacts, do not depend on such states.
+        """
+        return ()
+
+    @property
     def usually_open(self) -> tuple[bool, ...]:
         """Whether each contact group rarely touches, as end stops do. Default: none.
 
@@ -122,6 +131,16 @@ class Model(Protocol):
         """Return (low, high) per friction, low <= 0 <= high, in the unit of its equation.
 
         The force is ``low`` where the velocity is positive, ``high`` where it is negative.
+        """
+        return ()
+
+    def widths(
+        self, x: Any, xe: Any, memory: Any, par: Any, contact: tuple[float, ...]
+    ) -> tuple[float, ...]:
+        """Return the width of each stop operator, >= 0: its state is at most this from zero.
+
+        A width may depend on a load. The engine evaluates it at the start and at the predicted end
+        of a substep.
         """
         return ()
 
@@ -152,7 +171,8 @@ class Model(Protocol):
         """Return the rates of the Flow at the midpoint of a substep.
 
         ``xe`` is the predicted midpoint, as in ``balance``, so its periodic terms are computed only
-        once. ``rate`` is dx/dt. ``reaction`` contains the friction forces, then the limits' forces.
+        once. ``rate`` is dx/dt. ``reaction`` contains the friction forces, then the limits' forces,
+        then minus the slip speeds of the stop operators. There, ``x`` is the mean over the motion.
         """
         ...
 
@@ -223,7 +243,7 @@ class Model(Protocol):
 
 
 def require_states(model: Any) -> None:
-    """Reject a model's frictions and limits that are not among its states.
+    """Reject a model's frictions, limits and stop operators that are not among its states.
 
     Parameters
     ----------
@@ -236,7 +256,8 @@ def require_states(model: Any) -> None:
         With the declaration, the name, and the nearest state.
     """
     fields: tuple[str, ...] = getattr(model.State, "_fields", ())
-    for kind in ("frictions", "limits") if fields else ():
+    found: dict[str, str] = {}
+    for kind in ("frictions", "limits", "stops") if fields else ():
         names = getattr(model, kind)
         if isinstance(names, property):
             continue
@@ -251,6 +272,14 @@ def require_states(model: Any) -> None:
             if name not in fields:
                 error = unknown_name("state", str(name), fields)
                 raise error.at(f"{where} lists {name!r}, which is not a field of State", ModelError)
+            if kind == "stops" and name in found:
+                raise ModelError(
+                    f"{where} lists {name!r}, which is also one of {found[name]}: a stop operator "
+                    "has no other force",
+                    name=kind,
+                    value=str(name),
+                )
+            found[name] = kind
 
 
 def _declared(module: ModuleType) -> Iterator[type[Any]]:
@@ -334,6 +363,12 @@ class Wrapping(_Protocol):
     ) -> tuple[Bounds, ...]:
         """Return the bounds of the frictions."""
         return self.inner.bounds(x, xe, self.memory_inside(memory), par, contact)
+
+    def widths(
+        self, x: Any, xe: Any, memory: Any, par: Any, contact: tuple[float, ...]
+    ) -> tuple[float, ...]:
+        """Return the widths of the stop operators."""
+        return self.inner.widths(x, xe, self.memory_inside(memory), par, contact)
 
     def powers(
         self,
