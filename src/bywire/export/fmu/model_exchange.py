@@ -1,4 +1,4 @@
-"""A plant in model exchange: its variables, and its equations in continuous time as C text."""
+"""A plant in model exchange: its variables, and its continuous-time equations as C text."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from bywire.simulation.graph import Graph, Node
 from bywire.simulation.stages import indented, leaf_namer, statements
 
 LEAVES = {"p": "p", "x": "x", "m": "m", "c": "closed", "r": "reaction"}
-"""arguments of the C functions by kind of leaf; without integrals, which are not computed"""
+"""arguments of the C functions by kind of leaf, without the integrals, which the FMU omits"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,12 +39,12 @@ class Equations:
 
     @cached_property
     def continuous(self) -> Continuous:
-        """Its symbolic functions."""
+        """Symbolic functions of the plant."""
         return build_continuous(self.made.run.model, self.made.run.par)
 
     @cached_property
     def graph(self) -> Graph:
-        """Arguments of the other properties' nodes."""
+        """Graph that contains the nodes of the other properties."""
         return Graph()
 
     def _added(self, function: object, kinds: str) -> list[list[Node]]:
@@ -77,14 +77,14 @@ class Equations:
 
     @property
     def shown(self) -> list[int]:
-        """Recorded signals that depend on state and inputs: no integrals, no ECU signals."""
+        """Recorded signals that depend on state and inputs, without integrals and ECU signals."""
         held = leaves_read(self.graph, chain(*self.equations))["m"]
         reads = [leaves_read(self.graph, [node]) for node in self.output]
         return [k for k, each in enumerate(reads) if not each["q"] and each["m"] <= held]
 
     @property
     def counts(self) -> dict[str, object]:
-        """Constants for the functions around the equations, by name of their macro."""
+        """Constants for the C functions that use the equations, by the name of their macro."""
         states = list(signals_of(self.made.run.model.State).values())
         names = self.made.run.model.State._fields
         modal = [names.index(name) for name in self.continuous.modal]
@@ -144,7 +144,7 @@ def exchange_interface(equations: Equations, start_reads: frozenset[int]) -> Int
     Parameters
     ----------
     start_reads
-        Parameters that the initial values depend on, by index.
+        Indices of the parameters that the initial values depend on.
     """
     made, graph = equations.made, equations.graph
     read = leaves_read(graph, [n for nodes in equations.equations for n in nodes])
@@ -169,7 +169,7 @@ def exchange_interface(equations: Equations, start_reads: frozenset[int]) -> Int
 
 
 def _state_names(equations: Equations, shown: list[int]) -> list[str]:
-    """Return the names of the states; another name if the recorded signal differs or is held."""
+    """Return the names of the states, renamed where another signal has the same name."""
     made = equations.made
     recorded = list(made.program.outputs)
     taken = set(made.run.model.Memory._fields)
@@ -192,7 +192,7 @@ def _rates(made: Exported, names: list[str]) -> Iterator[Variable]:
 
 
 def _modes(equations: Equations) -> Iterator[Variable]:
-    """Yield modes, the number of their changes, and the event indicators."""
+    """Yield the modes, the number of mode changes, and the event indicators."""
     model = equations.made.run.model
     continuous = equations.continuous
     known = signals_of(model.State)
@@ -206,12 +206,12 @@ def _modes(equations: Equations) -> Iterator[Variable]:
     yield Variable("mode.changes", "local", "events", 0, "1", label, is_held=True)
     at = 0
     for name in continuous.modal:
-        yield _indicator(at, f"{name}.motion", known[name], "distance to reversal, or to its limit")
+        yield _indicator(at, f"{name}.motion", known[name], "distance to reversal or to its limit")
         yield _indicator(
             at + 1,
             f"{name}.hold",
             Signal("1", known[name].label),
-            "margin of the force that holds it while stuck",
+            "margin of the holding force while stuck",
         )
         at += 2
     for k in range(continuous.contacts):
