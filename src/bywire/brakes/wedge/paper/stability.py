@@ -82,7 +82,8 @@ def _static(runs: Runs) -> list[Item]:
     for mu_B in _COEFFICIENTS:
         stated = values[f"C_star_closed_{tag(mu_B)}"]
         where = (
-            "section 'Introduction': C* = 2 mu_B/(tan(alpha) - mu_B), evaluated at our wedge angle"
+            "section 'Introduction': C* = 2 mu_B/(tan(alpha) - mu_B), read as its value at our "
+            "wedge angle"
         )
         items.append(
             compared(
