@@ -280,8 +280,8 @@ def _stuck(q: Quoted) -> RootCause:
     return RootCause(
         "The remaining loop with dither comes from the dithered brake's delay on the ramp, and "
         f"friction bends its ends. Its area is {q('fig5.loop_area_ratio')} of the loop "
-        f"without dither, in which the piston jumps, then sticks at {q('ramp.p_max_without_dither')} and "
-        "traces a small loop.",
+        "without dither, in which the piston jumps, then sticks at "
+        f"{q('ramp.p_max_without_dither')} and traces a small loop.",
         ("fig5.loop_area_ratio*",),
     )
 

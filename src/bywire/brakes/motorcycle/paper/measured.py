@@ -423,7 +423,8 @@ HELD: Mapping[str, str] = {
     "caliper.A_pd": "acts only through A_pd^2/K_pd, which K_pd represents",
     "fluid.beta": "acts only through the chamber's volume/beta ratio, which s_mc represents",
     "pipeline.d_pl": "the misfit falls as the pipeline gets wider, until its resistance is "
-    "negligible and the misfit no longer depends on d_pl: the statements determine only a lower bound",
+    "negligible and the misfit no longer depends on d_pl: the statements determine only a lower "
+    "bound",
     "fluid.nu": "acts only through the pipeline's resistance, as d_pl does",
     "fluid.rho": "acts only through the pipeline's resistance, as d_pl does",
     "pipeline.L_pl": "acts only through the pipeline's resistance, as d_pl does",
