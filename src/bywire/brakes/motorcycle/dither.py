@@ -624,10 +624,7 @@ def law(par: Par, data: xr.Dataset, best: int, grid: Grid) -> list[Kpi]:
 
 # --- The plant under dither
 
-_DEAD, _NEUTRAL = (
-    1e-12,
-    1e-6,
-)  # poles that decay within a period, and distance of integrators from 1
+_DEAD, _NEUTRAL = 1e-12, 1e-6  # limits of poles that decay in a period, and of integrators
 _ROUNDS, _CLOSE = 12, 1e-4  # corrections of the current, and the relative error that ends them
 
 

@@ -84,7 +84,7 @@ def source_tick(readings: Readings, m: Memory, u: Stimulus, par: MotorcycleParam
     """Hold the value of an ideal source and the converter readings.
 
     Only the recording uses the readings, and ``shown`` rounds them. Rounding within the tick would
-    make derivatives zero, as in a closed loop.
+    interrupt derivatives, as it does in a closed loop.
     """
     p_share = adc.noisy(readings.p, u.noise_p, par.adc)
     i_share = adc.noisy(readings.i, u.noise_i, par.adc)

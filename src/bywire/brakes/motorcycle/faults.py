@@ -57,7 +57,7 @@ def _knocked_back(par: Any, gap: float) -> Mapping[str, Any]:
 
 
 def _boiling(par: Any, T: float) -> Mapping[str, Any]:
-    """Return the changes that add the vapor at a temperature [K] as gas in the caliper."""
+    """Return the changes that add vapor at a temperature [K] as gas in line and caliper."""
     if not 0.0 < T <= par.vapor.T_most:
         limits = f"> {shown(0.0, 'K')} and <= {shown(par.vapor.T_most, 'K')} (vapor.T_most)"
         raise not_valid(

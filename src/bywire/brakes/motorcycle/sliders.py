@@ -1,4 +1,4 @@
-"""Parameters at the top of this brake's pages: those with the most effect on braking."""
+"""Parameters at the top of this brake's pages, with the most effect on braking."""
 
 from bywire.report.live_page.sliders import Sliders
 

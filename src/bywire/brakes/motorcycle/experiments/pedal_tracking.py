@@ -22,11 +22,7 @@ from bywire.core.units import shown
 from bywire.data.measurement import read_trace, trace_names
 from bywire.plant import pedal
 
-_COLUMNS = {
-    "pressure": "Pa",
-    "force": "N",
-    "pedal": "m",
-}  # columns of a trace, in order of preference
+_COLUMNS = {"pressure": "Pa", "force": "N", "pedal": "m"}  # of a trace, by preference
 # Built-in ride (our choice): pedal travel [mm] over time [s]. Three increasingly fast pulls, a
 # modulated one, and a hold. The pedal map turns them into 5 to 30 bar, the range of Fig. 7b.
 _TIMES = (0.0, 0.5, 0.9, 1.6, 2.0, 2.5, 2.7, 3.3, 3.6, 4.2, 4.3, 4.8, 5.0, 5.3, 5.6, 5.9, 6.5, 7.5)
