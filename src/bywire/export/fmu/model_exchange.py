@@ -1,4 +1,4 @@
-"""A plant in model exchange: modes between events, variables, and its continuous-time equations as C text.
+"""A plant in model exchange: modes between events, variables, and its equations as C text.
 
 Set-valued forces become modes that only events change. A body with dry friction slides forward or
 backward, or sticks until the applied force exceeds the friction bounds. A state with a limit is
