@@ -7,12 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bywire.core.errors import ModelError
+from bywire.core.errors import DeviceError, ModelError
 from bywire.core.signals import zeros
 from bywire.simulation.advance import Change
+from bywire.simulation.cuda import find_device
+from bywire.simulation.ensemble import simulate_ensemble
 from bywire.simulation.program import build_program
 from bywire.simulation.run import Run, Trajectory, simulate
 from bywire.simulation.sensitivity import simulate_with_sensitivities
+from emulated_driver import EmulatedDriver, emulated
 from systems.maxwell_slip import AMPLITUDE, PARAMETERS, MaxwellSlip, State, driven, given_motion
 
 STEPS = (1e-3, 5e-4, 1e-4, 2e-5)
@@ -106,6 +109,45 @@ def test_virtual_machine_computes_the_same() -> None:
         np.testing.assert_allclose(
             virtual[name], compiled[name], rtol=0, atol=1e-9 * np.abs(compiled[name]).max()
         )
+
+
+CASES = {"W_1": np.linspace(40.0, 60.0, 11), "k_3": np.linspace(1.9e6, 2.1e6, 11)}
+OPTIONS = [{}, {"rubs": True}, {"loaded": True}, {"rubs": True, "loaded": True}]
+SIGNALS = ("x", "v", "z_1", "z_4", "F_springs", "slip_1", "E_slip", "E_stored")
+
+
+@pytest.mark.parametrize("options", OPTIONS)
+def test_lanes_have_the_digits_of_single_runs(options: dict[str, bool]) -> None:
+    run = driven(**options)
+    lanes = simulate_ensemble(run, CASES, SIGNALS)
+    for k in range(11):
+        par = run.par.replace({name: float(values[k]) for name, values in CASES.items()})
+        alone = simulate(replace(run, par=par), SIGNALS)
+        np.testing.assert_array_equal(lanes.values[k], alone.values)
+        assert lanes.repeated[k] == alone.repeated > 0
+
+
+@pytest.mark.parametrize("options", OPTIONS)
+def test_graphics_processors_have_the_digits_of_lanes(options: dict[str, bool]) -> None:
+    run = driven(**options)
+    lanes = simulate_ensemble(run, CASES, SIGNALS)
+    with emulated(EmulatedDriver()):
+        there = simulate_ensemble(run, CASES, SIGNALS, engine="cuda")
+    np.testing.assert_array_equal(there.values, lanes.values)
+    np.testing.assert_array_equal(there.repeated, lanes.repeated)
+
+
+@pytest.mark.parametrize("options", OPTIONS)
+def test_a_processor_that_is_there_agrees(options: dict[str, bool]) -> None:
+    try:
+        find_device()
+    except DeviceError as error:
+        pytest.skip(str(error))
+    run = driven(**options)
+    lanes = simulate_ensemble(run, CASES, SIGNALS)
+    there = simulate_ensemble(run, CASES, SIGNALS, engine="cuda")
+    largest = np.abs(lanes.values).max(axis=(0, 1))
+    assert np.all(np.abs(there.values - lanes.values).max(axis=(0, 1)) <= 1e-9 * largest)
 
 
 @pytest.mark.parametrize("name", ["k_1", "W_1", "W_3", "k", "m"])
