@@ -292,9 +292,11 @@ def linear_models(of: Linearization) -> tuple[LinearModel, ...]:
             f"motion: {option('side', 'above')}",
             name=names,
         )
+    point, slipping = on_stops(of.point, of.free)
+    of = replace(of, point=point)
     corner = _Corner(of)
     models = corner.chosen() if corner.is_near() else of.models(of.point)
-    texts = tuple(f"above the limit of {name}" for name in limits)
+    texts = (*(f"above the limit of {name}" for name in limits), *slipping)
     return tuple(replace(each, corners=texts + each.corners) for each in models)
 
 
@@ -304,6 +306,66 @@ def _limits_reached(of: Linearization) -> list[str]:
     fields, usual = point.model.State._fields, magnitudes(point)
     places = {name: fields.index(name) for name in point.model.limits}
     return [name for name, k in places.items() if of.free[k] and point.state[k] <= REACH * usual[k]]
+
+
+def on_stops(point: SmoothPoint, free: NDArray[np.bool_]) -> tuple[SmoothPoint, tuple[str, ...]]:
+    """Return a point whose free stop operators at their widths are on the stated side.
+
+    Returns
+    -------
+    tuple
+        The point, and texts with the side of each of these stop operators.
+
+    Raises
+    ------
+    CornerError
+        When no side is stated, or the width of a slipping stop operator changes with the state.
+    """
+    side = _STATED.get().usual
+    reached = _widths_reached(point, free) if point.model.stops else {}
+    if not reached:
+        return point, ()
+    beside = point.moved(beside_point(point, free)).widths()
+    fixed = {each for each, width in reached.items() if beside[each] == width}
+    without = {each for each in fixed if reached[each] == 0.0}  # it has no effect
+    slipping = set(without)
+    kinks = [each for each in reached if each not in without]
+    name, names = point.model.name, ", ".join(kinks)
+    if kinks and not side:
+        raise CornerError(
+            f"{name}: at the operating point, {names} is at its width: it slips outward, and "
+            "follows its motion inward. Choose another operating point, or one side: "
+            f"{option('side', 'above')}, it slips, or {option('side', 'below')}, it follows",
+            name=names,
+        )
+    if side == ABOVE:
+        changing = ", ".join(each for each in kinks if each not in fixed)
+        if changing:
+            raise CornerError(
+                f"{name}: at the operating point, {changing} slips, and its width changes with the "
+                "state, for which there is no linear model here. Choose another operating point, "
+                f"or the side where it follows its motion: {option('side', 'below')}",
+                name=changing,
+            )
+        slipping |= set(kinks)
+    first, moving = len(point.model.frictions), list(point.moving)
+    for each in slipping:
+        moving[first + point.model.stops.index(each)] = 0.0
+    how = "slips" if side == ABOVE else "follows"
+    texts = tuple(f"{each} {how} at its width" for each in kinks)
+    return replace(point, moving=moving), texts
+
+
+def _widths_reached(point: SmoothPoint, free: NDArray[np.bool_]) -> dict[str, float]:
+    """Return the free stop operators at their widths, with these widths."""
+    fields, usual = point.model.State._fields, magnitudes(point)
+    places = {name: fields.index(name) for name in point.model.stops}
+    widths = point.widths()
+    return {
+        name: widths[name]
+        for name, k in places.items()
+        if free[k] and abs(point.state[k]) >= widths[name] - REACH * usual[k]
+    }
 
 
 class _Corner:

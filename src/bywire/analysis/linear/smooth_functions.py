@@ -32,8 +32,9 @@ class SmoothFunctions:
         ``(x, p) -> (C of each group..., all overlaps)``.
     plant
         ``(x, m, p, K, s, g) -> (A, B, C, D, rate, y)`` with the stiffness K of closed contacts,
-        the direction s of each friction (0: removed) and g, 0 for each stuck velocity, else 1;
-        B and D by all of the Memory, C, D and y for all of the Output.
+        the direction s of each friction (0: removed) and g, 0 for each stuck velocity and each
+        slipping stop operator, else 1; B and D by all of the Memory, C, D and y for all of the
+        Output.
     ticks
         ``(x, m, u, p) -> (by x, by m, by u, renewed)``: each task's new memory and its Jacobians.
     reads
@@ -130,7 +131,7 @@ def _plant(
     require_states(model)
     K = ca.SX.sym("K", gap.shape[0], gap.shape[0])
     s = ca.SX.sym("s", len(model.frictions))
-    g = ca.SX.sym("g", len(model.frictions))
+    g = ca.SX.sym("g", len(model.frictions) + len(model.stops))
     contact = tuple(_split(K @ gap))
     rates, outputs = equations(model, par, (x, held), contact, _split(s), _split(g))
     rate, y = _column(rates), _column(outputs)
@@ -168,18 +169,22 @@ def equations(
     contact
         Forces of the contacts.
     directions, moving
-        For each friction: its direction, 0 if it is removed; and 0 if its velocity is stuck.
+        For each friction: its direction, 0 if it is removed; and 0 if its velocity is stuck. Then
+        0 for each stop operator that slips.
     outputs
         Whether to compute outputs.
     """
     x, held = at
     force = dict(zip(x._fields, model.balance(x, x, held, par, contact), strict=True))
-    reaction: list[Any] = [0.0] * (len(model.frictions) + len(model.limits))
+    reaction: list[Any] = [0.0] * len((*model.frictions, *model.limits, *model.stops))
     bounds = model.bounds(x, x, held, par, contact)
     for k, (name, (low, high)) in enumerate(zip(model.frictions, bounds, strict=True)):
         s = directions[k]
         reaction[k] = where(s > 0, low, where(s < 0, high, 0.0))
         force[name] = moving[k] * (force[name] + reaction[k])
+    for k, name in enumerate(model.stops, len(model.frictions)):
+        reaction[k + len(model.limits)] = (moving[k] - 1.0) * force[name]
+        force[name] = moving[k] * force[name]
     mass = model.mass(x, par)
     rates = [force[name] / getattr(mass, name) for name in x._fields]
     if not outputs:
@@ -245,6 +250,17 @@ class SmoothPoint:
             self.directions,
             self.moving,
         )
+
+    def widths(self) -> dict[str, float]:
+        """Return the widths of the stop operators by name."""
+        if not self.model.stops:
+            return {}
+        x = cast(Any, self.model.State)(*self.state.tolist())
+        memory = cast(Any, self.model.Memory)(*self.memory.tolist())
+        gaps = [d for group in self.model.gap(x, x, self.par) for d in group]
+        contact = tuple((self.K @ np.array(gaps)).tolist()) if gaps else ()
+        found = self.model.widths(x, x, memory, self.par, contact)
+        return dict(zip(self.model.stops, map(float, found), strict=True))
 
     def ticks(self) -> list[list[Array]]:
         """Return each task's Jacobians by state, memory and stimulus, and the new memory."""

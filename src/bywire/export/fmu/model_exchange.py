@@ -15,6 +15,7 @@ from typing import Any
 
 import casadi as ca
 
+from bywire.core.errors import ModelError
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import Signal, signals_of
@@ -77,7 +78,20 @@ def build_continuous(model: Model, par: ParameterSet) -> Continuous:
         The system.
     par
         Any parameter set with the required structure; its numbers become arguments.
+
+    Raises
+    ------
+    ModelError
+        When the model has stop operators.
     """
+    if model.stops:
+        raise ModelError(
+            f"{model.name} has stop operators ({', '.join(model.stops)}), which slip in substeps. "
+            "Model exchange does not support them. Use co-simulation",
+            name="kind",
+            value="model-exchange",
+            valid="co-simulation",
+        )
     names = tuple(par.leaves())
     p, x = SX.sym("p", len(names)), SX.sym("x", len(model.State._fields))
     symbolic: Any = par.with_leaves(dict(zip(names, scalars(p), strict=True)))
