@@ -84,7 +84,7 @@ def _playable(result: Result) -> list[str]:
 
 def animations(result: Result) -> list[Attachment]:
     """Return an animation page for each run of a result, as files for its folder."""
-    from bywire.report.animation.page import scene_page
+    from bywire.report.animation.scene import scene_page
     from bywire.report.drawing import write_bytes
 
     labels, draw = _playable(result), SCENES.find(result.bench.definition.assembly).draw
