@@ -145,7 +145,7 @@ def _forces(C: Any, overlap: Any, closed: Any) -> Any:
 # --- Variables and C text
 
 LEAVES = {"p": "p", "x": "x", "m": "m", "c": "closed", "r": "reaction"}
-"""arguments of the C functions by kind of leaf; without integrals, which are not computed"""
+"""arguments of the C functions by kind of leaf, without the integrals, which the FMU omits"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,12 +156,12 @@ class Equations:
 
     @cached_property
     def continuous(self) -> Continuous:
-        """Its symbolic functions."""
+        """Symbolic functions of the plant."""
         return build_continuous(self.made.run.model, self.made.run.par)
 
     @cached_property
     def graph(self) -> Graph:
-        """Arguments of the other properties' nodes."""
+        """Graph that contains the nodes of the other properties."""
         return Graph()
 
     def _added(self, function: object, kinds: str) -> list[list[Node]]:
@@ -194,14 +194,14 @@ class Equations:
 
     @property
     def shown(self) -> list[int]:
-        """Recorded signals that depend on state and inputs: no integrals, no ECU signals."""
+        """Recorded signals that depend on state and inputs, without integrals and ECU signals."""
         held = leaves_read(self.graph, chain(*self.equations))["m"]
         reads = [leaves_read(self.graph, [node]) for node in self.output]
         return [k for k, each in enumerate(reads) if not each["q"] and each["m"] <= held]
 
     @property
     def counts(self) -> dict[str, object]:
-        """Constants for the functions around the equations, by name of their macro."""
+        """Constants for the C functions that use the equations, by the name of their macro."""
         states = list(signals_of(self.made.run.model.State).values())
         names = self.made.run.model.State._fields
         modal = [names.index(name) for name in self.continuous.modal]
@@ -261,7 +261,7 @@ def exchange_interface(equations: Equations, start_reads: frozenset[int]) -> Int
     Parameters
     ----------
     start_reads
-        Parameters that the initial values depend on, by index.
+        Indices of the parameters that the initial values depend on.
     """
     made, graph = equations.made, equations.graph
     read = leaves_read(graph, [n for nodes in equations.equations for n in nodes])
@@ -286,7 +286,7 @@ def exchange_interface(equations: Equations, start_reads: frozenset[int]) -> Int
 
 
 def _state_names(equations: Equations, shown: list[int]) -> list[str]:
-    """Return the names of the states; another name if the recorded signal differs or is held."""
+    """Return the names of the states, renamed where another signal has the same name."""
     made = equations.made
     recorded = list(made.program.outputs)
     taken = set(made.run.model.Memory._fields)
@@ -309,7 +309,7 @@ def _rates(made: Exported, names: list[str]) -> Iterator[Variable]:
 
 
 def _modes(equations: Equations) -> Iterator[Variable]:
-    """Yield modes, the number of their changes, and the event indicators."""
+    """Yield the modes, the number of mode changes, and the event indicators."""
     model = equations.made.run.model
     continuous = equations.continuous
     known = signals_of(model.State)
@@ -323,12 +323,12 @@ def _modes(equations: Equations) -> Iterator[Variable]:
     yield Variable("mode.changes", "local", "events", 0, "1", label, is_held=True)
     at = 0
     for name in continuous.modal:
-        yield _indicator(at, f"{name}.motion", known[name], "distance to reversal, or to its limit")
+        yield _indicator(at, f"{name}.motion", known[name], "distance to reversal or to its limit")
         yield _indicator(
             at + 1,
             f"{name}.hold",
             Signal("1", known[name].label),
-            "margin of the force that holds it while stuck",
+            "margin of the holding force while stuck",
         )
         at += 2
     for k in range(continuous.contacts):
