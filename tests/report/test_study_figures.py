@@ -343,8 +343,9 @@ def test_what_is_thinned_is_said_with_its_numbers() -> None:
     assert (cases.met.size, cases.missed.size) == (400, 10)
     assert np.all(met[cases.met])
     assert not np.any(met[cases.missed])
-    said = "The figure shows 400 of 990 cases that meet the limit and all that miss it (10)."
-    assert cases.caption("meet the limit", "miss it") == said
+    caption = cases.caption("meet the limit", "miss it")
+    assert "400 of 990 cases that meet the limit" in caption
+    assert "10 cases that miss it" in caption
     assert drawn_cases(met, 990).caption("meet the limit", "miss it") == ""
 
 

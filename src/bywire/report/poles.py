@@ -157,7 +157,7 @@ def pole_map(rates: NDArray[np.complex128], period: float, bandwidth: float) -> 
     )
     if beyond:
         panels[0].set_title(
-            f"poles ({beyond} faster poles not shown)", fontsize=style.TEXT_SIZE, loc="left"
+            f"poles ({beyond} faster, not shown)", fontsize=style.TEXT_SIZE, loc="left"
         )
     return figure
 
