@@ -27,7 +27,7 @@ ENCODINGS = (
     "euc-kr",
     "big5",
 )
-"""encodings of text files that a mapping may name"""
+"""encodings of text files that a mapping may specify"""
 
 _BLOCK = 1 << 22  # bytes per block
 _MARKS = {
@@ -35,7 +35,7 @@ _MARKS = {
     codecs.BOM_UTF16_LE: "utf-16-le",
     codecs.BOM_UTF16_BE: "utf-16-be",
 }
-_SHARE = 0.4  # of null bytes among every other one: text in two bytes for each character
+_SHARE = 0.4  # minimum fraction of null bytes at every other position in UTF-16 text
 
 
 def encoding_of(head: bytes, named: str = "") -> str:
@@ -46,7 +46,7 @@ def encoding_of(head: bytes, named: str = "") -> str:
     head
         Its first bytes.
     named
-        Encoding that the user names; a byte-order mark takes precedence.
+        Encoding that the user specifies; a byte-order mark takes precedence.
 
     Examples
     --------
@@ -108,7 +108,7 @@ def blocks_of(path: Path, encoding: str, size: int = _BLOCK) -> Iterator[bytes]:
 
 
 def head_text(path: Path, named: str, size: int) -> tuple[list[str], str, bool]:
-    """Return the first lines of a text file with line ends, its encoding, and whether more follow.
+    """Return the first lines of a text file with line endings, its encoding, whether more follow.
 
     Raises
     ------
@@ -128,7 +128,7 @@ def head_text(path: Path, named: str, size: int) -> tuple[list[str], str, bool]:
             )
     if b"\r" in content and b"\n" not in content:
         raise FileError(
-            f"{path}: lines end with CR alone. Save the file with LF line endings", name=str(path)
+            f"{path}: lines end with CR only. Save the file with LF line endings", name=str(path)
         )
     raw = content.splitlines(keepends=True)
     try:
@@ -142,8 +142,8 @@ def not_utf8(path: Path, line: int) -> FileError:
     """Return the error for a line that is not UTF-8."""
     return FileError(
         f"{path}, line {line} is not UTF-8 text. Save it as UTF-8 (in spreadsheets: 'CSV "
-        f"UTF-8'). Or add the line encoding = 'cp1252' (Windows) or 'latin-1' to the mapping, a "
-        f"TOML file ({option('mapping')})",
+        f"UTF-8'). Alternatively, add encoding = 'cp1252' (Windows) or 'latin-1' to the "
+        f"mapping, a TOML file ({option('mapping')})",
         name="encoding",
         valid="'cp1252' (Windows) or 'latin-1'",
     )
