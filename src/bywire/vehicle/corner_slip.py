@@ -24,9 +24,9 @@ MomentRate = Annotated[float, Unit("N*m/s", 1e4), Field(gt=0, allow_inf_nan=Fals
 class Parameters(ParameterSet):
     """Sensors and laws of one wheel.
 
-    ``abs``: ``"pi"`` controls the slip; ``"rules"`` build, dump and hold by thresholds; ``"off"``
-    does not change the demand. ``sees``: speed and slip are ``"estimated"`` from pulses and an
-    accelerometer, or ``"known"``, for comparison.
+    ``abs``: ``"pi"`` controls the slip; ``"rules"`` build, dump and hold the pressure by
+    thresholds; ``"off"`` does not change the demand. ``sees``: speed and slip are ``"estimated"``
+    from pulses and an accelerometer, or ``"known"``, for comparison.
     """
 
     T_s: Duration
@@ -36,9 +36,9 @@ class Parameters(ParameterSet):
     sees: Literal["estimated", "known"]
     """whether speed and slip are estimated"""
     M_rate: MomentRate
-    """fastest build-up of a demand"""
+    """maximum build-up rate of the demand"""
     M_least: SomeMoment
-    """lowest moment under slip control, which keeps the pads on the disc"""
+    """minimum moment under slip control, which keeps the pads on the disc"""
     encoder: wheel_encoder.Parameters
     tau_a: TimeConstant
     """time constant of the accelerometer's filter"""
@@ -73,7 +73,7 @@ class Memory(NamedTuple):
 
 
 class Readings(NamedTuple):
-    """Readings at a tick, of vehicle, wheel, slope and brake."""
+    """Readings of vehicle, wheel, slope and brake at a tick."""
 
     v: Annotated[float, Signal("m/s", "vehicle speed", 20.0)]
     v_wheel: Annotated[float, Signal("m/s", "speed of the tread", 20.0)]
@@ -126,7 +126,7 @@ def tick(r: Readings, m: Any, M_set: float, par: Parameters) -> Any:
         m = m._replace(**{f"{name}_x": value for name, value in rules._asdict().items()})
     left = ops.fmax(k * out.p, ops.fmin(par.M_least, m.M_most))
     # Near standstill, the car rocks on its tire, and the motors would follow this slip although the
-    # disc is at rest. The lowered moment therefore stays, unless the demand is lower.
+    # disc is at rest. The lowered moment is therefore kept, unless the demand is lower.
     holds = ops.where(m.v_hat < par.vehicle_speed.v_still, before.abs, 0.0)
     kept = ops.fmin(before.M_left, m.M_most)
     left = ops.where(holds > 0.5, kept, left)

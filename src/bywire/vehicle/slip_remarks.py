@@ -9,7 +9,7 @@ from bywire.plant import adhesion, road
 from bywire.vehicle.surfaces import surface_name
 
 FAR = 2.0
-"""lowest ratio of the slip at the largest adhesion to the slip set point that causes a remark"""
+"""minimum ratio of the slip at maximum adhesion to the slip set point that causes a remark"""
 
 
 def far_from_peak(
@@ -25,7 +25,7 @@ def far_from_peak(
     Parameters
     ----------
     place
-        Place of the wheel along the road [m], row by row.
+        Position of the wheel along the road [m], row by row.
     acts
         Whether slip control acts, above 0.5.
     slip_set
@@ -55,6 +55,6 @@ def far_from_peak(
         texts[
             f"slip control uses a slip set point of {slip_set:.3g} ({parameter}), but {surface} "
             f"has its maximum adhesion at {peak:.3g}. The wheel uses {100.0 * held / most:.0f} % "
-            "of it. A larger set point, or rules (abs=rules), brake harder there"
+            "of it. A larger set point, or rules (abs=rules), would brake harder there"
         ] = None
     return list(texts)
