@@ -1,4 +1,4 @@
-"""Panels of time traces of the wedge brake and its rigs, and signals compared over runs."""
+"""Time-trace panels of the wedge brake and its rigs, and signals that runs compare."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ BRAKING = Panels(
         *_ADJUSTER,
     ),
 )
-"""moment, speed, current and power as in Figs. 7 to 9 of Roberts et al. (2003), and more"""
+"""moment, speed, current and power as in Figs. 7 to 9 of Roberts et al. (2003), and others"""
 
 CORNER = Panels(
     "wedge-corner",
@@ -65,7 +65,7 @@ CORNER = Panels(
         *_ADJUSTER,
     ),
 )
-"""the vehicle above, its brake below"""
+"""vehicle at the top, brake below"""
 
 DRIVES = Panels(
     "wedge-drives",
@@ -97,4 +97,4 @@ DRIVES = Panels(
 COMPARED: Mapping[str, str] = MappingProxyType(
     {"y_M": "moment", "theta": "angle", "F_M": "force", "i_2": "current 2", "P_meas": "power"}
 )
-"""signals that overlaid traces compare, with their names in low panels"""
+"""signals that overlaid traces compare, with short names for low panels"""

@@ -1,4 +1,4 @@
-"""Parameters at the top of this brake's pages: those with the most effect on braking."""
+"""Parameters with the most effect on braking, shown at the top of this brake's pages."""
 
 from bywire.report.live_page.sliders import Sliders
 
