@@ -182,6 +182,11 @@ def read_limits(requirements: Mapping[str, Any], units: Mapping[str, str]) -> di
     return {name: read_limit(name, text, units[name]) for name, text in requirements.items()}
 
 
+def limit_like(unit: str) -> str:
+    """Return a limit of a figure in some unit, as an example."""
+    return "<= 15 %" if unit == "%" else f"<= {units.example(unit)}"
+
+
 def read_limit(figure: str, text: Any, unit: str, what: str = "requirement") -> Limit:
     """Return the limit of a figure in its unit.
 
@@ -194,7 +199,7 @@ def read_limit(figure: str, text: Any, unit: str, what: str = "requirement") -> 
     UnitError
         When its unit does not have the dimension of the figure.
     """
-    example = "<= 15 %" if unit == "%" else f"<= {units.example(unit)}"
+    example = limit_like(unit)
     before, compare, bound = parted(text) if isinstance(text, str) else ("", None, "")
     if compare is None or before:
         raise not_valid(f"{what} {figure}", quoted(text), f"a limit such as {example!r}")
