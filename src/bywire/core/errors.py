@@ -20,7 +20,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from copy import copy
 from datetime import date, time
 from difflib import SequenceMatcher, get_close_matches
@@ -201,7 +201,7 @@ def unknown_name(
     """
     every, leading = {*known}, sorted(first)
     others = sorted(every.difference(leading))
-    candidates = [*leading, *(_by_likeness(others, [name]) if len(every) > _MOST else others)]
+    candidates = [*leading, *(by_likeness(others, [name]) if len(every) > _MOST else others)]
     close = get_close_matches(name, candidates, n=3, cutoff=0.5)
     hint = f"did you mean {', '.join(map(repr, close))}?" if close else _listing(candidates)
     if listed and not close and len(candidates) > _MOST:
@@ -229,18 +229,23 @@ def unknown_of_few(kind: str, name: str, known: Iterable[str]) -> UnknownNameErr
     return UnknownNameError(text, name=kind, value=name, valid=", ".join(every))
 
 
-def nearest_first(names: Iterable[str], requested: Iterable[str]) -> str:
+def nearest_first(
+    names: Iterable[str], requested: Iterable[str], units: Mapping[str, str] | None = None
+) -> str:
     """Return a short list of names for an error, those most similar to the requested ones first.
+
+    ``units``: unit of each name, to write it beside the name.
 
     Examples
     --------
     >>> nearest_first(["time", "p_caliper", "i_set"], ["p_set", "i_set"])
     'i_set, p_caliper, time'
     """
-    return _shown(_by_likeness(names, list(requested)))
+    ordered = by_likeness(names, list(requested))
+    return _shown(ordered if units is None else [f"{name} [{units[name]}]" for name in ordered])
 
 
-def _by_likeness(names: Iterable[str], aims: list[str]) -> list[str]:
+def by_likeness(names: Iterable[str], aims: list[str]) -> list[str]:
     """Return names in the order of their likeness to one of some others, ignoring case."""
 
     def distance(name: str) -> float:
