@@ -200,8 +200,6 @@ def test_field_weakening_reaches_a_speed_beyond_the_back_emf():
 def test_power_is_balanced(stage):
     run = Run(SERVO, 5.0, 200.0, stage)
     stored = pmsm.energy(run.end, run.par)
-    out = run.copper + run.shaft + run.lost + stored
-    assert run.power_in == pytest.approx(
-        out, rel=1e-6
-    )  # the method's error; see the energy contract
+    out = run.copper + run.shaft + run.lost + stored  # within the error of the method
+    assert run.power_in == pytest.approx(out, rel=1e-6)
     assert (run.lost > 0.01) == bool(stage)
