@@ -139,7 +139,7 @@ def test_a_temperature_is_no_time(tmp_path, header):
         ("t [s];x [m]\n0;1.5\n1;2,5\n", "mixes decimal comma and decimal point"),
         ("t [s],x [m]\n0,1\n", r"too few rows \(1\)"),
         ("x [m],y [m]\n0,1\n1,2\n", " Its columns are x, y"),
-        (b"t [s],x [m]\n0,1\n1,2\xb5\n", "is not UTF-8"),
+        (b"t [s],x [m]\n0,1\n1,2\xb5\n", "line 3, column 'x': '2µ' is not a finite number"),
         (b"Rig 3\nt [s],x [m]\n0,0,1,5\n0,1,1,6\n", "commas separate the columns and are also"),
         (b"", r"is empty \(0 bytes\)"),
     ],

@@ -262,13 +262,32 @@ def test_encodings(tmp_path, encoding):
         f"{german(t)};{german(p)};20,0\r\n" for t, p in zip(TIME, PRESSURE, strict=True)
     )
     path.write_bytes(text.encode(encoding))
-    needs = encoding in ("cp1252", "latin-1")
-    if needs:
-        with pytest.raises(FileError, match=r"is not UTF-8.*encoding = 'cp1252'"):
-            read_measurement(path)
-    found, _ = read_with_notes(path, {"encoding": encoding} if needs else None)
+    found, notes = read_with_notes(path)
     np.testing.assert_allclose(found["Druck"], 1e5 * PRESSURE, rtol=1e-14)
     np.testing.assert_allclose(found["Öltemp"], 293.15)
+    is_windows = encoding in ("cp1252", "latin-1")
+    assert [note for note in notes if "cp1252" in note] == list(notes)
+    assert len(notes) == is_windows
+    if is_windows:
+        assert not read_with_notes(path, {"encoding": encoding})[1]
+
+
+def test_a_remark_in_cp1252_far_below_the_head_is_read_with_the_note(tmp_path):
+    path = tmp_path / "a.csv"
+    rows = "".join(f"{t / 1000:.3f},{t % 7}\n" for t in range(40_000))
+    path.write_bytes(f"t [s],p [bar]\n{rows}# Störung\n40.000,1\n".encode("cp1252"))
+    found, notes = read_with_notes(path, signals=["p"])
+    assert found["p"].size == 40_001
+    assert found["p"].values[-1] == 1e5
+    assert sum("cp1252" in note for note in notes) == 1
+
+
+@pytest.mark.parametrize("byte", [0x01, 0x81])
+def test_bytes_that_are_not_text_in_any_table_are_refused(tmp_path, byte):
+    path = tmp_path / "a.csv"
+    path.write_bytes(b"t [s],p [bar]\n0,1\n1,2\xb5" + bytes([byte]))
+    with pytest.raises(FileError, match=r"line 3 is neither UTF-8 nor cp1252.*encoding = '"):
+        read_measurement(path)
 
 
 @pytest.mark.parametrize(

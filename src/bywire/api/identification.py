@@ -639,7 +639,7 @@ def _remove(out: Path, keep: Sequence[Path]) -> None:
     ----------
     out
         Folder of the results.
-        keep
+    keep
         Current measurement files, which must not be removed.
 
     Raises
@@ -711,7 +711,7 @@ class Identification(Answer):
         True values of a simulated measurement by the same labels. Empty for a real measurement.
     data_notes
         Notes on how bywire processed the measurement, and on doubtful data.
-        is_simulated
+    is_simulated
         Whether the measurement is simulated. If so, it is written with the result.
     files
         Measurement files, which remain if an earlier result is removed.

@@ -60,7 +60,7 @@ class PlantCase:
         Plant to linearize.
         name, par
         Name of the parameter set, and its values in use.
-        point
+    point
         Operating point, with the friction state there.
     """
 
@@ -259,7 +259,7 @@ def _plant_case(
     ----------
     name
         Name of the plant.
-        parameters
+    parameters
         Parameter set. If empty, the main one of the plant's brake.
     at
         Operating point, whose unit selects the quantity. If empty, the plant's nominal point.
@@ -353,7 +353,7 @@ class LinearizedLoop(Answer):
         Reduced model, or None if it was not requested.
         dithered
     Loop linearized about its motion under dither, or None if it was not requested.
-        dithered_error
+    dithered_error
         Largest relative numerical error of its gains for small sines. Infinite if the motion is
         not periodic in half steps.
     """

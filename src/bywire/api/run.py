@@ -82,7 +82,7 @@ def _playable(result: Result) -> list[str]:
 
 def animations(result: Result) -> list[Attachment]:
     """Return a page for each run of a result, as files of its folder."""
-    from bywire.report.animation.page import scene_page
+    from bywire.report.animation.scene import scene_page
     from bywire.report.drawing import write_bytes
 
     labels, draw = _playable(result), SCENES.find(result.bench.definition.assembly).draw

@@ -123,7 +123,7 @@ class ReadOptions:
     titles
         Whether the first row of a text table contains titles; detected if None.
     encoding
-        Encoding of a text table; if empty, UTF-8 or that of the byte-order mark.
+        Encoding of a text table; if empty, UTF-8, UTF-16 or cp1252 by content.
     missing
         Cells of a text table that mark missing values, in addition to the usual ones.
     """

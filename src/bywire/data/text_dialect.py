@@ -183,10 +183,9 @@ def head_of_table(path: Path, options: ReadOptions) -> Head:
     Raises
     ------
     FileError
-        When they are not text in the specified encoding, or in UTF-8.
+        When they are not text in the specified encoding, in UTF-8 or in Windows encoding.
     """
-    lines, encoding, _ = head_text(path, options.encoding, HEAD)
-    return Head(path, lines, encoding, options)
+    return Head(path, *head_text(path, options.encoding, HEAD), options)
 
 
 def dialect_of(head: Head) -> Dialect:

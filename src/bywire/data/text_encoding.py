@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import codecs
+import io
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -29,12 +31,16 @@ ENCODINGS = (
 )
 """encodings of text files that a mapping may specify"""
 
+WINDOWS = "cp1252"
+"""encoding of tables that are not UTF-8, unless a mapping specifies another one"""
+
 _BLOCK = 1 << 22  # bytes per block
 _MARKS = {
     codecs.BOM_UTF8: "utf-8",
     codecs.BOM_UTF16_LE: "utf-16-le",
     codecs.BOM_UTF16_BE: "utf-16-be",
 }
+_CONTROLS = re.compile(r"[\x00-\x08\x0e-\x19\x1b-\x1f]")  # not in tables; \x1a ends DOS files
 _SHARE = 0.4  # minimum fraction of null bytes at every other position in UTF-16 text
 
 
@@ -107,19 +113,18 @@ def blocks_of(path: Path, encoding: str, size: int = _BLOCK) -> Iterator[bytes]:
                 return
 
 
-def head_text(path: Path, named: str, size: int) -> tuple[list[str], str, bool]:
-    """Return the first lines of a text file with line endings, its encoding, whether more follow.
+def head_text(path: Path, named: str, size: int) -> tuple[list[str], str]:
+    """Return the first lines of a text file with line endings, and its encoding.
 
     Raises
     ------
     FileError
-        When they are not text in this encoding.
+        When they are not text in the specified encoding, in UTF-8 or in Windows encoding.
     """
     with path.open("rb") as stream:
         encoding = encoding_of(stream.read(1024), named)
     content = next(blocks_of(path, encoding, size), b"")
-    goes_on = path.stat().st_size > size
-    if goes_on:
+    if path.stat().st_size > size:
         content = content[: content.rfind(b"\n") + 1]
         if not content:
             raise FileError(
@@ -130,28 +135,47 @@ def head_text(path: Path, named: str, size: int) -> tuple[list[str], str, bool]:
         raise FileError(
             f"{path}: lines end with CR only. Save the file with LF line endings", name=str(path)
         )
-    raw = content.splitlines(keepends=True)
     try:
-        return [line.decode() for line in raw], encoding, goes_on
-    except UnicodeDecodeError:
-        number = next(k for k, line in enumerate(raw, 1) if not _is_utf8(line))
-        raise not_utf8(path, number) from None
+        text, used = decoded(content)
+    except UnicodeDecodeError as error:
+        raise not_text(path, 1 + content[: error.start].count(b"\n")) from None
+    return list(io.StringIO(text, newline="")), used or encoding
 
 
-def not_utf8(path: Path, line: int) -> FileError:
-    """Return the error for a line that is not UTF-8."""
-    return FileError(
-        f"{path}, line {line} is not UTF-8 text. Save it as UTF-8 (in spreadsheets: 'CSV "
-        f"UTF-8'). Alternatively, add encoding = 'cp1252' (Windows) or 'latin-1' to the "
-        f"mapping, a TOML file ({option('mapping')})",
-        name="encoding",
-        valid="'cp1252' (Windows) or 'latin-1'",
+def decoded(content: bytes) -> tuple[str, str]:
+    """Return text of unknown encoding, and the encoding if it is not UTF-8.
+
+    Raises
+    ------
+    UnicodeDecodeError
+        When it is neither UTF-8 nor text in Windows encoding.
+    """
+    try:
+        return content.decode(), ""
+    except UnicodeDecodeError as error:
+        text = content.decode(WINDOWS, "replace")
+        if "\ufffd" in text or _CONTROLS.search(text):
+            raise error from None
+        return text, WINDOWS
+
+
+def windows_note() -> str:
+    """Return the note that a table is not UTF-8, and how bywire reads it."""
+    return (
+        f"the text is not UTF-8, so bywire reads it as {WINDOWS} (Windows). If a name or a unit "
+        f"looks wrong, add the line encoding = 'cp850' or another encoding to the mapping, a TOML "
+        f"file ({option('mapping')})"
     )
 
 
-def _is_utf8(line: bytes) -> bool:
-    try:
-        line.decode()
-    except UnicodeDecodeError:
-        return False
-    return True
+def not_text(path: Path, line: int) -> FileError:
+    """Return the error for a line that is neither UTF-8 nor text in Windows encoding."""
+    valid = ", ".join(ENCODINGS)
+    return FileError(
+        f"{path}, line {line} is neither UTF-8 nor {WINDOWS} (Windows) text. Save it as UTF-8 (in "
+        "spreadsheets: 'CSV UTF-8'). If it is text in another encoding, add the line "
+        f"encoding = 'cp850' to the mapping, a TOML file ({option('mapping')}). Valid encodings "
+        f"are {valid}",
+        name="encoding",
+        valid=valid,
+    )

@@ -103,7 +103,9 @@ def _text(file: Path, kind: str, missing: Callable[[Path], str], too_large: str)
         return data.decode("utf-8-sig").replace("\r\n", "\n")
     except UnicodeDecodeError:
         raise FileError(
-            f"cannot read {kind} {file}: it is not UTF-8 text. Specify a TOML file", name=str(file)
+            f"cannot read {kind} {file}: it is not UTF-8 text. Save it as UTF-8, or specify a TOML "
+            "file",
+            name=str(file),
         ) from None
 
 

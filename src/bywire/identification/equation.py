@@ -391,7 +391,7 @@ def steady_dynamics(parts: Sequence[Problem], unknowns: Sequence[Unknown], advic
             weights = np.array([1.0 / _scatter(p.evaluate(final)[0]) for p in parts])
         return estimate(Problem(tuple(unknowns), partial(_weighted, parts, weights)))
     except ParameterError as error:
-        raise ParameterError(f"{error}: {advice}") from None
+        raise ParameterError(f"{error}. {advice}") from None
 
 
 def _weighted(parts: Sequence[Problem], weights: Array, values: Array) -> tuple[Array, Array]:

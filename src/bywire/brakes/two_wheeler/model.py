@@ -11,7 +11,7 @@ from bywire.core.model import Task
 from bywire.core.parts import Part
 from bywire.core.signals import zeros
 from bywire.plant import brake_disc, pressure_loop, road, road_wheel, wheel_encoder
-from bywire.vehicle.slip_remarks import far_from_peak
+from bywire.vehicle.slip_control import far_from_peak
 from bywire.vehicle.two_wheeler import HotBrakes, VehicleParameters, cold_start, rolling_start
 
 Par = TwoWheelerParameters

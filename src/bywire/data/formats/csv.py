@@ -37,7 +37,7 @@ from bywire.data.text_dialect import (
     layout_of,
     with_mark,
 )
-from bywire.data.text_encoding import blocks_of, is_text, not_utf8
+from bywire.data.text_encoding import WINDOWS, blocks_of, decoded, is_text, not_text, windows_note
 from bywire.data.time_stamps import (
     CLOCK,
     DAY,
@@ -73,12 +73,15 @@ class _Seen:
         Number of skipped comments, and of skipped rows with separators only.
     origins
         First time stamp [ns] of each column of time stamps.
+    is_windows
+        Whether a part is not UTF-8, unlike the head.
     """
 
     marks: Counter[tuple[int, str]] = field(default_factory=Counter)
     comments: int = 0
     empty: int = 0
     origins: dict[int, int] = field(default_factory=dict)
+    is_windows: bool = False
 
     def add(self, other: _Seen) -> None:
         """Add the content of another part of the table."""
@@ -114,9 +117,10 @@ def _strict_columns(
         column.
     """
     try:
-        text = block.decode("utf-8")
+        text, encoding = decoded(block)
     except UnicodeDecodeError as error:
-        raise not_utf8(path, first_line + block[: error.start].count(b"\n")) from None
+        raise not_text(path, first_line + block[: error.start].count(b"\n")) from None
+    seen.is_windows |= encoding == WINDOWS
     if dialect.separator == " ":
         text = "\n".join(" ".join(line.split()) for line in text.split("\n"))
     rows: list[list[float]] = []
@@ -411,6 +415,8 @@ class TextSource:
             self.remarks.append(f"comment lines skipped: {self._seen.comments}")
         if self._seen.empty:
             self.remarks.append(f"empty rows skipped: {self._seen.empty}")
+        if self._seen.is_windows:
+            self.remarks.append(windows_note())
         self._seen = _Seen(origins=self._seen.origins)
 
 
@@ -613,7 +619,10 @@ def _pieces(block: bytes) -> Iterator[bytes]:
 @contextmanager
 def _open(path: Path, options: ReadOptions) -> Iterator[TextSource]:
     head = head_of_table(path, options)
-    yield TextSource(path, layout_of(head) or dialect_of(head))
+    dialect = layout_of(head) or dialect_of(head)
+    if head.encoding == WINDOWS != options.encoding:
+        dialect = replace(dialect, notes=(windows_note(), *dialect.notes))
+    yield TextSource(path, dialect)
 
 
 def write_table(dataset: xr.Dataset, path: Path, progress: Progress, separator: str) -> None:

@@ -1,4 +1,4 @@
-"""Open loop: any stimulus at the motor, from an ideal source, or through the ECU."""
+"""Open loop: any stimulus at the motor, from an ideal source or through the ECU."""
 
 from __future__ import annotations
 
@@ -41,9 +41,9 @@ class Options(ParameterSet):
     add_holding: bool
     """whether to add the current, voltage or pressure that holds p_start to the stimulus"""
     p_start: Annotated[float, Unit("Pa", 2e6), Field(ge=0, allow_inf_nan=False)]
-    """pressure of the equilibrium at which the run starts"""
+    """equilibrium pressure at which the run starts"""
     duration: Duration
-    """length of the run"""
+    """duration of the run"""
     record: Duration
     """recording interval"""
     settle: TimeConstant

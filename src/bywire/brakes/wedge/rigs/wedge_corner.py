@@ -18,7 +18,7 @@ from bywire.core.model import Task
 from bywire.core.parts import Shown
 from bywire.core.signals import Role, joined
 from bywire.plant import flywheel, road, wheel_encoder
-from bywire.vehicle import corner_slip
+from bywire.vehicle import slip_control
 from bywire.vehicle.corner import (
     HotCorner,
     HotCornerParameters,
@@ -26,7 +26,7 @@ from bywire.vehicle.corner import (
     rolling_states,
     warm_disc,
 )
-from bywire.vehicle.slip_remarks import far_from_peak
+from bywire.vehicle.slip_control import far_from_peak
 from bywire.vehicle.two_wheeler import BOOK
 
 
@@ -34,10 +34,10 @@ class WedgeCornerParameters(WedgeParameters):
     """The wedge brake, its flywheel for a wheel, and a quarter of a car."""
 
     corner: HotCornerParameters
-    ecu: corner_slip.Parameters
+    ecu: slip_control.Parameters
 
 
-Memory: Any = joined(__name__, "Memory", control.Memory, corner_slip.Memory)
+Memory: Any = joined(__name__, "Memory", control.Memory, slip_control.Memory)
 """memory of moment, position and slip control"""
 
 
@@ -149,7 +149,7 @@ def _slip(x: Any, m: Any, u: control.Stimulus, par: WedgeCornerParameters) -> An
         wheel_encoder.State(x.phi), wheel_encoder.Input(x.Omega), par.ecu.encoder
     )
     sine = road.slope(x.s, par.corner.road).sine
-    seen = corner_slip.Readings(
+    seen = slip_control.Readings(
         x.v_x,
         x.Omega * par.corner.r,
         edge.angle,
@@ -157,7 +157,7 @@ def _slip(x: Any, m: Any, u: control.Stimulus, par: WedgeCornerParameters) -> An
         par.corner.body.g * sine,
         ops.where((m.mode - moment_control.MOMENT) ** 2 < 0.25, 1.0, 0.0),
     )
-    return corner_slip.tick(seen, m, u.M_set, par.ecu)
+    return slip_control.tick(seen, m, u.M_set, par.ecu)
 
 
 def _contact_tracked(x: Any, m: Any, par: WedgeCornerParameters) -> Any:
@@ -184,5 +184,5 @@ def at_speed(v: float, par: WedgeCornerParameters, T_disc: float | None = None) 
     disc = warm_disc(heat.T_a if T_disc is None else T_disc, heat)
     brake = state_at(0.0, par)._asdict() | {"Omega": v / par.corner.r}
     rolling = WedgeCorner.state(**rolling_states(v), disc_heat=disc)._asdict()
-    held = memory_at(0.0, par)._asdict() | corner_slip.awake(v, par.ecu)
+    held = memory_at(0.0, par)._asdict() | slip_control.awake(v, par.ecu)
     return WedgeCorner.State(**(rolling | brake)), Memory(**held)
