@@ -265,7 +265,7 @@ def test_values_lie_beside_their_checks_when_the_report_is_interrupted(
         stop.setattr("bywire.report.drawing.save_figure", stopped)
         outcome = bywire(*arguments)
     assert outcome.status == 130
-    assert f"the report in {out} is not complete: the same command writes it" in outcome.err
+    assert f"the report in {out} is incomplete" in outcome.err
     kept = {"measurement.nc", "parameters.toml", "estimate.json"}
     assert {p.name for p in out.iterdir()} == {*kept, UNFINISHED}
     left = json.loads((out / "estimate.json").read_text())

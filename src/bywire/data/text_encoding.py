@@ -29,7 +29,7 @@ ENCODINGS = (
     "euc-kr",
     "big5",
 )
-"""encodings of text files that a mapping may name"""
+"""encodings of text files that a mapping may specify"""
 
 WINDOWS = "cp1252"
 """encoding of tables that are not UTF-8, unless a mapping names another"""
@@ -52,7 +52,7 @@ def encoding_of(head: bytes, named: str = "") -> str:
     head
         Its first bytes.
     named
-        Encoding that the user names; a byte-order mark takes precedence.
+        Encoding that the user specifies; a byte-order mark takes precedence.
 
     Examples
     --------
@@ -133,7 +133,7 @@ def head_text(path: Path, named: str, size: int) -> tuple[list[str], str]:
             )
     if b"\r" in content and b"\n" not in content:
         raise FileError(
-            f"{path}: lines end with CR alone. Save the file with LF line endings", name=str(path)
+            f"{path}: lines end with CR only. Save the file with LF line endings", name=str(path)
         )
     try:
         text, used = decoded(content)

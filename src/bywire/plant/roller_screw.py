@@ -12,7 +12,7 @@ from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Fraction, Length, Unit
 from bywire.core.signals import Power, Signal, Torque
 
-BackEfficiency = Annotated[float, Unit("1", 0.5), Field(ge=0, le=1, allow_inf_nan=False)]
+BackEfficiency = Annotated[float, Unit("1", 0.5), Field(ge=-10, le=1, allow_inf_nan=False)]
 
 
 class Parameters(ParameterSet):
@@ -28,7 +28,8 @@ class Parameters(ParameterSet):
     eta_f: Fraction
     """efficiency when the screw drives the load"""
     eta_b: BackEfficiency
-    """efficiency when the load drives the screw; 2 - 1/eta_f makes both losses equal"""
+    """efficiency when the load drives the screw; 2 - 1/eta_f makes both losses equal; at 0 or
+    less, the screw locks itself"""
     law: Literal["load", "drive"]
     """quantity to which the loss is proportional: axial force or motor torque"""
 

@@ -24,10 +24,10 @@ class TwoWheelerByWire(HotBrakes[TwoWheelerParameters, ecu.Memory]):
     Memory: ClassVar = ecu.Memory
     Stimulus: ClassVar = ecu.Stimulus
 
-    front_circuit = Part(pressure_loop, par="front.circuit", suffix="_f")
-    rear_circuit = Part(pressure_loop, par="rear.circuit", suffix="_r")
-    front_encoder = Part(wheel_encoder, par="sensors.encoder", suffix="_f")
-    rear_encoder = Part(wheel_encoder, par="sensors.encoder", suffix="_r")
+    front_circuit = Part(pressure_loop, par="front.circuit", suffix="_f", which="front")
+    rear_circuit = Part(pressure_loop, par="rear.circuit", suffix="_r", which="rear")
+    front_encoder = Part(wheel_encoder, par="sensors.encoder", suffix="_f", which="front")
+    rear_encoder = Part(wheel_encoder, par="sensors.encoder", suffix="_r", which="rear")
     front_disc = Part(brake_disc, par="front.disc")
     rear_disc = Part(brake_disc, par="rear.disc")
 

@@ -33,9 +33,9 @@ class TwoWheelerWholeRear(HotBrakes[WholeRearParameters, Any]):
     Memory: ClassVar = ecu.Memory
     Stimulus: ClassVar = ecu.Stimulus
 
-    front_circuit = Part(pressure_loop, par="front.circuit", suffix="_f")
-    front_encoder = Part(wheel_encoder, par="sensors.encoder", suffix="_f")
-    rear_encoder = Part(wheel_encoder, par="sensors.encoder", suffix="_r")
+    front_circuit = Part(pressure_loop, par="front.circuit", suffix="_f", which="front")
+    front_encoder = Part(wheel_encoder, par="sensors.encoder", suffix="_f", which="front")
+    rear_encoder = Part(wheel_encoder, par="sensors.encoder", suffix="_r", which="rear")
     front_disc = Part(brake_disc, par="front.disc")
     rear_disc = Part(brake_disc, par="rear.disc")
     actuator = Sub(
