@@ -4,8 +4,7 @@ The names of a function's parameters determine its arguments:
 
 * ``t``: the times [s];
 * a field of the family's ``Setting`` that specifies a signal: its samples, or None if the
-  annotation
-  is ``Samples | None`` and the signal is not recorded;
+  annotation is ``Samples | None`` and the signal is not recorded;
 * ``setting``: the ``Setting``, from which the function reads numbers;
 * another function of the file: its result, which is computed once for all figures of a case. If it
   is undefined, the figure is undefined, too.
