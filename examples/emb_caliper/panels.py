@@ -1,8 +1,8 @@
-"""Panels of the brake's time traces."""
+"""Panels of the brake's time traces, and sliders of its pages."""
 
 from __future__ import annotations
 
-from bywire.authoring import LineRole, Panel, Panels, Trace
+from bywire.authoring import LineRole, Panel, Panels, Sliders, Trace
 
 PANELS = Panels(
     "emb-caliper",
@@ -25,3 +25,17 @@ PANELS = Panels(
         Panel("power", (Trace("P_el"),)),
     ),
 )
+
+SLIDERS = Sliders(
+    "emb-caliper",
+    ("emb-caliper",),
+    (
+        "screw.lead",
+        "friction.C",
+        "motor.R_m",
+        "caliper.k_1",
+        "caliper.clearance",
+        "ecu.force.k_p",
+    ),
+)
+"""parameters with the most effect on braking, at the top of this brake's pages"""

@@ -59,7 +59,7 @@ def test_broken_compiler_is_3_with_one_message(anew, bench, tmp_path):
     assert (outcome.status, outcome.out) == (3, "")
     assert outcome.lines[0].endswith("rejected a generated kernel:") or len(outcome.lines) == 1
     assert len(outcome.lines) <= 3
-    assert "set BYWIRE_CC to another C compiler" in outcome.lines[-1]
+    assert "BYWIRE_CC" in outcome.lines[-1]
     assert not list(Path(cache).glob("*.so"))
 
 

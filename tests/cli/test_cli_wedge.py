@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 from command_line import refused
 
@@ -17,9 +19,9 @@ def test_hold_without_rows_is_no_traceback(bywire, change):
     assert outcome.status == 0
     assert "Traceback" not in outcome.err
     assert "not defined" in outcome.out
-    assert "are too few" in " ".join(outcome.out.split())
+    assert re.search(r"between t = \S+ s and \S+ s", " ".join(outcome.out.split()))
 
 
 def test_unmet_demand_is_a_warning(bywire):
     outcome = bywire("run", "moment-pulses", "--set", "flywheel.Omega_0=0 rad/s")
-    assert "bywire: warning: the demand of 200 N*m was not reached" in outcome.err
+    assert re.search(r"bywire: warning: .* 200 N\*m", outcome.err)

@@ -182,7 +182,6 @@ def _text(rng: Random, data: Known, path: Path) -> dict[str, Any] | None:
     encoding = rng.choice(("utf-8", "utf-8-sig", "utf-16", "cp1252"))
     if encoding == "cp1252":
         text = text.replace("∞", "Inf")
-        mapping["encoding"] = "cp1252"
     path.write_bytes(text.encode(encoding))
     return mapping
 

@@ -38,7 +38,7 @@ def test_the_link_gives_a_cookie_and_leads_on_without_the_token(visit):
 def test_nothing_is_answered_without_the_token(visit, method, path):
     for token, word in (
         ("", "missing"),
-        ("x" * 43, "each start of the server"),
+        ("x" * 43, "each start"),
         ("\xe4", "token"),
     ):
         answer = visit(method, path, token=token)

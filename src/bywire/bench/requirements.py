@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from bywire.bench.kpis.kpi import Kpi
 from bywire.core import units
-from bywire.core.errors import UnitError, not_valid, quoted, unknown_name
+from bywire.core.errors import ParameterError, UnitError, not_valid, quoted, unknown_name
 from bywire.core.undefined import EqualWhereUndefined
 from bywire.core.values import number
 
@@ -162,48 +162,103 @@ def status_of(verdicts: Sequence[Judged]) -> str:
     return "undecided" if "undecided" in outcomes else "passed"
 
 
-def read_limits(requirements: Mapping[str, Any], units: Mapping[str, str]) -> dict[str, Limit]:
+def read_limits(
+    requirements: Mapping[str, Any], units: Mapping[str, str], *, has_probabilities: bool = False
+) -> dict[str, Limit]:
     """Return limits by KPI name.
 
-    ``requirements``: texts by KPI name; ``units``: unit of every KPI of the experiment by name.
+    ``requirements``: texts by KPI name; ``units``: unit of every KPI of the experiment by name;
+    ``has_probabilities``: see `read_limit`.
 
     Raises
     ------
     UnknownNameError
         When a requirement is for an unknown KPI.
     ParameterError
-        When a limit cannot be read.
+        When a limit or its probability cannot be read.
     UnitError
         When a limit's unit does not have the dimension of the KPI.
     """
     for name in requirements:
         if name not in units:
             raise unknown_name("KPI in [requirements]", name, units)
-    return {name: read_limit(name, text, units[name]) for name, text in requirements.items()}
+    return {
+        name: read_limit(name, text, units[name], has_probability=has_probabilities)
+        for name, text in requirements.items()
+    }
 
 
-def read_limit(figure: str, text: Any, unit: str, what: str = "requirement") -> Limit:
+def limit_like(unit: str) -> str:
+    """Return a limit of a figure in some unit, as an example."""
+    return "<= 15 %" if unit == "%" else f"<= {units.example(unit)}"
+
+
+def read_limit(
+    figure: str, text: Any, unit: str, what: str = "requirement", *, has_probability: bool = False
+) -> Limit:
     """Return the limit of a figure in its unit.
 
-    ``what``: noun for errors.
+    ``what``: noun for errors; ``has_probability``: whether the limit may end with a probability,
+    such as ``with 99 %``, because it applies to the cases of a study.
 
     Raises
     ------
     ParameterError
-        When the text is not a limit.
+        When the text is not a limit, or its probability is not valid.
     UnitError
         When its unit does not have the dimension of the figure.
     """
-    example = "<= 15 %" if unit == "%" else f"<= {units.example(unit)}"
+    subject = f"{what} {figure}"
+    probability = None
+    if isinstance(text, str) and (split := _WITH.fullmatch(text)):
+        if not has_probability:
+            raise ParameterError(
+                f"{subject} = {quoted(text)}: only requirements on the cases of a study have a "
+                f"probability. Write {quoted(split[1])}",
+                name=figure,
+                value=quoted(text),
+                valid=quoted(split[1]),
+            )
+        probability, text = _probability(figure, text, split[2]), split[1]
+    example = limit_like(unit)
     before, compare, bound = parted(text) if isinstance(text, str) else ("", None, "")
     if compare is None or before:
-        raise not_valid(f"{what} {figure}", quoted(text), f"a limit such as {example!r}")
+        raise not_valid(subject, quoted(text), f"a limit such as {example!r}")
     if unit != "%":
-        return Limit(figure, compare, number(bound, unit, f"{what} {figure}"), unit, text)
+        return Limit(figure, compare, number(bound, unit, subject), unit, text, probability)
     if not bound.endswith("%"):  # a plain 15 would be 1500 %
         limit = f"a limit in percent such as {example!r}"
-        raise not_valid(f"{what} {figure}", quoted(text), limit, kind=UnitError)
-    return Limit(figure, compare, 100.0 * units.parse(bound, "1", f"{what} {figure}"), unit, text)
+        raise not_valid(subject, quoted(text), limit, kind=UnitError)
+    return Limit(figure, compare, 100.0 * units.parse(bound, "1", subject), unit, text, probability)
+
+
+_WITH = re.compile(r"(.*?)\s+with\b\s*(.*?)\s*", re.DOTALL)
+_PERCENT = re.compile(r"[+-]?[\d.]+(?:[eE][+-]?\d+)?\s*%")
+_SHARE = re.compile(r"0?\.\d+")
+_DEMAND = "99 %"
+
+
+def _probability(kpi: str, text: str, given: str) -> float:
+    """Return the probability after "with" in the text of a requirement."""
+    if not _PERCENT.fullmatch(given):  # 0.9 may mean a share, or 0.9 %
+        example = f"{100.0 * float(given):.10g} %" if _SHARE.fullmatch(given) else _DEMAND
+        raise ParameterError(
+            f"requirement {kpi} = {quoted(text)}: the probability after 'with' must be in percent, "
+            f"not {quoted(given)}. For example, write 'with {example}'",
+            name=kpi,
+            value=quoted(given),
+            valid="in percent",
+        )
+    share = units.parse(given, "1", f"probability of requirement {kpi}")
+    if not 0.0 < share < 1.0:
+        raise ParameterError(
+            f"requirement {kpi}: a probability of {given} is not valid: it must be between 0 and "
+            "100 %, as in 'with 99.9 %'. Remove it if every case must meet the limit",
+            name=kpi,
+            value=given,
+            valid="between 0 and 100 %",
+        )
+    return share
 
 
 def parted(text: str) -> tuple[str, Comparison | None, str]:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import codecs
+import io
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -27,7 +29,10 @@ ENCODINGS = (
     "euc-kr",
     "big5",
 )
-"""encodings of text files that a mapping may name"""
+"""encodings of text files that a mapping may specify"""
+
+WINDOWS = "cp1252"
+"""encoding of tables that are not UTF-8, unless a mapping names another"""
 
 _BLOCK = 1 << 22  # bytes per block
 _MARKS = {
@@ -35,6 +40,7 @@ _MARKS = {
     codecs.BOM_UTF16_LE: "utf-16-le",
     codecs.BOM_UTF16_BE: "utf-16-be",
 }
+_CONTROLS = re.compile(r"[\x00-\x08\x0e-\x19\x1b-\x1f]")  # not in tables; \x1a ends DOS files
 _SHARE = 0.4  # of null bytes among every other one: text in two bytes for each character
 
 
@@ -46,7 +52,7 @@ def encoding_of(head: bytes, named: str = "") -> str:
     head
         Its first bytes.
     named
-        Encoding that the user names; a byte-order mark takes precedence.
+        Encoding that the user specifies; a byte-order mark takes precedence.
 
     Examples
     --------
@@ -107,19 +113,18 @@ def blocks_of(path: Path, encoding: str, size: int = _BLOCK) -> Iterator[bytes]:
                 return
 
 
-def head_text(path: Path, named: str, size: int) -> tuple[list[str], str, bool]:
-    """Return the first lines of a text file with line ends, its encoding, and whether more follow.
+def head_text(path: Path, named: str, size: int) -> tuple[list[str], str]:
+    """Return the first lines of a text file with line ends, and its encoding.
 
     Raises
     ------
     FileError
-        When they are not text in this encoding.
+        When they are not text in the named encoding, in UTF-8 or as Windows writes it.
     """
     with path.open("rb") as stream:
         encoding = encoding_of(stream.read(1024), named)
     content = next(blocks_of(path, encoding, size), b"")
-    goes_on = path.stat().st_size > size
-    if goes_on:
+    if path.stat().st_size > size:
         content = content[: content.rfind(b"\n") + 1]
         if not content:
             raise FileError(
@@ -128,30 +133,49 @@ def head_text(path: Path, named: str, size: int) -> tuple[list[str], str, bool]:
             )
     if b"\r" in content and b"\n" not in content:
         raise FileError(
-            f"{path}: lines end with CR alone. Save the file with LF line endings", name=str(path)
+            f"{path}: lines end with CR only. Save the file with LF line endings", name=str(path)
         )
-    raw = content.splitlines(keepends=True)
     try:
-        return [line.decode() for line in raw], encoding, goes_on
-    except UnicodeDecodeError:
-        number = next(k for k, line in enumerate(raw, 1) if not _is_utf8(line))
-        raise not_utf8(path, number) from None
+        text, used = decoded(content)
+    except UnicodeDecodeError as error:
+        raise not_text(path, 1 + content[: error.start].count(b"\n")) from None
+    return list(io.StringIO(text, newline="")), used or encoding
 
 
-def not_utf8(path: Path, line: int) -> FileError:
-    """Return the error for a line that is not UTF-8."""
-    return FileError(
-        f"{path}, line {line} is not UTF-8 text. Save it as UTF-8 (in spreadsheets: 'CSV "
-        f"UTF-8'). Or add the line encoding = 'cp1252' (Windows) or 'latin-1' to the mapping, a "
-        f"TOML file ({option('mapping')})",
-        name="encoding",
-        valid="'cp1252' (Windows) or 'latin-1'",
+def decoded(content: bytes) -> tuple[str, str]:
+    """Return text whose encoding is not known, and the encoding if it is not UTF-8.
+
+    Raises
+    ------
+    UnicodeDecodeError
+        When it is neither UTF-8 nor text as Windows writes it.
+    """
+    try:
+        return content.decode(), ""
+    except UnicodeDecodeError as error:
+        text = content.decode(WINDOWS, "replace")
+        if "\ufffd" in text or _CONTROLS.search(text):
+            raise error from None
+        return text, WINDOWS
+
+
+def windows_note() -> str:
+    """Return the note that a table is not UTF-8, and how bywire reads it."""
+    return (
+        f"the text is not UTF-8, so bywire reads it as {WINDOWS} (Windows). If a name or a unit "
+        f"looks wrong, add the line encoding = 'cp850' or another encoding to the mapping, a TOML "
+        f"file ({option('mapping')})"
     )
 
 
-def _is_utf8(line: bytes) -> bool:
-    try:
-        line.decode()
-    except UnicodeDecodeError:
-        return False
-    return True
+def not_text(path: Path, line: int) -> FileError:
+    """Return the error for a line that is neither UTF-8 nor text as Windows writes it."""
+    valid = ", ".join(ENCODINGS)
+    return FileError(
+        f"{path}, line {line} is not UTF-8 text, nor {WINDOWS} (Windows). Save it as UTF-8 (in "
+        "spreadsheets: 'CSV UTF-8'). If it is text in another encoding, add the line "
+        f"encoding = 'cp850' to the mapping, a TOML file ({option('mapping')}). Valid encodings "
+        f"are {valid}",
+        name="encoding",
+        valid=valid,
+    )

@@ -1,4 +1,4 @@
-"""C text of a loop's linear model: rates of the plant and laws of the controllers by parameters."""
+"""C code of a loop's linear model: plant rates and control laws as functions of parameters."""
 
 from __future__ import annotations
 
@@ -24,21 +24,22 @@ _NOT_SYMBOLIC = (BywireError, TypeError, ValueError, ArithmeticError, RuntimeErr
 
 @dataclass(frozen=True)
 class LoopSource:
-    """The linear model of a loop, sampled or analog, at one operating point, for any parameters.
+    """Linear model of a sampled or analog loop at one operating point, for any parameters.
 
     Parameters
     ----------
     loop
         The loop.
     entry, text
-        Name and C text of ``void entry(const double *p, double t, double *out)``, which writes
-        the nonzero entries of the model at the operating point (t = 0), or beside it on either side
-        (t = 1, -1; see `bywire.analysis.linear.corners`): first the distance of each contact from
-        opening or closing [m], then row by row A (n, n) and B (n, nm) of the plant, and for each
-        task the memory's Jacobians by states (nm, n) and by memory (nm, nm). For an analog loop,
-        whose sampled controllers hold their outputs, A is all.
+        Name and C text of ``void entry(const double *p, double t, double *out)``. The function
+        writes the nonzero entries of the model at the operating point (t = 0), or close to it on
+        either side (t = 1, -1; see `bywire.analysis.linear.corners`). The order is the distance of
+        each contact from opening or closing [m], then A (n, n) and B (n, nm) of the plant row by
+        row, then for each task the memory's Jacobians with respect to the states (nm, n) and to
+        the memory (nm, nm). An analog loop has only A, because its sampled controllers hold their
+        outputs.
     states, memory
-        Names, in the order of rows and columns; an analog loop has no memory.
+        Names in the order of rows and columns. An analog loop has no memory.
     contacts
         Number of contacts.
     every, frame
@@ -62,9 +63,9 @@ class LoopSource:
 
 
 def loop_source(loop: Loop, par: ParameterSet) -> LoopSource | None:
-    """Return a loop's linear model in C, at the loop's usual operating point.
+    """Return a loop's linear model in C at the loop's usual operating point.
 
-    None if the operating point or the structure cannot be computed with symbols.
+    Return None if symbols cannot express the operating point or the structure.
     """
     names = par.leaves()
     p = SX.sym("p", len(names))
@@ -88,7 +89,7 @@ def loop_source(loop: Loop, par: ParameterSet) -> LoopSource | None:
 
 
 def _jacobians(loop: Loop, at: Point, moving: Point, t: Any) -> list[Any]:
-    """Return the rows of the C function, for symbolic parameters and the side t."""
+    """Return the results of the C function for symbolic parameters and the side t."""
     model, functions = at.model, smooth_functions(at.model, at.par)
     p = column([moving.par.value(name) for name in at.par.leaves()])
     x, m, u = (column(list(each)) for each in (moving.state, moving.memory, moving.stimulus))
@@ -125,7 +126,7 @@ def _jacobians(loop: Loop, at: Point, moving: Point, t: Any) -> list[Any]:
 
 
 def _in_c(entry: str, function: ca.Function) -> str:
-    """Return the C of a function of parameters, without zeros."""
+    """Return the C text of a function of the parameters, without zero results."""
     graph = Graph()
     results = graph.add_function(
         function,

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
@@ -14,12 +13,11 @@ from pydantic import Field
 from bywire.bench import bench_file
 from bywire.bench.bench import Bench
 from bywire.bench.bench_file import names_experiment
-from bywire.bench.requirements import Limit, read_limit
+from bywire.bench.requirements import read_limits
 from bywire.core.callers import option
 from bywire.core.errors import InputError, ParameterError, not_valid, quoted, unknown_name
 from bywire.core.quantities import Unit
 from bywire.core.section import Hint, Name, Names, Section, Table
-from bywire.core.units import parse
 from bywire.data.toml_file import STUDY, read_toml, require_kind
 from bywire.studies.designs import (
     DEFAULT_CASES,
@@ -110,54 +108,6 @@ def _read_correlations(
         pairs[first, second] = section.value
     correlation_factor(list(names), {**known, **pairs})
     return pairs
-
-
-# --- The section ``[requirements]``: limits, each with a probability as wanted
-
-_WITH = re.compile(r"(.*?)\s+with\b\s*(.*?)\s*", re.DOTALL)
-_PERCENT = re.compile(r"[+-]?[\d.]+(?:[eE][+-]?\d+)?\s*%")
-_SHARE = re.compile(r"0?\.\d+")
-_DEMAND = "99 %"
-
-
-def _read_demands(bench: Bench, section: Mapping[str, Any]) -> Iterator[Limit]:
-    """Yield the study's requirements, and the bench's requirements on other key figures.
-
-    Raises
-    ------
-    InputError
-        For unknown key figures, and for unreadable limits and probabilities.
-    """
-    units = bench.definition.kpis_with(bench.chosen_options)
-    for kpi, text in {**bench.requirements, **section}.items():
-        if kpi not in units:
-            raise unknown_name("KPI in [requirements]", kpi, units)
-        split = _WITH.fullmatch(text) if isinstance(text, str) else None
-        limit = read_limit(kpi, split[1] if split else text, units[kpi])
-        yield replace(limit, probability=_probability(kpi, text, split[2])) if split else limit
-
-
-def _probability(kpi: str, text: str, given: str) -> float:
-    """Return the probability after "with" in the text of a requirement."""
-    if not _PERCENT.fullmatch(given):  # 0.9 may mean a share, or 0.9 %
-        example = f"{100.0 * float(given):.10g} %" if _SHARE.fullmatch(given) else _DEMAND
-        raise ParameterError(
-            f"requirement {kpi} = {quoted(text)}: the probability after 'with' must be in percent, "
-            f"not {quoted(given)}. For example, write 'with {example}'",
-            name=kpi,
-            value=quoted(given),
-            valid="in percent",
-        )
-    share = parse(given, "1", f"probability of requirement {kpi}")
-    if not 0.0 < share < 1.0:
-        raise ParameterError(
-            f"requirement {kpi}: a probability of {given} is not valid: it must be between 0 and "
-            "100 %, as in 'with 99.9 %'. Remove it if every case must meet the limit",
-            name=kpi,
-            value=given,
-            valid="between 0 and 100 %",
-        )
-    return share
 
 
 # --- Probabilities, correlations and numbers of cases that a design permits
@@ -370,7 +320,9 @@ def _plan(content: Mapping[str, Any], file: Path, overrides: Mapping[str, str]) 
     _require_no_bench(content)
     study = StudyFile.read({"name": file.stem, **content}, "a study file")
     bench = read_bench(study.bench, study.set, file.parent, overrides)
-    demands = tuple(_read_demands(bench, study.requirements))
+    units = bench.definition.kpis_with(bench.chosen_options)
+    texts = {**bench.requirements, **study.requirements}
+    demands = tuple(read_limits(texts, units, has_probabilities=True).values())
     limits = {demand.figure: demand.text for demand in demands}
     bench = replace(bench, requirements=limits, name=bench.name or study.name)
     varied, measured = read_all_varied(bench, study.vary, study.measured, file.parent)

@@ -1,7 +1,7 @@
-"""The use cases of bywire, one module per family; `declare` makes commands and forms of them.
+"""The use cases of bywire, one module per family. `declare` turns them into commands and forms.
 
-These modules load fast, because every start of the command line reads all of them. A use case
-imports what it computes with when its function is called.
+These modules load fast, because the command line loads all of them at every start. A use case
+imports the modules for its computation only when its function is called.
 """
 
 from __future__ import annotations

@@ -31,7 +31,7 @@ Frequencies = Annotated[
 Side = Annotated[
     str,
     Ask(
-        "Side of the kink on which the operating point lies: above, below, or FILE:LINE=above.",
+        "Side of the kink at the operating point: above, below, or FILE:LINE=above.",
         "Side of kinks",
     ),
 ]
@@ -65,7 +65,7 @@ ErrorEstimate = Annotated[
 ]
 LastBenchChanges = Annotated[Mapping[str, str], replace(BENCH_CHANGES, is_last=True)]
 NeededCase = Annotated[
-    str, Ask("Run of the experiment. Required if there is more than one.", "Run")
+    str, Ask("Run of the experiment. Required if the experiment has more than one.", "Run")
 ]
 CaseName = Annotated[str, Ask("Run of the experiment. Default: the first.", "Run")]
 OUT = Ask("Folder for recordings, figures and the report.", is_folder=True)
@@ -75,8 +75,8 @@ ExportFolder = Annotated[str | Path, Ask("Folder for the exported files.", is_fo
 Cases = Annotated[
     int | None,
     Ask(
-        "Number of cases. Overrides the file. A larger number extends the study. A smaller "
-        "number drops cases that are not yet computed.",
+        "Number of cases. Overrides the study file. A larger number extends the study. A smaller "
+        "number drops cases that are not computed yet.",
         "Cases",
     ),
 ]
@@ -86,12 +86,12 @@ Workers = Annotated[
 ClusterAddress = Annotated[
     str, Ask("Address of a Dask scheduler that runs the cases.", metavar="ADDRESS")
 ]
-EngineName = Annotated[str, Ask("Engine, e.g. cuda for a GPU.")]
-StudyFolder = Annotated[str | Path, Ask("Folder of the study.", metavar="FOLDER")]
+EngineName = Annotated[str, Ask("Simulation engine, e.g. cuda for a GPU.")]
+StudyFolder = Annotated[str | Path, Ask("Study folder.", metavar="FOLDER")]
 
 
 def require_study_folder(folder: Path, **others: Any) -> None:
-    """Reject a file in place of a study's folder, before the command creates anything."""
+    """Reject a file where a study folder is expected, before the command creates anything."""
     from bywire.studies.meant_study import require_no_file
 
     del others
@@ -103,7 +103,7 @@ STUDY_FOLDER: dict[str, Any] = {
     "writes": "folder",
     "advice": "Check that you have write permission there",  # another folder has no chunks
 }
-"""settings of commands that write into a study's folder"""
+"""settings for commands that write to a study folder"""
 
 TestBench = Annotated[
     "Bench | str | Path",
@@ -118,8 +118,8 @@ TestBench = Annotated[
 MeaningFile = Annotated[
     str | Path | None,
     Ask(
-        "File that maps columns to signals (TOML).",
-        "Map of the columns",
+        "TOML file that maps columns to signals.",
+        "Column map",
         name="map",
         metavar="PATH",
         offered=("maps",),

@@ -1,4 +1,4 @@
-"""Test of a brake, or of one of its parts, against every contract."""
+"""Check of a brake, or one of its parts, against every contract."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -15,13 +15,13 @@ Checked = Annotated[
     str | None,
     Ask(
         "Brake, model, experiment, element, control law or parameter set. Default: the brake "
-        "that --system loads, otherwise everything.",
+        "loaded with --system. Without --system, everything.",
         is_positional=True,
     ),
 ]
 
 
-@use_case(Command("check", status_1="if one fails"))
+@use_case(Command("check", status_1="if a contract fails"))
 def check(
     name: Checked = None,
     *,
@@ -30,20 +30,22 @@ def check(
 ) -> "Check":
     """Test a brake or an element against every contract.
 
-    For elements and control laws, contracts cover units, back ends, derivatives, energy, losses,
-    and round trip and ranges of parameters. For models, they cover units, order of the step, exact
-    rest, energy of a run, engines, lanes, linear model, and derivatives of a run. For experiments,
-    they cover the assembly, figures, stimuli, signals and key figures that the experiment declares.
+    For elements and control laws, the contracts cover units, back ends, derivatives, energy,
+    losses, parameter ranges, and saving and loading parameters. For models, they cover units, the
+    solver's order, exact rest, energy during a run, engines, lanes, the linear model, and
+    derivatives of a run. For experiments, they cover the assembly, figures, stimuli, signals and
+    key figures that the experiment declares.
 
     Parameters
     ----------
     name
         Name of a brake, model, experiment, element, control law or parameter set. Default: the
-        brake of ``system``, otherwise brakes loaded from files, otherwise everything installed.
+        brake of ``system``. Without ``system``, all brakes loaded from files, or everything
+        installed if there are none.
     system
-        File or folder of a brake to load first. bywire executes its code.
+        File or folder of a brake to load before the check. bywire executes its code.
     progress
-        Called with the subject of the check and the finished share, 0 to 1.
+        Called with the check's subject and the completed fraction, 0 to 1.
 
     Returns
     -------
@@ -53,7 +55,7 @@ def check(
     Raises
     ------
     UnknownNameError
-        If the name is unknown, with the closest matches.
+        If the name is unknown. The message lists the closest matches.
     FileError, ModelError
         If the system cannot be loaded.
 

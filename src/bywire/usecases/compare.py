@@ -1,4 +1,4 @@
-"""Comparison of runs. bywire reads result folders, and runs benches and experiments."""
+"""Comparison of runs, read from result folders or computed from benches and experiments."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -25,8 +25,8 @@ Runs = Annotated[
 IsFull = Annotated[
     bool,
     Ask(
-        "Also show equal settings and key figures.",
-        "Also show equal values",
+        "Also show identical settings and key figures.",
+        "Also show identical values",
         name="full",
     ),
 ]
@@ -61,15 +61,15 @@ def compare(
         `BenchResult`, or a bench to run: a `Bench`, a bench file or an experiment's name. A result
         folder takes precedence over an experiment of the same name.
     overrides
-        Changes to each bench that this call runs, in the form of ``--set``.
+        Changes to each bench that this call runs, in the same form as ``--set``.
     is_full
-        Whether to also show equal settings and key figures.
+        Whether to also show identical settings and key figures.
     progress
-        Called with a label and the finished share, 0 to 1.
+        Called with a label and the completed fraction, 0 to 1.
     estimate_error
-        Whether to repeat this call's runs in half and double steps (see `bywire.run`). Key figures
-        are not distinct if they differ by less than their numerical errors, which bywire estimates
-        here or reads from a result folder.
+        Whether to rerun each bench with half and twice the step size (see `bywire.run`). A
+        difference between key figures counts only if it exceeds their numerical errors, which
+        bywire estimates here or reads from the result folder.
 
     Returns
     -------
@@ -79,11 +79,11 @@ def compare(
     Raises
     ------
     InputError
-        For fewer than two runs, incomplete or damaged folders, and benches that cannot be set up.
+        If there are fewer than two runs, a folder is incomplete or damaged, or a bench is invalid.
     RunError
         If a run fails.
     KeyboardInterrupt
-        If interrupted: an incomplete run cannot be compared.
+        If interrupted, because an incomplete run cannot be compared.
     """
     from bywire.api.comparison import compared
 

@@ -19,7 +19,7 @@ Signals = Annotated[
     Ask("Signals to convert, e.g. 'p_mc, x_mc' or 'p_mc=Pressure [psi]'.", is_listing=True),
 ]
 Rate = Annotated[
-    str | float | None, Ask("Sample rate to which all signals are resampled, e.g. '1 kHz'.")
+    str | float | None, Ask("Sample rate to which bywire resamples all signals, e.g. '1 kHz'.")
 ]
 Method = Annotated[str, Ask("Resampling method: linear (default), previous, nearest or average.")]
 Exclude = Annotated[
@@ -29,7 +29,7 @@ Exclude = Annotated[
         is_listing=True,
     ),
 ]
-MaxGap = Annotated[str, Ask("Longest pause that is not a gap, e.g. '50 ms'. Default: 10 steps.")]
+MaxGap = Annotated[str, Ask("Longest pause not treated as a gap, e.g. '50 ms'. Default: 10 steps.")]
 Format = Annotated[str, Ask("Output format, e.g. mat73. Default: from the file name.")]
 Force = Annotated[bool, Ask("Overwrite an existing file.")]
 
@@ -59,30 +59,31 @@ def convert(
     mapping
         File that maps columns to signals.
     signals
-        Signals to convert: names, columns such as ``"Pressure [psi]"``, or columns with a new name,
-        ``"p_mc=Pressure [psi]"``. Default: all.
+        Signals to convert: names, columns such as ``"Pressure [psi]"``, or columns with a new name
+        such as ``"p_mc=Pressure [psi]"``. Default: all.
     time
-        Time column, such as ``"Zeit [s]"``, or a sample rate. Default: as the file declares it.
+        Time column, such as ``"Zeit [s]"``, or a sample rate. Default: the one that the file
+        declares.
     rate
         Sample rate [Hz] of the common time axis, for example ``"1 kHz"``. By default, each signal
-        keeps its time axis.
+        keeps its own time axis.
     method
         Resampling method: ``linear`` (default), ``previous``, ``nearest`` or ``average``.
     exclude
         Samples to exclude: ``gaps``, ``missing``, ``clipped``. Default: ``gaps`` and ``missing``.
     max_gap
-        Longest pause that is not a gap, for example ``"50 ms"``. Default: 10 steps.
+        Longest pause not treated as a gap, for example ``"50 ms"``. Default: 10 steps.
     format
         Output format, for example ``mat73``. Default: from the file name's suffix.
     force
         Whether to overwrite an existing file.
     progress
-        Called with a label and the finished share, 0 to 1.
+        Called with a label and the completed fraction, 0 to 1.
 
     Returns
     -------
     Conversion
-        Signals of the file, resampled if requested, with rates in Hz and gaps in s.
+        The file's signals, resampled if requested, with sample rates in Hz and gaps in s.
 
     Raises
     ------

@@ -1,9 +1,9 @@
-"""Declare a use case by an annotated function: its command, form and public name follow from it.
+"""Declare a use case as an annotated function, from which its command and form are generated.
 
 An argument's annotation contains its type and an `Ask`: the flag's help, the label and hint of the
-form's field, and its completions. The docstring's first line is the summary, which appears in the
-command's help, the form and the reference. Messages write an argument's name with
-`bywire.core.callers.option`.
+form's field, and the shell completions. The docstring's first line is the summary, which appears in
+the command's help, the form and the reference. In messages, `bywire.core.callers.option` writes an
+argument's name.
 """
 
 from __future__ import annotations
@@ -44,22 +44,22 @@ NOTHING: Mapping[str, Any] = MappingProxyType({})
 
 @dataclass(frozen=True)
 class Ask:
-    """Texts and valid values of an argument's command flag and form field.
+    """Texts and valid values for an argument's command flag and form field.
 
     Parameters
     ----------
     help
-        Help of the flag and hint of the field.
+        Help text of the flag, and hint of the field.
     label
         Label of the field. An argument without a label has no field.
     name
-        Name of flag and field, if it differs from the argument's name.
+        Name of the flag and the field, if it differs from the argument's name.
     kind
         Kind of the field, if it does not follow from the type.
     metavar
         Placeholder of the value in the command's help. By default, derived from the type.
     known
-        Topics of `bywire.overview` whose names are valid and complete in the shell.
+        Topics of `bywire.overview` whose names are valid and which the shell completes.
     files
         Suffix of files that are also valid, for example ``".toml"``.
     offered
@@ -67,27 +67,27 @@ class Ask:
     words
         All valid words: a tuple, or a function that returns them.
     completes
-        Names to complete in the shell: ``"changes"`` or ``"parameters"`` of a bench.
+        Names that the shell completes: ``"changes"`` or ``"parameters"`` of a bench.
     least, most
         Range of a whole number.
     ticked
-        Value that the form's checkbox sets, instead of a field for any value.
+        Value that a checkbox in the form sets, instead of a field for any value.
     is_flag
-        Whether a required argument is a flag in the command.
+        Whether a required argument is a flag of the command.
     is_positional
-        Whether an argument with a default is positional in the command.
+        Whether an argument with a default is a positional argument of the command.
     is_listing
-        Whether a command accepts a list with commas, instead of repeated flags.
+        Whether the command accepts a comma-separated list instead of repeated flags.
     is_text
-        Whether a command passes a text where the function also accepts a path.
+        Whether the command passes a string where the function also accepts a path.
     is_folder
-        Whether it is a folder that the command writes to.
+        Whether the argument is a folder to which the command writes.
     is_last
-        Whether the command lists it after all other arguments.
+        Whether the command's help lists the argument after all others.
     shown_default
-        Text for the default in the command's help. If None, the default itself.
+        Text shown for the default in the command's help. If None, the default itself.
     panel
-        Heading in the command's help under which it appears.
+        Heading in the command's help under which the argument appears.
     """
 
     help: str
@@ -113,38 +113,38 @@ class Ask:
 
     @property
     def example(self) -> str:
-        """The first example in the help, which an empty field of the form shows; may be empty."""
+        """First example in the help text, which an empty form field shows. May be empty."""
         found = _EXAMPLE.search(self.help)
         return (found[1] or found[2]) if found else ""
 
 
 @dataclass(frozen=True)
 class Command:
-    """Command of a use case.
+    """Command for a use case.
 
     Parameters
     ----------
     words
-        Words to type after ``bywire``.
+        Words that the user types after ``bywire``.
     help
-        Help of the command. Default: the use case's summary.
+        Help text of the command. Default: the use case's summary.
     status_1
         End of the sentence "Exits with status 1 ...".
     before
-        ``before(**asked)``: rejects invalid arguments before the command creates the result folder.
+        ``before(**asked)`` rejects invalid arguments before the command creates the result folder.
     writes
         Argument that contains the result folder. Empty if the command writes no result. The command
-        gets a flag ``--out`` if no argument is called ``out``.
+        gets an ``--out`` flag if no argument is named ``out``.
     default_folder
-        ``default_folder(**asked)``: returns the folder if the user specifies none.
+        ``default_folder(**asked)`` returns the folder if the user specifies none.
     advice
-        Advice if the folder is not writable.
+        Advice to the user if the folder is not writable.
     first
-        Arguments that its help lists first.
+        Arguments that the help lists first.
     without
-        Arguments without a flag in this command.
+        Arguments for which this command has no flag.
     required
-        Arguments with a default that this command nevertheless requires, with their help.
+        Arguments that this command requires although they have a default, with their help texts.
     """
 
     words: str
@@ -166,17 +166,17 @@ class Form:
     Parameters
     ----------
     title, action
-        Heading, and label of the button.
+        Heading of the form, and label of its button.
     subject
-        Field from which the result's folder gets its name.
+        Field after which the result folder is named.
     name
         Name of the task. Default: the words of the command.
     fields
-        Fields in their order. Default: all arguments with a label.
+        Fields in the order shown. Default: all arguments with a label.
     is_listed
-        Whether the start page links to a separate page for it.
+        Whether the start page links to a separate page for the form.
     is_kept
-        Whether another run of the same subject continues in its folder.
+        Whether another run of the same subject continues in the same folder.
     is_file
         Whether ``out`` is a file that the use case writes itself.
     """
@@ -200,7 +200,7 @@ class Argument:
     argument
         Name in Python.
     ask
-        Texts and valid values of flag and field.
+        Texts and valid values for the flag and the field.
     type, default
         From the function's signature.
     is_many
@@ -230,18 +230,18 @@ class Argument:
 
     @property
     def is_positional(self) -> bool:
-        """Whether a command accepts it without a flag."""
+        """Whether the command accepts the argument without a flag."""
         return self.is_many or self.ask.is_positional or (self.is_required and not self.ask.is_flag)
 
     @property
     def is_path(self) -> bool:
-        """Whether its value in a command is a path."""
+        """Whether the command reads the value as a path."""
         names = str(self.type)
         return "Path" in names and not self.ask.is_text
 
     @property
     def kind(self) -> Kind:
-        """Kind of the field. A command reads its flag the same way, except for `ticked`."""
+        """Kind of the field. The command reads its flag the same way, except for `ticked`."""
         ask, outer = self.ask, get_origin(self.type)
         if ask.kind is not None:
             return ask.kind
@@ -268,9 +268,9 @@ class UseCase:
     Parameters
     ----------
     public, function
-        The public function, and the function that command and form call. They are usually the same.
+        The public function, and the function that the command and the form call (usually the same).
     arguments
-        Arguments of command and form.
+        Arguments of the command and the form.
     commands, form, check, holds
         See `use_case`.
     takes
@@ -297,14 +297,14 @@ class UseCase:
         return (inspect.getdoc(self.public) or "").partition("\n")[0]
 
     def call(self, asked: Mapping[str, Any], **more: Any) -> Any:
-        """Call the function with the fields' values by name, and with additional arguments."""
+        """Call the function with the fields' values by name and with additional arguments."""
         others = {name: value for name, value in more.items() if name in self.takes}
         given = {a.argument: asked[a.name] for a in self.arguments if a.name in asked}
         many = [value for a in self.arguments if a.is_many for value in given.pop(a.argument, ())]
         return self.function(*many, **given, **others)
 
     def read(self, asked: Mapping[str, Any]) -> Any:
-        """Check the fields' values by name, without computing anything.
+        """Check the fields' values by name without computing anything.
 
         Raises
         ------
@@ -322,7 +322,7 @@ class UseCase:
 
 
 DECLARED: dict[str, UseCase] = {}
-"""use cases declared so far, by the names of their functions"""
+"""use cases declared so far, by function name"""
 
 
 def use_case(
@@ -332,7 +332,7 @@ def use_case(
     holds: Callable[[Path, Any], bool] | None = None,
     asked: Callable[..., Any] | None = None,
 ) -> Callable[[Callable[Asked, Given]], Callable[Asked, Given]]:
-    """Declare a use case, whose function checks its arguments and emits the result's warnings.
+    """Declare a function as a use case that checks its arguments and emits the result's warnings.
 
     Parameters
     ----------
@@ -341,13 +341,13 @@ def use_case(
     form
         Form of the use case.
     check
-        ``check(...)``: reads any of the arguments, and computes nothing.
+        ``check(...)`` accepts any of the arguments and checks them without computing anything.
     holds
-        ``holds(folder, read)``: returns whether a folder contains results for the value that
+        ``holds(folder, read)`` returns whether a folder contains results for the value that
         ``check`` returned, so that the command can continue there.
     asked
-        Function that command and form call, with the arguments that they offer. Default: the public
-        function.
+        Function that the command and the form call, with the arguments that they offer. Default:
+        the public function.
     """
 
     def declare(function: Callable[Asked, Given]) -> Callable[Asked, Given]:
@@ -377,7 +377,7 @@ def _arguments(function: Callable[..., Any]) -> list[Argument]:
 
 
 def _bare_signature(function: Callable[..., Any]) -> inspect.Signature:
-    """Return a signature with plain types as texts, for `help` and for argument checks."""
+    """Return a signature with plain types as strings, for `help` and argument checks."""
     written = inspect.signature(function)
     bare = [p.replace(annotation=_bare(p.annotation)) for p in written.parameters.values()]
     return written.replace(parameters=bare)

@@ -1,4 +1,4 @@
-"""Design of a loop's gains from requirements."""
+"""Design of a loop's gains to meet requirements."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -16,10 +16,10 @@ Required = Annotated[
     Sequence[str],
     Ask("Requirement, e.g. 'bandwidth >= 10 Hz'. Repeatable.", "Requirements"),
 ]
-RequirementsFile = Annotated[str | Path | None, Ask("TOML file with a section [requirements].")]
+RequirementsFile = Annotated[str | Path | None, Ask("TOML file with a [requirements] section.")]
 Ranges = Annotated[
     Sequence[str],
-    Ask("Range that the gains must cover, e.g. at=5bar:35bar:7. Repeatable.", "Ranges"),
+    Ask("Range over which the gains must work, e.g. at=5bar:35bar:7. Repeatable.", "Ranges"),
 ]
 SineAmplitudes = Annotated[
     str, Ask("Amplitudes of the bench's sine tests, e.g. '1 bar, 3 bar'.", "Amplitudes")
@@ -30,12 +30,15 @@ Schedule = Annotated[
 LinearOnly = Annotated[bool, Ask("Skip the test on the nonlinear bench.", "Linear only (faster)")]
 FreeDerivative = Annotated[
     bool,
-    Ask("Let the derivative filter be faster than the sampling and act on the set point."),
+    Ask(
+        "Allow a derivative filter faster than the sampling, and derivative action on the set "
+        "point."
+    ),
 ]
 DrawnFrom = Annotated[
     str | Path,
     Ask(
-        "Study file whose distributions bywire uses to draw models for the design.",
+        "Study file with the distributions from which bywire draws models for the design.",
         metavar="FILE",
         is_text=True,
     ),
@@ -54,7 +57,7 @@ def _read(loop: str, parameters: str, overrides: Mapping[str, Any], side: str) -
 
 
 @use_case(
-    Command("design", status_1="if they cannot be met"),
+    Command("design", status_1="if the requirements cannot be met"),
     form=Form(
         "Design a loop",
         "Design",
@@ -95,19 +98,19 @@ def design(
     progress: "Progress | None" = None,
     side: Side = "",
 ) -> "LoopDesign | LoopScheduleDesign":
-    """Design a loop's gains from requirements.
+    """Design a loop's gains to meet requirements.
 
     Parameters
     ----------
     loop, parameters, at, overrides
-        See `bywire.margins`. A parameter that you set is fixed. With ``schedule``, ``at`` lists
-        one point for each region.
+        See `bywire.margins`. The design does not change a parameter that you set. With
+        ``schedule``, ``at`` lists one point for each region.
     require
         Requirements, for example ``"bandwidth >= 10 Hz"``.
     requirements
-        TOML file with a section ``requirements``.
+        TOML file with a ``[requirements]`` section.
     over
-        Ranges that the gains must also cover, each as ``"NAME=LOW:HIGH:COUNT"``.
+        Ranges over which the gains must also work, each as ``"NAME=LOW:HIGH:COUNT"``.
     amplitudes
         Amplitudes of the bench's sine tests, with units, separated by commas. Default: those that
         the loop declares.
@@ -116,21 +119,21 @@ def design(
     linear_only
         Whether to skip the test on the nonlinear bench.
     free_derivative
-        Whether the derivative filter may be faster than the sampling and act on the set point. The
-        figures improve, but such gains are rarely suitable for an ECU.
+        Whether the derivative filter may be faster than the sampling, and the derivative may act on
+        the set point. This improves the figures, but such gains are rarely suitable for an ECU.
     vary
         Study file. bywire draws models from its distributions, chooses the gains for these models,
-        and judges them on additional models.
+        and tests the gains on additional models.
     drawn
-        Number of models to draw for choosing the gains.
+        Number of models that bywire draws to choose the gains.
     probability
-        Required probability of meeting all requirements together, for example ``"99 %"``.
+        Required probability that all requirements are met together, for example ``"99 %"``.
     seed
         Random seed of the search.
     progress
-        Called with a label and the finished share, 0 to 1.
+        Called with a label and the completed fraction, 0 to 1.
     side
-        Side of the linear models; see `bywire.margins`.
+        Side of the linear models (see `bywire.margins`).
 
     Returns
     -------
@@ -141,7 +144,7 @@ def design(
     Raises
     ------
     InputError
-        For unknown names, values out of range, and invalid requirements.
+        If a name is unknown, a value is out of range, or a requirement is invalid.
     """
     from bywire.api.design import designed_at_point, designed_by_region, requirements_of
     from bywire.api.loop_case import loop_case
@@ -151,7 +154,8 @@ def design(
     whole_number("seed", seed, 0, 2**63 - 1)
     if schedule and vary:
         raise ParameterError(
-            "use either schedule or vary, not both. bywire cannot schedule gains for drawn models",
+            "schedule and vary cannot be combined, because bywire cannot schedule gains for drawn "
+            "models. Use only one of them",
             name="schedule",
             value="True",
         )

@@ -1,4 +1,4 @@
-"""Exports of a bench: its ECU as C, a functional mock-up unit, WebAssembly, a page."""
+"""Exports of a bench: C code of its ECU, functional mock-up unit, WebAssembly, web page."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -18,15 +18,15 @@ IsChecked = Annotated[
     bool,
     Ask(
         "Run the C code on this machine and on emulated Cortex-M3, M4F and M7, in both "
-        "precisions. Exits with status 1 if a bit differs."
+        "precisions. Exits with status 1 if any bit differs."
     ),
 ]
-Bus = Annotated[bool, Ask("Also write a description of the ECU's memory for a CAN bus (DBC).")]
+Bus = Annotated[bool, Ask("Also write a CAN database (DBC) that describes the ECU's memory.")]
 Prefix = Annotated[
     str,
     Ask(
-        "Prefix of file and symbol names. Different prefixes let several ECUs link into one "
-        "program.",
+        "Prefix of file and symbol names. With different prefixes, several ECUs can be linked "
+        "into one program.",
         shown_default="the model's name",
     ),
 ]
@@ -44,7 +44,7 @@ def export_controller(
     dbc: Bus = False,
     name: Prefix = "",
 ) -> "ControllerExport":
-    """Export the ECU as readable C99 with parameters, test vectors and a test harness.
+    """Export the ECU as readable C99 code with parameters, test vectors and a test harness.
 
     Parameters
     ----------
@@ -53,22 +53,23 @@ def export_controller(
         options, or those of the first case if there are several. The export ignores the bench's
         faults.
     out
-        Folder, created if missing. The export overwrites the files of an earlier export there.
+        Folder, which bywire creates if it is missing. The export overwrites an earlier export
+        there.
     overrides
-        Changes to a bench file or experiment, in the form of ``--set``.
+        Changes to a bench file or experiment, in the same form as ``--set``.
     precision
         ``"double"``, bit-identical to Python, or ``"single"``.
     vectors
         Number of test vectors per task.
-        check
-        Whether to compile the C code in both precisions, run it on the vectors, compare it bit for
-        bit, and measure it. bywire does this on this machine, and also on Cortex-M3, M4F and M7 if
-        arm-none-eabi-gcc and qemu-system-arm are installed.
+    check
+        Whether to compile the C code in both precisions, run it on the test vectors, compare its
+        results bit for bit, and measure it. bywire does this on this machine, and also on emulated
+        Cortex-M3, M4F and M7 if arm-none-eabi-gcc and qemu-system-arm are installed.
     dbc
-        Whether to describe the memory as signals of a CAN bus, with C code that fills the messages.
+        Whether to write a CAN database (DBC) for the memory, with C code that fills the messages.
     name
-        Prefix of file and symbol names, a C identifier. Default: the model's name. ECUs with
-        different prefixes link into one program.
+        Prefix of file and symbol names, which must be a C identifier. Default: the model's name.
+        ECUs with different prefixes can be linked into one program.
 
     Returns
     -------
@@ -127,7 +128,7 @@ Part = Annotated[
     str,
     Ask("Part to export: brake, plant or ecu.", shown_default="brake, or plant for model-exchange"),
 ]
-UnitKind = Annotated[str, Ask("Kind of unit: co-simulation, or model-exchange (plant only).")]
+UnitKind = Annotated[str, Ask("Kind of FMU: co-simulation, or model-exchange (plant only).")]
 Version = Annotated[int, Ask("FMI version: 2 or 3.")]
 Targets = Annotated[
     Sequence[str],
@@ -155,25 +156,26 @@ def export_fmu(
     bench
         A `Bench`, the path of a bench file, or the name of an experiment.
     out
-        Folder for the file ``NAME_PART.fmu``. An existing file is overwritten.
+        Folder for the file ``NAME_PART.fmu``. bywire overwrites an existing file.
     overrides
-        Changes to a bench file or experiment, in the form of ``--set``.
+        Changes to a bench file or experiment, in the same form as ``--set``.
     part
         ``"brake"`` exports everything. ``"plant"`` has the ECU's outputs as inputs and the ECU's
-        readings as outputs. ``"ecu"`` is the reverse. Default: the brake, or the plant for model
-        exchange.
+        readings as outputs. ``"ecu"`` is the reverse. Default: ``"brake"``, or ``"plant"`` for
+        model exchange.
     kind
-        ``"co-simulation"`` is a unit with the bench's own solver. ``"model-exchange"`` is the plant
-        for a client's solver, with derivatives, event indicators and modes.
+        ``"co-simulation"`` is an FMU with the bench's own solver. ``"model-exchange"`` is the plant
+        without a solver, with derivatives, event indicators and modes for the importing tool's
+        solver.
     fmi
-        FMI version: 2 for 2.0, or 3 for 3.0, in which tasks are clocks and tables are arrays.
+        FMI version: 2 for 2.0, or 3 for 3.0, where tasks become clocks and tables become arrays.
     case
         Run of the experiment to export. Optional if there is only one.
     targets
-        Platforms of the binaries: ``linux64``, ``win64``, ``darwin64``, ``aarch64-linux``,
-        ``aarch64-darwin``. Default: the platform of this machine.
+        Platforms for which to build binaries: ``linux64``, ``win64``, ``darwin64``,
+        ``aarch64-linux``, ``aarch64-darwin``. Default: this machine's platform.
     progress
-        Called with a label and the finished share, 0 to 1.
+        Called with a label and the completed fraction, 0 to 1.
 
     Returns
     -------
@@ -231,16 +233,16 @@ def export_wasm(
     *,
     case: NeededCase = "",
 ) -> "ExportedWasm":
-    """Export a run as a WebAssembly function from parameters to a recording, with a loader.
+    """Export a run as a WebAssembly function that maps parameters to a recording, with a loader.
 
     Parameters
     ----------
     bench
         A `Bench`, the path of a bench file, or the name of an experiment.
     out
-        Folder for the files. Existing files are overwritten.
+        Folder for the files. bywire overwrites existing files.
     overrides
-        Changes to a bench file or experiment, in the form of ``--set``.
+        Changes to a bench file or experiment, in the same form as ``--set``.
     case
         Run of the experiment to export. Optional if there is only one.
 
@@ -303,21 +305,21 @@ def page(
     vary: Sliders = (),
     case: NeededCase = "",
 ) -> "BenchPage":
-    """Write a bench as one interactive HTML file that updates its curves as you move parameters.
+    """Write a bench as one interactive HTML file whose curves update as you change parameters.
 
     Parameters
     ----------
     bench
         A `Bench`, the path of a bench file, or the name of an experiment.
     out
-        File of the page (.html). An existing file is overwritten.
+        HTML file of the page (.html). bywire overwrites an existing file.
     overrides
-        Changes to a bench file or experiment, in the form of ``--set``.
+        Changes to a bench file or experiment, in the same form as ``--set``.
     vary
-        Parameters at the top of the page. Default: those that the bench changes, otherwise those
-        that its brake declares (`bywire.authoring.Sliders`).
+        Parameters at the top of the page. Default: those that the bench changes. If it changes
+        none, those that its brake declares (`bywire.authoring.Sliders`).
     case
-        Run of the experiment that the page computes. Optional if there is only one.
+        Run of the experiment for the page to compute. Optional if there is only one.
 
     Returns
     -------
@@ -345,7 +347,7 @@ def page(
     from bywire.report.time_traces import shown_panels
 
     if Path(out).suffix.lower() not in (".html", ".htm"):
-        raise not_valid("out", repr(str(out)), "a file that ends in .html")
+        raise not_valid("out", repr(str(out)), "a file name that ends in .html")
     bench = bench_of(bench, overrides)
     made = exported(bench, case)
     _, reads = start_source(made)

@@ -1,4 +1,4 @@
-"""Identification of parameters with their confidence from measured or simulated experiments."""
+"""Identification of parameters with confidence intervals from measured or simulated data."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -44,17 +44,18 @@ MethodOptions = Annotated[
     Mapping[str, Any],
     Ask(
         "Option of the method (see 'bywire list METHOD').",
-        "Options of the method",
+        "Method options",
         name="option",
         metavar="KEY=VALUE",
     ),
 ]
 Starts = Annotated[
     int | None,
-    Ask("Number of search starts. Default: 16, or 1 with --study.", "Search starts", least=1),
+    Ask("Number of starting points. Default: 16, or 1 with --study.", "Starting points", least=1),
 ]
 Seed = Annotated[
-    int, Ask("Random seed of the starts, or first seed of --study.", "Seed of the starts", least=0)
+    int,
+    Ask("Random seed of the starting points, or first seed with --study.", "Random seed", least=0),
 ]
 Synthetic = Annotated[
     int | None,
@@ -67,7 +68,7 @@ Synthetic = Annotated[
 ]
 Experiments = Annotated[
     int | None,
-    Ask("Test the method on this many simulated measurements.", metavar="COUNT", least=2),
+    Ask("Test the method on this number of simulated measurements.", metavar="COUNT", least=2),
 ]
 AnyBench = Annotated[
     Path | None,
@@ -82,7 +83,7 @@ AnyBench = Annotated[
 NoisyOutputs = Annotated[
     Mapping[str, str],
     Ask(
-        "Measured output with column and noise, e.g. 'p_mc=Pressure [psi] +- 0.02 bar'.",
+        "Measured output with its column and noise, e.g. 'p_mc=Pressure [psi] +- 0.02 bar'.",
         "Outputs",
         name="output",
         kind="names",
@@ -134,8 +135,8 @@ Loss = Annotated[
 Holdout = Annotated[
     Path | None,
     Ask(
-        "Measurement for validation. The fit does not use it.",
-        "Measurement for validation",
+        "Validation measurement, which the fit does not use.",
+        "Validation measurement",
         kind="file",
         panel=_ANY_BENCH,
     ),
@@ -255,42 +256,43 @@ def identify(
     folder: str | Path | None = None,
     progress: "Progress | None" = None,
 ) -> "Identification":
-    """Identify parameters with their confidence from measurements.
+    """Identify parameters and their confidence intervals from measurements.
 
     Parameters
     ----------
     method
         Name of the method (see ``bywire list methods``).
     measurements
-        One measurement, or several records of it, as files or results of
+        One measurement, or several records of one measurement, as files or results of
         `bywire.read_measurement`.
     parameters, overrides
-        Parameter set at which the search starts (default: the main one of the method's brake), and
-        changes to it as SI numbers or texts with units.
+        Parameter set from which the search starts (default: the main set of the method's brake),
+        and changes to it as SI numbers or strings with units.
     question
-        For methods for any bench: the bench, the measured outputs and the unknowns. For a method of
-        a single brake, ``outputs`` may specify the columns of its signals.
+        For methods for any bench: the bench, the measured outputs and the unknowns. For a method
+        for a single brake, its ``outputs`` can specify the columns of the brake's signals.
     mapping
         File that maps columns of measurement files to signals.
     time
-        Time column, such as ``"Zeit [s]"``, or a sample rate. Default: as the file declares it.
+        Time column, such as ``"Zeit [s]"``, or a sample rate. Default: the one that the file
+        declares.
     options
-        Options of the method as SI numbers or texts with units.
+        Options of the method as SI numbers or strings with units.
     starts, seed
-        Number of search starts, and the random seed of all starts except the first.
+        Number of starting points, and the random seed of all starting points except the first.
     synthetic
         Seed of a simulated measurement, to use instead of a real one.
     folder
         Folder of the result. bywire rejects a folder with another method's result, and removes an
-        earlier result of the same method. It saves finished starts there, so that an interrupted
-        search can continue.
+        earlier result of the same method. It saves the result of each finished start there, so that
+        an interrupted search can continue.
     progress
-        Called with a label and the finished share, 0 to 1.
+        Called with a label and the completed fraction, 0 to 1.
 
     Returns
     -------
     Identification
-        Parameters in SI units with their 95 % intervals, the checks of the result, and its
+        Parameters in SI units with their 95 % intervals, the checks of the result, and the
         measurements.
 
     Raises

@@ -1,4 +1,4 @@
-"""Loops: margins, linear models, responses by amplitude, causes of nonlinearity."""
+"""Control loops: margins, linear models, responses by amplitude, causes of nonlinearity."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any
@@ -45,35 +45,36 @@ def margins(
     *,
     side: Side = "",
 ) -> "Margins":
-    """Compute a sampled loop's margins and bandwidth, and the worst case over a range.
+    """Compute a sampled loop's margins and bandwidth, and their worst case over a range.
 
     Parameters
     ----------
     loop
         Name of the loop.
     parameters
-        Parameter set. Default: the main one of the loop's brake.
+        Parameter set. Default: the main set of the loop's brake.
     at
         Operating point with its unit, for example ``"20 bar"``. Default: the loop's nominal point.
     overrides
-        Changes of parameters by dotted name, as SI numbers or texts with units.
+        Changes to parameters by dotted name, as SI numbers or strings with units.
     over
         Range, for example ``"motor.R_m=0.2 ohm:0.6 ohm:9"`` or ``"at=5 bar:35 bar:7"``.
     side
-        Side of a kink to use if the operating point lies on one: ``"above"``, ``"below"``, or
+        Side to use if the operating point lies on a kink: ``"above"``, ``"below"``, or
         ``"FILE:LINE=above"`` for single operations, separated by commas. Without a side, bywire
-        rejects such a point if the linear models of both sides differ.
+        rejects the point if the linear models on the two sides differ.
 
     Returns
     -------
     Margins
-        Gain margins as factors, phase margin in degrees, crossover and bandwidth in Hz, delay
-        margin in s, at the operating point or at each value of the range, with the worst case.
+        Gain margins as factors, phase margin in degrees, crossover frequency and bandwidth in Hz,
+        and delay margin in s, at the operating point or at each value of the range, with the worst
+        case.
 
     Raises
     ------
     InputError
-        For unknown names, values out of range, and parameter sets of another brake.
+        If a name is unknown, a value is out of range, or the parameter set is for another brake.
 
     Examples
     --------
@@ -163,18 +164,18 @@ def linearize(
     dither: Dither = False,
     side: Side = "",
 ) -> "LinearizedLoop | LinearizedPlant | PlantLocus":
-    """Derive the exact linear model of a sampled closed loop or of a plant.
+    """Derive the exact linear model of a sampled closed loop or a plant.
 
     Parameters
     ----------
     name
-        Name of a loop or of a plant.
+        Name of a loop or a plant.
     parameters
-        Parameter set. Default: the main one of the loop's or plant's brake.
+        Parameter set. Default: the main set of the loop's or plant's brake.
     at
         Operating point with its unit, for example ``"20 bar"``. Default: the loop's nominal point.
     overrides
-        Changes of parameters by dotted name, as SI numbers or texts with units.
+        Changes to parameters by dotted name, as SI numbers or strings with units.
     locus
         Range of the root locus, ``"NAME=LOW:HIGH:COUNT"``.
     reduce
@@ -189,12 +190,12 @@ def linearize(
     Returns
     -------
     LinearizedLoop, LinearizedPlant or PlantLocus
-        The linear model in SI units, with its poles in 1/s. Over a range, only the poles.
+        The linear model in SI units, with its poles in 1/s. For a range, only the poles.
 
     Raises
     ------
     InputError
-        For unknown names, values out of range, and incompatible options.
+        If a name is unknown, a value is out of range, or options are incompatible.
     SolverError
         If the motion under dither does not become periodic.
     """
@@ -204,7 +205,7 @@ def linearize(
     return linearized(case, locus, reduce, dither)
 
 
-# --- A closed loop's response by amplitude: friction, limits and sampling included
+# --- A closed loop's response by amplitude, including friction, limits and sampling
 
 _RESPONSE_POINTS = 20
 _EXCITATIONS = ("sine", "multisine", "chirp")
@@ -260,15 +261,15 @@ def frequency_response(
     estimate_error: ErrorEstimate = True,
     side: Side = "",
 ) -> "FrequencyResponse":
-    """Measure a closed loop's response by amplitude, including friction, limits and sampling.
+    """Measure a closed loop's frequency response by amplitude, with friction, limits and sampling.
 
     Parameters
     ----------
     loop, parameters, at, overrides
         See `bywire.margins`.
     frequencies
-        Frequencies as ``"1 Hz:150 Hz:20"`` or separated by commas. Default: twenty over the loop's
-        band.
+        Frequencies as ``"1 Hz:150 Hz:20"`` or separated by commas. Default: 20 frequencies over the
+        loop's band.
     amplitudes
         Amplitudes with units, separated by commas. Default: those that the loop declares.
     excitation
@@ -276,12 +277,12 @@ def frequency_response(
     over
         Range of a parameter over which to compute bandwidths, ``"NAME=LOW:HIGH:COUNT"``.
     progress
-        Called with a label and the finished share, 0 to 1.
+        Called with a label and the completed fraction, 0 to 1.
     estimate_error
-        Whether to repeat the measurement in half steps. ``data`` then contains the numerical error
-        of gain, phase and bandwidths (``NAME_step_error``).
+        Whether to repeat the measurement with half the step size. ``data`` then contains the
+        numerical error of gain, phase and bandwidths (``NAME_step_error``).
     side
-        Side of the linear models; see `bywire.margins`.
+        Side of the linear models (see `bywire.margins`).
 
     Returns
     -------
@@ -291,7 +292,8 @@ def frequency_response(
     Raises
     ------
     InputError
-        For unknown names, values out of range, parameter sets of another brake, unstable loops.
+        If a name is unknown, a value is out of range, the parameter set is for another brake, or
+        the loop is unstable.
     """
     from bywire.api.frequency_response import measured_response
     from bywire.core.errors import unknown_name
@@ -314,7 +316,7 @@ def frequency_response(
     )
 
 
-# --- The causes of a loop's nonlinearity, one by one
+# --- The causes of a loop's nonlinearity, one at a time
 
 _AGREEMENT_POINTS = 6
 TwoAmplitudes = Annotated[
@@ -355,32 +357,34 @@ def agreement(
     progress: "Progress | None" = None,
     side: Side = "",
 ) -> "LoopAgreement":
-    """Attribute a loop's nonlinearity to its causes, one by one.
+    """Attribute a loop's nonlinearity to its causes, one at a time.
 
     Parameters
     ----------
     loop, parameters, at, overrides
         See `bywire.margins`.
     frequencies
-        Frequencies as ``"1 Hz:150 Hz:20"`` or separated by commas. Default: six over the loop's
-        band.
+        Frequencies as ``"1 Hz:150 Hz:20"`` or separated by commas. Default: six frequencies over
+        the loop's band.
     amplitudes
-        Small and large amplitude, ``"0.001 rad, 1 rad"``. Default: those that the loop declares.
+        Small and large amplitude, such as ``"0.001 rad, 1 rad"``. Default: those that the loop
+        declares.
     progress
-        Called with a label and the finished share, 0 to 1.
+        Called with a label and the completed fraction, 0 to 1.
     side
-        Side of the linear model; see `bywire.margins`.
+        Side of the linear model (see `bywire.margins`).
 
     Returns
     -------
     LoopAgreement
         Differences between the loop's responses by cause: frequencies in Hz, gains, phases in
-        degrees, shares of the difference in percent.
+        degrees, and contributions to the difference in percent.
 
     Raises
     ------
     InputError
-        For unknown names, values out of range, parameter sets of another brake, unstable loops.
+        If a name is unknown, a value is out of range, the parameter set is for another brake, or
+        the loop is unstable.
     """
     from bywire.api.agreement import compared_responses
 

@@ -24,19 +24,20 @@ def new(name: BrakeName, folder: ProjectFolder = ".") -> "NewBrake":
     Parameters
     ----------
     name
-        Name of the brake: lowercase letters, digits and single dashes, such as ``my-brake``.
+        Name of the brake, of lowercase letters, digits and single dashes, such as ``my-brake``.
     folder
-        Parent of its folder ``my-brake``, created if missing. Default: the current folder.
+        Parent folder of the new folder ``my-brake``, created if missing. Default: the current
+        folder.
 
     Returns
     -------
     NewBrake
-        The brake's name, the folder of its project, and its package.
+        The brake's name, its project folder, and its package.
 
     Raises
     ------
     ParameterError
-        If the name is not valid for Python or bywire, with the reason.
+        If the name is not valid for Python or bywire. The message states the reason.
     FileError
         If the folder already exists, or is not writable.
     """

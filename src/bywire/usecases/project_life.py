@@ -25,7 +25,11 @@ LifeName = Annotated[
 ]
 CheckedStops = Annotated[
     int,
-    Ask("Number of stops to simulate one by one, as a check.", "Stops one by one", least=0),
+    Ask(
+        "Number of stops to simulate individually as a check.",
+        "Stops to simulate individually",
+        least=0,
+    ),
 ]
 
 
@@ -53,23 +57,24 @@ def project_life(
     source
         Life file (see ``docs/life.md``), or the name of a life.
     overrides
-        Changes to the bench, to wear (``wear.NAME``) and to the conditions of stops
-        (``stop.NAME``), as texts with units.
+        Changes to the bench, wear (``wear.NAME``) and stop conditions (``stop.NAME``), as strings
+        with units.
     check
-        Number of stops to also simulate one by one, to check the projection, in whole rounds of
-        the population. Default: none.
+        Number of stops to also simulate individually to check the projection. bywire rounds it down
+        to whole rounds of the population. Default: none.
     progress
-        Called with a label and the finished share, 0 to 1.
+        Called with a label and the completed fraction, 0 to 1.
 
     Returns
     -------
     LifeResult
-        Stops until the end of life with an interval, and slow states after each stop in SI units.
+        Number of stops until end of life, with an interval, and the slow states after each stop
+        [SI].
 
     Raises
     ------
     InputError
-        If the life file is invalid, or the brake is at the end of its life from the start.
+        If the life file is invalid, or the brake is already at its end of life at the start.
     RunError
         If a run fails, or a stop lacks a key figure on which wear depends.
     KeyboardInterrupt

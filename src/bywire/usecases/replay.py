@@ -1,4 +1,4 @@
-"""Replay of a measured demand, which compares the model's response with the measured one."""
+"""Replay of a measured demand, which compares the model's response with the measurement."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -46,8 +46,8 @@ Tolerances = Annotated[
 Segments = Annotated[
     str | Path,
     Ask(
-        "Segments to judge: auto (steps and holds) or a TOML file.",
-        "Judge steps and holds separately",
+        "Segments to evaluate separately: auto (steps and holds) or a TOML file.",
+        "Evaluate steps and holds separately",
         is_text=True,
         ticked="auto",
     ),
@@ -101,44 +101,46 @@ def replay(
     progress: "Progress | None" = None,
     estimate_error: ErrorEstimate = True,
 ) -> "Replay":
-    """Drive the model with a measured demand, and compare the responses.
+    """Drive the model with a measured demand, and compare its response with the measurement.
 
     Parameters
     ----------
     measurement
         A file, or the result of `bywire.read_measurement`.
     bench, overrides
-        A `Bench`, the path of a bench file, or an experiment's name, and changes to it in the form
-        of ``--set``.
+        A `Bench`, the path of a bench file, or an experiment's name, and changes to it in the same
+        form as ``--set``.
     mapping
         File that maps columns of a measurement file to signals.
     inputs
         Stimulus of the model -> measured signal, or column such as ``"Demand [bar]"``. Default: all
-        signals with the same name.
+        signals with matching names.
     outputs
         Signals to compare. Default: all measured signals that show how well the model fits. A
-        mapping specifies their columns, ``{"p_mc": "Pressure [psi]"}``, empty for the same name.
+        mapping specifies the column of each signal, as in ``{"p_mc": "Pressure [psi]"}``. An empty
+        column means the signal's own name.
     time
-        Time column, such as ``"Zeit [s]"``, or a sample rate. Default: as the file declares it.
+        Time column, such as ``"Zeit [s]"``, or a sample rate. Default: the one that the file
+        declares.
     case
         Run of the experiment. Default: the first.
-        tolerances
+    tolerances
         Limits such as ``"nrmse <= 5 %"`` or ``"p_mc.max_error <= 2 bar"``.
     segments
-        Segments to judge: ``"auto"`` for steps and holds, or a TOML file. Default: the whole
-        record.
+        Segments to evaluate separately: ``"auto"`` for steps and holds, or a TOML file. Default:
+        the whole record.
     track
         Drifting parameters to track, for example ``"mu_B"``.
     progress
-        Called with a label and the finished share, 0 to 1.
+        Called with a label and the completed fraction, 0 to 1.
     estimate_error
-        Whether to repeat the run in half and double steps to estimate the figures' numerical error.
-        If a figure is closer to its tolerance than this error, the tolerance is undecided.
+        Whether to rerun with half and twice the step size to estimate each figure's numerical
+        error. If a figure is closer to its tolerance than this error, the tolerance is undecided.
 
     Returns
     -------
     Replay
-        Measurement and model by signal, in SI units, with the figures of their difference.
+        Measured and simulated signals in SI units, with figures for the differences between them.
 
     Raises
     ------

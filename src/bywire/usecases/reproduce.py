@@ -1,4 +1,4 @@
-"""Reproduction of a paper's tables and figures: published and computed values."""
+"""Reproduction of a paper's tables and figures, with published and computed values."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated
@@ -30,17 +30,17 @@ def reproduce(source: SourceName, *, progress: "Progress | None" = None) -> "Rep
     source
         Name of the source, for example ``"dardanelli2010"``.
     progress
-        Called with the label of a table or figure and its finished share, 0 to 1.
+        Called with the label of a table or figure and its completed fraction, 0 to 1.
 
     Returns
     -------
     Reproduction
-        Published and computed values side by side, each in the unit of the source.
+        Published and computed values side by side, in the units of the source.
 
     Raises
     ------
     UnknownNameError
-        If the source is unknown, with the closest matches.
+        If the source is unknown. The message lists the closest matches.
     RunError
         If a run fails.
     """

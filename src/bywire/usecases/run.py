@@ -1,4 +1,4 @@
-"""Run of a bench or experiment, judged by its requirements."""
+"""Run of a bench or experiment, with a check of its requirements."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -25,8 +25,10 @@ Faults = Annotated[
         metavar="NAME[=VALUE][@ONSET]",
     ),
 ]
-Engine = Annotated[str, Ask("Engine, e.g. sil for the ECU's compiled C code in the loop.")]
-Animate = Annotated[bool, Ask("Write pages that animate the runs. Needs --out.")]
+Engine = Annotated[
+    str, Ask("Simulation engine, e.g. sil to run the ECU's compiled C code in the loop.")
+]
+Animate = Annotated[bool, Ask("Write an animation of each run as a web page. Requires --out.")]
 
 
 def _read(bench: Path, overrides: Mapping[str, str], faults: Sequence[str]) -> None:
@@ -89,7 +91,7 @@ def run(
     estimate_error: ErrorEstimate = True,
     animate: Animate = False,
 ) -> "BenchResult | BenchRange":
-    """Run a bench file or experiment, and judge it by its requirements.
+    """Run a bench file or experiment, and check its results against its requirements.
 
     Parameters
     ----------
@@ -97,32 +99,33 @@ def run(
         A `Bench`, the path of a bench file, or the name of an experiment. An experiment runs with
         its defaults and its brake's main parameter set.
     overrides
-        Changes to a bench file or experiment, in the form of ``--set``.
+        Changes to a bench file or experiment, in the same form as ``--set``.
     over
         Range, for example ``"motor.R_m=0.2 ohm:0.6 ohm:9"`` or ``"options.p_to=20 bar, 30 bar"``.
         All values run side by side, and the result is a `BenchRange`.
     faults
-        Faults in addition to the bench's faults, in the form of ``--fault``, for example
+        Faults in addition to the bench's faults, in the same form as ``--fault``, for example
         ``"pressure.stuck=20 bar@1 s"``.
     progress
-        Called with the run's label and its finished share, 0 to 1.
+        Called with the run's label and the completed fraction, 0 to 1.
     engine
         ``compiled``, ``virtual-machine``, ``sil`` (the ECU's compiled C code in the loop, in double
         precision) or ``sil-single`` (in single precision). ``auto`` uses the bench's engine.
     estimate_error
-        Whether to repeat all runs in half and double steps to estimate the numerical error of key
-        figures and recorded signals. If a key figure is closer to its limit than this error, the
-        requirement is undecided.
+        Whether to rerun everything with half and twice the step size to estimate the numerical
+        error of key figures and recorded signals. If a key figure is closer to its limit than this
+        error, the requirement is undecided.
     animate
-        Whether to write a page that animates each run into the result's folder, if the assembly
-        declares an animation.
+        Whether to write an animation of each run as a web page to the result folder. The assembly
+        must declare an animation.
 
     Returns
     -------
     BenchResult
-        Recordings and key figures in SI units, verdicts on requirements, energy balance in J.
+        Recordings and key figures in SI units, verdicts on the requirements, and the energy balance
+        in J.
     BenchRange
-        For a range: the same for each value.
+        For a range, the same results for each value.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Fault campaign, which can continue after an interrupt."""
+"""Fault campaign that can continue after an interrupt."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -50,24 +50,24 @@ def run_faults(
     *,
     progress: "Progress | None" = None,
 ) -> "FaultCampaign":
-    """Simulate every fault in a maneuver, and report effects, detection and coverage.
+    """Simulate every fault during a maneuver, and report effects, detection and coverage.
 
     Parameters
     ----------
     campaign
         Campaign file (see ``docs/faults.md``), or the name of a campaign that comes with a brake.
     out
-        Folder that stores the outcomes, so that the same call continues after an interrupt. By
-        default, nothing is stored.
+        Folder for the outcomes, so that the same call continues after an interrupt. By default,
+        bywire saves nothing.
     overrides
-        Changes to the bench, as texts with units.
+        Changes to the bench, as strings with units.
     progress
-        Called with a label and the finished share, 0 to 1.
+        Called with a label and the completed fraction, 0 to 1.
 
     Returns
     -------
     FaultCampaign
-        Effect, fault tolerant time, time to detection [s] and class of each fault, diagnostic
+        Effect, class, fault tolerant time [s] and detection time [s] of each fault, the diagnostic
         coverage, and false alarms.
 
     Raises
@@ -77,7 +77,7 @@ def run_faults(
     RunError
         If a run fails.
     KeyboardInterrupt
-        If interrupted. Finished faults remain in the folder.
+        If interrupted. Finished faults stay in the folder.
     """
     from bywire.api.run_faults import FaultCampaign
     from bywire.bench import running

@@ -1,4 +1,4 @@
-"""Studies: run, resume, report and surrogates, and sizing studies."""
+"""Studies: run, resume, report, surrogates, and sizing studies."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -30,7 +30,7 @@ StudyFile = Annotated[
 ]
 FolderOfStudy = Annotated[
     str | Path | None,
-    Ask("Folder of the study. Default: the study file's name.", is_folder=True),
+    Ask("Study folder. Default: the study file's name without its suffix.", is_folder=True),
 ]
 
 
@@ -81,9 +81,9 @@ def run_study(
     engine: EngineName = "auto",
     progress: "Progress | None" = None,
 ) -> "StudyRun":
-    """Run a bench for many values of varied quantities to find probabilities and influences.
+    """Run a bench many times with varied quantities to estimate probabilities and influences.
 
-    bywire does not recompute results that are in the study's folder. The same call therefore
+    bywire does not recompute results that are already in the study folder. Therefore, the same call
     continues a study that was interrupted or killed.
 
     Parameters
@@ -91,36 +91,36 @@ def run_study(
     study
         Study file (see ``docs/studies.md``).
     out
-        Folder of the study. Default: the file's name without its suffix, in the current folder.
+        Study folder. Default: the file's name without its suffix, in the current folder.
     overrides
-        Changes to the bench, as texts with units. They are saved with the study.
+        Changes to the bench, as strings with units. bywire saves them with the study.
     cases
-        Number of cases, up to 10 million, which overrides the file's. A larger number than before
-        extends the study. A smaller number drops cases that are not yet computed. If the folder
-        contains more cases than the file requests, bywire judges all of them.
+        Number of cases, up to 10 million. Overrides the study file. A larger number than before
+        extends the study. A smaller number drops cases that are not computed yet. If the folder
+        contains more cases than the file requests, bywire uses all of them.
     workers
         Number of processes. Default: one per core, if the work justifies starting them.
     cluster
         Address of a Dask scheduler that runs the cases.
     engine
-        Engine. ``auto`` uses the bench's engine, ``cuda`` a graphics processor.
+        Simulation engine: ``auto`` for the bench's engine, or ``cuda`` for a GPU.
     progress
-        Called with a label and the finished share, 0 to 1.
+        Called with a label and the completed fraction, 0 to 1.
 
     Returns
     -------
     StudyRun
-        Probabilities of meeting requirements, with intervals, the spread of key figures in SI
+        Probabilities that requirements are met, with intervals, the spread of key figures in SI
         units, the main influences, and the worst cases.
 
     Raises
     ------
     InputError
-        For an invalid study file, and a folder that contains another study.
+        If the study file is invalid, or the folder contains another study.
     RunError
-        If the nominal bench fails, or workers are lost. A case that fails only lacks a result.
+        If the nominal bench fails, or workers are lost. A failed case only lacks a result.
     KeyboardInterrupt
-        If interrupted. Finished chunks remain.
+        If interrupted. Finished chunks stay in the folder.
     """
     from bywire.api.study_run import completed, with_engine
     from bywire.studies.meant_study import require_study_file
@@ -160,10 +160,10 @@ def resume_study(
     Parameters
     ----------
     folder
-        Folder of the study.
+        Study folder.
     cases
-        Number of cases, which replaces the present one. A larger number extends the study with
-        points of the same sequence. A smaller number drops cases that are not yet computed.
+        New total number of cases. A larger number extends the study with points of the same
+        sequence. A smaller number drops cases that are not computed yet.
     workers, cluster, engine, progress
         See `run_study`.
 
@@ -179,7 +179,7 @@ def resume_study(
     RunError
         If workers are lost.
     KeyboardInterrupt
-        If interrupted. Finished chunks remain.
+        If interrupted. Finished chunks stay in the folder.
     """
     from pathlib import Path
 
@@ -201,7 +201,7 @@ def resume_study(
 @use_case(
     Command(
         "study report",
-        "Judge a study's results so far by the requirements in its file, and write the report.",
+        "Check a study's results so far against the requirements in its file, and write a report.",
         **STUDY_FOLDER,
     ),
     Command("study status", before=require_study_folder, writes=""),
@@ -209,12 +209,12 @@ def resume_study(
 def study_report(folder: StudyFolder) -> "StudyRun":
     """Show a study's progress and results so far without writing anything.
 
-    bywire uses the requirements that are now in the study file.
+    bywire uses the requirements that the study file contains now.
 
     Parameters
     ----------
     folder
-        Folder of the study.
+        Study folder.
 
     Returns
     -------
@@ -249,30 +249,31 @@ def study_surrogates(
     kpis: KeyFigures = (),
     at: Values = NOTHING,
 ) -> "StudySurrogates":
-    """Estimate key figures between a study's cases with polynomials, including their error.
+    """Fit polynomials to a study's key figures to predict values between its cases.
 
     Parameters
     ----------
     folder
-        Folder of the study.
+        Study folder.
     kpis
-        One or several key figures. Default: those with a requirement, otherwise all.
+        One or more key figures. Default: those with a requirement. If none has one, all.
     at
-        Values of varied quantities at which to estimate, as SI numbers, texts with units, or
-        changes such as ``"+5 %"`` of the bench's value. All others have the bench's value.
+        Values of varied quantities at which to estimate, as SI numbers, strings with units, or
+        changes such as ``"+5 %"`` relative to the bench's value. All other quantities have the
+        bench's value.
 
     Returns
     -------
     StudySurrogates
         Each surrogate with its error in the key figure's unit. ``.surrogates["overshoot"]`` is a
-        function of values or arrays [SI].
+        function of numbers or arrays [SI].
 
     Raises
     ------
     InputError
         If the folder contains no study or too few cases, a name is unknown, or a value is outside
-        the range of the cases or between the values of a discrete quantity. Also if the design does
-        not determine values between its points, or structural choices vary.
+        the range of the cases or between the values of a discrete quantity. Also if the study's
+        design allows no estimates between its points, or structural choices vary.
     """
     from bywire.api.study_run import kept_study
     from bywire.api.study_surrogate import StudySurrogates
@@ -308,7 +309,7 @@ def study_surrogates(
     return StudySurrogates(report, surrogates, values, refused)
 
 
-# --- Sizing study: designs of a brake compared at equal demands
+# --- Sizing study: comparison of brake designs under the same demands
 
 SizingName = Annotated[
     str, Ask("Sizing study (see 'bywire list studies').", "Sizing study", known=("studies",))
@@ -331,7 +332,7 @@ def _read_sizing(name: str, parameters: str, overrides: Mapping[str, Any]) -> "A
 
 
 def _require_sizing(name: str, **others: Any) -> None:
-    """Reject an unknown sizing study; suggest the study file that the user may have meant."""
+    """Reject an unknown sizing study, and suggest the study file that the user may have meant."""
     from bywire.core.brake import loaded_files
     from bywire.studies.meant_study import meant_study
     from bywire.synthesis.study import STUDIES
@@ -373,29 +374,29 @@ def study(
     *,
     progress: "Progress | None" = None,
 ) -> "StudyResult":
-    """Compare brake designs at equal demands to find the best design, its limits and its cost.
+    """Compare brake designs under the same demands to find the best, its limits and its cost.
 
     Parameters
     ----------
     name
         Name of the study.
     parameters
-        Parameter set. Default: the main one of the study's brake.
+        Parameter set. Default: the main set of the study's brake.
     overrides
-        Changes as SI numbers or texts with units. Names with a dot are the brake's parameters, and
-        all others are the study's options.
+        Changes as SI numbers or strings with units. Names with a dot are the brake's parameters.
+        All others are the study's options.
     progress
-        Called with a label and the finished share, 0 to 1.
+        Called with a label and the completed fraction, 0 to 1.
 
     Returns
     -------
     StudyResult
-        The designs with their figures in SI units, the best, and its limits.
+        All designs with their figures in SI units, the best design, and its limits.
 
     Raises
     ------
     InputError
-        For unknown names, values out of range, and changes without effect.
+        If a name is unknown, a value is out of range, or a change has no effect.
     """
     from bywire.api.study import StudyResult
     from bywire.core.typing import silent

@@ -1,4 +1,4 @@
-"""Vehicles around any brake: bodies, slip control, ideal stops, and animations."""
+"""Vehicles with any brake: bodies, slip control, ideal stops, and animations."""
 
 from bywire.vehicle.corner import (
     Corner,

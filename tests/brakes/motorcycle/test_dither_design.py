@@ -82,7 +82,7 @@ def test_the_cheapest_frequency_within_all_limits_is_chosen() -> None:
     assert found[2].gain == pytest.approx(1.8)
     assert found[2].decisive == 1
     assert found[0].verdict == "ripple at the caliper"
-    assert "every gain is too low" in found[3].verdict
+    assert "too low" in found[3].verdict
     assert best_of(found[3:]) is None
 
 
@@ -159,7 +159,7 @@ def test_a_small_study_finds_a_dither_that_holds_on_the_bench() -> None:
     assert kpis["optimum_copper"] < 1.05 * kpis["given_copper"]
     assert kpis["given_gain"] == 1.0
     assert 0.7 < kpis["given_plant_gain"] / 10.1e5 < 0.8
-    assert any("fraction of the time stuck at 20 bar" in text for text in found.limits)
+    assert any("stuck at 20 bar" in text for text in found.limits)
     row = found.cuts[1].data.isel(pressure=0)
     assert float(row["torque"]) == pytest.approx(float(row["breakaway"]), rel=0.1)  # eq. (18)
     assert set(found.data.dims) == {"pressure", "gain", "frequency"}

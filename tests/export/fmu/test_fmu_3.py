@@ -144,7 +144,7 @@ def test_a_tick_is_never_left_out(path: Path, capfd: pytest.CaptureFixture[str])
     client.fmu.enterStepMode()
     with pytest.raises(FMICallException):
         client.fmu.doStep(0.0, shortest)
-    assert "ticks at 0 s: activate it in event mode first" in capfd.readouterr().out
+    assert "ticks at 0 s. Activate it in event mode first" in capfd.readouterr().out
     client.fmu.enterEventMode()
     client.tick(0.0)
     client.fmu.enterStepMode()

@@ -95,13 +95,13 @@ def test_changed_parameters_begin_at_rest_and_run_alike(folder: Path) -> None:
 @pytest.mark.parametrize(
     ("task", "said"),
     [
-        ({"parameters": {"motor.R": 1.0}}, "RangeError: there is no parameter 'motor.R'"),
+        ({"parameters": {"motor.R": 1.0}}, "RangeError: unknown parameter 'motor.R'"),
         ({"parameters": {"caliper.clearance": "x"}}, "is not valid: it must be >= 0 m"),
         ({"parameters": {"caliper.clearance": -1.0}}, "caliper.clearance = -1 m is not valid"),
-        ({"stimulus": {"demand": [1.0]}}, "there is no stimulus 'demand'"),
-        ({"stimulus": {"M_set": [1.0]}}, "M_set: "),
+        ({"stimulus": {"demand": [1.0]}}, "unknown stimulus 'demand'"),
+        ({"stimulus": {"M_set": [1.0]}}, "M_set has 1 rows, but the run needs "),
         ({"duration": -1.0}, "duration must be > 0"),
-        ({"duration": 1e12}, "the duration is too long"),
+        ({"duration": 1e12}, "duration = 1000000000000 s"),
     ],
 )
 def test_what_does_not_fit_is_said(tmp_path_factory, task: Any, said: str) -> None:

@@ -10,8 +10,7 @@ import re
 import numpy as np
 import xarray as xr
 
-from bywire.report.animation.page import scene_page
-from bywire.report.animation.scene import Dial, Move, Scene, frames_of
+from bywire.report.animation.scene import Dial, Move, Scene, frames_of, scene_page
 
 
 def scene() -> Scene:

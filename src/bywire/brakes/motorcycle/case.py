@@ -66,14 +66,14 @@ def smoothing(par: MotorcycleParameters) -> dict[str, float]:
 # --- Settling under dither
 
 _ROUNDS, _TOLERANCE = 12, 2e-3
-_WINDOW = 0.2  # averaging window, as a share of the settling time
-_SUBSTEPS, _LONGEST = 50, 20e-6  # smallest number of substeps per sample time; longest substep [s]
+_WINDOW = 0.2  # averaging window, as a fraction of the settling time
+_SUBSTEPS, _LONGEST = 50, 20e-6  # minimum number of substeps per sample time; maximum substep [s]
 
 
 def settled_start(p: float, par: MotorcycleParameters, settle: float) -> float:
     """Return the frictionless equilibrium [Pa] whose current lets the pressure settle at ``p``.
 
-    Under dither the asymmetric friction shifts the mean pressure by several bar from the
+    With dither, the asymmetric friction shifts the mean pressure by several bar from the
     frictionless equilibrium. Each run over the settling time corrects the current by the
     pressure ratio of the previous run.
 
@@ -93,7 +93,7 @@ def settled_start(p: float, par: MotorcycleParameters, settle: float) -> float:
             break
         start *= p / settled
     raise SolverError(
-        f"no current lets the dithered pressure settle at p_start = {p / 1e5:g} bar (last: "
+        f"no current makes the dithered pressure settle at p_start = {p / 1e5:g} bar (last: "
         f"{settled / 1e5:.4g} bar). Change p_start, increase settle, or set start = 'frictionless'",
         name="p_start",
         value=f"{p / 1e5:g} bar",

@@ -1,4 +1,4 @@
-"""Dithers for the motorcycle brake: trials on the nonlinear model, comparison and choice."""
+"""Dither for the motorcycle brake: trials on the nonlinear model, comparison and choice."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ from bywire.synthesis.study import Cut, variable
 
 Par = MotorcycleParameters
 
-_LEAST = 4  # smallest number of samples per period, enough for a triangle
+_LEAST = 4  # minimum number of samples per period, enough for a triangle
 
 
 def admissible_frequencies(par: Par, low: float, high: float, count: int) -> list[float]:
@@ -45,8 +45,8 @@ def admissible_frequencies(par: Par, low: float, high: float, count: int) -> lis
     Parameters
     ----------
     low, high, count
-        Range and number of frequencies, evenly spaced in their logarithm and then rounded; equal
-        ones count once.
+        Range and number of frequencies, logarithmically spaced and then rounded. Duplicates count
+        once.
 
     Raises
     ------
@@ -59,8 +59,9 @@ def admissible_frequencies(par: Par, low: float, high: float, count: int) -> lis
     inside = [f for f in frequencies if low * (1 - 1e-9) <= f <= high * (1 + 1e-9)]
     if not inside:
         raise ParameterError(
-            f"no dither of {low:g} to {high:g} Hz has a period of an even number of sample times "
-            f"of {T * 1e3:g} ms. Widen the range (f_min, f_max), or sample faster (ecu.T_s)",
+            f"no dither frequency from {low:g} to {high:g} Hz has a period of an even number of "
+            f"sample times of {T * 1e3:g} ms. Widen the range (f_min, f_max), or sample faster "
+            "(ecu.T_s)",
             name="f_min",
             value=f"{low:g}",
         )
@@ -74,15 +75,15 @@ def breakaway_torques(par: Par, p: float) -> tuple[float, float]:
 
 
 def dead_band(par: Par, p: float) -> float:
-    """Return the range of currents [A] at which the piston may rest at a pressure [Pa]."""
+    """Return the width of the current range [A] in which the piston may rest at a pressure [Pa]."""
     return sum(breakaway_torques(par, p)) / (_efficiency(par) * par.motor.K_e)
 
 
 def attenuation(par: Par, frequencies: Array, p: float) -> Complex:
-    """Return motor current over dither current at a stuck shaft, shape (n,).
+    """Return the ratio of motor current to dither current with a stuck shaft, shape (n,).
 
-    The ratio includes the current loop, and the demand's low-pass if it follows the dither. A stuck
-    shaft has neither back-EMF nor acceleration, so all of the current's torque acts against
+    The ratio includes the current loop, and the demand's low-pass filter if it follows the dither.
+    A stuck shaft has neither back-EMF nor acceleration, so all of the current's torque acts against
     friction.
     """
     loop = current_loop(par, p, "locked").response(frequencies)[:, 0, 0]
@@ -92,10 +93,10 @@ def attenuation(par: Par, frequencies: Array, p: float) -> Complex:
 
 
 def reach(par: Par, f: float, p: float) -> float:
-    """Return the motor current's largest value over the dither's amplitude, at a stuck shaft.
+    """Return the motor current's peak relative to the dither amplitude, with a stuck shaft.
 
-    Every harmonic of the sampled waveform passes filter and current loop; a square's fundamental
-    alone exceeds its amplitude.
+    Every harmonic of the sampled waveform passes through the filter and the current loop. A square
+    wave's fundamental alone exceeds its amplitude.
 
     ``f``: frequency [Hz] whose period is a whole number of sample times.
     """
@@ -109,7 +110,7 @@ def reach(par: Par, f: float, p: float) -> float:
 
 
 def waveform(par: Par, f: float) -> Array:
-    """Return one period of the dither at the ECU's samples, amplitude 1."""
+    """Return one period of the dither at the ECU's samples, with amplitude 1."""
     shape = par.ecu.dither.replace({"f_dit": f, "gain": 1.0})
     unit = par.ecu.est_par.replace({"T_pr": 1.0, "f_cfr_p": 0.0, "k_brk_p": 1.0, "K_e": 1.0})
     state, samples = dither.State(0.0), []
@@ -120,12 +121,12 @@ def waveform(par: Par, f: float) -> Array:
 
 
 def needed_gain(par: Par, f: float, p: float) -> float:
-    r"""Return the gain of the dither's law at which a stuck shaft just breaks away both ways.
+    r"""Return the dither gain at which a stuck shaft just breaks away in both directions.
 
     .. math:: A_{dit} = \frac{T_{brk,p} + T_{brk,n}}{2 \eta_g K_e r(f)}
 
-    with the reach r: the mean current settles in the middle of the dead band. The ECU's own
-    eqs. (18) and (19), in contrast, use only the apply direction and the ECU's estimate of the
+    with the reach r, because the mean current settles in the middle of the dead band. In contrast,
+    the ECU's own eqs. (18) and (19) use only the apply direction and the ECU's estimate of the
     friction. They include neither efficiency nor attenuation.
     """
     amplitude = 0.5 * dead_band(par, p) / reach(par, f, p)
@@ -139,16 +140,16 @@ def _efficiency(par: Par) -> float:
 # --- Trials
 
 FIGURES = {
-    "stuck": ("1", "fraction of the time stuck"),
+    "stuck": ("1", "fraction of time stuck"),
     "band": ("1", "remaining dead band"),
-    "ripple_sensor": ("Pa", "ripple at the sensor, p-p"),
-    "ripple_caliper": ("Pa", "ripple at the caliper, p-p"),
-    "current_rms": ("A", "dither's motor current, rms"),
-    "copper": ("W", "dither's copper power"),
-    "current_share": ("1", "peak of the current set point over the limit"),
-    "duty_share": ("1", "peak of the duty cycle over its limit"),
+    "ripple_sensor": ("Pa", "peak-to-peak ripple at the sensor"),
+    "ripple_caliper": ("Pa", "peak-to-peak ripple at the caliper"),
+    "current_rms": ("A", "rms motor current from dither"),
+    "copper": ("W", "copper loss from dither"),
+    "current_share": ("1", "peak current set point relative to its limit"),
+    "duty_share": ("1", "peak duty cycle relative to its limit"),
 }
-"""unit and label of the figures of a trial"""
+"""unit and label of a trial's key figures"""
 
 _SIGNALS = ("i", "i_ref", "duty", "p_mc", "p_pd", "t_stuck", "E_copper")
 _STEP = 20e-6
@@ -158,9 +159,9 @@ _STEP = 20e-6
 class Trial:
     """Settings of a trial.
 
-    ``settle``, ``window``: time [s] for the pressure loop to settle, and for measuring the figures,
-    rounded down to whole periods of each dither; ``approach``: distance [Pa] from which the
-    pressure loop approaches the pressure, from below and from above.
+    ``settle``: time [s] for the pressure loop to settle; ``window``: time [s] for measuring the
+    figures, rounded down to whole periods of each dither; ``approach``: distance [Pa] from which
+    the pressure loop approaches the pressure from below and from above.
     """
 
     settle: float = 4.0
@@ -171,18 +172,18 @@ class Trial:
 def tried(
     par: Par, p: float, gains: Sequence[float], frequencies: Sequence[float], trial: Trial
 ) -> Mapping[str, Array]:
-    """Return the figures of every dither at a pressure, pressure loop closed.
+    """Return every dither's figures at a pressure, with the pressure loop closed.
 
     The pressure controller approaches the pressure from below and from above. If dither overcomes
-    friction, both approaches need the same mean current. The difference of the currents over the
-    friction's dead band is the remaining hysteresis.
+    friction, both approaches need the same mean current. The difference of the currents, relative
+    to the friction's dead band, is the remaining hysteresis.
 
     Parameters
     ----------
     p
         Pressure [Pa], > ``trial.approach``.
     gains, frequencies
-        Gains of the dither's law; frequencies [Hz] with whole sample times in a period.
+        Dither gains; frequencies [Hz] whose period is a whole number of sample times.
 
     Returns
     -------
@@ -211,7 +212,7 @@ def tried(
 def _measured(
     par: Par, p: float, start: float, pairs: Sequence[tuple[float, float]], trial: Trial
 ) -> dict[str, Array]:
-    """Return the figures of all dithers after an approach from one side, shape (cases,) each."""
+    """Return all dithers' figures after an approach from one side, shape (cases,) each."""
     row = [float(value) for value in zeros(Stimulus)._replace(p_set=p)]
     T = par.ecu.T_s
     run = Run(
@@ -236,7 +237,7 @@ def _measured(
 
 
 def _figures(par: Par, values: Array, periods: int, samples: int) -> dict[str, float]:
-    """Return the figures of the last periods of a run, each of so many samples."""
+    """Return the figures of a run's last periods, each with a number of samples."""
     count = periods * samples
     late = dict(zip(_SIGNALS, values[-count - 1 :].T, strict=True))
     duration = count * par.ecu.T_s
@@ -257,7 +258,7 @@ def _figures(par: Par, values: Array, periods: int, samples: int) -> dict[str, f
 
 
 def _ripple(pressure: Array, samples: int) -> float:
-    """Return the dither's ripple: the median over all periods of the span of the pressure.
+    """Return the dither's ripple: the pressure's peak-to-peak value, as the median of all periods.
 
     If dither is too weak to free the piston, the controller's integral part does so occasionally.
     The median ignores these jumps.
@@ -266,10 +267,10 @@ def _ripple(pressure: Array, samples: int) -> float:
 
 
 def area_ratios(par: Par, designs: Sequence[tuple[float, float]]) -> list[float]:
-    """Return each design's loop area (current over pressure), relative to the area without dither.
+    """Return each design's loop area (current versus pressure), relative to that without dither.
 
     Loops are averaged over one dither period. Most of the remaining area is delay rather than
-    friction, and shrinks with the ramp's slope.
+    friction, and decreases with the ramp's slope.
 
     ``designs``: gain and frequency [Hz] of each dither.
     """
@@ -299,13 +300,13 @@ COSTS = ("ripple_caliper", "current_share", "duty_share")
 """figures that increase with the amplitude"""
 
 NAMES = {
-    "stuck": "fraction of the time stuck",
+    "stuck": "fraction of time stuck",
     "band": "remaining dead band",
     "ripple_caliper": "ripple at the caliper",
     "current_share": "current limit",
-    "duty_share": "duty cycle's limit",
+    "duty_share": "duty cycle limit",
 }
-"""their names in messages"""
+"""names of these figures in messages"""
 
 
 @dataclass(frozen=True)
@@ -315,11 +316,11 @@ class Least:
     Parameters
     ----------
     gain
-        Gain of the dither's law; NaN if none on the grid is enough.
+        Dither gain; NaN if no gain on the grid is sufficient.
     binding
         The figure of `OVERCOMES` that requires that gain.
     exceeded
-        Figures of `COSTS` beyond their limits at that gain.
+        Figures of `COSTS` that exceed their limits at that gain.
     figures
         All figures at that gain, interpolated.
     """
@@ -334,7 +335,7 @@ def least(gains: Array, figures: Figures, limits: Mapping[str, float]) -> Least:
     """Return the weakest dither that overcomes friction at its gain and at all higher gains.
 
     ``gains``: shape (n,), ascending; ``figures``: name -> values at these gains, shape (n,);
-    ``limits``: largest value of each of `OVERCOMES` and `COSTS`.
+    ``limits``: maximum of each figure in `OVERCOMES` and `COSTS`.
     """
     required = {name: crossing(gains, figures[name], limits[name]) for name in OVERCOMES}
     binding = max(OVERCOMES, key=lambda name: (math.isnan(required[name]), required[name]))
@@ -347,7 +348,7 @@ def least(gains: Array, figures: Figures, limits: Mapping[str, float]) -> Least:
 def _at_gain(
     gains: Array, figures: Figures, limits: Mapping[str, float], gain: float, binding: str
 ) -> Least:
-    """Return the figures at a gain within the grid, linear between its points."""
+    """Return the figures at a gain within the grid, interpolated linearly."""
     at = {name: float(np.interp(gain, gains, values)) for name, values in figures.items()}
     exceeded = tuple(name for name in COSTS if at[name] > limits[name])
     return Least(gain, binding, exceeded, at)
@@ -374,12 +375,12 @@ def crossing(gains: Array, values: Array, limit: float) -> float:
 
 @dataclass(frozen=True)
 class Candidate:
-    """The least sufficient gain of one frequency for all pressures.
+    """The lowest gain at one frequency that is sufficient at all pressures.
 
-    ``gain``: NaN if none on the grid is enough; ``decisive``: index of the pressure that requires
-    that gain; ``binding``: which of `OVERCOMES` requires it; ``price``: copper power [W], mean over
-    the pressures; ``ripple``: ripple at the caliper [Pa], worst pressure; ``exceeded``: which of
-    `COSTS` exceed their limits at any pressure.
+    ``gain``: NaN if no gain on the grid is sufficient; ``decisive``: index of the pressure that
+    requires that gain; ``binding``: figure of `OVERCOMES` that requires that gain; ``price``:
+    copper loss [W], mean of the pressures; ``ripple``: ripple at the caliper [Pa] at the worst
+    pressure; ``exceeded``: figures of `COSTS` that exceed their limits at any pressure.
     """
 
     gain: float
@@ -393,7 +394,7 @@ class Candidate:
     def verdict(self) -> str:
         """Reason to reject the candidate; empty if it is within all limits."""
         if math.isnan(self.gain):
-            return f"{NAMES[self.binding]}: every gain is too low"
+            return f"{NAMES[self.binding]}: all gains are too low"
         return ", ".join(NAMES[name] for name in self.exceeded)
 
 
@@ -415,7 +416,7 @@ def candidates(
 
 
 def _column(figures: Figures, k: int) -> Figures:
-    """Return the figures of a frequency, shape (gains,) each."""
+    """Return one frequency's figures, shape (gains,) each."""
     return {name: values[:, k] for name, values in figures.items()}
 
 
@@ -451,8 +452,8 @@ Report = Callable[[float], None]
 class Grid:
     """The dithers to compare.
 
-    ``pressures``, ``gains``, ``frequencies``: pressures [Pa], gains of the law (ascending),
-    frequencies [Hz]; ``trial``: settings of the trials.
+    ``pressures``, ``gains``, ``frequencies``: pressures [Pa], dither gains (ascending), frequencies
+    [Hz]; ``trial``: settings of the trials.
     """
 
     pressures: Sequence[float]
@@ -473,15 +474,15 @@ def figures_of(par: Par, grid: Grid, report: Report) -> list[Mapping[str, Array]
 def mapped(
     par: Par, grid: Grid, figures: Sequence[Mapping[str, Array]], limits: Mapping[str, float]
 ) -> xr.Dataset:
-    """Return all figures, the worst over the pressures, and the least sufficient gain.
+    """Return all figures, their worst values of all pressures, and the lowest sufficient gain.
 
     Returns
     -------
     xarray.Dataset
         Dimensions ``pressure``, ``gain``, ``frequency``: the variables of `FIGURES`; without
         pressure as ``worst_NAME``; ``least_gain`` and ``least_copper`` over pressure and
-        frequency, NaN if no gain is enough; ``predicted_gain`` likewise and ``reach`` over
-        frequency, from linear models alone.
+        frequency, NaN if no gain is sufficient; ``predicted_gain`` over pressure and frequency, and
+        ``reach`` over frequency, from linear models alone.
     """
     dims = ("pressure", "gain", "frequency")
     gains = np.asarray(grid.gains)
@@ -511,7 +512,7 @@ def mapped(
             [[c.figures["copper"] for c in row] for row in enough],
             both,
             "W",
-            "dither's copper power at the lowest gain",
+            "copper loss from dither at the lowest gain",
         ),
         "predicted_gain": variable(
             predicted, both, "1", "gain at which a stuck shaft breaks away, from linear models"
@@ -520,7 +521,7 @@ def mapped(
             [reach(par, f, middle) for f in grid.frequencies],
             ("frequency",),
             "1",
-            "motor current over dither, stuck shaft",
+            "ratio of motor current to dither, stuck shaft",
         ),
     }
     return xr.Dataset(columns).assign_coords(
@@ -531,7 +532,7 @@ def mapped(
 
 
 def by_frequency(grid: Grid, each: list[Candidate]) -> Cut:
-    """Return the least gain for all pressures, its price, and the limits that it exceeds."""
+    """Return the lowest gain for all pressures, its cost, and the limits that it exceeds."""
     names = ("gain", "price", "ripple")
     units = {"price": "W", "ripple": "Pa"}
     words = {
@@ -550,7 +551,7 @@ def by_frequency(grid: Grid, each: list[Candidate]) -> Cut:
 
 
 def by_pressure(par: Par, data: xr.Dataset) -> Cut:
-    """Return the least dither of every pressure, each at its cheapest frequency."""
+    """Return the weakest dither at every pressure, each at its cheapest frequency."""
     rows: dict[str, list[float]] = {}
     for k, p in enumerate(data["pressure"].values):
         copper = data["least_copper"].values[k]
@@ -586,12 +587,12 @@ def by_pressure(par: Par, data: xr.Dataset) -> Cut:
         {"pressure": (data["pressure"].values, "Pa", "pressure")},
         {name: (values, units.get(name, "1"), name) for name, values in rows.items()},
     )
-    title = "weakest dither for each pressure; torque at the shaft, gain predicted by linear models"
+    title = "weakest dither for each pressure: torque at the shaft, gain predicted by linear models"
     return Cut(title, table, ("pressure", *rows))
 
 
 def law(par: Par, data: xr.Dataset, best: int, grid: Grid) -> list[Kpi]:
-    """Return the friction that the ECU must assume for a gain of 1 to be just enough."""
+    """Return the friction that the ECU must assume so that a gain of 1 is just sufficient."""
     f = grid.frequencies[best]
     p, est = np.asarray(grid.pressures), par.ecu.est_par
     current = np.array([float(breakaway_current(pressure, est)) for pressure in p])
@@ -601,7 +602,7 @@ def law(par: Par, data: xr.Dataset, best: int, grid: Grid) -> list[Kpi]:
             "optimum_reach",
             reach(par, f, float(np.median(p))),
             "1",
-            "Motor current over dither at the optimum's frequency, with a stuck shaft.",
+            "Ratio of motor current to dither at the optimum's frequency, with a stuck shaft.",
         ),
         Kpi(
             "optimum_predicted_gain",
@@ -613,23 +614,23 @@ def law(par: Par, data: xr.Dataset, best: int, grid: Grid) -> list[Kpi]:
     if p.size > 1:
         slope, offset = np.polyfit(p, needed, 1)
         offset += float(np.max(needed - (offset + slope * p)))  # enough at every pressure
-        text = "Friction that the ECU must assume so that a gain of 1 is just enough:"
+        text = "Friction that the ECU must assume so that a gain of 1 is just sufficient:"
         kpis += [
-            Kpi("law_T_pr", offset, "N*m", f"{text} friction torque of the preload."),
-            Kpi("law_f_cfr_p", slope, "N*m/Pa", f"{text} growth with pressure."),
+            Kpi("law_T_pr", offset, "N*m", f"{text} friction torque from the preload."),
+            Kpi("law_f_cfr_p", slope, "N*m/Pa", f"{text} increase with pressure."),
         ]
     return kpis
 
 
 # --- The plant under dither
 
-_DEAD, _NEUTRAL = 1e-12, 1e-6  # poles that die within a period, and distance of integrators from 1
+_DEAD, _NEUTRAL = 1e-12, 1e-6  # limits of poles that decay in a period, and of integrators
 _ROUNDS, _CLOSE = 12, 1e-4  # corrections of the current, and the relative error that ends them
 
 
 @dataclass(frozen=True, eq=False)
 class DitheredPlant:
-    """The plant about its motion under dither, current loop closed, pressure loop open.
+    """The plant around its motion with dither: current loop closed, pressure loop open.
 
     ``i``: mean current demand [A]; ``model``: from ``i_set`` to ``p_mc``.
     """
@@ -639,22 +640,22 @@ class DitheredPlant:
 
     @property
     def gain(self) -> float:
-        """Change of the mean pressure over that of the current demand [Pa/A]."""
+        """Ratio of mean pressure change to current demand change [Pa/A]."""
         return self.model.steady_gain
 
     @property
     def slowest(self) -> float:
-        """Rate of the slowest decay over 2 pi [Hz]: the plant's first pole."""
+        """Slowest decay rate divided by 2 pi [Hz]: the plant's first pole."""
         size = np.abs(self.model.averaged.poles())
         moving = size[(size > _DEAD) & (size < 1.0 - _NEUTRAL)]
         return float(-np.log(moving.max()) / (2.0 * np.pi * self.model.run.duration))
 
 
 def dithered_plant(par: Par, p: float, step: float | None = None) -> DitheredPlant:
-    """Return the linear model from current demand to pressure at a mean pressure under dither.
+    """Return the linear model from current demand to pressure, at a mean pressure with dither.
 
     Seal friction that is higher while applying than while releasing shifts the mean pressure. A
-    Newton iteration with the model's gain finds the current that holds it.
+    Newton iteration with the model's gain finds the current that holds this pressure.
 
     Parameters
     ----------
@@ -668,7 +669,7 @@ def dithered_plant(par: Par, p: float, step: float | None = None) -> DitheredPla
     Raises
     ------
     SolverError
-        When no motion is periodic, or none has this mean pressure. If the piston stays stuck under
+        When no motion is periodic, or none has this mean pressure. If the piston remains stuck with
         dither, pressure does not follow the current.
     """
     driven = par.replace({"drive.mode": "current", "adc.law": "ideal"})
@@ -688,8 +689,8 @@ def dithered_plant(par: Par, p: float, step: float | None = None) -> DitheredPla
             return DitheredPlant(i, model)
         i += (p - model.mean) / gain
     raise SolverError(
-        f"no current demand near {i:.4g} A holds a mean pressure of {p / 1e5:g} bar under dither, "
-        "since the piston sticks. Increase ecu.dither.gain",
+        f"no current demand near {i:.4g} A holds a mean pressure of {p / 1e5:g} bar with "
+        "dither, because the piston sticks. Increase ecu.dither.gain",
         name="ecu.dither.gain",
         value=f"{i:.4g} A",
     )

@@ -51,14 +51,14 @@ class Memory(NamedTuple):
 
 
 class Readings(NamedTuple):
-    """Filtered sensor readings at the converter's inputs, as shares of the spans."""
+    """Filtered sensor readings at the converter's inputs, as fractions of the spans."""
 
     p: Annotated[float, Signal("1", "pressure reading", 0.5)]
     i: Annotated[float, Signal("1", "current reading", 0.5)]
 
 
 def tick(readings: Readings, m: Memory, u: Stimulus, par: MotorcycleParameters) -> Memory:
-    """Run the ECU once: conversion, pressure control if the mode has it, current control."""
+    """Run the ECU once: conversion, pressure control if the mode includes it, current control."""
     p_share = adc.sample(readings.p, u.noise_p, par.adc)
     i_share = adc.sample(readings.i, u.noise_i, par.adc)
     p_before = m.p_meas
@@ -81,10 +81,10 @@ def tick(readings: Readings, m: Memory, u: Stimulus, par: MotorcycleParameters) 
 
 
 def source_tick(readings: Readings, m: Memory, u: Stimulus, par: MotorcycleParameters) -> Memory:
-    """Hold the value of an ideal source, and the readings of the converters.
+    """Hold the value of an ideal source and the converter readings.
 
     Only the recording uses the readings, and ``shown`` rounds them. Rounding within the tick would
-    interrupt derivatives as in a closed loop.
+    interrupt derivatives, as it does in a closed loop.
     """
     p_share = adc.noisy(readings.p, u.noise_p, par.adc)
     i_share = adc.noisy(readings.i, u.noise_i, par.adc)
@@ -104,7 +104,7 @@ def shown(m: Memory, par: MotorcycleParameters) -> dict[str, float]:
 
 
 def _values(p: float, i: float, par: MotorcycleParameters) -> dict[str, float]:
-    """Return the measurements from shares of the sensors' spans."""
+    """Return the measurements from fractions of the sensor spans."""
     return {
         "p_meas": pressure_sensor.value(p, par.pressure_sensor) - par.ecu.p_atm,
         "i_meas": current_sensor.value(i, par.current_sensor),
@@ -112,7 +112,7 @@ def _values(p: float, i: float, par: MotorcycleParameters) -> dict[str, float]:
 
 
 def _derated(m: Memory, par: MotorcycleParameters) -> Memory:
-    """Return the memory with the current limit at the motor's temperature."""
+    """Return the memory with the current limit for the motor's temperature."""
     if par.ecu.derating.law == "off":
         return m
     x, out = derating.output(
@@ -129,7 +129,7 @@ def _derated(m: Memory, par: MotorcycleParameters) -> Memory:
 def _demand(m: Memory, p_before: float, u: Stimulus, par: MotorcycleParameters) -> Memory:
     """Return the memory with a new unfiltered current demand.
 
-    ``p_before``: pressure of the last tick, for a bumpless change of the scheduled gains.
+    ``p_before``: pressure at the last tick, for a bumpless change of the scheduled gains.
     """
     if par.drive.mode == "current":
         return m._replace(i_star=u.i_set)
@@ -141,7 +141,7 @@ def _demand(m: Memory, p_before: float, u: Stimulus, par: MotorcycleParameters) 
     state = pressure_pid.State(m.pid_integral, m.pid_slope, m.pid_last)
     signals = pressure_pid.Input(p_ref=p_ref, p_meas=m.p_meas)
     scheduled = par.ecu.pressure_at(m.p_meas)
-    if par.ecu.derating.law != "off":  # a smaller limit; symbols could not be validated
+    if par.ecu.derating.law != "off":  # a lower limit; symbols could not be validated
         limited = {**dict(scheduled), "i_max": m.i_most}
         scheduled = pressure_pid.Parameters.model_construct(**limited)
     if par.ecu.schedule.law != "off":

@@ -11,7 +11,7 @@ from bywire.core.faults import Channel, Channels, Fault
 from bywire.core.units import shown
 from bywire.plant import current_sensor, fluid_vapor, pressure_sensor
 
-_GAP_PRESSURE = 2e3  # Pa that closes a gap: small, but > 0, as the curve must increase
+_GAP_PRESSURE = 2e3  # Pa that closes a gap: small, but > 0, because the curve must increase
 NAME = MotorcycleBrake.name
 
 
@@ -57,7 +57,7 @@ def _knocked_back(par: Any, gap: float) -> Mapping[str, Any]:
 
 
 def _boiling(par: Any, T: float) -> Mapping[str, Any]:
-    """Return the changes that make gas in line and caliper of the vapor at a temperature [K]."""
+    """Return the changes that add vapor at a temperature [K] as gas in line and caliper."""
     if not 0.0 < T <= par.vapor.T_most:
         limits = f"> {shown(0.0, 'K')} and <= {shown(par.vapor.T_most, 'K')} (vapor.T_most)"
         raise not_valid(

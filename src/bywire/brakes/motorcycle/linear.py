@@ -1,4 +1,4 @@
-"""Linear models of the motorcycle brake: its plant by the paper's equations, its ECU's loops."""
+"""Linear models of the motorcycle brake: the plant from the paper's equations, the ECU's loops."""
 
 from __future__ import annotations
 
@@ -51,22 +51,22 @@ class Rational:
 
     @property
     def zeros(self) -> Complex:
-        """Zeros [rad/s], the slowest first."""
+        """Zeros [rad/s], slowest first."""
         return _sorted_roots(self.num)
 
     @property
     def poles(self) -> Complex:
-        """Poles [rad/s], the slowest first."""
+        """Poles [rad/s], slowest first."""
         return _sorted_roots(self.den)
 
     @property
     def zeros_hz(self) -> Array:
-        """Frequencies of the zeros [Hz], the slowest first."""
+        """Frequencies of the zeros [Hz], slowest first."""
         return np.abs(self.zeros) / (2.0 * math.pi)
 
     @property
     def poles_hz(self) -> Array:
-        """Frequencies of the poles [Hz], the slowest first."""
+        """Frequencies of the poles [Hz], slowest first."""
         return np.abs(self.poles) / (2.0 * math.pi)
 
     def response(self, frequencies: Array) -> Complex:
@@ -82,7 +82,7 @@ class Rational:
         Parameters
         ----------
         t
-            Times [s]; the response is 0 before 0.
+            Times [s]; the response is 0 for negative times.
 
         Notes
         -----
@@ -145,9 +145,9 @@ class Coefficients:
         \dot{\delta p}_{mc} &= b_p (\delta p_{pd} - \delta p_{mc}) + b_\Omega \delta\Omega \\
         \dot{\delta p}_{pd} &= c_p (\delta p_{mc} - \delta p_{pd})
 
-    ``a_p``: speed by pressure [rad/(s^2 Pa)]; ``a_T``: speed by torque [rad/(s^2 N m)];
-    ``a_Omega``: speed by speed [1/s]; ``b_p``, ``c_p``: equalization of the two pressures [1/s];
-    ``b_Omega``: pressure by speed [Pa/rad].
+    ``a_p``: from pressure to speed [rad/(s^2 Pa)]; ``a_T``: from torque to speed [rad/(s^2 N m)];
+    ``a_Omega``: from speed to speed [1/s]; ``b_p``, ``c_p``: equalization of the two pressures
+    [1/s]; ``b_Omega``: from speed to pressure [Pa/rad].
     """
 
     a_p: float
@@ -166,14 +166,14 @@ def coefficients(par: Par, p: float = 20e5, x: float | None = None) -> Coefficie
         a_\Omega = (k_g^2 k_{damp} + \mu_T)/M', \quad
         b_p = 1/(C_{mc} K_{lf}), \quad b_\Omega = A_{mc} k_g/C_{mc}, \quad c_p = 1/(C_{pd} K_{lf})
 
-    with the compliances C_mc = V_mc/beta and C_pd = A_pd^2/K_pd of the paper's laws.
+    with the compliances C_mc = V_mc/beta and C_pd = A_pd^2/K_pd from the paper's laws.
 
     Parameters
     ----------
     par
-        Parameters; other laws of gear, fluid and caliper contribute their own slopes.
+        Parameters. Other laws of gear, fluid and caliper contribute their own slopes.
     p
-        Pressure [Pa]; matters only with air or a nonlinear caliper.
+        Pressure [Pa]; relevant only with air or a nonlinear caliper.
     x
         Piston travel [m]. Default: ``x_nominal``.
 
@@ -187,8 +187,8 @@ def coefficients(par: Par, p: float = 20e5, x: float | None = None) -> Coefficie
     """
     if par.caliper.leak == "leaking" or par.port.law == "leaking":
         raise ParameterError(
-            "eq. (14) does not include a leak, which has no equilibrium. Set caliper.leak = "
-            "'tight' and port.law = 'makeup', or use a simulation",
+            "eq. (14) does not include leaks, and a leaking brake has no equilibrium. Set "
+            "caliper.leak = 'tight' and port.law = 'makeup', or use a simulation",
             name="caliper.leak" if par.caliper.leak == "leaking" else "port.law",
             value="'leaking'",
         )
@@ -240,7 +240,7 @@ def linear_model(par: Par, p: float = 20e5, x: float | None = None) -> LinearMod
 
 
 def theoretical(par: Par, p: float = 20e5, x: float | None = None) -> Rational:
-    r"""Return eq. (15), pressure over motor current.
+    r"""Return eq. (15), the transfer function from motor current to pressure.
 
     .. math::
         \frac{P}{I} = K_e \frac{a_T}{a_p} \frac{1 + s T_p}{\frac{m \tau}{a_p} s^3 +
@@ -281,8 +281,8 @@ def two_pole(par: Par, p: float = 20e5, x: float | None = None) -> Rational:
 
     Notes
     -----
-    In Table 2 the zero is at 160 Hz, the second pole at 9.75 Hz and the fast pole at 47 kHz: most
-    of the error comes from the zero. `two_pole_error` computes it.
+    In Table 2 the zero is at 160 Hz, the second pole at 9.75 Hz and the fast pole at 47 kHz, so
+    most of the error comes from the zero. `two_pole_error` computes it.
 
     References
     ----------
@@ -298,9 +298,9 @@ def two_pole(par: Par, p: float = 20e5, x: float | None = None) -> Rational:
 def two_pole_error(
     par: Par, p: float = 20e5, x: float | None = None, high: float = 50.0
 ) -> ReductionError:
-    """Return the error of eq. (21) against eq. (15) up to a frequency [Hz].
+    """Return the error of eq. (21) relative to eq. (15) up to a frequency [Hz].
 
-    ``par``, ``p``, ``x``: as in `coefficients`; ``high``: end of the band [Hz].
+    ``par``, ``p``, ``x``: as in `coefficients`; ``high``: upper limit of the band [Hz].
     """
     whole, reduced = linear_model(par, p, x), two_pole(par, p, x)
     a_2, a_1, _ = reduced.den
@@ -318,7 +318,7 @@ def two_pole_error(
 
 
 def with_slow_pair(K: float, tau_L: float, T_1: float, T_2: float, T_L: float) -> Rational:
-    r"""Return eq. (22): eq. (21) with a slow pair of a zero and a pole.
+    r"""Return eq. (22): eq. (21) with a slow zero-pole pair.
 
     .. math:: G = \frac{K (1 + s \tau_L)}{(1 + s T_1)(1 + s T_2)(1 + s T_L)}
 
@@ -339,8 +339,8 @@ def with_slow_pair(K: float, tau_L: float, T_1: float, T_2: float, T_L: float) -
 
     References
     ----------
-    Dardanelli, Alli, Savaresi (2010), eq. (22); Table 4 has the corner frequencies
-    1/(2 pi T) of three pressure regions: below 10 bar, 10 to 35 bar, above 35 bar.
+    Dardanelli, Alli, Savaresi (2010), eq. (22); Table 4 lists the corner frequencies
+    1/(2 pi T) for three pressure regions: below 10 bar, 10 to 35 bar, above 35 bar.
     """
     for name, T in (("tau_L", tau_L), ("T_1", T_1), ("T_2", T_2), ("T_L", T_L)):
         if not 0.0 < T < math.inf:
@@ -349,7 +349,7 @@ def with_slow_pair(K: float, tau_L: float, T_1: float, T_2: float, T_L: float) -
     return first_orders("eq-22", K, (1.0 / (2.0 * math.pi * tau_L),), corners)
 
 
-# --- The ECU's laws, current loop and pressure loop
+# --- The ECU's control laws, current loop and pressure loop
 # Scheduled gains are frozen at the pressure: the schedule is bumpless, so it does not affect
 # the linear model of small motion about an equilibrium.
 
@@ -389,7 +389,7 @@ def _pressure_law(
     signals: Callable[[Any], pressure_pid.Input],
     inputs: tuple[str, ...] = ("in",),
 ) -> LinearModel:
-    """Return the PID at a pressure p [Pa]; ``signals`` maps the model's inputs to its own."""
+    """Return the PID at a pressure p [Pa]; ``signals`` maps the model's inputs to the PID's."""
     gains = ecu.pressure_at(p)
 
     def law(x: pressure_pid.State, u: Any) -> tuple[Any, Any]:
@@ -411,7 +411,7 @@ def current_control(ecu: EcuParameters) -> LinearModel:
 
 
 def demand_filter(ecu: EcuParameters) -> LinearModel:
-    """Return the low-pass between pressure and current controller."""
+    """Return the low-pass filter between the pressure and current controllers."""
 
     def law(x: low_pass_2.State, u: Any) -> tuple[Any, Any]:
         state, out = low_pass_2.output(x, u, ecu.T_s, ecu.filter)
@@ -429,7 +429,7 @@ def current_loop(par: MotorcycleParameters, p: float, rotor: Rotor) -> LinearMod
     Parameters
     ----------
     par
-        Parameters; the drive mode does not matter.
+        Parameters; the drive mode has no effect.
     p
         Pressure of the operating point [Pa].
     rotor
@@ -456,7 +456,7 @@ def _linear(
     units: tuple[str, str],
     inputs: tuple[str, ...] = ("in",),
 ) -> LinearModel:
-    """Return a law's Jacobians at zero, inside all limits."""
+    """Return a control law's Jacobians at zero, inside all limits."""
     import casadi as ca
 
     signals = signals_of(state_type)
@@ -486,15 +486,15 @@ def _linear(
 # --- The pressure loop around a linear model of the braking system
 
 BAND = (0.02, 200.0)
-"""frequency band in which margins are searched [Hz]"""
+"""frequency band of the search for margins [Hz]"""
 
 
 @dataclass(frozen=True, eq=False)
 class PressureLoop:
-    """PID, low-pass, sampled current loop and anti-alias filters around a linear brake.
+    """PID, low-pass filter, sampled current loop and anti-alias filters around a linear brake.
 
     The current loop has a locked rotor, because a model from current to pressure already contains
-    the rotor's motion. Converters are ideal, the dither is off.
+    the rotor's motion. Converters are ideal, and the dither is off.
 
     ``par``: parameters of ECU, motor, supply and filters; ``brake``: transfer function from motor
     current to pressure [Pa/A]; ``p``: pressure of the operating point [Pa].
@@ -506,7 +506,7 @@ class PressureLoop:
 
     @cached_property
     def plant(self) -> LinearModel:
-        """Sampled model from duty cycle to measured current, pressure and measured pressure."""
+        """Sampled model from duty cycle to measured current, pressure, and measured pressure."""
         mode = {"drive.mode": "current-direct", "adc.law": "ideal"}
         driven = self.par.replace(mode)
         motor = linearize(
@@ -529,12 +529,12 @@ class PressureLoop:
         )
 
     def closed(self, frequencies: Array) -> Complex:
-        """Return pressure over its set point, at frequencies [Hz]."""
+        """Return the closed loop from set point to pressure at frequencies [Hz]."""
         drive = _gain(pressure_demand(self.par.ecu, self.p), frequencies)
         return drive * self._inner(frequencies, 1) / (1.0 + self.open(frequencies))
 
     def models(self) -> tuple[LinearModel, LinearModel]:
-        """Return loop gain (cut at the measured pressure) and closed loop, one model each."""
+        """Return the loop gain (cut at the measured pressure) and the closed loop as models."""
         import control
 
         def block(model: LinearModel) -> Any:
@@ -545,7 +545,7 @@ class PressureLoop:
         inner = control.feedback(block(self.plant) * block(current_control(ecu)), current)
         path = inner * block(demand_filter(ecu))
         gain = path[2, 0] * block(pressure_feedback(ecu, self.p))
-        # The measured pressure goes back into the second input of the pressure control.
+        # The measured pressure feeds back into the second input of the pressure control.
         ahead = path * block(_pressure_control(ecu, self.p))
         back = control.ss([], [], [], [[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]], T)
         closed = control.feedback(ahead, back, sign=1)[1, 0]
@@ -603,7 +603,7 @@ def _single(block: Any, output: str) -> LinearModel:
 
 
 def _companion(brake: Rational) -> tuple[Array, Array, Array]:
-    """Return A, B, C of a strictly proper transfer function, its first state the fastest."""
+    """Return A, B, C of a strictly proper transfer function, with the fastest state first."""
     den = np.asarray(brake.den, dtype=float) / brake.den[0]
     n = den.size - 1
     num = np.asarray(brake.num, dtype=float) / brake.den[0]

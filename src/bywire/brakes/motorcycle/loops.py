@@ -23,19 +23,19 @@ CAUSES: Mapping[str, Mapping[str, Any]] = {
     "dither": {"ecu.dither.waveform": "off"},
     "converter": {"adc.law": "ideal"},
 }
-"""changes that remove a cause of nonlinearity, by the cause"""
+"""changes that remove a cause of nonlinearity, keyed by the cause"""
 
 
 def _require_pressed(p: float) -> None:
     """Reject a released brake, since a piston that just touches its stop has no linear model."""
     if p == 0.0:
         raise not_valid(
-            "pressure", "0 bar", "> 0 bar", "since the piston just touches its stop at 0 bar"
+            "pressure", "0 bar", "> 0 bar", "because the piston just touches its stop at 0 bar"
         )
 
 
 def current_point(par: ParameterSet, value: float) -> Point:
-    """Return the brake that its current holds at a pressure [Pa]."""
+    """Return the brake held by its current at a pressure [Pa]."""
     _require_pressed(value)
     closed = cast(MotorcycleParameters, par.replace({"drive.mode": "current-direct"}))
     state, memory = state_at(value, closed), memory_at(value, closed)
@@ -66,7 +66,7 @@ def dither_frequency(par: ParameterSet) -> Sequence[float]:
 
 
 def pressure_laws(par: ParameterSet, value: float, frequencies: Array) -> tuple[Complex, Complex]:
-    """Return the PID's responses from set point and from pressure to its demand, at a pressure."""
+    """Return the PID's responses from set point and pressure to its demand, at a pressure."""
     brake = cast(MotorcycleParameters, par)
     demand = linear.pressure_demand(brake.ecu, value).response(frequencies)[:, 0, 0]
     feedback = linear.pressure_feedback(brake.ecu, value).response(frequencies)[:, 0, 0]
@@ -85,9 +85,9 @@ _OWN = {f"ecu.pressure.{name}": span for name, span in _GAINS.items()} | {
 def in_ecu(par: ParameterSet) -> Mapping[str, tuple[float, float]]:
     """Return the limits of a pressure PID that an ECU can run.
 
-    A filter faster than the sampling has no effect: backward differences then pass every step of
-    the converter undamped. The derivative of a stepped set point exceeds the current limit for one
-    sample.
+    A filter faster than the sampling has no effect: backward differences then pass every
+    converter step without damping. The derivative of a set point step exceeds the current limit
+    for one sample.
     """
     T_s = cast(MotorcycleParameters, par).ecu.T_s
     return {"ecu.pressure.tau_d": (T_s, max(_SLOWEST, 10.0 * T_s)), "ecu.pressure.c": (0.0, 0.0)}

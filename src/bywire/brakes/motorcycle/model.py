@@ -38,14 +38,14 @@ from bywire.plant import (
 
 Par = MotorcycleParameters
 IDEAL = ("voltage-source", "current-source")
-"""drive modes in which a source at the motor takes the place of battery, bridge and ECU"""
+"""drive modes in which a source at the motor replaces battery, bridge and ECU"""
 
 
 class MotorcycleBrake(Assembly[MotorcycleParameters, ecu.Memory]):
     """Model of the brake.
 
-    One dry friction (seals, and the gear when ``directional``) on the shaft; the chamber's
-    pressure is one-sided because the reservoir makes up missing fluid; two end stops.
+    The shaft has one dry friction (seals, and the gear when ``directional``). The chamber pressure
+    is one-sided, because the reservoir makes up missing fluid. The piston has two end stops.
     """
 
     name: ClassVar[str] = "motorcycle-brake"
@@ -59,26 +59,24 @@ class MotorcycleBrake(Assembly[MotorcycleParameters, ecu.Memory]):
     supply = Part(battery_supply, loss="E_supply")
     motor = Part(dc_motor, loss="E_copper")
     gear = Part(ball_screw_gear, output={"x": "x_mc"})
-    # Eq. (8) returns energy when the load drives the gear, at most the energy absorbed before.
+    # Eq. (8) returns energy when the load drives the gear, at most the energy absorbed earlier.
     E_gear = Integral(
         "J",
-        "loss of gear and screw, signed",
+        "signed loss of gear and screw",
         role=Role("sink", "gear and screw", returns="taken"),
     )
     seal = Part(seal_friction)
-    E_seal = Integral("J", "loss of the seals' friction", role=Role("sink", "seal friction"))
+    E_seal = Integral("J", "seal friction loss", role=Role("sink", "seal friction"))
     chamber = Part(master_cylinder, par="master_cylinder", state={"p": "p_mc"}, loss="E_damping")
     line = Part(pipeline, par="pipeline", output=("q", "Re"), loss="E_pipeline")
     pads = Part(caliper, par="caliper", state={"p": "p_pd"})
     stop = Part(end_stop, work="W_stop", loss="E_stop", rarely=True)
     piston = Part(piston_friction)
-    E_piston = Integral(
-        "J", "loss of the caliper piston's friction", role=Role("sink", "caliper piston")
-    )
+    E_piston = Integral("J", "caliper piston friction loss", role=Role("sink", "caliper piston"))
     port = Part(reservoir_port)
     E_port = Integral(
         "J",
-        "energy out through port and leak, minus that of warming fluid",
+        "energy lost through port and leak, minus energy from warming fluid",
         role=Role("sink", "port, leak, warming fluid", returns="any"),  # which expands
     )
     W_shaft = Integral("J", "work of the motor on the gear")
@@ -117,7 +115,7 @@ class MotorcycleBrake(Assembly[MotorcycleParameters, ecu.Memory]):
     at_stop = Shown("1", "piston at an end stop")
     P_gear = Shown("W", "gear loss power, signed")
     P_el = Shown("W", "electrical power from battery or source", 10.0)
-    E_warming = Shown("J", "copper loss of the motor that warms up", role=motor_heat.COPPER)
+    E_warming = Shown("J", "copper loss that heats the motor", role=motor_heat.COPPER)
     E_winding = Shown("J", "heat in the motor's winding", role=motor_heat.WINDING)
     E_housing = Shown("J", "heat in the motor's housing", role=motor_heat.HOUSING)
 
@@ -172,7 +170,7 @@ class MotorcycleBrake(Assembly[MotorcycleParameters, ecu.Memory]):
     )
 
     def wire(self, w: Self) -> None:
-        """Wire the parts: electrics, piston, fluid, load, sensors."""
+        """Connect the parts: electrics, piston, fluid, load, sensors."""
         warm = motor_heat.warmth(w.heat.xe, w.heat.par)
         w.motor.vary(R_m=w.motor.par.R_m * warm.R, K_e=w.motor.par.K_e * warm.K)
         w.current, w.voltage, w.i_dc = _electrics(w)
@@ -197,7 +195,7 @@ class MotorcycleBrake(Assembly[MotorcycleParameters, ecu.Memory]):
         w.load = force + end_stop.load(w.stop.f)
         w.gear.u = ball_screw_gear.Input(w.torque, w.load, 0.0)
         w.seal.u = seal_friction.Input(w.gear.x.omega, w.chamber.x.p)
-        # Values only, since the sensors do not act on the brake.
+        # Values only, because the sensors do not act on the brake.
         w.pressure_sensor.u = pressure_sensor.Input(_gauge(w) + w.par.fluid.p_atm)
         seen = pressure_sensor.reading(w.pressure_sensor.u.p, w.pressure_sensor.par)
         w.filter_p.u = anti_alias_filter.Input(seen)
@@ -209,7 +207,7 @@ class MotorcycleBrake(Assembly[MotorcycleParameters, ecu.Memory]):
     def balance(
         self, x: Any, xe: Any, memory: ecu.Memory, par: Par, contact: tuple[float, ...]
     ) -> Any:
-        """Return the right-hand sides; with a current source the winding's state is constant."""
+        """Return the right-hand sides; with a current source, the winding's state is constant."""
         rows = super().balance(x, xe, memory, par, contact)
         return rows._replace(i=0.0 * rows.i) if par.drive.mode == "current-source" else rows
 
@@ -220,7 +218,7 @@ class MotorcycleBrake(Assembly[MotorcycleParameters, ecu.Memory]):
         return ((low, high),)
 
     def power(self, w: Self) -> dict[str, float]:
-        """Return the powers that split a loss, cross the boundary or depend on the drive mode."""
+        """Return powers that split a loss, cross the boundary or depend on the drive mode."""
         friction, makeup = w.reaction
         gear, seal = _dry_losses(w, friction)
         loss = ball_screw_gear.transmission_loss(w.gear.x, w.torque, w.rate.omega, w.gear.par)
@@ -271,7 +269,7 @@ class MotorcycleBrake(Assembly[MotorcycleParameters, ecu.Memory]):
         return (Task("ecu", par.ecu.T_s, _ecu),)
 
     def rest(self, par: Par) -> tuple[Any, ecu.Memory]:
-        """Return the piston at its retracted end, without pressure and current."""
+        """Return the piston at its retracted end, without pressure or current."""
         state = self.state(
             gear=ball_screw_gear.State(theta=par.master_cylinder.x_rest / par.gear.k_g, omega=0.0),
             filter_p=anti_alias_filter.State(
@@ -283,7 +281,7 @@ class MotorcycleBrake(Assembly[MotorcycleParameters, ecu.Memory]):
         return state, zeros(ecu.Memory)
 
     def watch(self, recording: Any, par: Any) -> list[str]:
-        """Return the warnings of a recording."""
+        """Return the warnings about a recording."""
         held = par.drive.mode == "current-source" and "i" in recording
         source = {"i_source": ("time", recording["i"].values)} if held else {}
         seen = recording.assign(source) if held else recording
@@ -311,7 +309,8 @@ def _electrics(w: MotorcycleBrake) -> tuple[float, float, float]:
     """Return motor current, motor voltage and battery current of the drive mode."""
     m, i = w.m, w.motor.x.i
     if w.par.drive.mode == "current-source":
-        # The winding's state stays at rest; the source supplies what the voltage balance needs.
+        # The winding's state stays at rest; the source supplies the voltage that the balance
+        # requires.
         voltage = w.motor.par.R_m * m.i_source + w.motor.par.K_e * w.gear.x.omega
         return m.i_source, voltage, 0.0 * m.i_source
     if w.par.drive.mode == "voltage-source":
@@ -322,7 +321,7 @@ def _electrics(w: MotorcycleBrake) -> tuple[float, float, float]:
 
 
 def _port_conductance(w: MotorcycleBrake) -> float:
-    """Return the port's conductance [m^3/(s Pa)] as a value only, since it changes slowly."""
+    """Return the port's conductance [m^3/(s Pa)] as a value only, because it changes slowly."""
     travel = ball_screw_gear.output(w.gear.xe, w.gear.par).x
     place = reservoir_port.Input(travel - w.chamber.par.x_rest, w.chamber.xe.p)
     return reservoir_port.output(place, w.port.par).G
@@ -338,9 +337,9 @@ def _gauge(w: MotorcycleBrake) -> float:
 
 
 def _dry_losses(w: MotorcycleBrake, friction: float) -> tuple[float, float]:
-    """Return the powers lost in the gear's and in the seals' dry friction.
+    """Return the power losses in the dry friction of gear and seals.
 
-    The seals' share is their friction at this speed; the gear has the rest.
+    The seals account for their friction at this speed, and the gear for the rest.
     """
     total = -friction * w.gear.x.omega
     if w.gear.par.law == "paper":
@@ -350,7 +349,7 @@ def _dry_losses(w: MotorcycleBrake, friction: float) -> tuple[float, float]:
 
 
 def _gear_power(w: MotorcycleBrake, friction: float) -> float:
-    """Return the loss power of the gear [W]."""
+    """Return the gear's power loss [W]."""
     if w.gear.par.law == "paper":
         torque = ball_screw_gear.Input(w.torque, w.load, friction)
         acceleration = ball_screw_gear.balance(w.gear.x, torque, w.gear.par).omega

@@ -1,7 +1,8 @@
-"""Panels of the motorcycle brake's time traces."""
+"""Panels of the motorcycle brake's time traces, and sliders of its pages."""
 
 from __future__ import annotations
 
+from bywire.report.live_page.sliders import Sliders
 from bywire.report.panels import Panel, Panels, Role, Trace
 
 PANELS = Panels(
@@ -20,3 +21,17 @@ PANELS = Panels(
         Panel("winding", (Trace("T_winding"),), saturation="derated", saturated="derated"),
     ),
 )
+
+SLIDERS = Sliders(
+    "motorcycle",
+    ("motorcycle-brake",),
+    (
+        "seal.T_pr",
+        "motor.R_m",
+        "caliper.K_pd",
+        "fluid.beta",
+        "ecu.pressure.k_p",
+        "ecu.dither.gain",
+    ),
+)
+"""parameters with the most effect on braking, at the top of this brake's pages"""

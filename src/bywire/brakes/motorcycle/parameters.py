@@ -1,4 +1,4 @@
-"""Parameters of the motorcycle brake: one group per element, and a separate group for the ECU."""
+"""Parameters of the motorcycle brake: one group per element, and one for the ECU."""
 
 from __future__ import annotations
 
@@ -48,9 +48,9 @@ DriveMode = Literal[
 class DriveParameters(ParameterSet):
     """Source of the motor's command.
 
-    ``pressure`` and ``pedal`` close the pressure loop; ``current`` is a demand to the current
-    loop through dither and low-pass filter, ``current-direct`` bypasses both; ``voltage-source``
-    and ``current-source`` are ideal sources at the motor, open loop.
+    ``pressure`` and ``pedal`` close the pressure loop. ``current`` is a demand to the current loop
+    through dither and low-pass filter; ``current-direct`` bypasses both. ``voltage-source`` and
+    ``current-source`` are ideal sources at the motor, in open loop.
     """
 
     mode: DriveMode
@@ -94,7 +94,7 @@ class EcuParameters(ParameterSet):
         if self.schedule.law == "off":
             return self.pressure
         gains = gain_schedule.output(p, self.pressure, self.schedule)
-        # Not validated: the gains may be symbols, and they are between valid gains.
+        # Not validated: the gains may be symbols, and they lie between valid gains.
         return pressure_pid.Parameters.model_construct(**{**dict(self.pressure), **gains._asdict()})
 
 
@@ -136,13 +136,13 @@ class MotorcycleParameters(ParameterSet):
             )
         room = cylinder.A_mc * (cylinder.s_mc - cylinder.x_rest - closed)
         if self.fluid.air == "entrained" and not self.fluid.V_air < room:
-            valid = f"< the chamber's volume where pressure begins to build up, {room:g} m**3"
+            valid = f"< the chamber volume where pressure begins to build up, {room:g} m**3"
             raise RuleError("fluid.V_air", f"{self.fluid.V_air:g} m**3", valid)
         return self
 
     @model_validator(mode="after")
     def _sticks_on_fluid_alone(self) -> MotorcycleParameters:
-        """Reject a sticking piston together with laws of the caliper's fluid.
+        """Reject a sticking piston combined with laws of the caliper's fluid.
 
         These laws need the fluid pressure, but the state is the pads' pressure.
         """
@@ -158,7 +158,7 @@ class MotorcycleParameters(ParameterSet):
                 "piston.law",
                 "'sticking'",
                 f"another law with {clashing[0]} = {value!r}",
-                "the fluid's pressure then differs from the pads' and is not a state. Change one "
-                "of them",
+                "otherwise the fluid pressure differs from the pad pressure and is not a state. "
+                "Change one of them",
             )
         return self

@@ -1,4 +1,4 @@
-"""The motorcycle brake's plant at an operating point, driven by current or by voltage."""
+"""The motorcycle brake's plant at an operating point, driven by current or voltage."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def linear(
     Raises
     ------
     ParameterError
-        When there is no such point.
+        When the brake has no such operating point.
     """
     changes: dict[str, Any] = {"drive.mode": mode}
     driven = cast(MotorcycleParameters, par.replace(changes))
@@ -51,12 +51,12 @@ def linear(
 
 
 def by_current(par: ParameterSet, at: PlantPoint) -> LinearModel:
-    """Return the plant from the motor current: eq. (14) of Dardanelli et al. (2010), and angle."""
+    """Return the plant from motor current: eq. (14) of Dardanelli et al. (2010), plus the angle."""
     return linear(par, at, "current-source", ("i_source",), ("p_mc", "p_pd", "x_mc"))
 
 
 def by_voltage(par: ParameterSet, at: PlantPoint) -> LinearModel:
-    """Return the plant from the motor voltage, including winding and back-EMF."""
+    """Return the plant from motor voltage, including winding and back-EMF."""
     return linear(par, at, "voltage-source", ("v_source",), ("i", "p_mc", "p_pd", "x_mc"))
 
 

@@ -2,7 +2,7 @@
 
 The relations come from Dardanelli et al. (2010), eqs. (1), (4) and (8). The paper's rear brake has
 no angle or stroke sensor. Residuals count only while the demand is steady. During a step, all
-residuals are large even without a fault, and thresholds above them would not detect any fault.
+residuals are large even without a fault, so thresholds above them would not detect any fault.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ NAME = MotorcycleBrake.name
 Signals = Mapping[str, Array]
 
 
-_STEADY = 0.3  # s after which a step of the demand is over: several times the loop's rise
+_STEADY = 0.3  # s after which a demand step is over: several times the loop's rise time
 
 
 def _period(par: Any, dt: float) -> int:
@@ -36,7 +36,7 @@ def _period(par: Any, dt: float) -> int:
 
 
 def _steady(signals: Signals, dt: float, values: Array) -> Array:
-    """Return a residual where the demand is steady, `NEVER` elsewhere."""
+    """Return a residual where the demand is steady, and `NEVER` elsewhere."""
     rows = round(_STEADY / dt)
     p = signals["p_ref"]
     still = largest_of_the_last(p, rows) - least_of_the_last(p, rows) <= 0
@@ -54,20 +54,20 @@ def _pressure(signals: Signals, par: Any, dt: float) -> Array:
 
 
 def _winding(signals: Signals, par: Any, dt: float) -> Array:
-    """Return the back-EMF, a measure of the speed: bridge voltage minus R_m i, dither averaged."""
+    """Return the back-EMF, a measure of the speed: bridge voltage minus R_m i without dither."""
     back_emf = par.supply.V_bat * signals["duty"] - par.motor.R_m * signals["i_meas"]
     return _steady(signals, dt, np.abs(mean_of_the_last(back_emf, _period(par, dt))))
 
 
 def _balance(signals: Signals, par: Any, dt: float) -> Array:
-    """Return the motor's torque minus the load torque of the pressure, averaged over the dither."""
+    """Return motor torque minus the pressure's load torque, averaged over the dither period."""
     torque = par.gear.eta_g * par.ecu.est_par.K_e * signals["i_meas"]
     load = par.gear.k_g * par.master_cylinder.A_mc * signals["p_meas"]
     return _steady(signals, dt, np.abs(mean_of_the_last(torque - load, _period(par, dt))))
 
 
 def _still(signals: Signals, par: Any, dt: float) -> Array:
-    """Return minus the span of the pressure in two dither periods: zero for a stuck piston."""
+    """Return minus the pressure's range in two dither periods: zero for a stuck piston."""
     rows = 2 * _period(par, dt)
     p = signals["p_meas"]
     return _steady(signals, dt, least_of_the_last(p, rows) - largest_of_the_last(p, rows))
@@ -103,7 +103,7 @@ RESIDUALS = (
     ),
     Residual(
         "torque-balance",
-        "motor torque and load torque of the pressure",
+        "motor torque and load torque from the pressure",
         NAME,
         "N*m",
         ("i_meas", "p_meas", "p_ref"),

@@ -55,7 +55,7 @@ def travel_at(p: float, par: Par) -> float:
         F(p) = F(0) e^{-p/\beta} - \int_0^p C_{pd}(s) e^{(s - p)/\beta} ds
 
     Gauss quadrature integrates from node to node of the caliper's table. Its points never coincide
-    with nodes, where the slope jumps.
+    with the nodes, where the slope jumps.
     """
     cylinder, fluid, port, pads = par.master_cylinder, par.fluid, par.port, par.caliper
     start = cylinder.x_rest + reservoir_port.closed_at(port)
@@ -89,7 +89,7 @@ _kept_nodes = lru_cache(maxsize=64)(_nodes)  # a study rarely varies their param
 
 
 def highest_pressure(par: Par) -> float:
-    """Return the pressure [Pa] at which a slow piston meets its far end stop."""
+    """Return the pressure [Pa] at which a slow piston reaches its far end stop."""
     x_end, low, high = par.master_cylinder.x_end, 0.0, 1e6
     while travel_at(high, par) < x_end:
         high *= 2.0
@@ -107,7 +107,7 @@ def holding_current(p: float, par: Par) -> float:
 
 
 def state_at(p: float, par: Par, current: float | None = None) -> Any:
-    """Return the state at rest at a pressure [Pa]; see `resting_at`. Symbols are not checked.
+    """Return the state at rest at a pressure [Pa] (see `resting_at`), without checking symbols.
 
     Parameters
     ----------
@@ -123,10 +123,10 @@ def state_at(p: float, par: Par, current: float | None = None) -> Any:
     if not ops.is_symbol(x) and not (p >= 0 and x <= par.master_cylinder.x_end):
         limit = math.floor(highest_pressure(par) / 1e3) / 100.0
         raise not_valid(
-            "pressure of the start at rest",
+            "initial pressure at rest",
             f"{p / 1e5:g} bar",
             f">= 0 bar and <= {limit:g} bar",
-            "where the piston meets its end stop. Start lower, or move the stop "
+            "where the piston reaches its end stop. Start lower, or move the stop "
             "(master_cylinder.x_end)",
         )
     return _resting_at(p, x, par, current)
@@ -162,7 +162,7 @@ def _resting_at(p: float, x: float, par: Par, current: float | None) -> Any:
 
 
 def memory_at(p: float, par: Par, current: float | None = None) -> Memory:
-    """Return the memory with which each controller or the ideal source holds that state."""
+    """Return the memory with which the controllers or the ideal source hold that state."""
     i = holding_current(p, par) if current is None else current
     measured = _NOTHING._replace(p_meas=p, i_meas=i)
     if par.drive.mode == "voltage-source":

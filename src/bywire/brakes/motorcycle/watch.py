@@ -1,4 +1,4 @@
-"""Warnings about the whole motorcycle brake, in addition to its elements' warnings: its stops."""
+"""Warnings about the motorcycle brake's stops, in addition to its elements' warnings."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ WATCHED = ("at_stop", "F_stop", "i", "p_pd")
 
 
 def stop_warnings(recording: xr.Dataset, par: ParameterSet) -> list[str]:
-    """Return the warnings of a recording of at least one row; it may lack signals."""
+    """Return the warnings about a recording of at least one row, which may lack signals."""
     warnings: list[str] = []
     if "at_stop" in recording and "F_stop" in recording:
         at_far_stop = recording["F_stop"].values > 0
@@ -25,7 +25,7 @@ def stop_warnings(recording: xr.Dataset, par: ParameterSet) -> list[str]:
 
 
 def cases_at_stops(rows: Any) -> list[int]:
-    """Return the cases with a warning of a stop; ``rows``: signals of shape (cases, rows)."""
+    """Return the cases with a warning about a stop; ``rows``: signals of shape (cases, rows)."""
     if "F_stop" not in rows:
         return []
     force = rows["F_stop"].values
@@ -33,7 +33,7 @@ def cases_at_stops(rows: Any) -> list[int]:
 
 
 def _pulled_back(recording: xr.Dataset, choices: Mapping[str, Any]) -> list[str]:
-    """Return a warning if current pulls the piston against its retracted stop at the end."""
+    """Return a warning if the final current pulls the piston against its retracted stop."""
     if "port.law" not in choices or not {"F_stop", "i", "p_pd"} <= set(recording):
         return []
     F, i, p = (float(recording[name].values[-1]) for name in ("F_stop", "i", "p_pd"))
@@ -43,6 +43,6 @@ def _pulled_back(recording: xr.Dataset, choices: Mapping[str, Any]) -> list[str]
     if choices["port.law"] == "makeup":
         text += (
             f", with {p / 1e5:.2g} bar remaining in the caliper. port.law = 'makeup' does not "
-            "model the compensation port; use port.law = 'dead-stroke' to let the fluid out"
+            "model the compensation port. Use port.law = 'dead-stroke' to let the fluid out"
         )
     return [text]

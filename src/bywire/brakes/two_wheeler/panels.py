@@ -1,8 +1,9 @@
-"""Panels of time traces of the two-wheeler."""
+"""Panels of time traces of the two-wheeler, and sliders of its pages."""
 
 from __future__ import annotations
 
 from bywire.control import abs_rules
+from bywire.report.live_page.sliders import Sliders
 from bywire.report.panels import Panel, Panels, Role, Trace
 
 _VEHICLE = (
@@ -54,3 +55,17 @@ _REAR = (
 
 PANELS = Panels("two-wheeler", ("two-wheeler-by-wire",), _VEHICLE)
 WHOLE_REAR = Panels("two-wheeler-whole-rear", ("two-wheeler-whole-rear",), (*_VEHICLE, *_REAR))
+
+SLIDERS = Sliders(
+    "two-wheeler",
+    ("two-wheeler-by-wire", "two-wheeler-whole-rear"),
+    (
+        "vehicle.road.grip",
+        "vehicle.body.m",
+        "vehicle.body.h",
+        "front.disc.mu_pad",
+        "front.circuit.f_n",
+        "ecu.front_slip.slip_set",
+    ),
+)
+"""parameters with the most effect on braking, at the top of this vehicle's pages"""

@@ -1,10 +1,11 @@
-"""Panels of time traces of the wedge brake and its rigs, and signals compared over runs."""
+"""Panels and sliders of the wedge brake and its rigs, and signals that runs compare."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from types import MappingProxyType
 
+from bywire.report.live_page.sliders import Sliders
 from bywire.report.panels import Panel, Panels, Role, Trace
 
 _WINDINGS = Panel(
@@ -44,7 +45,7 @@ BRAKING = Panels(
         *_ADJUSTER,
     ),
 )
-"""moment, speed, current and power as in Figs. 7 to 9 of Roberts et al. (2003), and more"""
+"""moment, speed, current and power as in Figs. 7 to 9 of Roberts et al. (2003), and others"""
 
 CORNER = Panels(
     "wedge-corner",
@@ -65,7 +66,7 @@ CORNER = Panels(
         *_ADJUSTER,
     ),
 )
-"""the vehicle above, its brake below"""
+"""vehicle at the top, brake below"""
 
 DRIVES = Panels(
     "wedge-drives",
@@ -97,4 +98,18 @@ DRIVES = Panels(
 COMPARED: Mapping[str, str] = MappingProxyType(
     {"y_M": "moment", "theta": "angle", "F_M": "force", "i_2": "current 2", "P_meas": "power"}
 )
-"""signals that overlaid traces compare, with their names in low panels"""
+"""signals that overlaid traces compare, with short names for low panels"""
+
+SLIDERS = Sliders(
+    "wedge",
+    ("wedge-brake",),
+    (
+        "wedge.mu_B",
+        "wedge.alpha",
+        "caliper.K_cal",
+        "caliper.clearance",
+        "heart.K_W",
+        "control.moment.f_c",
+    ),
+)
+"""parameters with the most effect on braking, at the top of this brake's pages"""

@@ -1,4 +1,4 @@
-"""Text of C: names, numbers, comments, and lines of a readable length."""
+"""C text: names, numbers, comments, and lines of a readable length."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ _RESERVED = frozenset(_WORDS.split()) | frozenset(_CXX_WORDS.split())
 _LONGEST_NAME = 60
 BEGIN_C = '#ifdef __cplusplus\nextern "C" {\n#endif'
 END_C = "#ifdef __cplusplus\n}\n#endif"
-"""begin of the declarations in a header, so that programs in C++ link with them"""
+"""start and end of the declarations in a header, for linking with C++ programs"""
 
 
 @dataclass(frozen=True)
 class Precision:
-    """Type of numbers in C.
+    """Number type in C.
 
     Parameters
     ----------
@@ -50,23 +50,23 @@ class Precision:
     suffix: str
 
     def literal(self, value: float) -> str:
-        """Return the shortest literal for exactly this value.
+        """Return the shortest literal with exactly this value.
 
         Raises
         ------
         ModelError
-            If the value does not exist in this type.
+            If the type cannot represent the value.
         """
         number = float(value)
         if self.suffix and number != 0.0 and not 2.0**-126 <= abs(number) < 2.0**128:
             raise ModelError(
-                f"{number!r} is out of range in single precision. Export with precision = 'double'",
+                f"{number!r} exceeds the range of single precision. Use precision = 'double'",
                 name="precision",
                 value=repr(number),
                 valid="precision = 'double'",
             )
         if not math.isfinite(number):
-            raise ModelError(f"{number!r} is in the laws, but C has no literal for it")
+            raise ModelError(f"the laws contain {number!r}, but C has no literal for it")
         text = str(np.float32(number)) if self.suffix else repr(number)
         return text + self.suffix
 
@@ -78,7 +78,7 @@ PRECISIONS = {
 
 
 def c_name(text: str) -> str:
-    """Return an identifier of C for a name: other characters become underscores."""
+    """Return a C identifier for a name; characters that C does not allow become underscores."""
     name = re.sub(r"\W", "_", text, flags=re.ASCII).lstrip("_") or "value"
     if name[0].isdigit():
         name = f"n{name}"
@@ -91,7 +91,7 @@ def checked_name(name: str) -> str:
     Raises
     ------
     ParameterError
-        When C or C++ cannot use it as an identifier.
+        If the name is not a valid identifier in C and C++.
 
     Examples
     --------
@@ -99,9 +99,9 @@ def checked_name(name: str) -> str:
     'front_left'
     """
     if not isinstance(name, str) or not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name):
-        fault = "is not an identifier of C"
+        fault = "is not a valid C identifier"
     elif name in _RESERVED:
-        fault = "is a word that C, C++ or the export itself uses"
+        fault = "is reserved by C, C++ or the exported code"
     elif len(name) > _LONGEST_NAME:
         fault = f"has {len(name)} characters, more than {_LONGEST_NAME}"
     else:
@@ -121,12 +121,12 @@ def unique(name: str, taken: Container[str]) -> str:
 
 
 def in_comment(text: str) -> str:
-    """Return a text that is safe in a comment."""
+    """Return a text that is safe in a C comment."""
     return text.replace("*/", "* /").replace("/*", "/ *").replace("??", "? ?").rstrip("\\")
 
 
 def comment(lines: list[str], indent: str = "") -> str:
-    """Return a block comment of lines."""
+    """Return a block comment that contains these lines."""
     kept = [in_comment(line) for line in lines]
     if len(kept) == 1 and len(indent) + len(kept[0]) + 6 <= WIDTH:
         return f"{indent}/* {kept[0]} */"
@@ -135,7 +135,7 @@ def comment(lines: list[str], indent: str = "") -> str:
 
 
 def wrapped(line: str, indent: str = "") -> str:
-    """Return a statement on lines of a readable length, preferably broken after commas."""
+    """Return a statement wrapped to a readable length, preferably after commas."""
     lines, rest, lead = [], line, indent
     while len(lead) + len(rest) > WIDTH:
         room = WIDTH - len(lead)
@@ -150,7 +150,7 @@ def wrapped(line: str, indent: str = "") -> str:
 
 
 def _may_end(line: str, at: int) -> bool:
-    """Return whether a line may end at a space: not within a declaration or around an equals."""
+    """Return whether a line may end at a space: not in a declaration or next to an equals sign."""
     return not line[:at].endswith(("const", "=", "static", "inline")) and (
         line[at + 1 : at + 2] != "="
     )

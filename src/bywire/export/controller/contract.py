@@ -1,7 +1,7 @@
-"""Contract of a step of an exported ECU: valid inputs, and commands within limits.
+"""Contract of a step of an exported ECU: valid inputs, and commands within their limits.
 
-The step checks its inputs before the tick, and its memory and its commands after it. The laws
-themselves are translated unchanged.
+The step checks its inputs before the tick, and its memory and commands after it. The laws are
+translated unchanged.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ from bywire.export.controller.values import Expr, Group, Shape, Use
 from bywire.simulation.symbols import SX, scalars, symbol_tuple
 
 LARGEST = 1e15
-"""magnitude below which inputs, states and commands must lie, in their SI units: squares and
-products of such numbers stay numbers, in single precision too"""
+"""upper limit of the magnitude of inputs, states and commands in SI units: squares and products of
+such numbers are finite even in single precision"""
 INPUT, RESULT = 1, 2
-"""status of a step: an input is not valid; the memory was reset"""
+"""status of a step: ``INPUT`` for an invalid input, ``RESULT`` after a reset of the memory"""
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class CheckedInput:
     Parameters
     ----------
     low, high
-        Valid ends; infinite if the field declares none. `LARGEST` also applies.
+        Ends of the valid range, infinite if the field declares none. `LARGEST` also applies.
     """
 
     kind: str
@@ -51,17 +51,17 @@ class CheckedInput:
 
 @dataclass(frozen=True)
 class Command:
-    """A field of the memory that a step keeps within a limit.
+    """A memory field that a step keeps within a limit.
 
     Parameters
     ----------
     by
         Name of the limit.
     limit
-        The limit in C.
+        C expression of the limit.
     is_input
-        Whether the limit is a stimulus, which the command never exceeds; otherwise it is a
-        parameter, which the command's magnitude never exceeds.
+        Whether the limit is a stimulus or a parameter. A stimulus limits the command, and a
+        parameter limits the command's magnitude.
     """
 
     field: str
@@ -83,7 +83,7 @@ def checked_inputs(model: Model, structs: Structs, uses: Iterable[Use]) -> list[
 
 
 def commands(model: Model, renewed: Iterable[str], structs: Structs, shape: Shape) -> list[Command]:
-    """Return the commands among the fields that a task updates, with their limits.
+    """Return the commands, with their limits, among the fields that a task updates.
 
     Raises
     ------
@@ -104,16 +104,17 @@ def commands(model: Model, renewed: Iterable[str], structs: Structs, shape: Shap
         if limit is None:
             raise ModelError(
                 f"{place_of(model.Memory)}: {model.Memory.__qualname__}.{name} is limited by "
-                f"{by!r}, which is neither a parameter nor a stimulus: name one of them",
+                f"{by!r}, which is not valid. Use the name of a parameter or a stimulus",
                 name=f"{model.Memory.__qualname__}.{name}",
                 value=repr(by),
+                valid="a parameter or a stimulus",
             )
         found.append(Command(name, by, limit, False))
     return found
 
 
 def _parameter(structs: Structs, shape: Shape, dotted: str) -> Expr | None:
-    """Return a parameter in C, after the pointer to all of them."""
+    """Return a parameter in C, accessed with the pointer to all parameters."""
     group = Group(shape, Expr("par", uses=frozenset({("local", "par")})), pointer=True)
     text, uses = "par", set(group.expr.uses)
     *groups, last = dotted.split(".")
@@ -134,9 +135,9 @@ class Held:
     Parameters
     ----------
     renewed
-        Updated fields, in the order of the memory.
+        Fields that the task updates, in the order of the memory.
     read
-        Fields whose value before the tick is used.
+        Fields whose value before the tick the task uses.
     """
 
     renewed: tuple[str, ...]
@@ -144,7 +145,7 @@ class Held:
 
 
 def held_by(model: Model, par: ParameterSet, task: Task) -> Held:
-    """Return the access of a task to the memory, from a tick on symbols."""
+    """Return the access of a task to the memory, found by a tick on symbols."""
     leaves, fields = tuple(par.leaves()), model.Memory._fields
     symbols = dict(zip(leaves, scalars(SX.sym("p", len(leaves))), strict=True))
     x, m, u = (

@@ -1,6 +1,6 @@
-"""Elementary functions of an exported ECU as C: the operations of ``core.elementary``, one by one.
+"""Elementary functions of an exported ECU in C: the operations of ``core.elementary``.
 
-No function of the C library is called, so that every target gives the same bits as Python.
+They do not call the C library. So the results on every target are bit-identical to Python's.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ MAGNITUDE = frozenset({"whole", "sine", "cosine"})
 """functions that return a magnitude"""
 _MAGNITUDE = {"double": "fabs", "float": "fabsf"}
 _WHOLE = {"double": ((2.0**31, "int32_t"), (2.0**52, "int64_t")), "single": ((2.0**23, "int32_t"),)}
-"""largest magnitude rounded by integers; 64 bits take a processor without an FPU
-for doubles four times as long as 32"""
+"""maximum magnitude that integers round; without an FPU for doubles, 64-bit integers take four
+times as long as 32-bit integers"""
 Literal = Callable[[float], str]
 
 
 def elementary(wanted: Collection[str], precision: Precision) -> list[str]:
-    """Return the C code of functions by their names in C, in the order of their calls."""
+    """Return the C code of functions, given their names in C, in the order of their calls."""
     number = double if precision.name == "double" else single
     real, lit = precision.real, precision.literal
     parts: list[str] = []
@@ -50,10 +50,10 @@ def elementary(wanted: Collection[str], precision: Precision) -> list[str]:
 
 
 def contract_functions(precision: Precision, has_limits: bool) -> list[str]:
-    """Return the C code of the checks around a step; they examine digits, without arithmetic.
+    """Return the C code of the checks around a step, which examine bits without arithmetic.
 
-    Infinities and NaN are preserved under fast math, and a processor without an FPU for doubles
-    needs only a few instructions.
+    The checks detect infinities and NaN even under fast math. They take only a few instructions on
+    a processor without an FPU for doubles.
     """
     real, is_double = precision.real, precision.name == "double"
     integer, bits = ("uint64_t", 64) if is_double else ("uint32_t", 32)
@@ -65,7 +65,7 @@ def contract_functions(precision: Precision, has_limits: bool) -> list[str]:
     above = 1 << (bits - 1)  # the sign
     infinite = f"0x{_digits(math.inf, is_double):X}u"
     parts = [
-        f"""/* Return the upper digits of a magnitude; those of infinity are larger. */
+        f"""/* Return the upper bits of a magnitude, which are largest for infinity and NaN. */
 static inline uint32_t magnitude({real} x)
 {{
     {integer} bits;
@@ -74,7 +74,7 @@ static inline uint32_t magnitude({real} x)
     return {upper};
 }}
 
-/* Return whether x is a valid input or result: a number below 1e15 in magnitude. */
+/* Return whether x is a valid input or result, with a magnitude below 1e15. */
 static inline bool is_usual({real} x)
 {{
     return magnitude(x) < {magnitude(LARGEST)};
@@ -82,7 +82,7 @@ static inline bool is_usual({real} x)
     ]
     if has_limits:
         parts.append(f"""/*
- * Return a command limited to plus and minus its limit; a limit that is negative or NaN
+ * Return a command limited to plus and minus its limit. A limit that is negative or NaN
  * counts as 0.
  */
 static inline {real} within({real} command, {real} limit)
@@ -98,7 +98,7 @@ static inline {real} within({real} command, {real} limit)
     }} else if ((bits & {above - 1:#x}u) > most) {{
         bits = (bits & {above:#x}u) | most;
     }} else {{
-        /* it is within */
+        /* the command is within its limit */
     }}
     (void)memcpy((unsigned char *)&result, (const unsigned char *)&bits, sizeof result);
     return result;
@@ -107,7 +107,7 @@ static inline {real} within({real} command, {real} limit)
 
 
 def _digits(value: float, is_double: bool) -> int:
-    """Return the digits of a number as an integer."""
+    """Return the bits of a number as an integer."""
     return int.from_bytes(struct.pack(">d" if is_double else ">f", value), "big")
 
 
@@ -123,7 +123,7 @@ def _whole(real: str, lit: Literal, integers: Sequence[tuple[float, str]]) -> st
         f"if (size < {lit(most)}) {{\n        toward_zero = ({real})({integer})x;\n    }}"
         for most, integer in integers
     )
-    return f"""/* Return the largest whole number that is not above x. */
+    return f"""/* Return the largest integer that does not exceed x. */
 static inline {real} whole({real} x)
 {{
     const {real} size = {_MAGNITUDE[real]}(x);
@@ -144,7 +144,7 @@ def _turned(real: str, lit: Literal, number: Any) -> str:
     period = lit(number.FAR_PERIOD)
     sine = _nested(number.SINE, "z", lit)
     cosine = _nested(number.COSINE, "z", lit)
-    return f"""/* Return a large angle without most of its turns; beyond all digits it is 0. */
+    return f"""/* Return a large angle minus most full turns; 0 if it exceeds the precision. */
 static {real} near_angle({real} x)
 {{
     const {real} k = (x * {period} + {magic}) - {magic};
@@ -155,8 +155,8 @@ static {real} near_angle({real} x)
 }}
 
 /*
- * Return the sine of x [rad] plus quarter turns: quarters are taken off in parts, by Cody and
- * Waite, and the rest goes into Taylor's series.
+ * Return the sine of x [rad] plus quarter turns. Cody and Waite's method subtracts the quarter
+ * turns in parts, and a Taylor series computes the sine of the remainder.
  */
 static {real} turned({real} x, uint32_t quarter)
 {{
@@ -206,7 +206,7 @@ def _exponential(precision: Precision, lit: Literal) -> str:
 """
         result = "scale * a + ((scale * r4) * b + (scale * r8) * c)"
     integer, bias, shift = scale
-    return f"""/* Return e to the power of x, limited to {low} and {high}. */
+    return f"""/* Return e to the power of x, with x limited to {low} and {high}. */
 static {real} exponential({real} x)
 {{
     const {real} least = (x > {low}) ? x : {low};
@@ -231,7 +231,7 @@ def _log_words(lit: Literal) -> dict[str, str]:
 
 
 _LOG_PARTS = """/*
- * Return log a, a > 0, as *low + the result: a = m 2^k, m from sqrt(1/2) to sqrt(2).
+ * Return log a, a > 0, as *low plus the result, with a = m 2^k and m from sqrt(1/2) to sqrt(2).
  */
 static double log_parts(double a, double *low)
 {{
@@ -269,7 +269,7 @@ static double logarithm(double a)
     return high + low;
 }"""
 
-_POWER = """/* Return the upper half of the digits. */
+_POWER = """/* Return the upper half of the significand's bits. */
 static double upper_part(double a)
 {
     uint64_t bits;
@@ -281,7 +281,7 @@ static double upper_part(double a)
     return upper;
 }
 
-/* Return a to the power of b, a >= 0, with the product b log a to twice the digits. */
+/* Return a to the power of b, a >= 0. The product b log a has twice the precision. */
 static double power_of(double a, double b)
 {
     double result = (b > 0.0) ? 0.0 : 1.0;

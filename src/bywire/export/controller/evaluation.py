@@ -1,4 +1,4 @@
-"""Evaluation of Python expressions on known objects and C text: operators, members, calls."""
+"""Evaluation of Python expressions, with operators, attributes and calls, on objects or C text."""
 
 from __future__ import annotations
 
@@ -49,31 +49,31 @@ from bywire.export.controller.values import (
 
 
 class Functions(Protocol):
-    """All functions of an export; see `Translation`."""
+    """Protocol of all functions of an export; see `Translation`."""
 
     def constant(self, module: str, name: str, found: Any) -> Known:
-        """Return a module's object; a number has the name of its constant in C."""
+        """Return an object of a module; a number keeps the name of its C constant."""
         ...
 
     def call(self, at: Context, node: ast.AST, function: Any, given: list[Any], named: Any) -> Any:
-        """Return the result of a function."""
+        """Return the result of a call."""
         ...
 
     def inlined(
         self, at: Context, node: ast.AST, closure: Closure, given: list[Any], named: Any
     ) -> Any:
-        """Return the result of an inner function, inlined in its caller."""
+        """Return the result of an inner function, which is inlined in its caller."""
         ...
 
 
 class Context(Protocol):
-    """Evaluator of expressions; see `Evaluator`."""
+    """Protocol of an evaluator of expressions; see `Evaluator`."""
 
     translation: Functions
     body: Body
 
     def refuse(self, node: ast.AST, what: str) -> ModelError:
-        """Return the error for a construct that cannot be translated to C."""
+        """Return the error for code that cannot be translated to C."""
         ...
 
     def number(self, node: ast.AST, value: Any) -> Expr:
@@ -89,7 +89,7 @@ class Context(Protocol):
         ...
 
 
-# --- Fields and methods, as Python finds them behind a dot
+# --- Fields and methods of a value, written after a dot in Python
 
 
 def attribute(at: Context, node: ast.AST, owner: Any, name: str) -> Any:
@@ -118,7 +118,7 @@ def attribute(at: Context, node: ast.AST, owner: Any, name: str) -> Any:
         return Method(owner, name)
     if isinstance(owner, (Items, Table)):
         return Method(owner, name)
-    raise at.refuse(node, f"it has no {name!r}")
+    raise at.refuse(node, f"the object has no attribute {name!r}")
 
 
 def _of_known(at: Context, node: ast.AST, owner: Known, name: str) -> Any:
@@ -137,7 +137,7 @@ def _of_record(at: Context, node: ast.AST, owner: Record, name: str) -> Any:
     if name not in owner.cls._fields:
         if name in ("_replace", "_asdict"):
             return Method(owner, name)
-        raise at.refuse(node, f"{owner.cls.__name__} has no {name!r}")
+        raise at.refuse(node, f"{owner.cls.__name__} has no attribute {name!r}")
     struct = at.body.structs.of_tuple(owner.cls)
     place = f"{owner.expr.text}{'->' if owner.pointer else '.'}{c_name(name)}"
     expr = Expr(place, uses=owner.expr.uses | {("field", struct.name, name)})
@@ -208,7 +208,7 @@ def _unary(at: Context, node: ast.UnaryOp, value: Any) -> Any:
         return Expr(f"-{expr.at(PRIMARY)}", UNARY, expr.uses)
     if isinstance(node.op, ast.Not) and expr.truth:
         return Expr(f"!{expr.at(PRIMARY)}", UNARY, expr.uses, truth=True)
-    raise at.refuse(node, "this operator is not translated")
+    raise at.refuse(node, "this operator is not supported")
 
 
 def binary(at: Context, node: ast.BinOp, left: Any, right: Any) -> Any:
@@ -222,7 +222,7 @@ def binary(at: Context, node: ast.BinOp, left: Any, right: Any) -> Any:
     if kind is ast.Pow and isinstance(right, Known) and right.value in (2, 2.0):
         return _square(at, node, left)
     if kind not in _ARITHMETIC:
-        raise at.refuse(node, "this operator is not translated")
+        raise at.refuse(node, "this operator is not supported")
     sign, level, _ = _ARITHMETIC[kind]
     a, b = (at.body.as_number(at.number(node, each)) for each in (left, right))
     a, b = at.body.operands(a, b)
@@ -247,13 +247,13 @@ def compared(at: Context, node: ast.Compare, left: Any, right: Any) -> Any:
     if sign in ("==", "!="):
         return _equal(at, node, left, right, sign)
     if sign not in ("<", "<=", ">", ">="):
-        raise at.refuse(node, "this comparison is not translated")
+        raise at.refuse(node, "this comparison is not supported")
     a, b = at.body.operands(*(at.number(node, each) for each in (left, right)))
     return Expr(f"{a.at(SUM)} {sign} {b.at(SUM)}", COMPARED, a.uses | b.uses, truth=True)
 
 
 def _equal(at: Context, node: ast.AST, left: Any, right: Any, sign: str) -> Expr:
-    """Return a comparison of floats for equality without compiler warnings."""
+    """Return an equality comparison of floats that does not cause compiler warnings."""
     a, b = (at.body.settled(at.number(node, v), "compared") for v in (left, right))
     both = f"({a.at(SUM)} <= {b.at(SUM)}) && ({a.at(SUM)} >= {b.at(SUM)})"
     uses = a.uses | b.uses
@@ -263,7 +263,7 @@ def _equal(at: Context, node: ast.AST, left: Any, right: Any, sign: str) -> Expr
 
 
 def _connected(at: Context, node: ast.BoolOp, values: Iterable[Any]) -> Any:
-    """Return "and" or "or" of values; those after a known result are not evaluated."""
+    """Return "and" or "or" of values, without the values that cannot change the result."""
     is_and = isinstance(node.op, ast.And)
     parts: list[Expr] = []
     value: Any = Known(is_and)
@@ -307,7 +307,7 @@ _OURS: dict[Any, str] = {
 }
 _OURS_IN_DOUBLE: dict[Any, str] = {**_OURS, ops.log: "logarithm", ops.power: "power_of"}
 _EXTREMES = {ops.fmin: "smaller", ops.fmax: "larger"}
-"""functions of core.ops that are defined at the top of the C file"""
+"""functions of core.ops that the C file defines at its top"""
 
 _Named = dict[str, Any]
 
@@ -318,7 +318,7 @@ def called(at: Context, node: ast.Call, function: Any, given: list[Any], named: 
         return _method(at, node, function, given, named)
     if isinstance(function, Closure):
         return at.translation.inlined(at, node, function, given, named)
-    target = at.known(node, function, "it is not a function that export can translate")
+    target = at.known(node, function, "this is not a function that bywire can translate")
     if isinstance(target, partial):
         held = {**{n: Known(v) for n, v in target.keywords.items()}, **named}
         return called(at, node, Known(target.func), [*map(Known, target.args), *given], held)
@@ -338,7 +338,7 @@ def called(at: Context, node: ast.Call, function: Any, given: list[Any], named: 
             values = {name: each.value for name, each in named.items()}
             return Known(target(*(each.value for each in given), **values))
         what = getattr(target, "__qualname__", repr(target))
-        raise at.refuse(node, f"{what} is not translated: laws call core.ops and each other")
+        raise at.refuse(node, f"{what} is not supported. A law can call core.ops and other laws")
     if isinstance(target, types.MethodType):
         return at.translation.call(
             at, node, target.__func__, [Known(target.__self__), *given], named
@@ -367,7 +367,7 @@ def _elementary(at: Context, node: ast.AST, function: Any, given: list[Any]) -> 
 
 
 def _ours(at: Context) -> dict[Any, str]:
-    """Return the functions that exports define themselves."""
+    """Return the functions for which an export contains its own code."""
     return _OURS_IN_DOUBLE if at.body.structs.precision.name == "double" else _OURS
 
 
@@ -376,7 +376,7 @@ def _made(at: Context, node: ast.AST, cls: Any, given: list[Any], named: _Named)
     items = {**defaults, **dict(zip(cls._fields, given, strict=False)), **named}
     missing = [name for name in cls._fields if name not in items]
     if missing or len(given) > len(cls._fields):
-        raise at.refuse(node, f"fields and values of {cls.__name__} do not match")
+        raise at.refuse(node, f"the values do not match the fields of {cls.__name__}")
     return Built(cls, {name: items[name] for name in cls._fields})
 
 
@@ -415,7 +415,7 @@ def _method(at: Context, node: ast.AST, method: Method, given: list[Any], named:
         function = getattr(cls, name, None)
         if isinstance(function, types.FunctionType) and name not in vars(ParameterSet):
             return at.translation.call(at, node, function, [owner, *given], named)
-    raise at.refuse(node, f"the method {name} is not translated")
+    raise at.refuse(node, f"the method {name} is not supported")
 
 
 def _zipped(at: Context, node: ast.AST, given: list[Any], named: _Named) -> Any:
@@ -454,7 +454,7 @@ def _dictionary(at: Context, node: ast.AST, given: list[Any], named: _Named) -> 
 
 
 def _attribute_named(at: Context, node: ast.AST, given: list[Any], named: _Named) -> Any:
-    name = at.known(node, given[1], "names of fields must be known at export")
+    name = at.known(node, given[1], "field names must be known at export")
     return attribute(at, node, given[0], name)
 
 
@@ -470,7 +470,7 @@ def _sum(at: Context, node: ast.AST, given: list[Any], named: _Named) -> Any:
 
 
 def _extreme(function: Any) -> Callable[..., Any]:
-    """Return the rule of max or min, which keep the first of equal values."""
+    """Return the rule for max or min, which return the first of equal values."""
 
     def rule(at: Context, node: ast.AST, given: list[Any], named: _Named) -> Any:
         values = given if len(given) > 1 else list(at.sequence(node, given[0]))
@@ -519,11 +519,11 @@ class Evaluator:
     Parameters
     ----------
     file
-        Its source file, for error messages.
+        Source file of the function, for error messages.
     module
         Names in the function's module.
     scope
-        Values of its variables.
+        Values of the function's variables.
     """
 
     translation: Functions
@@ -537,14 +537,17 @@ class Evaluator:
         line = getattr(node, "lineno", 0)
         shown = ast.unparse(node).splitlines()[0][:60]
         return ModelError(
-            f"{self.file}, line {line}: bywire cannot export the ECU as C: {what}, in: {shown}"
+            f"{self.file}, line {line}: bywire cannot export the ECU as C, because {what}. "
+            f"The code is: {shown}",
+            name=f"{self.file}, line {line}",
+            value=shown,
         )
 
     def value(self, node: ast.expr) -> Any:
         """Return the value of an expression."""
         rule = getattr(self, f"_{type(node).__name__.lower()}", None)
         if rule is None:
-            raise self.refuse(node, f"{type(node).__name__} is not translated")
+            raise self.refuse(node, f"{type(node).__name__} is not supported")
         try:
             return rule(node)
         except (ArithmeticError, LookupError) as error:  # as Python would raise it at run time
@@ -582,7 +585,7 @@ class Evaluator:
             return tuple(Known(name) for name in value.items)
         if isinstance(value, Known) and hasattr(value.value, "__iter__"):
             return tuple(lifted(Known(each)) for each in value.value)
-        raise self.refuse(node, "loops can only run over tuples of a known length")
+        raise self.refuse(node, "a loop can iterate only over a tuple of known length")
 
     def _constant(self, node: ast.Constant) -> Any:
         return Known(node.value)
@@ -634,7 +637,7 @@ class Evaluator:
         for each in node.values:
             inner = each.value if isinstance(each, ast.FormattedValue) else each
             value = self.value(inner)
-            parts.append(str(self.known(each, value, "texts must be known at export")))
+            parts.append(str(self.known(each, value, "strings must be known at export")))
         return Known("".join(parts))
 
     def _lambda(self, node: ast.Lambda) -> Any:
@@ -648,7 +651,7 @@ class Evaluator:
         value = self.value(node)
         if isinstance(value, (Items, Table)):
             return bool(value.values if isinstance(value, Items) else value.items)
-        why = "it depends on a value that only the running ECU knows: use ops.where"
+        why = "the condition depends on a value that is unknown at export. Use ops.where"
         return bool(self.known(node, value, why))
 
     def _unaryop(self, node: ast.UnaryOp) -> Any:
@@ -659,7 +662,7 @@ class Evaluator:
 
     def _compare(self, node: ast.Compare) -> Any:
         if len(node.ops) > 1:
-            raise self.refuse(node, "chained comparisons are not translated")
+            raise self.refuse(node, "chained comparisons are not supported")
         return compared(self, node, self.value(node.left), self.value(node.comparators[0]))
 
     def _boolop(self, node: ast.BoolOp) -> Any:
@@ -673,7 +676,9 @@ class Evaluator:
         entries = self.sequence(node, value)
         if isinstance(node.slice, ast.Slice):
             bounds = [
-                None if each is None else self.known(node, self.value(each), "slices must be known")
+                None
+                if each is None
+                else self.known(node, self.value(each), "slices must be known at export")
                 for each in (node.slice.lower, node.slice.upper, node.slice.step)
             ]
             return Items(entries[slice(*bounds)])
@@ -691,12 +696,12 @@ class Evaluator:
                 yield from self._comprehended(rest)
 
     def bind(self, target: ast.expr, value: Any) -> None:
-        """Bind loop variables to values, without variables in C."""
+        """Bind loop variables to values, without C variables."""
         if isinstance(target, ast.Name):
             self.scope[target.id] = self.body.settled(value, target.id)
             return
         if not isinstance(target, (ast.Tuple, ast.List)):
-            raise self.refuse(target, "only names can be assigned")
+            raise self.refuse(target, "only a name can be assigned")
         for each, entry in zip(target.elts, self.sequence(target, value), strict=True):
             self.bind(each, entry)
 

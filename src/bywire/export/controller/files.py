@@ -1,4 +1,4 @@
-"""All files of an ECU in C, by name: with those of tools (A2L, DBC), and ``README.txt``."""
+"""All files of an ECU in C by name, including A2L, DBC and ``README.txt``."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from bywire.export.controller.render import c_path, parameter_file
 from bywire.export.controller.vectors import Vectors
 
 _FAR = 1e32
-"""limit where there is none: some tools reject infinity"""
+"""limit of a quantity without a limit, because some tools reject infinity"""
 
 
 def a2l(program: Program) -> str:
-    """Return the A2L description; symbol links replace addresses, which are zero.
+    """Return the A2L description, with symbol links instead of addresses, which are zero.
 
-    The links lead to the memory and the parameters of ``NAME_instance.c``, which are in RAM.
+    The links refer to the memory and the parameters in ``NAME_instance.c``, which are in RAM.
     """
     name = program.name
     kind = "FLOAT32_IEEE" if program.precision.name == "single" else "FLOAT64_IEEE"
@@ -85,7 +85,7 @@ def _a2l_text(text: str) -> str:
     return text.replace("\\", "\\\\").replace('"', '\\"')
 
 
-# --- ``NAME_instance.c``: memory and parameters in RAM, under the names that the A2L links to
+# --- ``NAME_instance.c``: memory and parameters in RAM, with the names of the A2L's links
 
 
 def instance_header(program: Program) -> str:
@@ -100,9 +100,9 @@ def instance_header(program: Program) -> str:
     ]
     if program.parameters():
         parts += [
-            f"{comment(['Parameters that a calibration tool changes.'])}\n"
+            f"{comment(['Parameters for calibration tools to change.'])}\n"
             f"extern {name}_Parameters {name}_calibration;",
-            f"{comment(['Parameters for the steps, copied from the calibration.'])}\n"
+            f"{comment(['Parameters for the steps: a copy of the calibration.'])}\n"
             f"extern {name}_Parameters {name}_active;",
         ]
     parts.append(
@@ -111,8 +111,8 @@ def instance_header(program: Program) -> str:
     )
     if program.parameters():
         said = [
-            "Apply the calibration, and return how many of its numbers are out of range or NaN.",
-            "If there is one, the steps keep their parameters.",
+            "Return the number of calibrated parameters that are out of range or NaN. If it is 0,",
+            "apply the calibration. Otherwise, the steps keep their parameters.",
         ]
         parts.append(f"{comment(said)}\nuint32_t {name}_instance_apply(void);")
     return "\n\n".join([*parts, END_C, "#endif"]) + "\n"
@@ -124,8 +124,8 @@ def instance_source(program: Program) -> str:
     parts = [
         comment(
             [
-                f"An instance of the ECU of {program.model.name}; leave this file out if memory",
-                "and parameters are elsewhere in your program.",
+                f"An instance of the ECU of {program.model.name}. Omit this file if your program",
+                "stores memory and parameters elsewhere.",
             ]
         ),
         f'#include "{name}_instance.h"',
@@ -161,7 +161,7 @@ def _outside(program: Program) -> str:
             place = f"par->{c_path(dotted)}{f'[{k}]' if member.length else ''}"
             checks = " && ".join(_within(program, place, leaves[dotted]))
             lines.append(wrapped(f"count += ({checks}) ? 0u : 1u;", "    "))
-    said = "Return how many parameters are out of range or NaN."
+    said = "Return the number of parameters that are out of range or NaN."
     return "\n".join(
         [
             comment([said]),
@@ -177,7 +177,7 @@ def _outside(program: Program) -> str:
 
 
 def _within(program: Program, place: str, leaf: Leaf) -> list[str]:
-    """Return the conditions of a parameter's range; a distant end is the last number."""
+    """Return the conditions for a parameter's range; a distant end becomes the largest number."""
     kind = np.float32 if program.precision.name == "single" else np.float64
     last = float(np.finfo(kind).max)
     low = f">{'' if leaf.low_open else '='}", leaf.low
@@ -191,22 +191,22 @@ def _within(program: Program, place: str, leaf: Leaf) -> list[str]:
 
 
 # --- CAN
-# Every field of the memory is a signed signal of 16 bits, four per message of 8 bytes, and so is
-# the status of every step. The lowest count means "not available".
+# Each memory field and the status of each step is a signed 16-bit signal. A message of 8 bytes
+# contains four signals. The lowest count means "not available".
 
 FIRST = 0x100
 """identifier of the first message"""
 CYCLE = 10
 """interval between messages [ms]"""
 NOT_AVAILABLE = -32768
-"""count of a NaN or infinite value: outside the range of every signal"""
+"""count for a NaN or infinite value, outside the range of every signal"""
 _MOST, _IN_A_MESSAGE, _LONGEST = 32767, 4, 32
-_ROOM = 10.0  # least ratio of full scale to the usual magnitude of a signal
+_ROOM = 10.0  # minimum ratio of full scale to the usual magnitude of a signal
 
 
 @dataclass(frozen=True)
 class CanSignal:
-    """A measurement on the bus: its field of the memory, unit, meaning, and value of one count."""
+    """A measurement on the bus: memory field, unit, meaning, and value of one count."""
 
     field: str
     unit: str
@@ -220,7 +220,7 @@ class CanSignal:
 
 
 def messages(program: Program) -> list[list[CanSignal]]:
-    """Return the signals of every message, in the order of the memory; then the statuses."""
+    """Return the signals of each message: memory fields in their order, then the statuses."""
     signals = signals_of(program.model.Memory)
     each = [
         CanSignal(member.name, found.unit, found.label, _factor(found.nominal))
@@ -235,7 +235,7 @@ def messages(program: Program) -> list[list[CanSignal]]:
 
 
 def _factor(nominal: float) -> float:
-    """Return the value of a count: 1, 2 or 5 times a power of ten."""
+    """Return the value of one count, which is 1, 2 or 5 times a power of ten."""
     least = _ROOM * abs(nominal) / _MOST
     power = math.floor(math.log10(least))
     return next(f for f in (float(f"{k}e{power}") for k in (1, 2, 5, 10)) if f >= least)
@@ -248,7 +248,7 @@ def dbc(program: Program) -> str:
     lines = ['VERSION ""', "", "NS_ :", "", "BS_:", "", "BU_: ECU"]
     for number, signals in every:
         lines += ["", f"BO_ {number} {_message(name, number)}: 8 ECU", *_signals(signals)]
-    lines += ["", f'CM_ "ECU of {_dbc_text(program.model.name)}: its memory behind a tick";']
+    lines += ["", f'CM_ "ECU of {_dbc_text(program.model.name)}: its memory after a tick";']
     lines += [
         f'CM_ SG_ {number} {each.name} "{_dbc_text(each.label)}";'
         for number, signals in every
@@ -280,7 +280,7 @@ def _message(name: str, number: int) -> str:
 
 
 def _dbc_text(text: str) -> str:
-    """Return a text for quotation marks, in characters that every DBC reader accepts."""
+    """Return a text for use in quotation marks, with characters that every DBC reader accepts."""
     plain = text.encode("ascii", "replace").decode()
     return plain.replace("\\", "/").replace('"', "'")
 
@@ -290,14 +290,14 @@ def can_header(program: Program) -> str:
     name, count = program.name, len(messages(program))
     guard = f"{name.upper()}_CAN_H"
     fill = [
-        "Fill a message, counted from 0. A value beyond full scale saturates; one that",
-        f"is NaN or infinite becomes the count {NOT_AVAILABLE}: not available.",
+        "Fill a message; the first message is 0. A value beyond full scale saturates. A NaN or",
+        f'infinite value becomes the count {NOT_AVAILABLE}, which means "not available".',
     ]
     return (
         "\n\n".join(
             [
                 comment(
-                    [f"Messages of {name}.dbc: their first identifier and number, and their bytes."]
+                    [f"Messages of {name}.dbc: first identifier, number of messages, and bytes."]
                 ),
                 f"#ifndef {guard}\n#define {guard}",
                 f'#include <stdint.h>\n#include "{name}_ecu.h"',
@@ -334,7 +334,7 @@ def can_source(program: Program) -> str:
 
 #include "{name}_can.h"
 
-/* Return the counts of a value, rounded; of NaN, the count for \"not available\". */
+/* Return the rounded count of a value; for NaN, the count for \"not available\". */
 static int32_t counts({real} value, {real} factor)
 {{
     const {real} wanted = value / factor;
@@ -354,7 +354,7 @@ static int32_t counts({real} value, {real} factor)
     return result;
 }}
 
-/* Put 16 bits into a message, the lower ones first. */
+/* Write 16 bits to a message, low byte first. */
 static void put(int32_t count, uint8_t *bytes)
 {{
     const uint32_t word = (uint32_t)count;
@@ -399,7 +399,7 @@ def files(
     every
         Test vectors of the tasks.
     bus
-        Whether to describe measurements for a CAN bus, too.
+        Whether to include descriptions of measurements for a CAN bus.
     """
     name = program.name
     made = {
@@ -436,25 +436,24 @@ def readme(program: Program, files: Iterable[str], count: int) -> str:
     values = sum(max(m.length, 1) for _, m in program.parameters())
     tasks = [f"    {step.name}: every {step.task.period:.9g} s" for step in program.steps]
     said = [
-        f"The ECU of {program.model.name} in C99, {program.precision.name} precision: it was "
-        "translated from the Python of the laws and equals what the bench runs, operation by "
-        "operation. Choices of equations are fixed as in the bench; its numbers are parameters.",
-        f"Call {name}_ecu_init once, then every task at its period; call tasks due together "
-        "in this order:",
+        f"The ECU of {program.model.name} in C99, {program.precision.name} precision. bywire "
+        "translated it from the laws' Python code. It performs the same operations as the bench. "
+        "Choices of equations are fixed as in the bench, and its numbers are parameters.",
+        f"Call {name}_ecu_init once, then call each task at its period. If several tasks are due "
+        "at the same time, call them in this order:",
         *tasks,
         _derived(program),
-        f"Memory ({memory} numbers of {size} bytes and a status for each task) belongs to the "
-        f"caller. Parameters ({values} numbers) are constants in {name}_parameters.c. Nothing is "
-        "allocated, no function is recursive, and the memory contains all states.",
+        f"The caller owns the memory ({memory} numbers of {size} bytes and a status for each "
+        f"task), which contains all states. Parameters ({values} numbers) are constants in "
+        f"{name}_parameters.c. The code allocates no memory, and no function is recursive.",
         *_instance(program),
         *_contract(program),
-        f"All names in the headers begin with {name}_, and the headers also work in C++: ECUs with "
-        "other names link into one program, for example this ECU in both precisions under two "
-        "names.",
+        f"All names in the headers begin with {name}_, so you can link ECUs with different names "
+        "into one program, for example this ECU in both precisions. The headers also work in C++.",
         _plant(program),
-        f"Compile with {' '.join(FLAGS)} or similar flags: fast math and fused multiply-add change "
-        "the last digits. 'make check' compares the compiled ECU with "
-        f"{count} vectors of each task, which Python computed.",
+        f"Compile with {' '.join(FLAGS)} or similar flags, because fast math and fused "
+        "multiply-add change the last digits. 'make check' compares the compiled ECU with Python's "
+        f"results for {count} test vectors of each task.",
         _exactness(program, real),
         "Files: " + ", ".join(files) + ".",
     ]
@@ -478,18 +477,18 @@ def _contract(program: Program) -> list[str]:
     ]
     said = [
         "CONTRACT OF A STEP",
-        f"Inputs. A step checks the inputs that its task reads. Each must be a number below "
-        f"{LARGEST:g} in magnitude, in its SI unit"
-        + (", and within its range:" if ranges else "."),
+        "Inputs. A step checks the inputs that its task reads. The magnitude of each input must "
+        f"be below {LARGEST:g} in its SI unit"
+        + (", and these inputs must be in their range:" if ranges else "."),
         *(["\n".join(ranges)] if ranges else []),
         "If an input is not valid (NaN, infinity, out of range), the step computes nothing. The "
         f"memory keeps its values, including the last commands, and memory->status_TASK becomes "
-        f"{upper}_STATUS_INPUT ({INPUT}). The next step with valid inputs continues from there. "
-        "The caller decides how long to hold commands, and what replaces them.",
-        "Results. If a state or a command is not a number below that magnitude after a tick, due "
-        "to a wrong parameter or corrupted memory, the step resets the memory as in "
-        f"{name}_ecu_init, and the status becomes {upper}_STATUS_RESULT ({RESULT}). Otherwise the "
-        "status is 0.",
+        f"{upper}_STATUS_INPUT ({INPUT}). The next step with valid inputs continues from this "
+        "memory. The caller decides how long to hold the commands and how to replace them.",
+        "Results. A wrong parameter or corrupted memory can cause a state or a command that is NaN "
+        "or exceeds this magnitude after a tick. The step then resets the memory as "
+        f"{name}_ecu_init does, and the status becomes {upper}_STATUS_RESULT ({RESULT}). Otherwise "
+        "the status is 0.",
     ]
     limits = [
         f"    memory->{c_name(each.field)}: "
@@ -499,15 +498,15 @@ def _contract(program: Program) -> list[str]:
     ]
     if limits:
         said += [
-            "Commands. For any inputs, memory and parameters, these commands stay within "
-            "their limits. A limit that is negative or NaN counts as 0:",
+            "Commands. These commands stay within their limits for any inputs, memory and "
+            "parameters. A limit that is negative or NaN counts as 0:",
             "\n".join(limits),
         ]
     said.append(
         "Parameters. A step does not check them. "
         + (
             f"{name}_instance_apply accepts calibrated parameters only if all of them are "
-            "within the ranges of the A2L file. It does not check relations between parameters."
+            "within the ranges in the A2L file. It does not check relations between parameters."
             if program.parameters()
             else ""
         )
@@ -516,7 +515,7 @@ def _contract(program: Program) -> list[str]:
 
 
 def _inputs(program: Program) -> list[CheckedInput]:
-    """Return the inputs of all tasks, each once."""
+    """Return the inputs of all tasks without duplicates."""
     return list(dict.fromkeys(each for step in program.steps for each in step.inputs))
 
 
@@ -533,12 +532,12 @@ def _range(each: CheckedInput) -> str:
 def _instance(program: Program) -> list[str]:
     name = program.name
     if not program.parameters():
-        return [f"{name}_instance.c contains {name}_memory, to which {name}.a2l links."]
+        return [f"{name}_instance.c contains {name}_memory, which {name}.a2l refers to."]
     return [
-        f"{name}_instance.c is optional. It contains {name}_memory, and parameters in RAM: a "
-        f"calibration tool changes {name}_calibration, to which {name}.a2l links, and the steps "
-        f"use {name}_active. Call {name}_instance_init instead of {name}_ecu_init, and "
-        f"{name}_instance_apply between two steps to apply the calibration."
+        f"{name}_instance.c is optional. It contains {name}_memory and parameters in RAM. "
+        f"Calibration tools change {name}_calibration, which {name}.a2l refers to. The steps use "
+        f"{name}_active. Call {name}_instance_init instead of {name}_ecu_init. To apply the "
+        f"calibration, call {name}_instance_apply between two steps."
     ]
 
 
@@ -556,9 +555,9 @@ def _plant(program: Program) -> str:
     if not names:
         return ""
     return (
-        f"{program.name}_io.c contains the plant's side of the ticks ({', '.join(names)}): "
-        "sensors and converters as simulated by the bench, and limits of the power stage. On "
-        "a target the hardware takes its place."
+        f"{program.name}_io.c contains the plant side of the ticks ({', '.join(names)}): sensors "
+        "and converters as simulated by the bench, and power-stage limits. On a target, the "
+        "hardware replaces this file."
     )
 
 
@@ -567,10 +566,11 @@ def _exactness(program: Program, real: str) -> str:
     said = "Calls of the C library: " + (", ".join(program.libraries) or "none") + ". "
     if free:
         return said + (
-            f"The last digit of {', '.join(free)} differs between libraries: results equal "
-            "Python's in every bit if both use the same library, otherwise within rounding."
+            f"The last digit of {', '.join(free)} differs between libraries. Results are "
+            "bit-identical to Python's if both use the same library, and otherwise agree to within "
+            "rounding."
         )
     return said + (
-        f"With IEEE 754 arithmetic of {real} all results are equal to Python's in every bit, on "
+        f"With IEEE 754 arithmetic of type {real}, all results are bit-identical to Python's on "
         "every target."
     )

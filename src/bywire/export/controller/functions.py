@@ -45,9 +45,9 @@ class Statement:
     Parameters
     ----------
     target
-        None (an empty text) for a function that is called only for its side effects.
+        C variable. An empty string means that the function is called only for its side effects.
     changes
-        Memory that the function called in ``value`` changes in place.
+        Memory that is changed in place by the function called in ``value``.
     is_pointer
         Whether the target is a pointer to the owner of the member.
     """
@@ -92,7 +92,7 @@ class Body:
     stores
         Number of assignments to every Python variable.
     memory
-        Versions of the memory, and the variables that keep them.
+        Versions of the memory, and the variables that contain them.
     fixed
         Arguments that depend only on parameters: shapes of parameter sets, None for numbers.
     """
@@ -134,12 +134,12 @@ class Body:
             self.memory.changed(place)
 
     def is_stable(self, expr: Expr) -> bool:
-        """Return whether a text has the same value further down: it reads nothing that changes."""
+        """Return whether an expression keeps its value later: it reads nothing that changes."""
         changing = {use[1] for use in expr.uses if use[0] == "local"} & self.moving
         return expr.is_path and not changing and not self.memory.versions_in(expr.uses)
 
     def is_steady(self, value: Any) -> bool:
-        """Return whether a number depends only on parameters, or is known."""
+        """Return whether a number is known or depends only on parameters."""
         if isinstance(value, Group):
             return bool(value.origin) and value.origin[0] in self.fixed
         if isinstance(value, Known):
@@ -150,13 +150,13 @@ class Body:
         return is_exact(value.uses) and places <= self.fixed.keys()
 
     def derived(self, value: Expr, hint: str = "") -> Expr:
-        """Return a number that depends only on parameters as a derived parameter."""
+        """Return a value, as a derived parameter if it depends only on parameters."""
         groups = [
             n for n, shape in self.fixed.items() if shape is not None and ("local", n) in value.uses
         ]
         is_plain = value.is_path or Expr(value.text.removeprefix("-")).is_path
         if self.structs.precision.name == "single" and not hint:
-            # Then a sum or a product takes one instruction, like reading it.
+            # In single precision, a sum or a product takes one instruction, like reading it.
             is_plain |= "/" not in value.text and not any(u[0] == "own" for u in value.uses)
         refused = (self.memory.function, value.text) in self.structs.derivations.refused
         if not groups or is_plain or refused or not self.is_steady(value):
@@ -166,13 +166,13 @@ class Body:
         return self.structs.derive(self.memory.function, groups[0], shape, value, hint)
 
     def operands(self, *values: Expr) -> list[Expr]:
-        """Return operands of which some change; derive those that depend only on parameters."""
+        """Return operands; if some of them change, the constant ones become derived parameters."""
         if all(map(self.is_steady, values)):
             return list(values)
         return [self.derived(each) for each in values]
 
     def settled(self, value: Any, hint: str) -> Any:
-        """Return a value that stays the same further down, in a variable if necessary."""
+        """Return a value that stays the same in later statements, in a variable if necessary."""
         value = lifted(value)
         if isinstance(value, Expr):
             return value if self.is_stable(value) else self.variable(hint, value)
@@ -196,7 +196,7 @@ class Body:
         return {name: self.settled(v, f"{hint}_{name}") for name, v in items.items()}
 
     def variable(self, hint: str, value: Any, name: str = "") -> Any:
-        """Return a value in a variable, a new one unless a name is given."""
+        """Return a value in the variable of this name, or in a new variable without a name."""
         if isinstance(value, Update) and self.structs.is_memory(value):
             return self.changed_memory(value)
         target = name or self.fresh(hint)
@@ -221,7 +221,7 @@ class Body:
         return here
 
     def changed_memory(self, value: Update) -> Record:
-        """Return the memory with some fields replaced: in place, unless they are read later."""
+        """Return the memory with some fields replaced, in place unless old values are needed."""
         place = self.owned(value.record)
         self.update(place, value.items)
         self.memory.changed(place.expr.text)
@@ -232,14 +232,14 @@ class Body:
         return replace(record.expr, text=f"{'' if record.pointer else '&'}{record.expr.text}")
 
     def owned(self, record: Record) -> Record:
-        """Return where to change the memory: in a copy if its values are read later."""
+        """Return the memory to change: a copy if the old values are read later."""
         if self.memory.stays(record.expr.text):
             return record
         copied: Record = self.variable(f"{record.expr.text}_new", record)
         return copied
 
     def update(self, record: Record, items: Mapping[str, Any]) -> None:
-        """Write new values of fields of a variable."""
+        """Assign new values to fields of a variable."""
         struct = self.structs.of_tuple(record.cls)
         kept = {
             name: v
@@ -247,7 +247,7 @@ class Body:
             if struct.is_memory or self.structs.keeps(struct, name)
         }
         target = record.expr.text
-        # All are computed before the first assignment.
+        # Compute all values before the first assignment.
         values = {name: self.rvalue(lifted(v)) for name, v in kept.items()}
         earlier: set[Any] = set()
         for name, value in values.items():
@@ -290,7 +290,7 @@ class Body:
             return self._compound(self.structs.of_group(built_shape(value)), numbers)
         if isinstance(value, Update):
             return self.rvalue(self.variable(f"{c_name(value.record.expr.text)}_new", value))
-        raise TypeError(f"{type(value).__name__} has no value in C")
+        raise TypeError(f"a value of type {type(value).__name__} cannot be written in C")
 
     def _compound(self, struct: Any, items: Mapping[str, Any]) -> Expr:
         uses: set[Any] = set()
@@ -319,14 +319,14 @@ class Body:
 
 @dataclass(frozen=True)
 class Argument:
-    """An argument in C."""
+    """An argument of a C function."""
 
     name: str
     declaration: str
 
 
 def kind_of(value: Any, structs: Structs) -> Any:
-    """Return the part of an argument that selects the C function."""
+    """Return the part of an argument that determines which C function is called."""
     value = lifted(value)
     if isinstance(value, Expr):
         return "truth" if value.truth else "number"
@@ -364,7 +364,7 @@ def _hashable(value: Any) -> Any:
 
 
 def received(value: Any, name: str, body: Body) -> Iterator[tuple[Any, Argument | None]]:
-    """Yield the form of an argument within the function, then its arguments in C."""
+    """Yield an argument's form inside the function, with its arguments in C."""
     value, structs = lifted(value), body.structs
     if isinstance(value, Known) and not isinstance(value.value, float):
         yield value, None
@@ -408,12 +408,12 @@ def received(value: Any, name: str, body: Body) -> Iterator[tuple[Any, Argument 
 
 
 def stays_there(value: Any, structs: Structs) -> bool:
-    """Return whether a NamedTuple is passed as a pointer to constant data: inputs."""
+    """Return whether a NamedTuple is an input, which is passed as a pointer to constant data."""
     return isinstance(value, Record) and value.pointer and not structs.is_memory(value)
 
 
 def passed(value: Any, body: Body) -> Iterator[Expr | Record]:
-    """Yield the C arguments of a value, in the order of `received`; memory unchanged."""
+    """Yield the C arguments of a value, in the order of `received`; memory is passed unchanged."""
     value = lifted(value)
     if isinstance(value, Known) and not isinstance(value.value, float):
         return
@@ -445,16 +445,16 @@ class CFunction:
     Parameters
     ----------
     result
-        C type; empty if the result is known at export, and nothing is called; ``void`` if it
-        changes memory and has no other result.
+        C type of the result. It is empty if the result is known at export and nothing is called,
+        and ``void`` if the function only changes memory.
     value
-        Its result, in its own variables.
+        The result, in terms of the function's own variables.
     members
         Fields of the structure for several results, by their place in ``value``.
     arguments
-        Arguments that it reads.
+        Arguments that the function reads.
     all_arguments
-        Names of all arguments of a call, read or not.
+        Names of all arguments of a call, including unused ones.
     changes
         Memory arguments that are changed in place.
     """
@@ -476,7 +476,7 @@ class CFunction:
 
     @property
     def uses(self) -> frozenset[Use]:
-        """All dependencies of its statements."""
+        """All dependencies of the function's statements."""
         every = [each.value.uses for each in self.statements]
         if self.returned is not None:
             every.append(self.returned.uses)
@@ -484,7 +484,7 @@ class CFunction:
 
 
 def finish(made: CFunction, body: Body, value: Any, node: ast.AST) -> None:
-    """Let a function return a value: directly, in a structure, or not at all if it is known."""
+    """Let a function return a value directly or in a structure; a known value needs no result."""
     value = lifted(value)
     if isinstance(value, Update):
         value = _changed(value, body)
@@ -510,7 +510,7 @@ def finish(made: CFunction, body: Body, value: Any, node: ast.AST) -> None:
 
 
 def _left_there(made: CFunction, body: Body, value: Any) -> Any:
-    """Return a function's value, with returned memory replaced by the original argument."""
+    """Return a function's value, with returned memory replaced by the function's argument."""
     memories = [a.name for a in made.arguments if a.name in body.memory.versions]
     if not memories:
         return value
@@ -519,7 +519,7 @@ def _left_there(made: CFunction, body: Body, value: Any) -> Any:
     def walked(value: Any) -> Any:
         value = lifted(value)
         if isinstance(value, Items):
-            # Expressions that read the memory are computed before it is changed.
+            # Compute the expressions that read the memory before the memory changes.
             each = [
                 v if body.structs.is_memory(v) else body.settled(v, "kept") for v in value.values
             ]
@@ -544,7 +544,7 @@ def _left_there(made: CFunction, body: Body, value: Any) -> Any:
 
 
 def _changed(value: Update, body: Body) -> Any:
-    """Return a replaced NamedTuple in its own variable if that belongs to the function."""
+    """Return a replaced NamedTuple in its own variable if the function owns this variable."""
     name = value.record.expr.text
     if body.structs.is_memory(value):
         return body.changed_memory(value)
@@ -555,7 +555,7 @@ def _changed(value: Update, body: Body) -> Any:
 
 
 def _several(made: CFunction, body: Body, value: Items | Table, node: ast.AST) -> None:
-    """Return several values in a structure."""
+    """Let a function return several values in a structure."""
     updates = [v for v in getattr(value, "values", ()) if isinstance(v, Update)]
     if isinstance(value, Items) and updates:
         value = Items(tuple(body.settled(v, "changed") for v in value.values))
@@ -586,7 +586,7 @@ def _several(made: CFunction, body: Body, value: Items | Table, node: ast.AST) -
 
 
 def _leaves(value: Any, place: tuple[Any, ...]) -> Iterator[tuple[tuple[Any, ...], Any]]:
-    """Yield the parts of a result that are not known at export, by their place."""
+    """Yield the parts of a result that are unknown at export, with their places."""
     value = lifted(value)
     if isinstance(value, Items):
         for k, each in enumerate(value.values):
@@ -599,7 +599,7 @@ def _leaves(value: Any, place: tuple[Any, ...]) -> Iterator[tuple[tuple[Any, ...
 
 
 def _member_names(value: Any, node: ast.AST) -> dict[Any, str]:
-    """Return names for the values of a result, from its return expression."""
+    """Return names for the values of a result, derived from the return expression."""
     if isinstance(value, Table):
         return {name: str(name) for name in value.items}
     names: dict[Any, str] = {}
@@ -614,7 +614,7 @@ def _member_names(value: Any, node: ast.AST) -> dict[Any, str]:
 
 
 def given_back(made: CFunction, structs: Structs, result: Expr) -> Any:
-    """Return the results of a function with a structure, which is in a variable."""
+    """Return the results of a function as members of its structure, which is in a variable."""
 
     def rebuilt(value: Any, place: tuple[Any, ...]) -> Any:
         value = lifted(value)
@@ -633,7 +633,7 @@ def given_back(made: CFunction, structs: Structs, result: Expr) -> Any:
 
 
 def as_value(value: Any, expr: Expr) -> Any:
-    """Return a C expression as its kind of value."""
+    """Return a C expression as the same kind of value."""
     if isinstance(value, (Record, Built)):
         return Record(value.cls, expr)
     if isinstance(value, (Group, BuiltGroup)):

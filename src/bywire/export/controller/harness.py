@@ -1,4 +1,4 @@
-"""C programs that test the compiled ECU: test vectors, invalid inputs, arbitrary bits."""
+"""C programs that test the compiled ECU with test vectors, invalid inputs and arbitrary bits."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from bywire.export.controller.render import parameter_values
 from bywire.export.controller.vectors import Vectors
 
 _BASES, _WILD = 8, 400
-"""vectors of a task that are tried with invalid inputs; draws of arbitrary bits"""
+"""number of a task's vectors with trials of invalid inputs; number of draws of arbitrary bits"""
 
 
 def trespassing(program: Program, every: Sequence[Vectors]) -> list[str]:
-    """Return the functions of a harness that count breaches of the contract, one for each task."""
+    """Return the harness functions that count violations of the contract, one for each task."""
     if not every:
         return []
     left = [_left(program)] if any(each.step.inputs for each in every) else []
@@ -31,7 +31,7 @@ def prepared(program: Program, vectors: Vectors) -> list[str]:
     name, task = program.name, c_name(vectors.step.task.name)
     types = {"x": f"{name}_Plant", "u": f"{name}_Stimulus", "memory": f"{name}_Memory"}
     wanted = [short for _, short in vectors.step.arguments]
-    # A structure that a task does not read gets zeros.
+    # A structure that the task does not read contains zeros.
     lines = [f"{types[kind]} {kind} = {{0}};" for kind in ("x", "u", "memory") if kind in wanted]
     for at, (kind, field) in enumerate(vectors.names):
         if kind in wanted:
@@ -50,7 +50,7 @@ def stepped(vectors: Vectors) -> str:
 
 
 def _left(program: Program) -> str:
-    """Return the function that compares memory before and after a rejected step."""
+    """Return the function that compares the memory before and after a rejected step."""
     fields = [c_name(each.name) for each in program.members(program.model.Memory)]
     same = [f"is_same(a->{each}, b->{each})" for each in fields] or ["1"]
     return (
@@ -61,7 +61,7 @@ def _left(program: Program) -> str:
 
 
 def _drawn(program: Program) -> str:
-    """Return the functions that draw arbitrary bits, often at the ends of their ranges."""
+    """Return the functions that draw arbitrary bits, often at the ends of the ranges."""
     real = program.precision.real
     return f"""static const {real} special[] = {{
     ({real})NAN, ({real})INFINITY, -({real})INFINITY, {_limits(program)}
@@ -111,7 +111,7 @@ def _refused(program: Program, each: CheckedInput) -> list[str]:
     for end, away in ((each.low, -math.inf), (each.high, math.inf)):
         if math.isfinite(end):
             beyond = float(np.nextafter(kind(end), kind(away)))
-            # The number next to 0 is subnormal, which compilers may flush: use a normal one.
+            # The number next to 0 is subnormal, which code may flush to 0. Use a normal number.
             values.append(literal(beyond if abs(beyond) > 1e-30 else math.copysign(1e-6, away)))
     return values
 
@@ -125,7 +125,7 @@ def _breaches(program: Program, vectors: Vectors) -> str:
 
 
 def _refusing(program: Program, vectors: Vectors) -> list[str]:
-    """Return the trial of invalid inputs: the memory stays as the previous step left it."""
+    """Return the test of invalid inputs, which must leave the memory unchanged."""
     name, step, task = program.name, vectors.step, c_name(vectors.step.task.name)
     status, refused = f"memory.{step.status}", f"{name.upper()}_STATUS_INPUT"
     lines = ["", f"    for (int k = 0; k < VECTORS_{task}; k += 1 + VECTORS_{task} / {_BASES}) {{"]
@@ -154,7 +154,7 @@ def _refusing(program: Program, vectors: Vectors) -> list[str]:
 
 
 def _wild(program: Program, vectors: Vectors) -> list[str]:
-    """Return the trial of arbitrary bits: memory stays finite, and commands within limits."""
+    """Return the test of arbitrary bits: memory must stay finite, and commands within limits."""
     name, step, model = program.name, vectors.step, program.model
     short = [each for _, each in step.arguments]
     types = {"x": model.State, "u": model.Stimulus, "memory": model.Memory}
@@ -217,11 +217,11 @@ WARNINGS = (
     "-Wpedantic",
 )
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off")
-"""without -ffast-math and fused multiply-add, which would change the last digits"""
+"""no -ffast-math and no fused multiply-add, which would change the last digits"""
 SMALL_FLAGS = ("-std=c99", "-Os", "-ffp-contract=off", "-fno-math-errno")
-"""for targets with little memory; square roots are instructions, without the library's errno"""
+"""flags for targets with little memory; a square root is an instruction, without errno"""
 TOLERANCE = 1e-5
-"""tolerance in single precision for functions of the C library, whose last digit may differ"""
+"""single-precision tolerance for functions of the C library, whose last digit may differ"""
 
 
 def vector_header(program: Program, every: Sequence[Vectors]) -> str:
@@ -229,7 +229,7 @@ def vector_header(program: Program, every: Sequence[Vectors]) -> str:
     name, real = program.name, program.precision.real
     guard = f"{name.upper()}_TEST_VECTORS_H"
     parts = [
-        comment(["Results of the Python laws for inputs that reach every limit."]),
+        comment(["Results of the Python laws for inputs at every limit."]),
         f"#ifndef {guard}\n#define {guard}",
     ]
     literal = program.precision.literal
@@ -259,7 +259,7 @@ def _reads_parameters(vectors: Vectors) -> bool:
 
 
 def harness(program: Program, every: Sequence[Vectors]) -> str:
-    """Return ``NAME_harness.c``: exit status 1 where a vector differs."""
+    """Return ``NAME_harness.c``, a program that exits with status 1 if a result differs."""
     name = program.name
     what = f"Compares the compiled ECU of {program.model.name} with its test vectors."
     calls = " + ".join(f"differing_{c_name(e.step.task.name)}()" for e in every)
@@ -281,7 +281,7 @@ def harness(program: Program, every: Sequence[Vectors]) -> str:
 
 
 def _derived(program: Program, every: Sequence[Vectors]) -> list[str]:
-    """Return the function that compares derived parameters with Python's numbers."""
+    """Return the function that compares the derived parameters with Python's numbers."""
     if not program.derived:
         return []
     name = program.name
@@ -299,14 +299,14 @@ def _derived(program: Program, every: Sequence[Vectors]) -> list[str]:
 
 
 def comparison(program: Program, every: Sequence[Vectors], what: str, include: str) -> list[str]:
-    """Return the beginning of a harness: a function per task that compares it with its vectors.
+    """Return the first part of a harness: one function per task that compares it with its vectors.
 
     Parameters
     ----------
     what
         Comment at the top.
     include
-        Header for its output.
+        ``#include`` line for the harness's output.
     """
     name = program.name
     return [
@@ -336,7 +336,7 @@ def _same(program: Program) -> str:
 
 def _mixed(program: Program) -> str:
     real = program.precision.real
-    return f"""/* A number for all results (FNV-1a): equal where they are equal in every bit. */
+    return f"""/* A hash of all results (FNV-1a), equal if the results are bit-identical. */
 static uint32_t bits = 2166136261u;
 
 static void mix({real} value)
@@ -368,13 +368,13 @@ def _compared(program: Program, vectors: Vectors) -> str:
 
 
 def makefile(program: Program, has_io: bool) -> str:
-    """Return a Makefile: ``make check`` compares with the vectors."""
+    """Return a Makefile whose ``make check`` compares the compiled ECU with the vectors."""
     name = program.name
     parts = ["ecu", *(["io"] if has_io else []), "parameters", "harness"]
     objects = " ".join(f"{name}_{part}.o" for part in parts)
     library = " -lm" if program.libraries else ""
     return (
-        "# Any C99 compiler will do, without fused multiply-add and fast math.\n"
+        "# Use any C99 compiler, without fused multiply-add and fast math.\n"
         "CC = gcc\n"
         f"CFLAGS = {' '.join(FLAGS)} {' '.join(WARNINGS)}\n"
         f"OBJECTS = {objects}\n\n"

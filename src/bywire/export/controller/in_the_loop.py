@@ -1,6 +1,6 @@
-"""Software in the loop: the compiled C of the ECU ticks, the plant's kernel steps in between.
+"""Software in the loop: ticks of the ECU's compiled C code between steps of the plant's kernel.
 
-Per frame the kernel runs one frame, numbered so that none of its own tasks is due.
+The kernel runs one frame at a time, with a frame number at which none of its own tasks is due.
 """
 
 from __future__ import annotations
@@ -27,31 +27,31 @@ from bywire.simulation.tapped import Tapped
 
 NEVER = 2**40
 """frame number that no run reaches"""
-# Kernels assume finite numbers, an ECU does not: it is compiled with the flags of its export.
+# A kernel assumes finite numbers. An ECU does not, so it is compiled with the flags of its export.
 _FLAGS = ("-O2", "-fsigned-zeros", "-ftrapping-math", "-fno-finite-math-only")
 _INCLUDED = re.compile(r'^#include "(.*)"$', re.MULTILINE)
 
 
 class SoftwareInTheLoop:
-    """Engine of single runs whose tasks are the compiled C of the ECU.
+    """Engine for single runs whose tasks are the ECU's compiled C code.
 
-    Falsified signals and missed ticks of tasks apply around the ECU.
+    Falsified signals and missed ticks apply outside the ECU.
 
     Parameters
     ----------
     model, par
-        The exported model; numbers come with every request.
+        The exported model and its parameters. Every request contains the parameter values.
     precision
-        ``double`` or ``single``, for the ECU.
+        ``double`` or ``single`` precision of the ECU.
     plant
         Kernel that steps the plant.
 
     Raises
     ------
     ModelError
-        With file, line and operation of a construct that cannot be translated.
+        If the ECU contains code that cannot be translated, with file, line and operation.
     CompilerError
-        If there is no compiler, or it fails.
+        If there is no compiler, or the compiler fails.
     """
 
     def __init__(
@@ -76,7 +76,7 @@ class SoftwareInTheLoop:
         self._derive = getattr(loaded, f"{made.name}_ecu_derive") if made.derived else None
 
     def advance(self, request: Request, state: Array, begin: int, end: int, rows: Array) -> None:
-        """Run frames begin..end: updates ``state`` and fills ``rows`` in place."""
+        """Run the frames from begin to end; update ``state`` and fill ``rows`` in place."""
         schedule, model, start = request.schedule, self._model, self.layout.start
         x, m = (slice(start[k], start[k] + self.layout.length[k]) for k in ("x", "m"))
         tasks = self._tasks(request.parameters)
@@ -94,7 +94,7 @@ class SoftwareInTheLoop:
                     values = model.State(*state[x].tolist()), model.Memory(*state[m].tolist())
                     state[m] = task.tick(*values, model.Stimulus(*stimulus.tolist()), None)
             is_recorded, is_last = frame % schedule.record_frames == 0, frame == schedule.frames
-            # Only for this frame: recorded if due, and without substeps at the end.
+            # The plan covers only this frame: recorded if due, and without substeps at the end.
             plan = replace(
                 aside, record_frames=1 if is_recorded else NEVER, frames=1 if is_last else NEVER
             )
@@ -103,7 +103,7 @@ class SoftwareInTheLoop:
             row += int(is_recorded)
 
     def _tasks(self, parameters: Array) -> tuple[Task, ...]:
-        """Return the compiled tasks for parameters, after the model's taps if it has any."""
+        """Return the compiled tasks for these parameters, after the model's taps if it has any."""
         is_leaf = self._leaves >= 0
         par = np.zeros(len(is_leaf), self._real)
         par[is_leaf] = parameters[self._leaves[is_leaf]]
@@ -117,7 +117,7 @@ class SoftwareInTheLoop:
 
     def _tick(self, step: Step, function: Any, par: NDArray[Any]) -> Callable[..., Any]:
         """Return the tick of a compiled task: State, Memory and Stimulus in, Memory out."""
-        # The memory contains a status for every step after its numbers.
+        # After its numbers, the memory contains a status for each step.
         room = 1 + len(self._made.steps)
         held = {short: np.zeros(len(at) + room, self._real) for short, at in self._places.items()}
         arguments = [pointer({**held, "par": par}[short]) for _, short in step.arguments]
@@ -137,7 +137,7 @@ class SoftwareInTheLoop:
 
 
 def compiled(made: Program, compiler: Compiler) -> ctypes.CDLL:
-    """Return the loaded ECU: its files as one source, with each header where it is first needed."""
+    """Return the compiled ECU: all files in one source, with each header at its first inclusion."""
     name = made.name
     headers = {f"{name}_ecu.h": render.header(made), f"{name}_ops.h": render.operations(made)}
     sources = [render.source(made)]
@@ -148,7 +148,7 @@ def compiled(made: Program, compiler: Compiler) -> ctypes.CDLL:
     def unfolded(text: str) -> str:
         return _INCLUDED.sub(lambda found: unfolded(headers.pop(found[1], "")), text)
 
-    # Initial memory and parameters come from the bench.
+    # Zeros, because initial memory and parameters come from the bench.
     zeros = f"const {name}_Memory {name}_initial_memory = {{0}};"
     source = "\n".join([*map(unfolded, sources), zeros, ""])
     entry = made.steps[0].name
@@ -156,13 +156,13 @@ def compiled(made: Program, compiler: Compiler) -> ctypes.CDLL:
 
 
 def _places(made: Program, cls: Any) -> list[int]:
-    """Return which fields of a NamedTuple exist in C, in the order of its structure."""
+    """Return the indices of a NamedTuple's fields that exist in C, in the structure's order."""
     fields = list(cls._fields)
     return [fields.index(each.name) for each in made.members(cls)]
 
 
 def _leaves_read(made: Program, leaves: Sequence[str]) -> NDArray[np.int64]:
-    """Return which numbers of the parameters exist in C, in order; -1: derived."""
+    """Return the indices of the parameter values that exist in C, in order; -1 if derived."""
     places = []
     for dotted, member in made.held():
         if member.is_derived:

@@ -1,4 +1,4 @@
-"""An ECU as a program in C: its tasks, with all functions and structures that they need."""
+"""An ECU as a C program: its tasks, with all functions and structures that they need."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ from bywire.export.controller.values import (
 )
 
 _ROOMS = frozenset({"plant", "plants", "elements"})
-"""folders with functions of the plant: converters, sensors, limits of the bridge"""
+"""folders with functions of the plant: converters, sensors, and limits of the power stage"""
 OPS = "bywire.core.ops"
 """module of the elementary functions"""
 _MOST = 30
@@ -47,17 +47,17 @@ _MOST = 30
 
 @dataclass(frozen=True)
 class Step:
-    """One task: its arguments, its statements, and the resulting memory.
+    """A task as a C function: arguments, statements, and the resulting memory.
 
     Parameters
     ----------
     inputs
-        Inputs that it checks before the computation.
+        Inputs that the function checks before the computation.
     commands
-        Commands that it limits afterwards.
+        Commands that the function limits after the computation.
     kept
-        Fields of the memory that it updates and that must be finite: commands, and fields whose
-        value a later tick uses.
+        Updated memory fields that must be finite: commands, and fields whose value a later tick
+        uses.
     """
 
     task: Task
@@ -71,12 +71,12 @@ class Step:
 
     @property
     def status(self) -> str:
-        """Field of the memory with the status of its last call."""
+        """Memory field with the status of the task's last call."""
         return f"status_{c_name(self.task.name)}"
 
     @property
     def uses(self) -> frozenset[Use]:
-        """All its dependencies."""
+        """All dependencies of the task."""
         every = [each.value.uses for each in self.statements]
         every += [each.limit.uses for each in self.commands]
         return frozenset().union(*every, *([self.result.uses] if self.result else []))
@@ -84,16 +84,16 @@ class Step:
 
 @dataclass(frozen=True)
 class Program:
-    """The ECU of a model in C.
+    """A model's ECU in C.
 
     Parameters
     ----------
     name
-        Prefix of its files and functions.
+        Prefix of files and functions.
     functions
-        Laws and the plant's side, in the order of their calls.
+        Laws and functions of the plant side, in the order of their calls.
     derived
-        Derived parameters, which are stored beside the others.
+        Derived parameters, which are stored next to the other parameters.
     """
 
     name: str
@@ -109,11 +109,11 @@ class Program:
 
     @property
     def plant_functions(self) -> list[CFunction]:
-        """Functions of the plant's side of the ticks, declared in a header."""
+        """Functions of the plant side of the ticks, declared in a header."""
         return [each for each in self.functions if each.is_plant and each.module != OPS]
 
     def shown(self) -> list[Struct]:
-        """Return the structures of the plant's side that are not in the ECU's header."""
+        """Return the structures of the plant side that are not in the ECU's header."""
         names: set[str] = set()
         for each in self.plant_functions:
             names |= {a.declaration.removeprefix("const ").split()[0] for a in each.arguments}
@@ -131,12 +131,12 @@ class Program:
 
     @property
     def libraries(self) -> tuple[str, ...]:
-        """Called functions of the C library."""
+        """Functions of the C library that the ECU calls."""
         return tuple(sorted({use[1] for use in self.uses if use[0] == "library"}))
 
     @property
     def inexact(self) -> tuple[str, ...]:
-        """Called functions of the C library with a library-dependent last digit."""
+        """Functions of the C library that the ECU calls and whose last digit differs by library."""
         exact = {"fabs", "sqrt", "fabsf", "sqrtf"}
         return tuple(each for each in self.libraries if each not in exact)
 
@@ -148,7 +148,7 @@ class Program:
 
     @property
     def memory_size(self) -> int:
-        """Bytes of the memory: its numbers, and a status for every step."""
+        """Size of the memory in bytes: its numbers, and a status for each step."""
         real = 4 if self.precision.name == "single" else 8
         size = real * len(self.members(self.model.Memory)) + 4 * len(self.steps)
         return -(-size // real) * real
@@ -159,7 +159,7 @@ class Program:
         return shape_of(self.par)
 
     def parameters(self) -> list[tuple[str, Member]]:
-        """Return the parameters that are read, by dotted name."""
+        """Return the parameters that the ECU reads, by dotted name."""
         return [each for each in self.held() if not each[1].is_derived]
 
     def held(self) -> list[tuple[str, Member]]:
@@ -177,20 +177,20 @@ class Program:
 
 
 def program(model: Model, par: ParameterSet, precision: str = "double", name: str = "") -> Program:
-    """Translate the tasks of a model for the structure of its parameters.
+    """Translate a model's tasks for the structure of its parameters.
 
     Parameters
     ----------
     name
-        Prefix of its files and symbols; by default that of the model.
+        Prefix of files and symbols. The default is the model's name.
 
     Raises
     ------
     ParameterError
-        If a name is not an identifier of C.
+        If a name is not a valid C identifier.
     ModelError
-        With file, line and operation of a construct that cannot be translated; for a model that
-        contains another model with its own ECU.
+        If code cannot be translated, with file, line and operation, or if the model contains
+        another model with its own ECU.
     """
     for sub in getattr(model, "subs", {}).values():
         if any(sub.tasks(par)):
@@ -221,11 +221,13 @@ def program(model: Model, par: ParameterSet, precision: str = "double", name: st
         }
         is_settled = fields == used and (len(copied), len(refused), shared) == before
         used = fields
-        if held is None:  # only now, so that the translation reports its errors first
+        if held is None:  # after the translation, which reports its errors first
             held = {task.name: held_by(model, par, task) for task in model.tasks(par)}
         elif is_settled:
             return made
-    raise ModelError(f"{model.name}: its set of read fields does not settle")  # pragma: no cover
+    raise ModelError(
+        f"{model.name}: the set of fields that the ECU reads does not converge"
+    )  # pragma: no cover
 
 
 def _translated(
@@ -293,7 +295,7 @@ def _translated(
 
 
 def _needed(uses: frozenset[Use], by_name: Mapping[str, CFunction]) -> set[Use]:
-    """Return the dependencies of a text, and the functions that it calls."""
+    """Return the dependencies of a text, including those of the functions that it calls."""
     found: set[Use] = set()
     waiting = [uses]
     while waiting:
@@ -319,7 +321,7 @@ def _step(
     taken: set[str],
     held: Mapping[str, Held],
 ) -> Step:
-    """Return the step of a task: its tick, called with the targets of pointers."""
+    """Return the step of a task, which calls the tick with the targets of the pointers."""
     structs = made.structs
     step = unique(f"{name}_ecu_step_{c_name(task.name)}", taken)
     body = Body(structs, Counter(), Memories(step, made.copied))

@@ -1,7 +1,8 @@
 """C structures for NamedTuples, parameter sets and several results, with derived parameters.
 
-Such numbers become members of their parameter set, beside its parameters: a law for two wheels has
-them for each wheel. ``NAME_ecu_derive`` updates them; `values` are those of the export.
+A derived parameter is a member of its parameter set, next to the parameters. So a law for two
+wheels has one for each wheel. ``NAME_ecu_derive`` updates derived parameters, and `values` computes
+them during export.
 """
 
 from __future__ import annotations
@@ -44,7 +45,7 @@ from bywire.export.controller.values import (
 )
 
 STEADY = frozenset({"local", "field", "own", "library", "constant"})
-"""kinds of dependencies that derived parameters may have; calls of laws are not among them"""
+"""kinds of dependencies that derived parameters may have, without calls of laws"""
 _EXACT = frozenset({"fabs", "sqrt", "fabsf", "sqrtf"})
 _NAME = re.compile(r"(?<![\w.>])[A-Za-z_]\w*(->)?")
 _NUMBER = re.compile(r"(?<![\w.])(\d+\.\d*(?:e[-+]?\d+)?|\d+e[-+]?\d+)f?")
@@ -75,14 +76,14 @@ _ARITHMETIC: Mapping[type[ast.operator], Callable[[Any, Any], Any]] = {
 
 @dataclass(frozen=True)
 class Term:
-    """A derived number, in the terms of the function that reads it.
+    """A derived number in terms of the function that reads it.
 
     Parameters
     ----------
     holder
-        The function's argument with this member.
+        The function's argument that contains the member.
     struct, member
-        Structure and member.
+        Structure, and its member for the number.
     """
 
     function: str
@@ -94,7 +95,7 @@ class Term:
 
 @dataclass(frozen=True)
 class Derived:
-    """The same for one set, from the root of all parameters: ``par.PLACE = TEXT``."""
+    """A derived number of one parameter set, from the root of all: ``par.PLACE = TEXT``."""
 
     place: str
     text: str
@@ -102,7 +103,7 @@ class Derived:
 
     @property
     def statement(self) -> str:
-        """Its assignment in C."""
+        """Assignment of the number in C."""
         return f"par->{self.place} = {re.sub(r'(?<![.])par[.]', 'par->', self.text)};"
 
 
@@ -113,7 +114,8 @@ class Derivations:
     Parameters
     ----------
     refused
-        Function and text of terms with two values for one member; this translation adds to them.
+        Function and text of each term with two values for one member. This translation adds to
+        them.
     """
 
     refused: set[tuple[str, str]] = field(default_factory=set)
@@ -123,7 +125,7 @@ class Derivations:
     def member(
         self, function: str, holder: str, struct: str, expr: Expr, hint: str, taken: Iterable[str]
     ) -> str:
-        """Return the name of the member for a term, a new one if there is none."""
+        """Return the name of a term's member; a new term gets a new member."""
         for each in self.terms:
             if (each.function, each.holder, each.expr.text) == (function, holder, expr.text):
                 return each.member
@@ -136,7 +138,7 @@ class Derivations:
         self.calls.setdefault(function, []).append((caller, arguments))
 
     def _roots(self, function: str) -> Iterator[tuple[dict[str, str], Uses]]:
-        """Yield the arguments from the root of all parameters, call by call."""
+        """Yield the arguments of each call, in terms of the root of all parameters."""
         if function not in self.calls:
             yield {"par": "par"}, frozenset()
             return
@@ -150,7 +152,7 @@ class Derivations:
                 yield inner, uses
 
     def derived(self, uses: frozenset[Use]) -> list[Derived]:
-        """Return the terms to compute, in the order of their dependencies."""
+        """Return the numbers to compute, in the order of their dependencies."""
         wanted, needs = [], set(uses)
         for term in reversed(self.terms):
             if ("field", term.struct, term.member) in needs:
@@ -187,7 +189,7 @@ def rooted(text: str, roots: Mapping[str, str]) -> str:
 
 
 def worded(text: str) -> str:
-    """Return a name for an expression without one.
+    """Return a name that describes an expression.
 
     Examples
     --------
@@ -208,7 +210,7 @@ def values(
     constants: Mapping[str, float],
     number: Callable[[float], Any],
 ) -> dict[str, Any]:
-    """Return the numbers of a parameter set by their place, as Python computes them."""
+    """Return the derived numbers of a parameter set by place, as Python computes them."""
     made: dict[str, Any] = {}
     names: dict[str, Any] = {name: number(value) for name, value in constants.items()}
     names["par"] = _Place(par, "", made, number)
@@ -227,7 +229,7 @@ def values(
                 return names[node.id]
             case ast.Constant(value=float() as value):
                 return number(value)
-        raise TypeError(f"{ast.unparse(node)} does not follow from parameters")
+        raise TypeError(f"{ast.unparse(node)} does not depend on parameters alone")
 
     with np.errstate(all="ignore"):
         for each in derived:
@@ -238,7 +240,7 @@ def values(
 
 @dataclass(frozen=True)
 class _Place:
-    """A parameter set in C: names in C, and derived numbers."""
+    """A parameter set with the names of its C members, and its derived numbers."""
 
     group: Any
     path: str
@@ -261,9 +263,9 @@ class _Place:
 
 @dataclass(frozen=True)
 class Member:
-    """A field of a structure: its name in Python, its type, its length as an array, its meaning.
+    """A field of a structure: name in Python, type, length of an array, and meaning.
 
-    ``is_derived``: whether it is derived from parameters.
+    ``is_derived``: whether the field is derived from parameters.
     """
 
     name: str
@@ -274,13 +276,13 @@ class Member:
 
     @property
     def declaration(self) -> str:
-        """Its line in the structure, without the comment."""
+        """Line of the field in the structure, without the comment."""
         return f"{self.ctype} {c_name(self.name)}{f'[{self.length}]' if self.length else ''};"
 
 
 @dataclass(frozen=True)
 class Struct:
-    """A structure of C."""
+    """A C structure."""
 
     name: str
     members: dict[str, Member]
@@ -300,11 +302,11 @@ class Structs:
     public
         Names of structures in the header, by class.
     memory
-        The class whose written fields are all kept.
+        The class that keeps all written fields, read or not.
     prefix
-        Prefix of the names of structures in headers: all parameter sets, and those of ``shared``.
+        Prefix of structure names in headers: all parameter sets, and those of ``shared``.
     shared
-        Further classes whose structures are in a header.
+        Other classes whose structures are in a header.
     """
 
     precision: Precision
@@ -328,13 +330,13 @@ class Structs:
         return self.known[cls]
 
     def is_memory(self, value: Any) -> bool:
-        """Return whether a value is the memory, which is changed in place."""
+        """Return whether a value is the memory, which functions change in place."""
         if hasattr(value, "record"):
             value = value.record
         return getattr(value, "cls", None) is self.memory
 
     def known_tuple(self, ctype: str) -> type[Any] | None:
-        """Return the NamedTuple class of a C type; None for that of a number."""
+        """Return the NamedTuple class of a C type; None for the type of a number."""
         for cls, struct in self.known.items():
             if struct.name == ctype and is_named_tuple(cls):
                 return cls  # type: ignore[no-any-return]
@@ -360,11 +362,11 @@ class Structs:
         return self.known[lengths]
 
     def of_result(self, function: str, members: Mapping[str, str]) -> Struct:
-        """Return the structure of a function with several results, by their types."""
+        """Return the structure for a function with several results, by their types."""
         made = {name: Member(name, ctype) for name, ctype in members.items()}
         name = unique(f"{function}_Result", self.names)
         self.names.add(name)
-        self.known["result", name] = Struct(name, made, f"What {function} returns.")
+        self.known["result", name] = Struct(name, made, f"Results of {function}.")
         return self.known["result", name]
 
     def derive(self, function: str, holder: str, shape: Shape, expr: Expr, hint: str) -> Expr:
@@ -372,7 +374,7 @@ class Structs:
         struct = self.of_group(shape)
         taken = struct.members
         name = self.derivations.member(function, holder, struct.name, expr, hint, taken)
-        note = "follows from other parameters"
+        note = "derived from other parameters"
         struct.members.setdefault(name, Member(name, self.precision.real, 0, note, True))
         uses = frozenset({("local", holder), ("field", struct.name, name)})
         return Expr(f"{holder}->{name}", uses=uses)
@@ -382,11 +384,11 @@ class Structs:
         return self.used is None or ("field", struct.name, name) in self.used
 
     def kept(self, struct: Struct) -> list[Member]:
-        """Return the fields that are read."""
+        """Return the fields that code reads."""
         return [each for name, each in struct.members.items() if self.keeps(struct, name)]
 
     def ordered(self) -> list[Struct]:
-        """Return the structures with fields, in the order of their dependencies."""
+        """Return the structures that have fields, in the order of their dependencies."""
         by_name = {each.name: each for each in self.known.values()}
         done: dict[str, Struct] = {}
 
@@ -434,7 +436,7 @@ def _doc(cls: type[Any]) -> str:
 
 
 def _lengths(shape: Shape) -> Any:
-    """Return the difference between structures of a parameter class: lengths of tables."""
+    """Return the table lengths, which distinguish the structures of a parameter class."""
     return (
         shape.cls,
         tuple(
@@ -445,7 +447,7 @@ def _lengths(shape: Shape) -> Any:
     )
 
 
-# --- Values in C: literals of known numbers, types, structures of parameter sets
+# --- Values in C: literals of known numbers, types, and structures of parameter sets
 
 
 def is_number(value: Any) -> bool:
@@ -477,7 +479,7 @@ def built_shape(value: BuiltGroup) -> Shape:
         elif isinstance(each, Expr) or is_number(each):
             fields.append((name, Number()))
         elif isinstance(each, Array):
-            raise TypeError("a parameter set with a table cannot be constructed again")
+            raise TypeError("a parameter set that contains a table cannot be rebuilt")
         elif hasattr(type(each.value), "model_fields"):
             fields.append((name, shape_of(each.value)))
         else:

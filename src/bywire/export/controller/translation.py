@@ -1,4 +1,4 @@
-"""All functions of an ECU in C: from the Python of a law, statement by statement."""
+"""Translation of an ECU's functions from Python to C, statement by statement."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def node_of(function: types.FunctionType) -> Function:
     Raises
     ------
     ModelError
-        If its source is missing, or two functions are on its line.
+        If the source is missing, or if two functions are on the same line.
     """
     code = function.__code__
     try:
@@ -105,7 +105,7 @@ def _is_of(node: Function, code: types.CodeType) -> bool:
 
 
 def notes_above(file: str, line: int) -> list[str]:
-    """Return the comment right above a line of a file."""
+    """Return the comment directly above a line of a file."""
     lines = _text(file).splitlines()
     notes: list[str] = []
     at = line - 2
@@ -116,7 +116,7 @@ def notes_above(file: str, line: int) -> list[str]:
 
 
 def description(function: types.FunctionType) -> list[str]:
-    """Return a function's description: first line, equations, references of its docstring."""
+    """Return the first line, the equations and the references of a function's docstring."""
     lines = inspect.cleandoc(function.__doc__ or "").splitlines()
     said, part = lines[:1], ""
     for line in lines[1:]:
@@ -133,7 +133,7 @@ def description(function: types.FunctionType) -> list[str]:
 
 
 def stores(node: ast.AST) -> Counter[str]:
-    """Return the number of assignments to every variable; those in a loop count twice."""
+    """Return the number of assignments to each variable; an assignment in a loop counts twice."""
     counted: Counter[str] = Counter()
     weights: dict[ast.AST, int] = {node: 1}
     for each in ast.walk(node):
@@ -151,7 +151,7 @@ def stores(node: ast.AST) -> Counter[str]:
 
 
 def closure_of(function: types.FunctionType) -> dict[str, Any]:
-    """Return the variables of enclosing functions that a function uses."""
+    """Return the variables that a function uses from its enclosing functions."""
     cells = function.__closure__ or ()
     return {
         name: cell.cell_contents
@@ -164,21 +164,21 @@ def closure_of(function: types.FunctionType) -> dict[str, Any]:
 
 @dataclass
 class Returned:
-    """The value that a function returned, and its expression."""
+    """A value that a function returned, and its expression."""
 
     value: Any
     node: ast.AST
 
 
 class Executor(Evaluator):
-    """Executes the statements of a function once, for its structure."""
+    """Executor that runs the statements of a function once, to find its structure."""
 
     def run(self, statements: list[ast.stmt]) -> Returned | None:
         """Return the returned value; None if the function continues."""
         for statement in statements:
             rule = getattr(self, f"_do_{type(statement).__name__.lower()}", None)
             if rule is None:
-                what = f"a statement {type(statement).__name__} is not translated"
+                what = f"the statement {type(statement).__name__} is not supported"
                 raise self.refuse(statement, what)
             self.body.notes[:] = notes_above(self.file, statement.lineno)
             returned = rule(statement)
@@ -188,7 +188,7 @@ class Executor(Evaluator):
 
     def _do_expr(self, node: ast.Expr) -> None:
         if not isinstance(node.value, ast.Constant):
-            raise self.refuse(node, "a statement without a result is not translated")
+            raise self.refuse(node, "a statement without a result is not supported")
 
     def _do_pass(self, node: ast.Pass) -> None:
         return None
@@ -239,7 +239,7 @@ class Executor(Evaluator):
             self.scope[target.id] = self.named(target.id, value)
             return
         if not isinstance(target, (ast.Tuple, ast.List)):
-            raise self.refuse(target, "only names can be assigned")
+            raise self.refuse(target, "only a name can be assigned")
         values = list(self.sequence(target, value))
         names = {each.id for each in target.elts if isinstance(each, ast.Name)}
         for at, each in enumerate(values[1:], 1):
@@ -251,7 +251,7 @@ class Executor(Evaluator):
             self._assign(each, entry)
 
     def named(self, name: str, value: Any) -> Any:
-        """Return a value under the name of a Python variable, in a C variable if not known."""
+        """Return a value named like a Python variable; an unknown value gets a C variable."""
         value = lifted(value)
         body = self.body
         if isinstance(value, Expr):
@@ -275,7 +275,7 @@ class Executor(Evaluator):
         return self._variable(name, value)
 
     def _is_own(self, name: str, record: Record) -> bool:
-        """Return whether a NamedTuple is already in the variable of this name."""
+        """Return whether the variable of this name already contains a NamedTuple."""
         own = self.scope.get(name)
         return isinstance(own, Record) and own.expr.text == record.expr.text and not own.pointer
 
@@ -309,10 +309,10 @@ def _uses(value: Any) -> frozenset[Any]:
     return frozenset()
 
 
-# --- Functions: each law once for every structure in which it is called
+# --- Functions: one version of each law for every structure of its arguments
 
 DEEP = 40
-"""depth of calls above which a law counts as recursive"""
+"""call depth above which a law counts as recursive"""
 
 
 @dataclass
@@ -322,9 +322,9 @@ class Translation:
     Parameters
     ----------
     is_plant
-        ``is_plant(function, arguments)``: whether a function belongs to the plant's side.
+        ``is_plant(function, arguments)``: whether a function belongs to the plant side.
     prefix
-        Prefix of the names of functions in headers.
+        Prefix of function names in headers.
     """
 
     structs: Structs
@@ -338,7 +338,7 @@ class Translation:
     depth: int = 0
 
     def constant(self, module: str, name: str, value: Any) -> Known:
-        """Return a module's object; a number has the name of its constant in C."""
+        """Return an object of a module; a number keeps the name of its C constant."""
         if isinstance(value, float) and module != "math" and name.strip("_").isupper():
             called = c_name(f"{module.rpartition('.')[2]}_{name.strip('_')}").upper()
             if self.constants.setdefault(called, value) == value:
@@ -346,10 +346,10 @@ class Translation:
         return Known(value)
 
     def call(self, at: Context, node: ast.AST, function: Any, given: list[Any], named: Any) -> Any:
-        """Return the result of a function, called in C if it is not known at export."""
+        """Return the result of a call, which is a C call if the result is unknown at export."""
         function = inspect.unwrap(function)
         if not isinstance(function, types.FunctionType):
-            raise at.refuse(node, f"{function!r} is not translated")
+            raise at.refuse(node, f"{function!r} is not supported")
         try:
             bound = inspect.signature(function).bind(*given, **named)
         except TypeError as error:
@@ -393,7 +393,7 @@ class Translation:
     def _called(
         self, at: Context, made: CFunction, arguments: Mapping[str, Any]
     ) -> tuple[Expr, dict[str, Record]]:
-        """Return the call, and its memory arguments by name."""
+        """Return the C call, and its memory arguments by name."""
         wanted = {each.name for each in made.arguments}
         every = [e for value in arguments.values() for e in passed(value, at.body)]
         given = dict(zip(made.all_arguments, every, strict=True))
@@ -415,8 +415,8 @@ class Translation:
     def function(
         self, function: types.FunctionType, arguments: Mapping[str, Any], caller: Body
     ) -> CFunction:
-        """Return the C function of a Python function for arguments of a kind."""
-        # An elementary function has a single version, for all kinds of arguments.
+        """Return the C function of a Python function for one kind of arguments."""
+        # An elementary function has a single version for all kinds of arguments.
         is_law = function.__module__ != ops.__name__
         steady = tuple(is_law and caller.is_steady(each) for each in arguments.values())
         closure = closure_of(function)
@@ -485,7 +485,7 @@ class Translation:
     def inlined(
         self, at: Context, node: ast.AST, closure: Closure, given: list[Any], named: Any
     ) -> Any:
-        """Return the result of a function that is defined within the caller, inlined there."""
+        """Return the result of a function that is defined in its caller and inlined there."""
         names = [each.arg for each in closure.node.args.args]
         values = {**dict(zip(names, given, strict=False)), **named}
         if set(values) != set(names):
@@ -507,7 +507,7 @@ def _rooted(
     arguments: Mapping[str, Any],
     memories: Mapping[str, Record],
 ) -> Any:
-    """Return a function's result in its caller's terms: its arguments are the caller's."""
+    """Return a function's result in terms of the caller's arguments."""
     value = lifted(value)
     if isinstance(value, Given):
         given = memories[value.argument]

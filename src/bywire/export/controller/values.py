@@ -1,4 +1,4 @@
-"""Values in the translation of Python: Python objects, C text, or structures of both."""
+"""Values during the translation to C: Python objects, C text, or structures of both."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 Use = tuple[Any, ...]
-"""dependencies of a C text: ("local", name), ("field", struct, name), ("call", function), ..."""
+"""dependency of a C text: ("local", name), ("field", struct, name), ("call", function), ..."""
 Uses = frozenset[Use]
 
 PRIMARY, UNARY, PRODUCT, SUM, COMPARED, BOTH, EITHER, CHOICE = 16, 14, 13, 12, 10, 5, 4, 3
@@ -18,18 +18,18 @@ _PATH = re.compile(r"[A-Za-z_][\w.\[\]]*(->[\w.\[\]]+)*|[0-9][\w.]*(e[-+]?[0-9]+
 
 @dataclass(frozen=True)
 class Expr:
-    """A number, or a truth value, of the running ECU.
+    """A number or a truth value of the running ECU.
 
     Parameters
     ----------
     text
         C expression.
     level
-        Precedence of its last operator.
+        Precedence of the expression's last operator.
     uses
-        Its dependencies.
+        Dependencies of the expression.
     truth
-        Whether it is a truth value.
+        Whether the value is a truth value.
     """
 
     text: str
@@ -38,18 +38,18 @@ class Expr:
     truth: bool = False
 
     def at(self, level: int) -> str:
-        """Return the text as an operand of an operator, in parentheses where it needs them."""
+        """Return the text as an operand of an operator, in parentheses if necessary."""
         return self.text if self.level >= level else f"({self.text})"
 
     @property
     def is_path(self) -> bool:
-        """Whether it is only a name, a field of one, or a literal."""
+        """Whether the text is only a name, a field of a structure, or a literal."""
         return _PATH.fullmatch(self.text) is not None
 
 
 @dataclass(frozen=True)
 class Known:
-    """A Python object known at export; ``name`` is that of the module's constant, if it is one."""
+    """A Python object known at export; ``name`` is the name of a module's constant."""
 
     value: Any
     name: str = ""
@@ -82,7 +82,7 @@ class Update:
 
 @dataclass(frozen=True)
 class Given:
-    """The memory argument of a function in its final state: by the argument's name in C."""
+    """The final state of a function's memory argument, by the argument's name in C."""
 
     argument: str
 
@@ -96,14 +96,14 @@ class Items:
 
 @dataclass(frozen=True)
 class Table:
-    """A dictionary of values by text."""
+    """A dictionary of values with string keys."""
 
     items: Mapping[str, Any]
 
 
 @dataclass(frozen=True)
 class Array:
-    """A table of a parameter set: numbers in a C array."""
+    """A table of a parameter set as a C array of numbers."""
 
     expr: Expr
     length: int
@@ -123,21 +123,21 @@ class Nodes:
 
 @dataclass(frozen=True)
 class Choice:
-    """Shape of a parameter that selects equations: its value."""
+    """Shape of a parameter that selects equations; the shape is its value."""
 
     value: Any
 
 
 @dataclass(frozen=True)
 class Shape:
-    """Structure of a parameter set: its class, and the shape of every field."""
+    """Structure of a parameter set: its class, and the shape of each field."""
 
     cls: type[Any]
     fields: tuple[tuple[str, Any], ...]
 
     @property
     def by_name(self) -> dict[str, Any]:
-        """Shapes by field."""
+        """Shape of each field."""
         return dict(self.fields)
 
 
@@ -148,11 +148,11 @@ class Group:
     Parameters
     ----------
     expr
-        Its place.
+        C expression of the parameter set.
     pointer
-        Whether the place is a pointer to it.
+        Whether the expression is a pointer to the parameter set.
     origin
-        The function's argument that contains it, and the path from there; None for a variable.
+        The function's argument that contains the set, and the path from there; None for a variable.
     """
 
     shape: Shape
@@ -171,7 +171,7 @@ class BuiltGroup:
 
 @dataclass(frozen=True)
 class Method:
-    """A method of a value, not called yet."""
+    """A method of a value before its call."""
 
     owner: Any
     name: str
@@ -179,14 +179,14 @@ class Method:
 
 @dataclass(frozen=True)
 class Closure:
-    """A function defined within a function: it is inlined where it is called.
+    """A function defined inside another function, which is inlined at each call.
 
     Parameters
     ----------
     scope
-        Variables around it.
+        Variables of the enclosing function.
     file, module
-        Its source file, and the names in its module.
+        Source file, and the names in the module.
     """
 
     node: ast.FunctionDef | ast.Lambda
@@ -222,7 +222,7 @@ def is_parameter_class(value: Any) -> bool:
 
 
 def lifted(value: Any) -> Any:
-    """Return a known NamedTuple, tuple or dictionary as a structure of values."""
+    """Return a value; a known NamedTuple, tuple or dictionary becomes a structure of values."""
     if not isinstance(value, Known):
         return value
     known = value.value
@@ -238,7 +238,7 @@ def lifted(value: Any) -> Any:
     return value
 
 
-# --- Memory that is changed in its place, where the laws return it as a new value
+# --- Memory: the laws return new values, and the C code changes it in place
 
 Site = tuple[str, int]
 """a change of memory: the C function that contains it, and its number there"""
@@ -246,18 +246,18 @@ Site = tuple[str, int]
 
 @dataclass
 class Memories:
-    """Versions of the memory in a C function, by its place.
+    """Versions of the memory in a C function, by place.
 
-    Python keeps old values of a memory; in C they are overwritten. When code reads an overwritten
-    version, the change that came too early is recorded: the next translation lets this change begin
-    with a copy.
+    Python preserves old values of a memory, but C code overwrites them. If code reads an
+    overwritten version, this class records the change that came too early. In the next translation,
+    the change starts with a copy.
 
     Parameters
     ----------
     function
         Name of the C function.
     copied
-        Changes that begin with a copy; this translation adds to them.
+        Changes that start with a copy. This translation adds to them.
     """
 
     function: str = ""
@@ -267,13 +267,13 @@ class Memories:
     changes: int = 0
 
     def at(self, cls: type[Any], place: str, pointer: bool) -> Record:
-        """Return the current version of the memory in a place."""
+        """Return the current version of the memory at a place."""
         version = self.versions.setdefault(place, 0)
         uses = frozenset({("local", place), ("version", place, version)})
         return Record(cls, Expr(place, uses=uses), pointer)
 
     def stays(self, place: str) -> bool:
-        """Return whether the next change of a place is made in place, without a copy before it."""
+        """Return whether the next change of a place happens in place, without a copy."""
         self.changes += 1
         site = (self.function, self.changes)
         if site in self.copied:
@@ -282,26 +282,26 @@ class Memories:
         return True
 
     def changed(self, place: str) -> None:
-        """Count a change of a place."""
+        """Record a change of a place."""
         self.versions[place] += 1
 
     def versions_in(self, uses: Iterable[Use]) -> list[Use]:
-        """Return the versions of memory among a text's dependencies."""
+        """Return the memory versions among a text's dependencies."""
         return [use for use in uses if use[0] == "version"]
 
     def read(self, uses: Iterable[Use]) -> None:
-        """Keep every version that a text reads."""
+        """Preserve each version that a text reads."""
         for _, place, version in self.versions_in(uses):
             if self.versions[place] != version:
                 self.copied.add(self.ended[place, version])
 
     def is_now(self, record: Record) -> bool:
-        """Return whether a memory is the current version of its place."""
+        """Return whether a memory is the current version at its place."""
         self.read(record.expr.uses)
         place = record.expr.text
         return ("version", place, self.versions[place]) in record.expr.uses
 
     def keep(self, place: str) -> None:
-        """Keep the first version of a place."""
+        """Preserve the first version at a place."""
         if self.versions[place]:
             self.copied.add(self.ended[place, 0])

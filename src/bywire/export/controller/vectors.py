@@ -1,10 +1,10 @@
-"""Test vectors: results of a task in Python for inputs at every limit and border.
+"""Test vectors: a task's results in Python for inputs at every limit and boundary.
 
-Random inputs rarely meet a limit to the last digit, where ``<`` and ``<=`` differ, nor come close
-enough to it to reveal another limit. A tick runs on numbers that record every comparison and the
-distance of its sides. One input is changed until a comparison changes its result, and the border in
-between is searched. The search then continues from the border, because behind rare limits there are
-limits that are met nowhere else.
+Random inputs rarely equal a limit to the last digit, where ``<`` and ``<=`` differ, and rarely come
+close enough to reveal a wrong limit. The search therefore runs a tick on numbers that record every
+comparison and the distance of its two sides. It changes one input until the result of a comparison
+changes, and then finds the boundary in between. It continues from this boundary, because some
+limits apply only beyond another rare limit.
 """
 
 from __future__ import annotations
@@ -28,17 +28,17 @@ from bywire.export.controller.contract import LARGEST
 from bywire.export.controller.program import Program, Step
 
 _Place = tuple[Any, ...]
-"""code locations that lead to a comparison, innermost first; ``core.ops`` counts as one"""
+"""call stack of a comparison, innermost location first; ``core.ops`` counts as one location"""
 Margins = dict[_Place, float]
-"""distances of the sides of comparisons"""
+"""distance of the two sides of each comparison"""
 _LESS = ("__lt__", "__ge__")
 
 _now = threading.local()
-"""``margins``: those of the current tick of this thread"""
+"""``margins``: margins of this thread's current tick"""
 
 
 class Traced(float):
-    """A float that records its comparisons, as do all results computed from it."""
+    """A float that records its comparisons and those of all results computed from it."""
 
     __slots__ = ()
     __hash__ = float.__hash__
@@ -49,7 +49,7 @@ def _comparing(name: str) -> Callable[[Traced, Any], Any]:
 
     def compare(self: Traced, other: Any) -> Any:
         if isinstance(other, (float, int)):
-            # Equal sides count as one of both results: where the comparison changes.
+            # This margin is positive for one result only; equal sides have the other result.
             apart = float(self) - float(other)
             _now.margins[_place(sys._getframe(1))] = -apart if name in _LESS else apart
         return plain(self, other)
@@ -99,7 +99,7 @@ for _name in (
 
 
 def margins(tick: Callable[..., Any], inputs: tuple[Any, Any, Any], par: Any) -> Margins:
-    """Return the distance of the sides of every comparison of a tick; empty if the tick fails.
+    """Return the margin of every comparison in a tick; empty if the tick fails.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ def margins(tick: Callable[..., Any], inputs: tuple[Any, Any, Any], par: Any) ->
     x, u, m = (type(each)(*map(Traced, each)) for each in inputs)
     _now.margins = {}
     try:
-        with np.errstate(all="ignore"):  # numbers of single precision warn where others raise
+        with np.errstate(all="ignore"):  # single-precision numbers warn instead of raising
             tick(x, m, u, par)
     except (ArithmeticError, ValueError):
         return {}
@@ -120,25 +120,25 @@ def margins(tick: Callable[..., Any], inputs: tuple[Any, Any, Any], par: Any) ->
 
 
 _BEGIN = margins.__code__
-"""outermost place of a law: calls above it are not part of the law"""
+"""outermost location of a law; calls outside it are not part of the law"""
 
 
-# --- Where a comparison turns while an input of a tick changes
+# --- Boundary of a comparison as an input of a tick changes
 
 Inputs = tuple[Any, Any, Any]
 """plant, stimulus and memory of a tick"""
 _Field = tuple[int, str]
-"""an input: which of the three, and its name"""
+"""an input: index of plant, stimulus or memory, and name"""
 _STEPS, _JUMP = 60, 1e-7
 
 
 def _value_of(inputs: Inputs, field: _Field) -> float:
-    """Return an input."""
+    """Return the value of an input."""
     return float(getattr(inputs[field[0]], field[1]))
 
 
 def changed(inputs: Inputs, changes: Iterable[tuple[_Field, float]]) -> Inputs:
-    """Return inputs with some values changed."""
+    """Return the inputs with some values changed."""
     parts = list(inputs)
     for (part, name), value in changes:
         parts[part] = parts[part]._replace(**{name: value})
@@ -147,14 +147,14 @@ def changed(inputs: Inputs, changes: Iterable[tuple[_Field, float]]) -> Inputs:
 
 @dataclass(frozen=True)
 class Border:
-    """Inputs on both sides of a border of a comparison, and whether its sides are equal at one."""
+    """Inputs on both sides of a comparison's boundary, and whether one gives equal sides."""
 
     above: Inputs
     below: Inputs
     is_met: bool
 
     def changed(self, field: _Field, value: float) -> Border:
-        """Return both sides with another input changed, assumed to be equal at one."""
+        """Return the inputs on both sides with another input changed, assuming equal sides."""
         above, below = (changed(each, [(field, value)]) for each in (self.above, self.below))
         return Border(above, below, is_met=True)
 
@@ -168,7 +168,7 @@ class Turn:
     tick
         ``tick(x, m, u, par) -> memory``.
     place
-        Place of the comparison.
+        Location of the comparison.
     field
         The input.
     """
@@ -179,23 +179,23 @@ class Turn:
     field: _Field
 
     def margins(self, inputs: Inputs, value: float) -> Margins:
-        """Return the distances of the sides of all comparisons, for a value of the input."""
+        """Return the margins of all comparisons for a value of the input."""
         return margins(self.tick, changed(inputs, [(self.field, value)]), self.par)
 
     def margin(self, inputs: Inputs, value: float) -> float:
-        """Return the distance of the sides; NaN if the comparison is not reached."""
+        """Return the comparison's margin; NaN if the tick does not reach the comparison."""
         return self.margins(inputs, value).get(self.place, math.nan)
 
     def border(
         self, inputs: Inputs, first: tuple[float, float], last: tuple[float, float]
     ) -> Border:
-        """Return the border of the comparison between two values with their margins."""
+        """Return the comparison's boundary between two values with their margins."""
         ends = _turning_point(lambda value: self.margin(inputs, value), first, last)
         above, below = (changed(inputs, [(self.field, value)]) for value, _ in ends)
         return Border(above, below, ends[1][1] == 0.0)
 
     def is_at(self, border: Border) -> bool:
-        """Return whether the comparison changes at the border."""
+        """Return whether the comparison's result changes at the boundary."""
         above, below = (
             margins(self.tick, each, self.par).get(self.place, 0.0)
             for each in (border.above, border.below)
@@ -203,7 +203,7 @@ class Turn:
         return above > 0.0 >= below and (below == 0.0 or not border.is_met)
 
     def is_seen(self, border: Border) -> bool:
-        """Return whether the memory jumps between two adjacent inputs."""
+        """Return whether the memory jumps at the boundary."""
         try:
             with np.errstate(all="ignore"):
                 first, last = (
@@ -217,19 +217,19 @@ class Turn:
 def _turning_point(
     margin: Callable[[float], float], first: tuple[float, float], last: tuple[float, float]
 ) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return two adjacent numbers between which a margin changes its sign.
+    """Return two adjacent numbers between which a margin changes sign.
 
     Parameters
     ----------
     margin
-        Margin of a number; NaN if the comparison is not reached.
+        Margin as a function of a number; NaN if the tick does not reach the comparison.
     first, last
-        Numbers and their margins, of which one is above zero.
+        Numbers with their margins, one of which is above zero.
 
     Returns
     -------
     tuple
-        The number above with its margin, and the other one.
+        The number with the positive margin, and the other number, with their margins.
     """
     above, below = (first, last) if first[1] > 0.0 else (last, first)
     for step in range(_STEPS):
@@ -251,7 +251,7 @@ def _turning_point(
 def _guessed(
     above: tuple[float, float], below: tuple[float, float], middle: float, is_beyond: bool
 ) -> float:
-    """Return the zero of a straight line, or a number just beyond the end that is closer to it."""
+    """Return the zero of a straight line, or a number next to the end with the smaller margin."""
     (a, at_a), (b, at_b) = above, below
     guess = b - at_b * (a - b) / (at_a - at_b)
     if is_beyond or at_b == 0.0:
@@ -261,30 +261,30 @@ def _guessed(
     return guess if min(a, b) < guess < max(a, b) else middle
 
 
-# --- Inputs next to borders
+# --- Inputs next to boundaries
 
 _LAW = 3
-"""places, innermost first, that are the same for all who call a law"""
+"""number of innermost locations that identify a law, whatever calls it"""
 _BORDER_TRIES, _CONTEXTS, _NEAR_BY, _SMALL = 4, 40, 3, 1e-6
 _AT_ONCE, _ENOUGH, _UNSEEN, _MET = 2, 6, 2, 2
-"""comparisons of a change; borders of each that are kept, those that do not show in the memory, and
-those whose sides are equal"""
+"""comparisons per change; saved boundaries per comparison, of which some have no visible effect on
+the memory, and some have equal sides"""
 _BEYOND, _FAR = 1.01, 1e3
-"""how far beyond a border is aimed, and how many times its size an input may become"""
+"""distance of the aim beyond a boundary, and maximum growth of an input, both as factors"""
 _ULPS = (1, -1, 2, -2, 3, -3, 5, -5, 8, -8)
 _LATEST = 200
-"""borders from which the search goes on"""
+"""number of boundaries from which the search continues"""
 
 
 class Borders:
-    """Search for inputs of a task next to the borders of its comparisons.
+    """Search for inputs of a task next to the boundaries of its comparisons.
 
     Parameters
     ----------
     tick
         ``tick(x, m, u, par) -> memory``.
     used
-        Fields that the task reads, of plant, stimulus and memory.
+        Fields of plant, stimulus and memory that the task reads.
     """
 
     def __init__(
@@ -300,14 +300,14 @@ class Borders:
         self.sides: dict[_Place, list[_Field]] = {}
 
     def near(self, rows: Sequence[tuple[Inputs, Any]], wanted: int) -> Iterator[tuple[Inputs, int]]:
-        """Yield inputs on both sides of borders, and the rows that they come from.
+        """Yield inputs on both sides of boundaries, with the index of their initial row.
 
         Parameters
         ----------
         rows
             Initial inputs and parameters of the search.
         wanted
-            Approximate number of inputs; rarely met comparisons come first.
+            Approximate number of inputs. Comparisons that are rarely reached come first.
         """
         self.rows = [inputs for inputs, _ in rows]
         self.reached = [(inputs, at) for at, inputs in enumerate(self.rows)]
@@ -329,14 +329,14 @@ class Borders:
         return int(self.rng.integers(count))
 
     def _another(self, inputs: Inputs, field: _Field) -> float:
-        """Return another value of an input: that of another input, zero, or its own changed."""
+        """Return another value of an input: another input's value, zero, or a changed value."""
         others = self.rows[self._any(len(self.rows))]
         before = _value_of(inputs, field)
         values = (_value_of(others, field), 0.0, -before, 3.0 * before)
         return values[max(int(self.rng.integers(-3, 4)), 0)]
 
     def _turned(self, inputs: Inputs, par: Any) -> Iterator[Border]:
-        """Yield borders of the rarest comparisons that change with another value of an input."""
+        """Yield boundaries of the rarest comparisons that change with an input."""
         along = Turn(self.tick, par, (), self.fields[self._any(len(self.fields))])
         at, to = _value_of(inputs, along.field), self._another(inputs, along.field)
         here, there = (along.margins(inputs, value) for value in (at, to))
@@ -357,13 +357,13 @@ class Borders:
                 yield self._met(turn, shown) if shown is not None else border
 
     def _is_worth(self, law: _Place, shown: Border | None) -> bool:
-        """Count a border; return whether it is kept."""
+        """Count a boundary, and return whether to save it."""
         self.shown[law] += int(shown is not None)
         self.unseen[law] += int(shown is None)
         return shown is not None or self.unseen[law] <= _UNSEEN
 
     def _aimed(self, first: tuple[float, Margins], last: tuple[float, Margins]) -> Iterator[float]:
-        """Yield a value at which the rarest comparison that depends on the input changes."""
+        """Yield a value at which the rarest comparison that depends on an input changes."""
         (at, here), (to, there) = first, last
         for place in sorted(here.keys() & there.keys(), key=self._rank):
             moves = there[place] - here[place]
@@ -375,14 +375,14 @@ class Borders:
                 return
 
     def _rank(self, place: _Place) -> tuple[float, _Place]:
-        """Return how often a comparison has been met already."""
+        """Return the sort key of a comparison: the number of times that it has been reached."""
         law = place[:_LAW]
         return self.met[law] + self.shown[law] / 3 + self.unseen[law] / 10, place
 
     def _met(self, turn: Turn, border: Border) -> Border:
-        """Return a border with its sides equal, if the last digits of inputs allow it.
+        """Return a boundary with equal sides, if the last digits of the inputs allow it.
 
-        The resolution of one input may make a side jump over the other.
+        The resolution of one input may be too coarse for equal sides.
         """
         law = turn.place[:_LAW]
         if not border.is_met and self.met[law] < _MET:
@@ -402,7 +402,7 @@ class Borders:
                     yield nudged
 
     def _sides(self, turn: Turn, inputs: Inputs) -> Iterator[_Field]:
-        """Yield inputs that affect a comparison."""
+        """Yield the inputs that affect a comparison."""
         before = margins(self.tick, inputs, turn.par).get(turn.place)
         for field in self.fields:
             value = _value_of(inputs, field) * (1.0 + _SMALL) + _SMALL
@@ -411,9 +411,9 @@ class Borders:
                 yield field
 
     def _elsewhere(self, turn: Turn, border: Border) -> Border | None:
-        """Return a border of the same comparison with a visible effect, if there is one."""
+        """Return a boundary of the same comparison that has a visible effect, or None."""
         above, below = (_value_of(each, turn.field) for each in (border.above, border.below))
-        for count in range(_CONTEXTS):  # at the same place: its effect may be hidden
+        for count in range(_CONTEXTS):  # at the same boundary, where the effect may be hidden
             inputs = border.above
             if count % 2:
                 inputs = self.reached[self._any(len(self.reached))][0]
@@ -423,7 +423,7 @@ class Borders:
             if turn.is_seen(moved) and turn.is_at(moved):
                 return moved
         apart = 1e-3 * (2.0 * abs(above) + 1e-3)
-        for _ in range(_NEAR_BY):  # where other inputs affect the comparison
+        for _ in range(_NEAR_BY):  # at other values of the inputs that affect the comparison
             inputs = changed(border.above, self._changes(border.above, turn.field))
             first, last = ((v, turn.margin(inputs, v)) for v in (above - apart, above + apart))
             if (first[1] > 0.0) != (last[1] > 0.0) and math.isfinite(first[1] - last[1]):
@@ -443,14 +443,14 @@ class Borders:
 # --- Vectors
 
 WILD, CALM, RELATED = tuple(range(10)), (9,) * 20 + tuple(range(10)), (9,) * 5 + (6, 6, 5)
-"""kinds of draws: arbitrary, mostly usual, and often equal or at a limit"""
+"""kinds of draws: arbitrary, usually of normal size, and often equal or at a limit"""
 _DRIFTS = -5.0, -1.5
-"""tenths of the usual size, as powers, by which signals drift in a tick"""
+"""drift of signals per tick, as exponents of ten relative to the usual size"""
 _LEVELS = (0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, -1.0)
 
 
 class Draw:
-    """Random signals: of their usual size, far beyond it, at limits, equal to each other."""
+    """Random signals: of usual size, far beyond it, at limits, or equal to each other."""
 
     def __init__(self, program: Program, rng: np.random.Generator, number: Callable[[float], Any]):
         self.rng, self.number = rng, number
@@ -464,7 +464,7 @@ class Draw:
                 self.limits.setdefault(units[group].unit.symbol, []).append(value)
 
     def value(self, signal: Signal, others: list[float]) -> float:
-        """Return a value of a signal; ``others``: earlier values of its unit."""
+        """Return a value of a signal; ``others``: earlier values with the same unit."""
         rng, nominal = self.rng, signal.nominal
         kind = int(rng.choice(self.kinds))
         if kind == 5 and signal.unit in self.limits:
@@ -481,9 +481,9 @@ class Draw:
         return 0.0 if kind == 8 else nominal * float(rng.uniform(0.0, 1.0))
 
     def tuple(self, cls: Any, used: set[str], pool: dict[str, list[float]]) -> Any:
-        """Return signals of a NamedTuple; unused ones have their usual size.
+        """Return signals of a NamedTuple; unused signals have their usual size.
 
-        ``pool``: earlier values by unit, to which these are added.
+        ``pool``: earlier values by unit. This method adds its values.
         """
         values: list[Any] = []
         for name, signal in signals_of(cls).items():
@@ -495,14 +495,14 @@ class Draw:
         return cls(*values)
 
     def moved(self, values: Any, used: set[str]) -> Any:
-        """Return signals with few of them changed."""
+        """Return the signals with a few of them changed."""
         cls: Any = type(values)
         signals = signals_of(cls)
         names = [n for n in sorted(used) if self.rng.random() < 2.0 / max(len(used), 1)]
         return values._replace(**{n: self.number(self.value(signals[n], [])) for n in names})
 
     def alike(self, values: Any, used: set[str]) -> Any:
-        """Return signals of usual size, all of them smaller by about the same factor."""
+        """Return signals of usual size, all scaled down by about the same factor."""
         cls: Any = type(values)
         factor = float(10.0 ** self.rng.uniform(-2.0, 0.5))
         return values._replace(
@@ -514,7 +514,7 @@ class Draw:
         )
 
     def drift(self, cls: Any, used: set[str]) -> dict[str, float]:
-        """Return the change of the signals of a NamedTuple per tick: some slow, some immediate."""
+        """Return the change of each signal of a NamedTuple per tick; some are slow, some fast."""
         return {
             name: signal.nominal * float(10.0 ** self.rng.uniform(*_DRIFTS) * self.rng.normal())
             for name, signal in signals_of(cls).items()
@@ -522,13 +522,13 @@ class Draw:
         }
 
     def drifted(self, values: Any, drift: Mapping[str, float]) -> Any:
-        """Return signals one tick later."""
+        """Return the signals one tick later."""
         return values._replace(
             **{name: self.number(getattr(values, name) + step) for name, step in drift.items()}
         )
 
     def parameters(self, par: ParameterSet) -> ParameterSet:
-        """Return parameters with all numbers changed, tables by a factor, within their ranges."""
+        """Return parameters with all numbers changed within their ranges; tables are scaled."""
         leaves = leaf_fields(type(par))
         factors: dict[str, float] = {}
         values: dict[str, float] = {}
@@ -550,31 +550,31 @@ class Draw:
 # --- Vectors
 
 _BORDERING = 3
-"""one of this many vectors is next to a border"""
+"""one of this many vectors is next to a boundary"""
 _MOST_AT_BORDERS = 400
 _SEGMENT = 40
 """length of a trajectory in ticks"""
 _TRIES = 50
 _KINDS = ("random", "jumping", "smooth")
 """kinds of consecutive vectors, in turn: independent, with few changes, and with all inputs
-drifting like those of a plant, so that derivatives have their usual size"""
+drifting like a plant's signals, so that derivatives have their usual size"""
 
 
 @dataclass(frozen=True)
 class Vectors:
-    """Inputs of a task and its results.
+    """Inputs and results of a task.
 
     Parameters
     ----------
     given, after
-        Shape (vectors, fields): plant, stimulus and memory in the order of ``names``; the memory
-        after the tick.
+        Shape (vectors, fields): plant, stimulus and memory in the order of ``names``, and the
+        memory after the tick.
     names
         Kind (``x``, ``u``, ``memory``) and field of every column of ``given``.
     kept
         Fields of the columns of ``after``.
     which
-        Shape (vectors,): 0 with the parameters of the bench, 1 with ``other``.
+        Shape (vectors,): 0 for the bench's parameters, 1 for ``other``.
     """
 
     step: Step
@@ -590,9 +590,9 @@ _Row = tuple[Any, Any, Any, Any, int]
 
 
 def vectors(program: Program, memory: Any, count: int, seed: int = 0) -> list[Vectors]:
-    """Return test vectors of every task: random ones, trajectories, and borders of comparisons.
+    """Return each task's test vectors: random inputs, trajectories, boundaries of comparisons.
 
-    Every other sequence has other parameters, because those of the bench may switch terms off.
+    Every second sequence has other parameters, because the bench's may switch terms off.
 
     Parameters
     ----------
@@ -627,7 +627,7 @@ def vectors(program: Program, memory: Any, count: int, seed: int = 0) -> list[Ve
 
 
 def _filled(rows: dict[str, list[_Row]], drawn: Iterator[tuple[str, _Row]], count: int) -> None:
-    """Give every task this number of rows."""
+    """Fill the rows of every task up to this number."""
     while any(len(each) < count for each in rows.values()):
         name, row = next(drawn, ("", None))
         if row is None:
@@ -644,7 +644,7 @@ def _drawn(
     used: Mapping[Any, set[str]],
     count: int,
 ) -> Iterator[tuple[str, _Row]]:
-    """Yield tasks and their results for random inputs and, in turn, trajectories."""
+    """Yield tasks and their results, alternately for random inputs and along trajectories."""
     model, number = program.model, draw.number
     start = type(memory)(*map(number, memory))
     for stretch in range(_TRIES * count):
@@ -678,7 +678,7 @@ def _drawn(
 def _at_rest(
     program: Program, x: Any, u: Any, m: Any, par: ParameterSet, number: Callable[[float], Any]
 ) -> Any:
-    """Return the memory after ticks with constant inputs, when filters are at rest."""
+    """Return the memory after enough ticks with constant inputs for filters to settle."""
     for _ in range(_SEGMENT):
         for step in program.steps:
             after = _ticked(step, x, m, u, par, number)
@@ -696,7 +696,7 @@ def _at_borders(
     count: int,
     draw: Draw,
 ) -> Iterator[_Row]:
-    """Yield vectors next to borders of comparisons, with Python's results."""
+    """Yield vectors next to boundaries of comparisons, with Python's results."""
     given = 0
     plain = [each.with_leaves({n: float(v) for n, v in each.leaves().items()}) for each in sets]
     begins = [
@@ -711,7 +711,7 @@ def _at_borders(
 
 
 def _inside(values: Any, number: Callable[[float], Any]) -> Any:
-    """Return signals within their valid ranges, which a step requires."""
+    """Return the signals, limited to their valid ranges, which a step requires."""
     cls: Any = type(values)
     return values._replace(
         **{
@@ -736,7 +736,7 @@ def _nominal(cls: Any, number: Callable[[float], Any]) -> Any:
 def _ticked(
     step: Step, x: Any, m: Any, u: Any, par: ParameterSet, number: Callable[[float], Any]
 ) -> Any:
-    """Return the memory after a tick; None if Python, or a step, rejects its inputs."""
+    """Return the memory after a tick; None if Python or a step rejects the inputs."""
     if not (_is_accepted(x) and _is_accepted(u)):
         return None
     try:

@@ -1,7 +1,7 @@
 """An FMU: description, binaries, sources, documentation and a reference run in one archive.
 
-The kernel may assume finite numbers, which would delete the checks of a client's values: so both
-are compiled separately.
+The compiler may assume finite numbers in the kernel. This option would delete the checks of a
+client's values, so kernel and checks are compiled separately.
 """
 
 from __future__ import annotations
@@ -53,16 +53,16 @@ _LANGUAGE = ("-std=c11", "-fvisibility=hidden")
 
 @dataclass(frozen=True)
 class Platform:
-    """A system for binaries.
+    """A platform for binaries.
 
     Parameters
     ----------
     folder_2, folder_3
-        Their folders in an FMU of version 2.0 and of 3.0.
+        Folders of its binaries in an FMU of version 2.0 and of 3.0.
     suffix
-        Ending of the file name.
+        File extension.
     triple
-        Name of the system for the compiler of the extra ``compiler``.
+        Name of the platform for the compiler of the extra ``compiler``.
     """
 
     folder_2: str
@@ -81,7 +81,7 @@ PLATFORMS: Mapping[str, Platform] = {
 
 
 def this_platform() -> str:
-    """Return the name of this system in ``PLATFORMS``."""
+    """Return the name of this platform in ``PLATFORMS``."""
     is_arm = platform.machine().lower() in ("aarch64", "arm64")
     if sys.platform == "win32":
         return "win64"
@@ -96,11 +96,11 @@ def compiled(sources: Path, kernel: str, functions: str, target: str, library: P
     Parameters
     ----------
     sources
-        Their folder.
+        Folder of the sources.
     kernel, functions
         File of the kernel, and file of the interface's functions.
     target
-        Name of the system, one of ``PLATFORMS``.
+        Name of the platform, one of ``PLATFORMS``.
     library
         Path of the library.
 
@@ -112,9 +112,9 @@ def compiled(sources: Path, kernel: str, functions: str, target: str, library: P
     Raises
     ------
     UnknownNameError
-        For another system.
+        For another platform.
     CompilerError
-        If there is no compiler for it, or it fails.
+        If there is no compiler for the platform, or the compiler fails.
     """
     if target not in PLATFORMS:
         raise unknown_name("target", target, PLATFORMS)
@@ -139,7 +139,7 @@ def _libraries(target: str) -> list[str]:
 
 
 def _compiler_for(target: str) -> tuple[Compiler, tuple[str, ...]]:
-    """Return a compiler, and its arguments for the system."""
+    """Return a compiler, and its arguments for the platform."""
     if target == this_platform():
         compiler = find_compiler()
         if compiler is None:
@@ -169,11 +169,13 @@ def _call(compiler: Compiler, cross: tuple[str, ...], arguments: list[str]) -> N
     try:
         done = run_program(command, TIMEOUT)
     except subprocess.TimeoutExpired:
-        raise CompilerError(f"{compiler.label} took longer than {TIMEOUT:g} s for an FMU") from None
+        raise CompilerError(
+            f"{compiler.label} exceeded its limit of {TIMEOUT:g} s for an FMU"
+        ) from None
     except OSError as error:
-        raise CompilerError(f"{compiler.label} did not run ({error.strerror or error})") from None
+        raise CompilerError(f"{compiler.label} did not start ({error.strerror or error})") from None
     if done.returncode != 0:
-        message = "\n".join(done.stderr.splitlines()[:6]) or "without a message"
+        message = "\n".join(done.stderr.splitlines()[:6]) or "(no message)"
         raise CompilerError(f"{compiler.label} rejected the sources of an FMU:\n{message}")
 
 
@@ -181,7 +183,7 @@ def _call(compiler: Compiler, cross: tuple[str, ...], arguments: list[str]) -> N
 
 _HERE = Path(__file__).parent
 _KERNEL = "kernel.c"
-_DATE = (1980, 1, 1, 0, 0, 0)  # of every file in the archive: the same FMU has the same bytes
+_DATE = (1980, 1, 1, 0, 0, 0)  # of every file, so that equal FMUs are byte-identical
 Progress = Callable[[str, float], None]
 
 
@@ -194,19 +196,19 @@ class Unit:
     made
         The exported run.
     faces
-        Its variables.
+        Variables of the run.
     version
-        Version of the interface: 2 or 3.
+        Version of the interface, 2 or 3.
     functions
         File of the interface's functions.
     identifier
-        Name of its binaries.
+        Name of the binaries.
     token
         Unique identifier.
     begins_anywhere
-        Whether it also begins at rest with changed parameters.
+        Whether the run begins at rest with changed parameters, too.
     files
-        Texts of its sources by name.
+        Contents of the source files by name.
     """
 
     made: Exported
@@ -235,7 +237,7 @@ class Unit:
 
 
 def unit_of(made: Exported, part: Part, version: int, kind: Kind = "co-simulation") -> Unit:
-    """Return the FMU of a part of an exported run; for model exchange that of its plant."""
+    """Return the FMU of a part of an exported run; for model exchange, the FMU of the plant."""
     start, reads = start_source(made)
     modes: dict[str, object] = {}
     if kind == "model-exchange":
@@ -261,12 +263,12 @@ def unit_of(made: Exported, part: Part, version: int, kind: Kind = "co-simulatio
 
 
 def write_unit(unit: Unit, path: Path, targets: Sequence[str], progress: Progress) -> list[str]:
-    """Write an FMU, whole or not at all, and return the compilers of its binaries.
+    """Write a complete FMU or nothing, and return the compilers of its binaries.
 
     Raises
     ------
     CompilerError
-        If a binary cannot be made.
+        If a binary cannot be compiled.
     OSError
         If the file cannot be written.
     """
@@ -296,7 +298,7 @@ def write_unit(unit: Unit, path: Path, targets: Sequence[str], progress: Progres
 
 
 def reference(made: Exported) -> bytes:
-    """Return the bench's own run as CSV: time, stimulus, and signals after the ticks, SI."""
+    """Return the bench's own run as CSV: time, stimulus, and signals after the ticks (SI)."""
     trajectory = simulate(made.run)
     schedule = made.schedule
     stimulus = sampled_stimulus(made.run, schedule)
@@ -326,22 +328,23 @@ def _add(archive: zipfile.ZipFile, name: str, content: bytes) -> None:
     archive.writestr(entry, content)
 
 
-# --- The page inside an FMU: content, stepping, inputs and outputs
+# --- Documentation page inside an FMU: content, stepping, inputs and outputs
 
 _STEPS = {
-    2: "A step first runs the ticks of the ECU that are due at its beginning, with the inputs as "
-    "they were set, then the substeps. Between steps a client reads the state right before the "
-    "ticks that are due then (left limits), and the memory of the ECU after its last tick.",
-    3: "Without event mode, a step first runs the ticks of the ECU that are due at its beginning, "
-    "with the inputs as they were set, then the substeps; between steps a client reads the state "
-    "right before the ticks that are due then. With event mode, ticks run in events, when "
-    "their clocks tick, and the results after them are those that a bench records.",
+    2: "A step first runs the ECU's ticks that are due at its beginning, with the current inputs, "
+    "and then the substeps. Between steps, a client reads the state just before the ticks that are "
+    "due at that time (left limits), and the ECU's memory after its last tick.",
+    3: "Without event mode, a step first runs the ECU's ticks that are due at its beginning, with "
+    "the current inputs, and then the substeps. Between steps, a client reads the state just "
+    "before the ticks that are due at that time. With event mode, ticks run in events, when their "
+    "clocks tick. The results after an event are those that a bench records.",
 }
 _EXCHANGED = (
-    "A client's solver integrates the states. Bodies with dry friction are stuck or slide, states "
-    "with limits are free or at a limit, contacts are closed or open. These modes (mode.*) change "
-    "only in event mode, if an event indicator has changed its sign or an input has changed. The "
-    "ECU's outputs are inputs; set them in event mode. This FMU omits energies and other integrals."
+    "A client's solver integrates the states. Bodies with dry friction stick or slide, states "
+    "with limits are free or at a limit, and contacts are closed or open. These modes (mode.*) "
+    "change only in event mode, when an event indicator has changed sign or an input has changed. "
+    "The ECU's outputs are inputs of this FMU. Set them in event mode. This FMU omits energies and "
+    "other integrals."
 )
 
 
@@ -350,10 +353,10 @@ def documentation(made: Exported, faces: Interface, begins_anywhere: bool, versi
     bench, par, schedule = made.bench, made.run.par, made.schedule
     title = escape(f"{bench.name or bench.experiment}: {faces.part}")
     begins = (
-        "With changed parameters the run also begins at rest."
+        "With changed parameters, the run begins at rest, too."
         if begins_anywhere
-        else "The initial state belongs to the exported parameters: with others, the brake begins "
-        "off its equilibrium and settles."
+        else "The initial state is the equilibrium for the exported parameters. With other "
+        "parameters, the brake starts away from its equilibrium and settles."
     )
     tasks = ", ".join(
         f"{task.name} every {shown(task.period, 's')}" for task in made.run.model.tasks(par)
@@ -380,11 +383,12 @@ def documentation(made: Exported, faces: Interface, begins_anywhere: bool, versi
     ]
     texts = [
         _EXCHANGED if is_exchanged else _STEPS[version],
-        f"{begins} The FMU rejects values that are NaN or out of range, and keeps the "
-        "previous ones. Sensor noise is an input: a standard normal number for each tick, or zero.",
-        "reference.csv, next to this page, is the bench's own run: time, stimulus, and every "
-        "recorded signal after the ticks, in SI units. This FMU omits the bench's warnings of "
-        "ranges of validity.",
+        f"{begins} The FMU rejects values that are NaN or out of range, and keeps the previous "
+        "values. Sensor noise is an input. Set it to a standard normal number for each tick, or to "
+        "zero.",
+        "The file reference.csv, next to this page, contains the bench's own run: time, stimulus, "
+        "and every recorded signal after the ticks, in SI units. This FMU does not warn you if the "
+        "model leaves its range of validity.",
     ]
     rows = [
         (
@@ -398,13 +402,13 @@ def documentation(made: Exported, faces: Interface, begins_anywhere: bool, versi
         for v in faces.variables
         if v.causality != "local" or is_exchanged
     ]
-    heading = ("name", "what", "unit", "start", "range", "meaning")
+    heading = ("name", "role", "unit", "start", "range", "meaning")
     return f"""<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8"><title>{title}</title>
 <style>body {{ font: 15px sans-serif; margin: 2em auto; max-width: 70em }}
 td, th {{ text-align: left; padding: 0.1em 1em 0.1em 0; vertical-align: top }}</style></head>
 <body><h1>{title}</h1>
-<p>Made by bywire {escape(__version__)}. All values in SI units.</p>
+<p>Generated by bywire {escape(__version__)}. All values are in SI units.</p>
 <table>{_rows(facts)}</table>
 {"".join(f"<p>{escape(each)}</p>" for each in texts)}
 <h2>Variables</h2>

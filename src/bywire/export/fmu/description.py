@@ -1,4 +1,4 @@
-"""Model descriptions of versions 2.0 and 3.0, with units as exponents of the SI's base units."""
+"""Model descriptions of versions 2.0 and 3.0, with units as exponents of the SI base units."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _BASES = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
 def _unit_definitions(units: Iterable[str]) -> Element:
     """Return the element ``UnitDefinitions`` of both versions.
 
-    Each has the display unit of bywire, if that is different.
+    A unit has bywire's display unit if the display unit is different.
     """
     made = Element("UnitDefinitions")
     for unit in sorted(set(units)):
@@ -66,13 +66,13 @@ def description_2(
     Parameters
     ----------
     identifier
-        Attributes of both versions.
+        Name of the FMU's binaries.
     token
         The GUID.
     head
         Attributes that both versions share.
     sources
-        Files to compile.
+        Source files to compile.
     """
     frame = repr(made.schedule.frame)
     root = Element(
@@ -113,9 +113,9 @@ def description_2(
 
 
 def _states_of_rates(faces: Interface) -> dict[int, int]:
-    """Return the value reference of the state of each derivative, by that of the derivative.
+    """Return the value reference of each derivative's state, by the derivative's reference.
 
-    The integrated states are first in the state vector.
+    The integrated states come first in the state vector.
     """
     states = faces.at("state")
     return {rate: states[k] for k, rate in faces.at("rate").items()}
@@ -145,14 +145,14 @@ def _scalar(reference: int, each: Variable, state: int | None) -> Element:
 
 
 def _variability(each: Variable) -> str:
-    """Return when a variable may change."""
+    """Return the ``variability`` of a variable: when its value may change."""
     if each.causality == "parameter":
         return "tunable" if each.is_tunable else "fixed"
     return "discrete" if each.is_held else "continuous"
 
 
 def _real_attributes(each: Variable) -> dict[str, str]:
-    """Return unit, range and start of a variable, as both versions write them."""
+    """Return the attributes for unit, range and start of a variable, the same in both versions."""
     made = {} if each.unit == "1" else {"unit": each.unit}
     if each.leaf is not None:
         low, high = finite_range(each.leaf)
@@ -173,7 +173,7 @@ def _real_attributes(each: Variable) -> dict[str, str]:
 def description_3(
     made: Exported, faces: Interface, identifier: str, token: str, head: dict[str, str]
 ) -> Element:
-    """Return the model description; arguments as those of `description_2`."""
+    """Return the model description; the arguments are those of `description_2`."""
     schedule = made.schedule
     root = Element(
         "fmiModelDescription",
@@ -281,7 +281,7 @@ def _float(nodes: list[Numbered], state: int | None) -> Element:
 
 
 def build_description(identifier: str, sources: Sequence[str]) -> Element:
-    """Return how the sources are compiled."""
+    """Return the element that describes how to compile the sources."""
     root = Element("fmiBuildDescription", fmiVersion="3.0")
     build = SubElement(root, "BuildConfiguration", modelIdentifier=identifier)
     files = SubElement(build, "SourceFileSet", language="C11")

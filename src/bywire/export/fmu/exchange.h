@@ -1,9 +1,9 @@
 /* A plant between the events of a client's solver: modes, derivatives, event indicators.
  *
- * A modal state carries dry friction or a limit. Its mode is 1 or -1, the direction in which it
- * moves, or 0 while it is stuck: then it is zero, and so is its derivative. Contacts are closed or
- * open. Modes change only in event mode; in between all equations are smooth except for kinks
- * in the plant's own laws.
+ * A modal state has dry friction or a limit. Its mode is its direction of motion, 1 or -1, or 0 while
+ * it is stuck. A stuck state and its derivative are zero. Contacts are closed or open. Modes change
+ * only in event mode. Between events, all equations are smooth except for kinks in the plant's own
+ * laws.
  */
 #include <stdint.h>
 
@@ -16,12 +16,14 @@ void bw_output(const double *p, const double *x, const double *m, const double *
     const double *reaction, double *row);
 
 #define INDICATORS (2 * MODAL + CONTACTS)
-/* A value exactly on an edge is not beyond it: otherwise solvers that stop there find that nothing
- * has changed. Edges have a width where rounding plays: of a velocity, as a share of its usual
- * magnitude, which a solver errs by when a body breaks away; of an overlap [m], a sum of others. */
+/* A value exactly on an edge is not beyond it, because a solver that stops there would otherwise find
+ * no change. The edges of quantities with rounding errors have a width. For a velocity, the width is
+ * a fraction of its usual magnitude: a solver's error when a body breaks away. For an overlap, which
+ * is a sum of other quantities, it is a length [m]. */
 #define EDGE 1e-300
 #define MOTION_EDGE 1e-9
 #define CONTACT_EDGE 1e-14
+#define WRONG_STATES "wrong number of continuous states"
 
 static const int modal_states[] = MODAL_STATES;
 static const double nominals[] = NOMINALS;
@@ -29,10 +31,10 @@ static const double nominals[] = NOMINALS;
 typedef struct {
   double p[PARAMETERS + 1], u[STIMULI + 1], state[STATE], row[ROWS + 1];
   double time, events; /* events: number of mode changes */
-  double origin, stop; /* times of the client at which the run begins, and may end at most [s] */
+  double origin, stop; /* client's times of the run's beginning and of its latest end [s] */
   double mode[MODAL + 1], closed[CONTACTS + 1], reaction[MODAL + 1];
   double rate[STATES], indicator[INDICATORS + 1];
-  int32_t is_set;   /* a value was set since the derivatives were computed */
+  int32_t is_set;   /* a value has been set since the derivatives were computed */
   int32_t is_stale; /* the rows are older than the derivatives */
   int32_t is_begun; /* the initial values are set */
 } run;
@@ -43,8 +45,8 @@ static double *states(run *r) { return r->state + X_AT; }
 
 static inline double seconds(const run *r) { return r->time; }
 
-/* Derivatives and event indicators. A stuck body is held by the load on it, and an indicator
- * turns negative where the load leaves the bounds, a body reverses, or a contact changes. */
+/* Derivatives and event indicators. A reaction balances the load on a stuck body. An indicator turns
+ * negative if the load exceeds the reaction's bounds, a body reverses, or a contact changes. */
 static void evaluate(run *r) {
   double balance[STATES], mass[STATES], low[MODAL + 1], high[MODAL + 1];
   double pressed[CONTACTS + 1], lack[CONTACTS + 1];
@@ -72,8 +74,8 @@ static void refresh(run *r) {
   r->is_stale = 0;
 }
 
-/* Take the modes that state and inputs ask for; 1 where a state was set to zero or a rate may jump:
- * some clients' solvers restart only where states are reported as changed. */
+/* Set the modes that follow from state and inputs. Return 1 if a state was set to zero or a rate may
+ * jump, because some clients' solvers restart only if the FMU reports changed states. */
 static int settle(run *r) {
   double balance[STATES], mass[STATES], low[MODAL + 1], high[MODAL + 1];
   double pressed[CONTACTS + 1], lack[CONTACTS + 1], mode[MODAL + 1], closed[CONTACTS + 1];
@@ -82,7 +84,7 @@ static int settle(run *r) {
   memcpy(closed, r->closed, sizeof closed);
   for (int k = 0; k < MODAL; ++k) {
     double *x = &states(r)[modal_states[k]];
-    if (mode[k] * *x > 0.0) continue; /* it continues in its direction */
+    if (mode[k] * *x > 0.0) continue; /* the body keeps moving in its direction */
     is_new |= *x != 0.0;
     *x = 0.0;
     r->mode[k] = 0.0;
@@ -125,41 +127,41 @@ static double *place_of(run *r, unsigned k) {
   }
 }
 
-/* Common functions of both versions; each returns an error message, NULL for success. */
+/* Functions that both versions share; each returns an error message, or NULL for success. */
 static const char *take_states(run *r, const double *x, size_t n) {
-  if (n != STATES) return "there are not as many continuous states";
+  if (n != STATES) return WRONG_STATES;
   memcpy(states(r), x, n * sizeof *x);
   r->is_set = 1;
   return NULL;
 }
 
 static const char *give_states(run *r, double *x, size_t n) {
-  if (n != STATES) return "there are not as many continuous states";
+  if (n != STATES) return WRONG_STATES;
   memcpy(x, states(r), n * sizeof *x);
   return NULL;
 }
 
 static const char *give_rates(run *r, double *rate, size_t n) {
-  if (n != STATES) return "there are not as many continuous states";
+  if (n != STATES) return WRONG_STATES;
   evaluate(r);
   memcpy(rate, r->rate, n * sizeof *rate);
   return NULL;
 }
 
 static const char *give_indicators(run *r, double *z, size_t n) {
-  if (n != INDICATORS) return "there are not as many event indicators";
+  if (n != INDICATORS) return "wrong number of event indicators";
   evaluate(r);
   memcpy(z, r->indicator, n * sizeof *z);
   return NULL;
 }
 
 static const char *give_nominals(double *x, size_t n) {
-  if (n != STATES) return "there are not as many continuous states";
+  if (n != STATES) return WRONG_STATES;
   memcpy(x, nominals, n * sizeof *x);
   return NULL;
 }
 
-/* The state whose derivative is not a number; NULL where there is none. */
+/* Return the first state whose derivative is not finite; NULL if all are finite. */
 static const char *unknown_rate(const run *r) {
   for (int k = 0; k < STATES; ++k)
     if (!isfinite(r->rate[k])) return state_names[k];

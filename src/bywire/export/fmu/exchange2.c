@@ -1,4 +1,4 @@
-/* Functional Mock-up Interface 2.0, model exchange: the functions of a solver, over exchange.h. */
+/* Functional Mock-up Interface 2.0, model exchange: the functions that a solver calls, with exchange.h. */
 #include "exchange.h"
 
 #define KIND 0
@@ -18,7 +18,7 @@ API fmi2Status fmi2EnterEventMode(fmi2Component c) {
 
 API fmi2Status fmi2NewDiscreteStates(fmi2Component c, event_info *info) {
   instance *one = c;
-  if (one->now != IN_EVENT) return refuse(one, fmi2Error, "it is not in event mode");
+  if (one->now != IN_EVENT) return refuse(one, fmi2Error, "the FMU is not in event mode");
   memset(info, 0, sizeof *info);
   info->states = settle(&one->r);
   return fmi2OK;
@@ -54,7 +54,7 @@ API fmi2Status fmi2GetDerivatives(fmi2Component c, double rate[], size_t n) {
   char said[MESSAGE];
   const fmi2Status status = answer(c, give_rates(&one->r, rate, n));
   if (status != fmi2OK || !unknown_rate(&one->r)) return status;
-  snprintf(said, MESSAGE, "the derivative of %s is no number here", unknown_rate(&one->r));
+  snprintf(said, MESSAGE, "the derivative of %s is not a finite number", unknown_rate(&one->r));
   return refuse(c, fmi2Discard, said);
 }
 

@@ -1,4 +1,4 @@
-/* Functional Mock-up Interface 3.0, model exchange: the functions of a solver, over exchange.h. */
+/* Functional Mock-up Interface 3.0, model exchange: the functions that a solver calls, with exchange.h. */
 #include "exchange.h"
 
 #define KIND_TEXT "model exchange"
@@ -29,7 +29,7 @@ API fmi3Status fmi3EnterEventMode(fmi3Instance c) {
 API fmi3Status fmi3UpdateDiscreteStates(fmi3Instance c, bool *again, bool *terminate,
     bool *nominal, bool *state, bool *has_next, double *next) {
   instance *one = c;
-  if (one->now != IN_EVENT) return refuse(one, fmi3Error, "it is not in event mode");
+  if (one->now != IN_EVENT) return refuse(one, fmi3Error, "the FMU is not in event mode");
   *again = *terminate = *nominal = *has_next = false;
   *next = 0.0;
   *state = settle(&one->r);
@@ -66,7 +66,7 @@ API fmi3Status fmi3GetContinuousStateDerivatives(fmi3Instance c, double rate[], 
   char said[MESSAGE];
   const fmi3Status status = answer(c, give_rates(&one->r, rate, n));
   if (status != fmi3OK || !unknown_rate(&one->r)) return status;
-  snprintf(said, MESSAGE, "the derivative of %s is no number here", unknown_rate(&one->r));
+  snprintf(said, MESSAGE, "the derivative of %s is not a finite number", unknown_rate(&one->r));
   return refuse(c, fmi3Discard, said);
 }
 
@@ -90,7 +90,7 @@ API fmi3Status fmi3GetNumberOfContinuousStates(fmi3Instance c, size_t *n) {
   return fmi3OK;
 }
 
-/* Neither steps nor clocks. */
+/* Functions for steps and clocks. */
 NOT_OFFERED(fmi3EnterStepMode, (fmi3Instance c))
 NOT_OFFERED(fmi3DoStep, (fmi3Instance c))
 NOT_OFFERED(fmi3SetClock, (fmi3Instance c))

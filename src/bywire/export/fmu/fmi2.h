@@ -1,7 +1,7 @@
-/* Functional Mock-up Interface 2.0: what co-simulation and model exchange have in common.
+/* Functional Mock-up Interface 2.0: functions that co-simulation and model exchange share.
  *
- * The file that includes this one has included what a run is, and says by KIND (the number of an
- * interface type), KIND_TEXT and AFTER_INITIALIZATION which of both it is.
+ * The including file first includes the definition of a run. It selects the interface type with KIND
+ * (its number), KIND_TEXT and AFTER_INITIALIZATION.
  */
 #include <stddef.h>
 
@@ -34,14 +34,14 @@ typedef struct {
   char name[128];
 } instance;
 
-/* Say what a function does not do, or did with a reservation, and return its status. */
+/* Log an error or a warning of a function, and return its status. */
 static fmi2Status refuse(fmi2Component c, fmi2Status status, const char *text) {
   const instance *one = c;
   const char *category = status == fmi2Warning ? "logStatusWarning" : "logStatusError";
   char format[2 * MESSAGE];
   size_t to = 0;
   for (const char *from = text; *from && to < sizeof format - 2; ++from) {
-    if (*from == '%') format[to++] = '%'; /* some clients show the format as it stands */
+    if (*from == '%') format[to++] = '%'; /* some clients print the unexpanded format */
     format[to++] = *from;
   }
   format[to] = 0;
@@ -50,7 +50,7 @@ static fmi2Status refuse(fmi2Component c, fmi2Status status, const char *text) {
   return status;
 }
 
-/* Return the status of what may have gone wrong. */
+/* Return fmi2OK, or log an error message and return fmi2Error. */
 static fmi2Status answer(fmi2Component c, const char *wrong) {
   return wrong ? refuse(c, fmi2Error, wrong) : fmi2OK;
 }
@@ -67,9 +67,9 @@ API fmi2Component fmi2Instantiate(const char *name, int type, const char *guid,
   one->is_logging = logging;
   snprintf(one->name, sizeof one->name, "%s", name ? name : "");
   if (type != KIND) {
-    refuse(one, fmi2Error, "only " KIND_TEXT " is offered");
+    refuse(one, fmi2Error, "this FMU supports only " KIND_TEXT);
   } else if (!guid || strcmp(guid, TOKEN)) {
-    refuse(one, fmi2Error, "the GUID is not that of this model's description");
+    refuse(one, fmi2Error, "the GUID does not match this model's description");
   } else {
     reset(&one->r);
     return one;
@@ -91,7 +91,7 @@ API fmi2Status fmi2SetupExperiment(fmi2Component c, int has_tolerance, double to
   instance *one = c;
   (void)has_tolerance, (void)tolerance; /* the step is fixed */
   if (one->now != INSTANTIATED)
-    return refuse(one, fmi2Error, "the experiment must be set up before the initialization");
+    return refuse(one, fmi2Error, "fmi2SetupExperiment must be called before initialization");
   return answer(one, timed(&one->r, start, has_stop, stop));
 }
 
@@ -104,7 +104,7 @@ API fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
   instance *one = c;
   if (!one->r.is_begun && !begin(&one->r)) {
     one->now = FAILED;
-    return refuse(one, fmi2Error, "there is no state at rest with these parameters");
+    return refuse(one, fmi2Error, "the model has no equilibrium with these parameters");
   }
   one->now = AFTER_INITIALIZATION;
   return fmi2OK;
@@ -125,11 +125,11 @@ API fmi2Status fmi2Reset(fmi2Component c) {
 API fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n,
     double values[]) {
   instance *one = c;
-  if (one->now == INITIALIZING && !one->r.is_begun) { /* a look at the initial values */
+  if (one->now == INITIALIZING && !one->r.is_begun) { /* compute a preview of the initial values */
     run tried = one->r;
     if (begin(&tried)) {
       for (size_t k = 0; k < n; ++k) {
-        if (vr[k] >= VARIABLES) return refuse(one, fmi2Error, "there is no such variable");
+        if (vr[k] >= VARIABLES) return refuse(one, fmi2Error, "unknown value reference");
         values[k] = *place_of(&tried, vr[k]);
       }
       return fmi2OK;
@@ -137,7 +137,7 @@ API fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_
   }
   refresh(&one->r);
   for (size_t k = 0; k < n; ++k) {
-    if (vr[k] >= VARIABLES) return refuse(one, fmi2Error, "there is no such variable");
+    if (vr[k] >= VARIABLES) return refuse(one, fmi2Error, "unknown value reference");
     values[k] = *place_of(&one->r, vr[k]);
   }
   return fmi2OK;
@@ -146,7 +146,7 @@ API fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_
 API fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n,
     const double values[]) {
   instance *one = c;
-  run before = one->r; /* all of them, or none */
+  run before = one->r; /* set all values or none */
   char said[MESSAGE];
   for (size_t k = 0; k < n; ++k) {
     set_value(&one->r, vr[k], values[k], one->now >= IN_EVENT, said);
@@ -193,7 +193,7 @@ API fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const char bytes[], size
 API fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference unknown[],
     size_t nu, const fmi2ValueReference known[], size_t nk, const double dk[], double du[]) {
   (void)unknown, (void)nu, (void)known, (void)nk, (void)dk, (void)du;
-  return refuse(c, fmi2Error, "directional derivatives are not offered");
+  return refuse(c, fmi2Error, "directional derivatives are not supported");
 }
 
 #define NO_VARIABLES(type, ctype) \

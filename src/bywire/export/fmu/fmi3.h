@@ -1,7 +1,7 @@
-/* Functional Mock-up Interface 3.0: what co-simulation and model exchange have in common.
+/* Functional Mock-up Interface 3.0: functions that co-simulation and model exchange share.
  *
- * The file that includes this one has included what a run is, and says by KIND_TEXT which of both
- * it is. Value references: the variables, then time, then what else there is.
+ * The including file first includes the definition of a run. It specifies the interface type with
+ * KIND_TEXT. The value references are those of the variables, then of time, then any others.
  */
 #include <stdbool.h>
 #include <stddef.h>
@@ -36,7 +36,7 @@ static fmi3Status refuse(fmi3Instance c, fmi3Status status, const char *text) {
   return status;
 }
 
-/* Return the status of what may have gone wrong. */
+/* Return fmi3OK, or log an error message and return fmi3Error. */
 static fmi3Status answer(fmi3Instance c, const char *wrong) {
   return wrong ? refuse(c, fmi3Error, wrong) : fmi3OK;
 }
@@ -53,7 +53,7 @@ API fmi3Status fmi3SetDebugLogging(fmi3Instance c, bool on, size_t n, const char
   return fmi3OK;
 }
 
-/* Return an instance; NULL with a message where the token is another model's. */
+/* Return an instance, or log a message and return NULL if the token belongs to another model. */
 static fmi3Instance instantiated(const char *token, bool logging, void *environment, logger log) {
   instance *one = calloc(1, sizeof *one);
   if (!one) return NULL;
@@ -61,7 +61,7 @@ static fmi3Instance instantiated(const char *token, bool logging, void *environm
   one->environment = environment;
   one->log = log;
   if (!token || strcmp(token, TOKEN)) {
-    refuse(one, fmi3Error, "the instantiation token is not that of this model's description");
+    refuse(one, fmi3Error, "the instantiation token does not match this model's description");
     free(one);
     return NULL;
   }
@@ -69,9 +69,9 @@ static fmi3Instance instantiated(const char *token, bool logging, void *environm
   return one;
 }
 
-/* Say that an interface type is not offered. */
+/* Log that this FMU does not support an interface type. */
 static inline fmi3Instance not_this(void *environment, logger log) {
-  if (log) log(environment, fmi3Error, "logStatusError", "only " KIND_TEXT " is offered");
+  if (log) log(environment, fmi3Error, "logStatusError", "this FMU supports only " KIND_TEXT);
   return NULL;
 }
 
@@ -98,7 +98,7 @@ API fmi3Status fmi3ExitInitializationMode(fmi3Instance c) {
   instance *one = c;
   if (!one->r.is_begun && !begin(&one->r)) {
     one->now = FAILED;
-    return refuse(one, fmi3Error, "there is no state at rest with these parameters");
+    return refuse(one, fmi3Error, "the model has no equilibrium with these parameters");
   }
   one->now = one->has_events ? IN_EVENT : RUNNING;
   return fmi3OK;
@@ -116,7 +116,7 @@ API fmi3Status fmi3Reset(fmi3Instance c) {
   return fmi3OK;
 }
 
-/* How many numbers a value reference stands for; 0 where it stands for none. */
+/* Return the number of values of a value reference; 0 if the reference is unknown. */
 static int size_of(fmi3ValueReference vr) {
   return vr < VARIABLES ? sizes[vr] : vr == TIME;
 }
@@ -126,12 +126,12 @@ API fmi3Status fmi3GetFloat64(fmi3Instance c, const fmi3ValueReference vr[], siz
   instance *one = c;
   run tried = one->r, *r = &one->r;
   size_t at = 0;
-  if (one->now == INITIALIZING && !r->is_begun && begin(&tried)) r = &tried; /* a look ahead */
+  if (one->now == INITIALIZING && !r->is_begun && begin(&tried)) r = &tried; /* a preview */
   else refresh(r);
   for (size_t k = 0; k < n; ++k) {
     const int size = size_of(vr[k]);
     if (!size || at + (size_t)size > count)
-      return refuse(one, fmi3Error, "there is no such variable, or no room for its values");
+      return refuse(one, fmi3Error, "unknown value reference, or too little space for its values");
     for (int j = 0; j < size; ++j)
       values[at++] = vr[k] == TIME ? seconds(r)
                                    : *place_of(r, vr[k] + (unsigned)j);
@@ -142,8 +142,8 @@ API fmi3Status fmi3GetFloat64(fmi3Instance c, const fmi3ValueReference vr[], siz
 API fmi3Status fmi3SetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t n,
     const double values[], size_t count) {
   instance *one = c;
-  run before = one->r; /* all of them, or none */
-  char said[MESSAGE] = "there is no such variable, or there are not as many values";
+  run before = one->r; /* set all values or none */
+  char said[MESSAGE] = "unknown value reference, or too few values";
   size_t at = 0;
   for (size_t k = 0; k < n; ++k) {
     const int size = vr[k] == TIME ? 0 : size_of(vr[k]);
@@ -199,7 +199,7 @@ API fmi3Status fmi3EvaluateDiscreteStates(fmi3Instance c) {
   return fmi3OK;
 }
 
-/* What is not offered: no variables of other types, derivatives, partitions or configurations. */
+/* Not supported: variables of other types, derivatives, partitions and configurations. */
 #define NO_TYPE(type, ctype) \
   API fmi3Status fmi3Get##type(fmi3Instance c, const fmi3ValueReference vr[], size_t n, \
       ctype values[], size_t count) { \
@@ -212,7 +212,7 @@ API fmi3Status fmi3EvaluateDiscreteStates(fmi3Instance c) {
     return n ? refuse(c, fmi3Error, "all variables are Float64 or clocks") : fmi3OK; \
   }
 #define NOT_OFFERED(name, arguments) \
-  API fmi3Status name arguments { return refuse(c, fmi3Error, #name " is not offered"); }
+  API fmi3Status name arguments { return refuse(c, fmi3Error, #name " is not supported"); }
 typedef const char *text;
 NO_TYPE(Float32, float)
 NO_TYPE(Int8, int8_t)
@@ -238,7 +238,7 @@ API fmi3Status fmi3SetBinary(fmi3Instance c, const fmi3ValueReference vr[], size
   return n ? refuse(c, fmi3Error, "all variables are Float64 or clocks") : fmi3OK;
 }
 
-/* They read no other argument than the instance, which comes first in all of them. */
+/* These functions read only the instance, which is always the first argument. */
 NOT_OFFERED(fmi3EnterConfigurationMode, (fmi3Instance c))
 NOT_OFFERED(fmi3ExitConfigurationMode, (fmi3Instance c))
 NOT_OFFERED(fmi3GetNumberOfVariableDependencies, (fmi3Instance c))

@@ -1,8 +1,9 @@
-/* Functional Mock-up Interface 2.0, co-simulation: the functions of an importer, over stepping.h.
+/* Functional Mock-up Interface 2.0, co-simulation: the functions that an importer calls. They use
+ * stepping.h.
  *
- * A step runs the ticks that are due at its beginning, with the inputs that were set, then the
- * substeps. Between steps a client reads the state right before the ticks that are due
- * then: the left limit. Signals named sampled.* are those right after the ticks at the beginning
+ * A step first runs the ticks that are due at its beginning, with the current inputs, and then the
+ * substeps. Between steps, a client reads the state just before the ticks that are due at that time
+ * (the left limit). Signals named sampled.* contain the values just after the ticks at the beginning
  * of the last step, as a bench records them.
  */
 #include "stepping.h"
@@ -18,61 +19,61 @@ API fmi2Status fmi2DoStep(fmi2Component c, double time, double step, int no_earl
   double before = unsettled(&one->r);
   int64_t frames;
   (void)no_earlier_state;
-  if (one->now != RUNNING) return refuse(one, fmi2Error, "it is not initialized");
+  if (one->now != RUNNING) return refuse(one, fmi2Error, "the FMU is not initialized");
   frames = frames_of(&one->r, time, step, said);
   if (!frames) return refuse(one, fmi2Error, said);
   advance(&one->r, frames, !IS_PLANT);
   if (lost(&one->r)) {
     one->now = FAILED;
-    snprintf(said, MESSAGE, "the run left the numbers: %s is not finite", lost(&one->r));
+    snprintf(said, MESSAGE, "the run diverged: %s is not finite", lost(&one->r));
     return refuse(one, fmi2Error, said);
   }
   if (unsettled(&one->r) > before)
-    return refuse(one, fmi2Warning, "contacts or frictions did not settle in some substeps");
+    return refuse(one, fmi2Warning, "contacts or friction did not settle in some substeps");
   return fmi2OK;
 }
 
 API fmi2Status fmi2CancelStep(fmi2Component c) {
-  return refuse(c, fmi2Error, "steps are done at once: there is none to cancel");
+  return refuse(c, fmi2Error, "steps are synchronous and cannot be canceled");
 }
 
 API fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[],
     size_t n, const int order[], const double values[]) {
   (void)vr, (void)n, (void)order, (void)values;
-  return refuse(c, fmi2Error, "derivatives of inputs are not taken: they are held over a step");
+  return refuse(c, fmi2Error, "input derivatives are not supported, because inputs are constant over a step");
 }
 
 API fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference vr[],
     size_t n, const int order[], double values[]) {
   (void)vr, (void)n, (void)order, (void)values;
-  return refuse(c, fmi2Error, "derivatives of outputs are not offered");
+  return refuse(c, fmi2Error, "output derivatives are not supported");
 }
 
 API fmi2Status fmi2GetStatus(fmi2Component c, int kind, fmi2Status *value) {
   (void)kind, (void)value;
-  return refuse(c, fmi2Discard, "steps are done at once: there is no status to ask for");
+  return refuse(c, fmi2Discard, "steps are synchronous and have no pending status");
 }
 
 API fmi2Status fmi2GetRealStatus(fmi2Component c, int kind, double *value) {
   instance *one = c;
-  if (kind != 2) return refuse(c, fmi2Discard, "only the last successful time can be asked for");
+  if (kind != 2) return refuse(c, fmi2Discard, "the only available status is the last successful time");
   *value = seconds(&one->r);
   return fmi2OK;
 }
 
 API fmi2Status fmi2GetIntegerStatus(fmi2Component c, int kind, int *value) {
   (void)kind, (void)value;
-  return refuse(c, fmi2Discard, "there is no such status");
+  return refuse(c, fmi2Discard, "unknown status");
 }
 
 API fmi2Status fmi2GetBooleanStatus(fmi2Component c, int kind, int *value) {
   instance *one = c;
-  if (kind != 3) return refuse(c, fmi2Discard, "there is no such status");
+  if (kind != 3) return refuse(c, fmi2Discard, "unknown status");
   *value = one->now == FAILED;
   return fmi2OK;
 }
 
 API fmi2Status fmi2GetStringStatus(fmi2Component c, int kind, const char **value) {
   (void)kind, (void)value;
-  return refuse(c, fmi2Discard, "there is no such status");
+  return refuse(c, fmi2Discard, "unknown status");
 }

@@ -1,9 +1,10 @@
-/* Functional Mock-up Interface 3.0, co-simulation: the functions of an importer, over stepping.h.
+/* Functional Mock-up Interface 3.0, co-simulation: the functions that an importer calls. They use
+ * stepping.h.
  *
- * Without event mode a step runs the ticks that are due at its beginning, then the substeps, and
- * results are left limits, as in version 2.0. With event mode the ECU's tasks are clocks: the
- * importer activates them at their times, and the results after that event are those of the
- * bench. Value references: those of fmi3.h, then a clock for every task.
+ * Without event mode, a step runs the ticks that are due at its beginning and then the substeps.
+ * Results are left limits, as in version 2.0. With event mode, the ECU's tasks are clocks, which the
+ * importer activates at their times. The results after that event equal those of the bench. The
+ * value references are those of fmi3.h, then a clock for every task.
  */
 #include "stepping.h"
 
@@ -32,7 +33,7 @@ API fmi3Instance fmi3InstantiateModelExchange(const char *name, const char *toke
 
 API fmi3Status fmi3EnterEventMode(fmi3Instance c) {
   instance *one = c;
-  if (!one->has_events) return refuse(one, fmi3Error, "it was instantiated without event mode");
+  if (!one->has_events) return refuse(one, fmi3Error, "the FMU was instantiated without event mode");
   one->now = IN_EVENT;
   return fmi3OK;
 }
@@ -46,12 +47,12 @@ API fmi3Status fmi3SetClock(fmi3Instance c, const fmi3ValueReference vr[], size_
     const bool values[]) {
   instance *one = c;
   char said[MESSAGE];
-  if (one->now != IN_EVENT) return refuse(one, fmi3Error, "clocks tick in event mode");
+  if (one->now != IN_EVENT) return refuse(one, fmi3Error, "clocks tick only in event mode");
   for (size_t k = 0; k < n; ++k) {
     const int64_t task = (int64_t)vr[k] - CLOCK(0);
-    if (task < 0 || task >= TASKS) return refuse(one, fmi3Error, "there is no such clock");
+    if (task < 0 || task >= TASKS) return refuse(one, fmi3Error, "unknown clock");
     if (values[k] && one->r.frame % task_frames[task]) {
-      snprintf(said, MESSAGE, "clock %s does not tick at %.9g s, but every %.9g s",
+      snprintf(said, MESSAGE, "clock %s does not tick at %.9g s. Its interval is %.9g s",
           task_names[task], seconds(&one->r),
           STEP * SUBSTEPS * (double)task_frames[task]);
       return refuse(one, fmi3Error, said);
@@ -66,7 +67,7 @@ API fmi3Status fmi3GetClock(fmi3Instance c, const fmi3ValueReference vr[], size_
   instance *one = c;
   for (size_t k = 0; k < n; ++k) {
     const int64_t task = (int64_t)vr[k] - CLOCK(0);
-    if (task < 0 || task >= TASKS) return refuse(one, fmi3Error, "there is no such clock");
+    if (task < 0 || task >= TASKS) return refuse(one, fmi3Error, "unknown clock");
     values[k] = one->r.is_active[task];
   }
   return fmi3OK;
@@ -76,7 +77,7 @@ API fmi3Status fmi3UpdateDiscreteStates(fmi3Instance c, bool *again, bool *termi
     bool *nominals, bool *states, bool *has_next, double *next) {
   instance *one = c;
   int any = 0;
-  if (one->now != IN_EVENT) return refuse(one, fmi3Error, "it is not in event mode");
+  if (one->now != IN_EVENT) return refuse(one, fmi3Error, "the FMU is not in event mode");
   for (int k = 0; k < TASKS; ++k) any |= one->r.is_active[k];
   if (any) tick(&one->r, one->r.is_active);
   for (int k = 0; k < TASKS; ++k) {
@@ -88,7 +89,7 @@ API fmi3Status fmi3UpdateDiscreteStates(fmi3Instance c, bool *again, bool *termi
   return fmi3OK;
 }
 
-/* Frames until a task ticks next, excluding now; NEVER without tasks. */
+/* Frames until the next tick of any task, not counting the current frame; NEVER without tasks. */
 static int64_t until_tick(const run *r) {
   int64_t nearest = NEVER;
   for (int k = 0; k < TASKS; ++k) {
@@ -109,19 +110,19 @@ API fmi3Status fmi3DoStep(fmi3Instance c, double time, double step, bool no_earl
   (void)no_earlier_state;
   *needs_event = *terminate = *returned_early = false;
   *last = seconds(r);
-  if (one->now != RUNNING) return refuse(one, fmi3Error, "it is not in step mode");
+  if (one->now != RUNNING) return refuse(one, fmi3Error, "the FMU is not in step mode");
   frames = frames_of(r, time, step, said);
   if (!frames) return refuse(one, fmi3Error, said);
   if (one->has_events && !IS_PLANT) {
     for (int k = 0; k < TASKS; ++k)
       if (r->frame % task_frames[k] == 0 && !one->r.is_done[k]) {
-        snprintf(said, MESSAGE, "clock %s ticks at %.9g s: activate it in event mode first",
+        snprintf(said, MESSAGE, "clock %s ticks at %.9g s. Activate it in event mode first",
             task_names[k], *last);
         return refuse(one, fmi3Error, said);
       }
     if (frames > until_tick(r)) {
       if (!one->may_return_early)
-        return refuse(one, fmi3Error, "a clock ticks within this step: end it there");
+        return refuse(one, fmi3Error, "a clock ticks within this step. End the step at the tick");
       frames = until_tick(r);
       *returned_early = true;
     }
@@ -131,12 +132,12 @@ API fmi3Status fmi3DoStep(fmi3Instance c, double time, double step, bool no_earl
   memset(one->r.is_done, 0, sizeof one->r.is_done);
   if (lost(r)) {
     one->now = FAILED;
-    snprintf(said, MESSAGE, "the run left the numbers: %s is not finite", lost(r));
+    snprintf(said, MESSAGE, "the run diverged: %s is not finite", lost(r));
     return refuse(one, fmi3Error, said);
   }
   *last = seconds(r);
   if (unsettled(r) > before)
-    return refuse(one, fmi3Warning, "contacts or frictions did not settle in some substeps");
+    return refuse(one, fmi3Warning, "contacts or friction did not settle in some substeps");
   return fmi3OK;
 }
 
@@ -145,14 +146,14 @@ API fmi3Status fmi3GetIntervalDecimal(fmi3Instance c, const fmi3ValueReference v
   instance *one = c;
   for (size_t k = 0; k < n; ++k) {
     const int64_t task = (int64_t)vr[k] - CLOCK(0);
-    if (task < 0 || task >= TASKS) return refuse(one, fmi3Error, "there is no such clock");
+    if (task < 0 || task >= TASKS) return refuse(one, fmi3Error, "unknown clock");
     intervals[k] = STEP * SUBSTEPS * (double)task_frames[task];
-    qualifiers[k] = 1; /* unchanged: it is constant */
+    qualifiers[k] = 1; /* unchanged, because the interval is constant */
   }
   return fmi3OK;
 }
 
-/* No model exchange. */
+/* Functions of model exchange. */
 NOT_OFFERED(fmi3EnterContinuousTimeMode, (fmi3Instance c))
 NOT_OFFERED(fmi3CompletedIntegratorStep, (fmi3Instance c))
 NOT_OFFERED(fmi3SetTime, (fmi3Instance c))

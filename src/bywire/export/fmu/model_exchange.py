@@ -1,4 +1,9 @@
-"""A plant in model exchange: its variables, and its equations in continuous time as C text."""
+"""A plant in model exchange: modes between events, variables, and its equations as C text.
+
+Set-valued forces become modes that change only at events. A body with dry friction slides forward
+or backward, or sticks until the applied force exceeds the friction bounds. A state with a limit is
+similar: its force is any push away from the limit. A contact is closed or open.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +11,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import chain
+from typing import Any
 
+import casadi as ca
+
+from bywire.core.model import Model
+from bywire.core.parameters import ParameterSet
 from bywire.core.signals import Signal, signals_of
 from bywire.export.exported import (
     Exported,
@@ -22,13 +32,120 @@ from bywire.export.exported import (
     state_variable,
 )
 from bywire.simulation.c_runtime import SCALAR
-from bywire.simulation.continuous import Continuous, build_continuous
+from bywire.simulation.contacts import gaps, stiffness
 from bywire.simulation.expressions import as_number, needed
 from bywire.simulation.graph import Graph, Node
+from bywire.simulation.scheme import NEVER, solve_small
 from bywire.simulation.stages import indented, leaf_namer, statements
+from bywire.simulation.symbols import SX, column, scalars, symbol_tuple
+
+
+@dataclass(frozen=True)
+class Continuous:
+    """A plant's symbolic functions between two events.
+
+    Parameters
+    ----------
+    modal
+        States with a set-valued force: first those with friction, then those with a limit.
+    contacts
+        Number of contacts.
+    closing
+        ``(x, p) -> closed``: 1 for each closed contact, else 0.
+    equations
+        ``(x, m, p, closed) -> (balance, mass, low, high, pressed, lack)``: right-hand sides without
+        set-valued forces, and factors of the derivatives, (nx,) each; bounds of the set-valued
+        forces; each contact's force if only this contact were closed; and its overlap minus its
+        elastic deflection.
+    output
+        ``(x, m, p, closed, reaction, flow) -> o``: recorded signals; ``flow``: integrals.
+    """
+
+    modal: tuple[str, ...]
+    contacts: int
+    closing: Any
+    equations: Any
+    output: Any
+
+
+def build_continuous(model: Model, par: ParameterSet) -> Continuous:
+    """Evaluate a plant on symbols.
+
+    Parameters
+    ----------
+    model
+        The system.
+    par
+        Any parameter set with the required structure. Its numbers become arguments.
+    """
+    names = tuple(par.leaves())
+    p, x = SX.sym("p", len(names)), SX.sym("x", len(model.State._fields))
+    symbolic: Any = par.with_leaves(dict(zip(names, scalars(p), strict=True)))
+    m = SX.sym("m", len(model.Memory._fields))
+    overlap = gaps(model, symbolic, x, x)
+    closed = SX.sym("closed", overlap.shape[0])
+    modal = (*model.frictions, *model.limits)
+    reaction = SX.sym("reaction", len(modal))
+    compliance = _compliance(model, symbolic)
+    force = _forces(compliance, overlap, closed)
+    state, memory = symbol_tuple(model.State, x), symbol_tuple(model.Memory, m)
+    pressed = scalars(force)
+    pairs = [
+        (ca.fmin(SX(low), 0), ca.fmax(SX(high), 0))
+        for low, high in model.bounds(state, state, memory, symbolic, pressed)
+    ]
+    pairs += [(SX(0), SX(NEVER))] * len(model.limits)
+    equations = [
+        column(model.balance(state, state, memory, symbolic, pressed)),
+        column(model.mass(state, symbolic)),
+        column([low for low, _ in pairs]),
+        column([high for _, high in pairs]),
+        column([compliance[k, k] * force[k] for k in range(overlap.shape[0])]),
+        overlap - compliance @ force,
+    ]
+    flow = SX.sym("flow", len(model.Flow._fields))
+    integrals = symbol_tuple(model.Flow, flow)
+    shown = model.output(state, memory, symbolic, pressed, scalars(reaction), integrals)
+    K = stiffness(model, symbolic, overlap, exact=True)
+    presses = column([ca.if_else(K[k, k] > 0, 1, 0) for k in range(overlap.shape[0])])
+    return Continuous(
+        modal,
+        overlap.shape[0],
+        _function("closing", [x, p], [presses]),
+        _function("equations", [x, m, p, closed], equations),
+        _function("output", [x, m, p, closed, reaction, flow], [column(shown)]),
+    )
+
+
+def _function(name: str, arguments: list[Any], results: list[Any]) -> Any:
+    return ca.Function(name, arguments, [ca.densify(SX(each)) for each in results])
+
+
+def _compliance(model: Model, par: ParameterSet) -> Any:
+    """Return the compliances of all groups, block by block, shape (n, n)."""
+    groups = [C for C in model.compliance(par) if C]
+    blocks = [SX(ca.vertcat(*(ca.horzcat(*map(SX, row)) for row in C))) for C in groups]
+    return ca.densify(ca.diagcat(*blocks)) if blocks else SX(0, 0)
+
+
+def _forces(C: Any, overlap: Any, closed: Any) -> Any:
+    """Return the contact forces F: C F = d for closed contacts, zero for open ones."""
+    n = overlap.shape[0]
+    if n == 0:
+        return SX(0, 1)
+    M, b = SX(C), SX(n, 1)
+    for k in range(n):
+        b[k] = ca.if_else(closed[k], overlap[k], 0)
+        for j in range(n):
+            if not M[k, j].is_zero():
+                M[k, j] = ca.if_else(closed[k], C[k, j], 1.0 if j == k else 0.0)
+    return ca.densify(solve_small(M, b))
+
+
+# --- Variables and C text
 
 LEAVES = {"p": "p", "x": "x", "m": "m", "c": "closed", "r": "reaction"}
-"""arguments of the C functions by kind of leaf; without integrals, which are not computed"""
+"""arguments of the C functions by kind of leaf, without the integrals, which the FMU omits"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,12 +156,12 @@ class Equations:
 
     @cached_property
     def continuous(self) -> Continuous:
-        """Its symbolic functions."""
+        """Symbolic functions of the plant."""
         return build_continuous(self.made.run.model, self.made.run.par)
 
     @cached_property
     def graph(self) -> Graph:
-        """Arguments of the other properties' nodes."""
+        """Graph that contains the nodes of the other properties."""
         return Graph()
 
     def _added(self, function: object, kinds: str) -> list[list[Node]]:
@@ -77,14 +194,14 @@ class Equations:
 
     @property
     def shown(self) -> list[int]:
-        """Recorded signals that depend on state and inputs: no integrals, no ECU signals."""
+        """Recorded signals that depend on state and inputs, without integrals and ECU signals."""
         held = leaves_read(self.graph, chain(*self.equations))["m"]
         reads = [leaves_read(self.graph, [node]) for node in self.output]
         return [k for k, each in enumerate(reads) if not each["q"] and each["m"] <= held]
 
     @property
     def counts(self) -> dict[str, object]:
-        """Constants for the functions around the equations, by name of their macro."""
+        """Constants for the C functions that use the equations, by the name of their macro."""
         states = list(signals_of(self.made.run.model.State).values())
         names = self.made.run.model.State._fields
         modal = [names.index(name) for name in self.continuous.modal]
@@ -144,7 +261,7 @@ def exchange_interface(equations: Equations, start_reads: frozenset[int]) -> Int
     Parameters
     ----------
     start_reads
-        Parameters that the initial values depend on, by index.
+        Indices of the parameters that the initial values depend on.
     """
     made, graph = equations.made, equations.graph
     read = leaves_read(graph, [n for nodes in equations.equations for n in nodes])
@@ -169,7 +286,7 @@ def exchange_interface(equations: Equations, start_reads: frozenset[int]) -> Int
 
 
 def _state_names(equations: Equations, shown: list[int]) -> list[str]:
-    """Return the names of the states; another name if the recorded signal differs or is held."""
+    """Return the names of the states, renamed where another signal has the same name."""
     made = equations.made
     recorded = list(made.program.outputs)
     taken = set(made.run.model.Memory._fields)
@@ -192,7 +309,7 @@ def _rates(made: Exported, names: list[str]) -> Iterator[Variable]:
 
 
 def _modes(equations: Equations) -> Iterator[Variable]:
-    """Yield modes, the number of their changes, and the event indicators."""
+    """Yield the modes, the number of mode changes, and the event indicators."""
     model = equations.made.run.model
     continuous = equations.continuous
     known = signals_of(model.State)
@@ -206,12 +323,12 @@ def _modes(equations: Equations) -> Iterator[Variable]:
     yield Variable("mode.changes", "local", "events", 0, "1", label, is_held=True)
     at = 0
     for name in continuous.modal:
-        yield _indicator(at, f"{name}.motion", known[name], "distance to reversal, or to its limit")
+        yield _indicator(at, f"{name}.motion", known[name], "distance to reversal or to its limit")
         yield _indicator(
             at + 1,
             f"{name}.hold",
             Signal("1", known[name].label),
-            "margin of the force that holds it while stuck",
+            "margin of the holding force while stuck",
         )
         at += 2
     for k in range(continuous.contacts):

@@ -1,4 +1,4 @@
-/* A run that a client advances frame by frame, by calls of the kernel.
+/* A run that a client advances frame by frame with calls of the kernel.
  *
  * A frame is the longest interval that divides the tasks' sample times and the recording interval.
  */
@@ -14,19 +14,20 @@ void bw_run(const double *p, double h, const double *u, double *state, const int
 typedef struct {
   double p[PARAMETERS + 1], u[STIMULI + 1], state[STATE], row[ROWS + 1], sampled[ROWS + 1];
   int64_t frame;       /* frames since the start */
-  double origin, stop; /* times of the client at which the run begins, and may end at most [s] */
-  int32_t is_set;      /* a value was set since the rows were computed */
+  double origin, stop; /* client's times of the run's beginning and of its latest end [s] */
+  int32_t is_set;      /* a value has been set since the rows were computed */
   int32_t is_begun;    /* the initial values are set */
-  int32_t is_done[TASKS + 1], is_active[TASKS + 1]; /* 3.0: tasks that have ticked now, or shall */
+  int32_t is_done[TASKS + 1];   /* 3.0: tasks that have ticked at this time */
+  int32_t is_active[TASKS + 1]; /* 3.0: tasks that must tick */
 } run;
 
 #include "values.h"
 
-/* Frames between the ticks of every task, and the values for which none or all of them tick. */
+/* Frames between the ticks of every task. The value NEVER disables a task's ticks. */
 static const int64_t task_frames[] = TASK_FRAMES;
 
-/* Advance from one frame to another. With rows, those frames' recorded signals are written, the
- * last one's too where it is asked for. Tasks tick in frames that their entries divide. */
+/* Advance from one frame to another. If rows is set, write the recorded signals of these frames, and
+ * those of the last frame if requested. Tasks tick in frames that are multiples of their entries. */
 static void kernel(const run *r, double *state, int64_t begin, int64_t end, int rows, int last,
     const int64_t *ticks, double *rec) {
   int32_t selection[ROWS + 1];
@@ -36,7 +37,7 @@ static void kernel(const run *r, double *state, int64_t begin, int64_t end, int 
   plan[1] = end;
   plan[2] = last;
   plan[3] = IS_ECU ? 0 : SUBSTEPS;
-  plan[4] = NEVER; /* one row of the stimulus for all frames */
+  plan[4] = NEVER; /* all frames use one row of the stimulus */
   plan[5] = rows ? 1 : NEVER;
   plan[6] = rows ? begin : 0;
   plan[7] = IS_ECU ? 0 : ROWS;
@@ -44,8 +45,8 @@ static void kernel(const run *r, double *state, int64_t begin, int64_t end, int 
   bw_run(r->p, STEP, r->u, state, plan, selection, rec);
 }
 
-/* The recorded signals now, before any tick that is due. Frame 1: every entry divides zero,
- * so that all tasks would tick. */
+/* Compute the recorded signals before any tick that is due at this time. Use frame 1, because every
+ * entry divides zero: in frame 0, all tasks would tick. */
 static void refresh(run *r) {
   double state[STATE];
   if (!r->is_set) return;
@@ -60,10 +61,10 @@ static void started(run *r) {
   memcpy(r->sampled, r->row, sizeof r->row);
 }
 
-/* Advance some frames, with the ticks that are due in them or without any. */
+/* Advance a number of frames, with or without the ticks that are due in them. */
 static void advance(run *r, int64_t frames, int has_ticks) {
   const int64_t *ticks = has_ticks ? task_frames : NULL;
-  int64_t first = has_ticks ? r->frame : 1; /* without ticks, no frame differs from another */
+  int64_t first = has_ticks ? r->frame : 1; /* without ticks, all frames are the same */
   kernel(r, r->state, first, first + 1, 1, 0, ticks, r->sampled);
   if (frames > 1) {
     double rest[ROWS + 1];
@@ -74,7 +75,7 @@ static void advance(run *r, int64_t frames, int has_ticks) {
   refresh(r);
 }
 
-/* Run ticks of some tasks now; every frame is a multiple of 1. */
+/* Run the ticks of the active tasks now. Their entry is 1, which divides every frame. */
 static inline void tick(run *r, const int *is_active) {
   int64_t ticks[TASKS + 1];
   for (int k = 0; k < TASKS; ++k) ticks[k] = is_active[k] ? 1 : NEVER;
@@ -83,8 +84,8 @@ static inline void tick(run *r, const int *is_active) {
   r->is_set = 0;
 }
 
-/* The client's time [s]. It follows from whole frames, so that no rounding adds up, and no result
- * depends on when the run begins. */
+/* The client's time [s]. It is computed from the number of frames. So rounding errors do not
+ * accumulate, and results do not depend on the start time. */
 static inline double seconds(const run *r) {
   return r->origin + STEP * SUBSTEPS * (double)r->frame;
 }
@@ -102,11 +103,11 @@ static double *place_of(run *r, unsigned k) {
   }
 }
 
-/* How many frames a step from a time makes; 0 with a message where it makes none. */
+/* Return the number of frames of a step from a time; 0 with a message if the step is not valid. */
 static int64_t frames_of(const run *r, double time, double step, char *said) {
   const double frame = STEP * SUBSTEPS, here = seconds(r);
   const double frames = step / frame;
-  /* Rounding of a client's times: of one time, and of all the steps that it may have added up. */
+  /* Rounding error of a client's times: of one time, and of the sum of all its steps. */
   const double once = 4.5e-16 * fmax(fabs(here), fabs(r->origin));
   const double often = fmin(1e-6 * frame + once * (double)(r->frame + 1), 0.1 * frame);
   said[0] = 0;
@@ -116,7 +117,7 @@ static int64_t frames_of(const run *r, double time, double step, char *said) {
   }
   if (!(frames > 0.5 && frames < 1e15 && fabs(frames - round(frames)) <= 1e-6 + 2.0 * once / frame)) {
     snprintf(said, MESSAGE, "a communication step of %.9g s is not valid: it must be a whole "
-        "multiple of %.9g s, which divides the sample times of the ECU", step, frame);
+        "multiple of %.9g s, an interval that divides the ECU's sample times", step, frame);
     return 0;
   }
   if (here + step > r->stop + often) {

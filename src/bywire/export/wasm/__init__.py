@@ -1,1 +1,1 @@
-"""A bench's run as WebAssembly: parameters in, recording out, in any page or program."""
+"""A bench's run as WebAssembly, from parameters to the recording, for any page or program."""

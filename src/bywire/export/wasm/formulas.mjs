@@ -1,4 +1,4 @@
-// Generates WebAssembly from the formulas that a module contains as a table, see formulas.py.
+// Generates WebAssembly from a module's table of formulas (written by module.py).
 
 const OPERATIONS = ("add sub mul neg inv fabs sqrt floor ceil copysign fmax fmin lt le eq ne not "
   + "and or if_else_zero select exp log sin cos pow tan atan tanh").split(" ");
@@ -8,16 +8,16 @@ const TRUTHS = new Set(["lt", "le", "eq", "ne", "not", "and", "or"]);
 const PLAIN = { add: 0xa0, sub: 0xa1, mul: 0xa2, neg: 0x9a, fabs: 0x99, sqrt: 0x9f, floor: 0x9c,
   ceil: 0x9b, copysign: 0xa6, lt: 0x63, le: 0x65, eq: 0x61, ne: 0x62 };
 const GET = 0x20, SET = 0x21, TEE = 0x22, LOAD = 0x2b, STORE = 0x39, I32 = 0x7f, F64 = 0x7c;
-const REACH = 64; // values back that a byte of an operand reaches
+const REACH = 64; // maximum distance to an earlier value in one byte
 
-/** Return a number as the format writes it: seven bits a byte. */
+/** Return a number in LEB128 encoding, seven bits per byte. */
 function leb(number) {
   const bytes = [];
   for (; number > 127; number >>>= 7) bytes.push(number & 127 | 128);
   return [...bytes, number];
 }
 
-/** Return bytes with their number before them. */
+/** Return bytes preceded by their count. */
 function counted(...parts) {
   const length = parts.reduce((sum, part) => sum + part.length, 0), start = leb(length);
   const bytes = new Uint8Array(start.length + length);
@@ -30,7 +30,7 @@ const section = (id, items) => [[id], counted(leb(items.length), ...items)];
 
 const inBytes = (name) => [name.length, ...new TextEncoder().encode(name)];
 
-/** Return values (inputs, constants, operations with their operands) and formulas. */
+/** Return the values (inputs, constants, and operations with their operands) and the formulas. */
 function readTable(buffer) {
   const view = new DataView(buffer), bytes = new Uint8Array(buffer);
   const [count, operands, length] = [0, 2, 4].map((at) => view.getUint16(at, true));
@@ -66,25 +66,25 @@ function readTable(buffer) {
   return { values, formulas: made };
 }
 
-/** Return the body of the function that computes a formula, in a working memory from `base` on. */
+/** Return the body of the function that computes a formula in the working memory at `base`. */
 function bodyOf({ again, results, places }, values, kept, base) {
   const uses = new Uint32Array(values.length), locals = new Int32Array(values.length).fill(-1);
-  const code = [], types = [], held = new Map(); // held: locals of values in memory, by place
-  const isOther = (v) => !values[v].op || kept.has(v); // there is nothing to compute
+  const code = [], types = [], held = new Map(); // held: locals for values in memory, by place
+  const isOther = (v) => !values[v].op || kept.has(v); // needs no computation
   const stack = [...results];
   while (stack.length) {
     const v = stack.pop();
     if (uses[v]++ || isOther(v)) continue;
     const { op, args } = values[v];
     stack.push(...args);
-    if (op === "fmax" || op === "fmin") stack.push(...args); // which read each operand twice
+    if (op === "fmax" || op === "fmin") stack.push(...args); // these read each operand twice
   }
   const at = (opcode, number) => { // an instruction with its operand
     code.push(opcode);
     for (; number > 127; number >>>= 7) code.push(number & 127 | 128);
     code.push(number);
   };
-  const local = (type) => types.push(type) - (again ? 0 : 1); // behind the argument of a loop
+  const local = (type) => types.push(type) - (again ? 0 : 1); // a loop's argument comes first
   const load = (place) => { code.push(0x41, 0, LOAD); at(3, base + 8 * place); };
   const zero = () => code.push(0x44, 0, 0, 0, 0, 0, 0, 0, 0);
   const isCostly = (v) => !isOther(v) && uses[v] === 1
@@ -150,7 +150,7 @@ function bodyOf({ again, results, places }, values, kept, base) {
     code.push(0x02, 0x40, 0x03, 0x40); // a block around a loop
     all();
     truth(results[0]);
-    code.push(0x0d, 1); // leaves both
+    code.push(0x0d, 1); // leave both
     results.forEach((v, k) => {
       if (k > again) { at(GET, own[k]); number(v); code.push(0xa0); at(SET, own[k]); }
     });
@@ -167,8 +167,8 @@ function bodyOf({ again, results, places }, values, kept, base) {
 /**
  * Return the functions of a table.
  *
- * `exported` gives the memory and the elementary functions, `base` is where the working memory
- * begins. A formula takes no argument; a loop takes the number of remaining turns and returns it at its end.
+ * `exported` contains the memory and the elementary functions; `base` is the address of the working memory.
+ * A formula takes no argument. A loop takes the number of remaining turns and returns it when it ends.
  */
 async function functionsOf(buffer, exported, base) {
   const { values, formulas } = readTable(buffer);

@@ -1,5 +1,5 @@
-/* Functions of a mathematics library for the kernel, where there is none: single instructions of
- * WebAssembly, and for arguments beyond the kernel's own functions those of the page. */
+/* Math functions for the kernel, which has no C library here: single instructions of WebAssembly,
+ * and the page's functions for arguments outside the range of the kernel's own functions. */
 #define IN_PAGE(name) __attribute__((import_module("math"), import_name(#name))) double name
 #define HUGE_VAL __builtin_huge_val()
 #define sqrt __builtin_sqrt

@@ -1,9 +1,10 @@
-"""The files of an exported run: module, description, loader, types; formulas as a table.
+"""Files of an exported run: module, description, loader and types, with the formulas as a table.
 
-Instructions of straight-line code name their operands by number, with little repetition. In the
-table, values that are read once have no number: operations follow their operands and take them from
-a stack. Most other operands are stored as the distance to a named value: small numbers, which
-compress well. All formulas share one table, and each computes only what its results need.
+Instructions of straight-line code refer to their operands by number, so they compress poorly. In
+this table, a value that is read once has no number: its operation follows the operands and pops
+them from a stack. Most other operands are stored as the distance to a named value. Such distances
+are small numbers, which compress well. All formulas share one table, and each formula computes only
+the values that its results need.
 """
 
 from __future__ import annotations
@@ -75,15 +76,15 @@ OPERATIONS = (
     "atan",
     "tanh",
 )
-"""In the order of their numbers in the table; the loader has the same."""
+"""operations in the order of their numbers in the table, the same as in the loader"""
 
-_NEAR = 64  # largest distance to a named value in one byte; 0 is none, larger ones are others
-_MOST = 0xFFFF  # lengths and names have two bytes
+_NEAR = 64  # maximum distance to a named value in one byte; 0 means none, larger bytes differ
+_MOST = 0xFFFF  # lengths and names take two bytes
 _EITHER = frozenset({"add", "mul", "eq", "ne", "and", "or"})  # commutative operations
 
 _Places = Mapping[tuple[str, int], int]
 _Value = tuple[Any, ...]
-_Token = tuple[str, int, bool]  # operation, which operands have names, whether it gets one
+_Token = tuple[str, int, bool]  # operation, operands with names, whether the result gets a name
 
 
 @dataclass(frozen=True)
@@ -93,10 +94,10 @@ class Formula:
     Parameters
     ----------
     graph, results
-        Expressions, and pairs of place in the working memory and node.
+        Expressions, and pairs of a node and its place in the working memory.
     again
-        Zero, or in a loop the number of results after the first, which ends the loop, that begin
-        its next turn; those after them are summed up.
+        Zero for straight-line code. In a loop, the first result ends the loop, the next ``again``
+        results start its next turn, and the loop adds up the remaining results.
     """
 
     graph: Graph
@@ -106,14 +107,14 @@ class Formula:
 
 @dataclass
 class _Table:
-    """Written form of expressions: tokens, and operands with the number of earlier names."""
+    """Written form of expressions: tokens, and operands with the number of names before them."""
 
     names: dict[_Value, int]
     tokens: list[_Token] = field(default_factory=list)
     operands: list[tuple[int, int]] = field(default_factory=list)
 
     def add(self, graph: Graph, named: Node) -> None:
-        """Append an expression that gets a name; operands without one are part of it."""
+        """Append an expression that gets a name, including its operands without a name."""
         stack = [named]
         while stack:
             node = stack.pop()
@@ -134,7 +135,7 @@ class _Table:
 
 
 def _operands(graph: Graph, node: Node, names: Mapping[_Value, int]) -> list[Node]:
-    """Return the operands in the order in which they are written."""
+    """Return the operands in the order of the table."""
     op, parts = graph.nodes[node].op, list(graph.arguments(node))
     if op in _EITHER:
         parts.sort(key=lambda a: _value(graph, a) in names)
@@ -144,26 +145,24 @@ def _operands(graph: Graph, node: Node, names: Mapping[_Value, int]) -> list[Nod
 
 
 def _value(graph: Graph, node: Node) -> _Value:
-    """Return the identity of a value among several graphs: inputs and constants are shared."""
+    """Return the identity of a value across graphs, which share inputs and constants."""
     operation = graph.nodes[node]
     is_leaf = operation.op in ("leaf", "const")
     return (operation.op, *operation.args) if is_leaf else (id(graph), node)
 
 
 def table(formulas: Sequence[Formula], places: _Places) -> bytes:
-    """Return the table of some formulas.
-
-    The results of the first formula are inputs of the others.
+    """Return the table of formulas; the results of the first formula are inputs of the others.
 
     Parameters
     ----------
     places
-        Places of inputs in the working memory, by kind and index.
+        Places of the inputs in the working memory, by kind and index.
 
     Raises
     ------
     CompilerError
-        If there are more values than the table can name.
+        If there are more values than the table can address.
     """
     orders = [needed(f.graph, [n for _, n in f.results], lambda _: False) for f in formulas]
     uses, graphs = _uses(formulas, orders)
@@ -190,7 +189,7 @@ def table(formulas: Sequence[Formula], places: _Places) -> bytes:
 def _uses(
     formulas: Sequence[Formula], orders: Sequence[Sequence[Node]]
 ) -> tuple[dict[_Value, int], dict[_Value, Graph]]:
-    """Return how often every value is read, in an order in which operands come first."""
+    """Return the number of reads of each value, with operands before the values that use them."""
     uses: dict[_Value, int] = {}
     graphs: dict[_Value, Graph] = {}
     for formula, order in zip(formulas, orders, strict=True):
@@ -209,18 +208,18 @@ def _uses(
 
 
 def _steps(numbers: Sequence[int]) -> list[int]:
-    """Return the differences of numbers, which are constant for regular steps."""
+    """Return the differences of consecutive numbers, which are constant for regular steps."""
     return [(b - a) & 0xFFFF for a, b in zip([0, *numbers], numbers, strict=False)]
 
 
 def _packed(made: _Table, leaves: int, numbers: list[int], constants: Sequence[float]) -> bytes:
-    """Return lengths and planes: similar bytes are stored together."""
+    """Return the bytes of the table: lengths, then planes of similar bytes."""
     kinds = [kind for kind, _ in Counter(made.tokens).most_common()]
     count = max(len(made.tokens), len(made.operands), len(numbers) + len(made.operands))
     if count > _MOST or len(kinds) > 255:
         raise CompilerError(
             f"this run's formulas have {count} operands, but a module can contain only {_MOST}. "
-            "Export the run as an FMU, whose kernel is compiled",
+            "Export the run as an FMU, which contains a compiled kernel",
             name="operands",
             value=str(count),
             valid=str(_MOST),
@@ -262,7 +261,7 @@ def _number(kind: _Token) -> int:
 
 
 def _with_section(module: bytes, name: str, content: bytes) -> bytes:
-    """Return a module of WebAssembly with a section that engines ignore."""
+    """Return a WebAssembly module with an added custom section, which engines ignore."""
     title = name.encode()
     body = bytes([len(title)]) + title + content
     length, left = bytearray(), len(body)
@@ -272,14 +271,14 @@ def _with_section(module: bytes, name: str, content: bytes) -> bytes:
     return module + b"\0" + bytes(length) + bytes([left]) + body
 
 
-# --- The formulas of a run, where their inputs and results stand, and that in C
+# --- The formulas of a run, and the places of their inputs and results, also in C
 
 _OWN = OPERATIONS[OPERATIONS.index("exp") : OPERATIONS.index("pow") + 1]  # functions of the kernel
 
 
 @dataclass(frozen=True)
 class RunFormulas:
-    """The table of a run, and the C text of its layout."""
+    """The table of a run's formulas, and the C text of its memory layout."""
 
     table: bytes
     header: str
@@ -356,11 +355,11 @@ def _run_formulas(made: Exported) -> RunFormulas:
 
 
 def _integrals(stages: Stages) -> list[Node]:
-    """Return the integrals after a frame with constant coefficients."""
+    """Return the integrals at the end of a frame; their coefficients are constant."""
     graph, nodes = stages.graph, []
     for k, pairs in enumerate(stages.quadrature.combinations):
         total = None
-        for coefficient, product in pairs:  # the order is that of the bench's kernel
+        for coefficient, product in pairs:  # in the same order as in the bench's kernel
             part = graph.intern(Operation("mul", (coefficient, graph.leaf("s", product))))
             total = part if total is None else graph.intern(Operation("add", (total, part)))
         q = graph.leaf("q", k)
@@ -369,7 +368,7 @@ def _integrals(stages: Stages) -> list[Node]:
 
 
 def _kept(stages: Stages, roots: Sequence[Node]) -> list[Node]:
-    """Return the values derived from parameters and step that other expressions read."""
+    """Return the values that depend only on parameters and step, and that expressions read."""
     graph, level = stages.graph, stages.level()
     order = needed(graph, roots, lambda _: False)
     readers = [node for node in order if level[node] or graph.is_boolean(node)]
@@ -399,7 +398,7 @@ static const double state_start[] = {braced(map(number, made.vector))};
 
 
 def _lent(op: str) -> str:
-    """Return the C text that exports an elementary function to formulas."""
+    """Return the C text that exports an elementary function for the formulas."""
     given, taken = ("double a, double b", "a, b") if op == "pow" else ("double a", "a")
     return f"PAGE({op}) double lent_{op}({given}) {{ return bw_{op}({taken}); }}\n"
 
@@ -428,14 +427,14 @@ _FLAGS = (
 def module_files(
     made: Exported, name: str, further: Mapping[str, str] = MappingProxyType({})
 ) -> dict[str, bytes]:
-    """Return the files of an exported run by their names.
+    """Return the files of an exported run by name.
 
-    ``further``: C functions for the module, by the name under which it exports them.
+    ``further``: additional C functions for the module, by their exported name.
 
     Raises
     ------
     CompilerError
-        Without the extra ``compiler``, or when it fails.
+        If the extra ``compiler`` is missing or the compiler fails.
     """
     start = start_nodes(made)
     faces = interface(made, "brake", start.reads if start else frozenset())
@@ -449,7 +448,7 @@ def module_files(
 
 
 def _module(made: Exported, further: Mapping[str, str]) -> bytes:
-    """Return the module: common code for every bench, with its formulas as a table."""
+    """Return the module: code that all benches share, and the run's formulas as a table."""
     formulas = _run_formulas(made)
     headers = {"runtime.h": SCALAR, "layout.h": formulas.header, "cut.h": CUT}
     return _with_section(_compiled(headers, further), "formulas", formulas.table)
@@ -480,9 +479,9 @@ def _compiled(headers: Mapping[str, str], further: Mapping[str, str]) -> bytes:
         try:
             done = run_program([*command, "-o", str(made)], TIMEOUT)
         except subprocess.TimeoutExpired:
-            raise CompilerError(f"the compiler took longer than {TIMEOUT:g} s") from None
+            raise CompilerError(f"the compiler exceeded its limit of {TIMEOUT:g} s") from None
         if done.returncode != 0:
-            message = "\n".join(done.stderr.splitlines()[:6]) or "without a message"
+            message = "\n".join(done.stderr.splitlines()[:6]) or "(no message)"
             raise CompilerError(f"the compiler rejected the kernel for WebAssembly:\n{message}")
         return made.read_bytes()
 
@@ -490,9 +489,9 @@ def _compiled(headers: Mapping[str, str], further: Mapping[str, str]) -> bytes:
 def _description(
     made: Exported, name: str, begins_anywhere: bool, faces: Interface
 ) -> dict[str, Any]:
-    """Return the description of a run for the loader and its users."""
+    """Return the description of a run for the loader and for users."""
     schedule, par = made.schedule, made.run.par
-    count = made.program.sizes.parameters  # all: the loader fills the kernel's whole vector
+    count = made.program.sizes.parameters  # all, because the loader fills the whole vector
     used = {each.name for each in faces.of("parameter")}
     parameters = []
     for each in parameter_variables(made, frozenset(range(count)), frozenset()):
@@ -529,7 +528,7 @@ def _description(
 
 
 def _stimuli(made: Exported) -> list[dict[str, Any]]:
-    """Return the stimulus of the bench as steps: values from their times on, without noise."""
+    """Return the bench's stimulus without noise as steps: pairs of a time and the new value."""
     rows = sampled_stimulus(made.run, made.schedule)
     times = made.schedule.stimulus_times
     ranges = ranges_of(made.run.model.Stimulus)

@@ -1,6 +1,6 @@
-/* A run in a page. Its formulas are functions that the loader makes, in the table behind NONE; they
- * read and write the working memory: state, parameters and what they hand on. Long arrays lie
- * behind __heap_base. */
+/* A run in a page. Its formulas are functions that the loader generates, in the table after NONE.
+ * They read and write the working memory: state, parameters and intermediate results. Long arrays
+ * are stored after __heap_base. */
 #include <stdint.h>
 
 #define PAGE(name) __attribute__((export_name(#name)))
@@ -18,7 +18,7 @@ PAGE(room) void *room(void) { return &__heap_base; }
 
 static void compute(int formula) { ((void (*)(void))(intptr_t)formula)(); }
 
-/* Values derived from the parameters and from the length of a substep. */
+/* Compute the values that depend only on the parameters and on the length of a substep. */
 static void keep(double h) {
   if (area[H_AT] == h) return;
   area[H_AT] = h;
@@ -48,7 +48,7 @@ static void exact_pass(const double *c, double h, const double *m, const double 
 
 #include "cut.h"
 
-/* A repeated or shortened substep. */
+/* Repeat or shorten a substep. */
 static void repeat(void) {
   double x[NX], d[NX], o[RESULTS];
   cuts made;
@@ -57,20 +57,20 @@ static void repeat(void) {
   area[COUNTERS_AT] += located(0, STEP, 0, x, d, 0, o, &made);
   area[COUNTERS_AT + 1] += 1.0;
   area[COUNTERS_AT + 2] += made.tries;
-  memcpy(area + X_AT, o, FLOW * sizeof(double)); /* x, d and reactions stand in a row */
+  memcpy(area + X_AT, o, FLOW * sizeof(double)); /* x, d and reactions are contiguous */
   for (int k = 0; k < FLOWS; ++k) area[Q_AT + k] += o[FLOW + k];
   keep(STEP);
 }
 
-/* Take the initial values of the parameters as they are; those of the bench exactly as it has them,
- * where none is changed. */
+/* Set the initial values for the current parameters. If none was changed, they are bit-identical to
+ * the bench's initial values. */
 PAGE(begin) void begin(int is_changed) {
   for (int k = 0; k < STATE; ++k) area[k] = state_start[k];
   if (is_changed) compute(START);
 }
 
-/* Advance from frame to frame with rows of the stimulus, each for some frames; record every so many
- * frames all signals, in the last frame too where it is asked for. */
+/* Advance frame by frame; each row of the stimulus applies for a number of frames. Record all
+ * signals at a fixed interval of frames, and after the last frame if requested. */
 PAGE(advance) void advance(const double *u, int32_t held, int32_t first, int32_t end, int32_t last,
     int32_t every, double *rec) {
   area[H_AT] = 0.0; /* parameters may have changed */

@@ -1,4 +1,4 @@
-/* Functions of a C library for the kernel, where there is none. */
+/* String functions for the kernel, which has no C library here. */
 #include <stddef.h>
 #define memcpy __builtin_memcpy
 #define memset __builtin_memset

@@ -34,7 +34,7 @@ class Sliders:
     parameters: tuple[str, ...]
 
 
-SLIDERS = Kind("choice of sliders", ("sliders",), instances(Sliders), declared="a Sliders")
+SLIDERS = Kind("choice of sliders", ("panels", "sliders"), instances(Sliders), declared="a Sliders")
 """every brake's choice of parameters at the top of its pages"""
 
 

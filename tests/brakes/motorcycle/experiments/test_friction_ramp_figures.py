@@ -27,4 +27,4 @@ def test_a_loop_without_area_has_no_ratio(monkeypatch: pytest.MonkeyPatch) -> No
     short = {"options.i_max": "1 A", "options.slope": "20 A/s"}
     ratio = bywire.run("friction-ramp", short, estimate_error=False).kpi("loop_area_ratio")
     assert math.isnan(ratio.value)
-    assert ratio.note == "the area of the loop without dither is zero"
+    assert "zero" in ratio.note

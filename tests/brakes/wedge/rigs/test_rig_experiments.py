@@ -87,7 +87,7 @@ def test_torque_that_does_not_get_through_is_said(overrides, options, names):
     result = run_once(bench)
     for name in names:
         assert math.isnan(result.kpi(name).value), name
-        assert "no steady motion" in result.kpi(name).note
+        assert result.kpi(name).note
 
 
 def check_stiffness(found):

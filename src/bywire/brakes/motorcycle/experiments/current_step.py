@@ -1,4 +1,4 @@
-"""Current step: only the current loop (Dardanelli 2010, Fig. 3)."""
+"""Current step in the current loop alone (Dardanelli 2010, Fig. 3)."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Options(ParameterSet):
 
 
 def cases(par: MotorcycleParameters, options: Options, _: object = None) -> tuple[Case, ...]:
-    """Return the single run, which starts at the retracted piston without dither and filter."""
+    """Return the single run, which starts with a retracted piston, without dither and filter."""
     stimulus = step_at_zero("i_set", 0.0, options.i_step)
     return (
         case_from_rest(
@@ -48,7 +48,7 @@ def step(options: Options) -> step_response.Setting:
 
 
 def judged(options: Options) -> dict[str, Any]:
-    """Return the families of key figures: the step of the motor current, and effort."""
+    """Return the families of key figures: step of the motor current, and effort."""
     return {"step_response": step(options), "effort": effort.Setting()}
 
 

@@ -40,7 +40,7 @@ class Options(ParameterSet):
 
 
 def cases(par: MotorcycleParameters, options: Options, _: object = None) -> tuple[Case, ...]:
-    """Return both runs; each starts at the retracted piston, with the current loop closed."""
+    """Return both runs; each starts with a retracted piston and a closed current loop."""
     shape = ramp.Parameters(
         start=0.0, end=options.i_max, slope=options.slope, t_start=0.0, t_hold=0.0, after="return"
     )
@@ -69,7 +69,7 @@ def finish(recording: xr.Dataset, options: Options) -> xr.Dataset:
 
 
 def loop(options: Options) -> hysteresis.Setting:
-    """Return the setting of the loops: filtered current over pressure."""
+    """Return the setting of the loops: filtered current versus pressure."""
     return hysteresis.Setting("i_filtered", "p_mc", options.smoothing, demand="i_star")
 
 
@@ -88,7 +88,7 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
         (peak,) = PEAK(f"_{suffix}", p_max=run["p_mc"].max())
         loops[peak.name] = peak
     plain = loops["loop_area_undithered"]
-    ratio, note = math.nan, plain.note or "the area of the loop without dither is zero"
+    ratio, note = math.nan, plain.note or "the loop area without dither is zero"
     if plain.value:
         ratio, note = loops["loop_area_dithered"].value / plain.value, plain.note
     return (*loops.values(), *RATIO(loop_area_ratio=(ratio, note)))
@@ -99,7 +99,7 @@ _LOOP = units_of("hysteresis", "occupation", resolved={"drive": "A", "drive*resp
 EXPERIMENT = Experiment(
     name="friction-ramp",
     assembly="motorcycle-brake",
-    summary="slow current ramp to {i_max} and back, without and with dither (Fig. 5, eq. 17)",
+    summary="slow current ramp to {i_max} and back, with and without dither (Fig. 5, eq. 17)",
     options=Options,
     defaults=Options(i_max=5.0, slope=0.2, f_filter=20.0, smoothing=0.02),
     cases=cases,

@@ -1,4 +1,4 @@
-"""Hard braking: a step of the pressure demand in closed loop (Dardanelli 2010, Fig. 7a)."""
+"""Hard braking: a pressure demand step in closed loop (Dardanelli 2010, Fig. 7a)."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Options(ParameterSet):
     duration: Duration
     """recording time after the step"""
     settle: TimeConstant
-    """time before the step during which dither and loop settle"""
+    """time before the step for dither and loop to settle"""
     smoothing: TimeConstant
     """moving average for the step's KPIs; default: one dither period; 0: raw pressure"""
 

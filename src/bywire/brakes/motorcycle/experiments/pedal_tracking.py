@@ -22,7 +22,7 @@ from bywire.core.units import shown
 from bywire.data.measurement import read_trace, trace_names
 from bywire.plant import pedal
 
-_COLUMNS = {"pressure": "Pa", "force": "N", "pedal": "m"}  # of a trace, in order of preference
+_COLUMNS = {"pressure": "Pa", "force": "N", "pedal": "m"}  # of a trace, by preference
 # Built-in ride (our choice): pedal travel [mm] over time [s]. Three increasingly fast pulls, a
 # modulated one, and a hold. The pedal map turns them into 5 to 30 bar, the range of Fig. 7b.
 _TIMES = (0.0, 0.5, 0.9, 1.6, 2.0, 2.5, 2.7, 3.3, 3.6, 4.2, 4.3, 4.8, 5.0, 5.3, 5.6, 5.9, 6.5, 7.5)
@@ -37,13 +37,13 @@ class Options(ParameterSet):
     trace_map: str
     """mapping file for pedal, force or pressure; empty if the columns have these names"""
     max_gap: TimeConstant
-    """longest gap in the file that bywire interpolates linearly"""
+    """maximum gap in the file that bywire interpolates linearly"""
     smoothing: TimeConstant
     """moving average for the tracking KPIs; default: one dither period; 0: raw signals"""
 
 
 def cases(par: MotorcycleParameters, options: Options, _: object = None) -> tuple[Case, ...]:
-    """Return the single run; it starts at rest at the first sample's pressure."""
+    """Return the single run, which starts at rest at the first sample's pressure."""
     ride = _ride(par, options)
     t = ride["time"].values - float(ride["time"][0])
     mode: DriveMode = "pressure" if "pressure" in ride else "pedal"
@@ -58,7 +58,7 @@ def cases(par: MotorcycleParameters, options: Options, _: object = None) -> tupl
 
 
 def followed(options: Options) -> tracking.Setting:
-    """Return the tracking pressure and its set point."""
+    """Return the pressure and the set point that it tracks."""
     return tracking.Setting("p_mc", "p_ref", options.smoothing)
 
 
@@ -72,7 +72,7 @@ def judged(options: Options) -> dict[str, Any]:
 
 
 def _ride(par: MotorcycleParameters, options: Options) -> xr.Dataset:
-    """Return the ride with a variable ``force`` [N], or ``pressure`` [Pa] if it has one."""
+    """Return the ride with a variable ``force`` [N], or ``pressure`` [Pa] if present."""
     if not options.trace:
         from scipy.interpolate import PchipInterpolator
 
@@ -86,8 +86,8 @@ def _ride(par: MotorcycleParameters, options: Options) -> xr.Dataset:
         if chosen is None:
             raise FileError(
                 f"{options.trace}: none of its columns {quoted(', '.join(names))} is pedal [mm], "
-                "force [N] or pressure [bar]: rename the column that the brake should follow, or "
-                "add it to a mapping file, options.trace_map",
+                "force [N] or pressure [bar]. Rename the column that the brake should follow, or "
+                "add it to a mapping file (options.trace_map)",
                 name="options.trace",
                 value=quoted(", ".join(names)),
                 valid="pedal [mm], force [N] or pressure [bar]",
@@ -103,7 +103,7 @@ def _ride(par: MotorcycleParameters, options: Options) -> xr.Dataset:
 
 
 def _require_within_stop(ride: xr.Dataset, par: MotorcycleParameters, source: str) -> None:
-    """Reject a ride that goes beyond the pedal's stop."""
+    """Reject a ride that exceeds the pedal's stop."""
     x_max = par.pedal.x_max
     limits = {"pedal": (x_max, "m"), "force": (pedal.force_at(x_max, par.pedal), "N")}
     for name, (limit, unit) in limits.items():

@@ -31,7 +31,7 @@ class Options(ParameterSet):
     p_from: Pressure
     """pressure at the start of the release"""
     how: Literal["controlled", "current-off"]
-    """ramp of the pressure demand to zero in closed loop, or step of the current demand to zero"""
+    """pressure demand ramp to zero in closed loop, or current demand step to zero"""
     t_ramp: TimeConstant
     """time for the pressure demand to fall to zero (how = "controlled")"""
     p_empty: Pressure
@@ -39,14 +39,14 @@ class Options(ParameterSet):
     duration: Duration
     """recording time after the release begins"""
     settle: TimeConstant
-    """time before the release during which dither and loop settle"""
+    """time before the release for dither and loop to settle"""
 
 
 def cases(par: MotorcycleParameters, options: Options, _: object = None) -> tuple[Case, ...]:
     """Return the single run."""
     keep = min(options.settle, 0.1)
     if options.how == "current-off":
-        # Without dither, since an ECU with its current off does not dither the piston.
+        # Without dither, because an ECU with its current off does not dither the piston.
         return (
             case_from_rest(
                 "run",
@@ -76,7 +76,7 @@ def cases(par: MotorcycleParameters, options: Options, _: object = None) -> tupl
 
 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
-    """Return time to empty, residual pressure, energies."""
+    """Return time to empty, residual pressure and energies."""
     run = recordings["run"]
     after = run.sel(time=slice(-1e-9, None))
     fallen = evaluate("release", run, release.Setting("p_pd", options.p_empty))

@@ -15,18 +15,18 @@ from bywire.core.quantities import Current, Duration, Pressure, TimeConstant
 
 
 class Options(ParameterSet):
-    """The step of the current demand."""
+    """The current demand step."""
 
     p_start: Pressure
     """pressure before the step"""
     start: Literal["settled", "frictionless"]
-    """meaning of p_start: settled pressure under dither, or frictionless equilibrium"""
+    """meaning of p_start: settled pressure with dither, or frictionless equilibrium"""
     i_step: Current
-    """height of the step of the current demand"""
+    """height of the current demand step"""
     duration: Duration
     """recording time after the step"""
     settle: TimeConstant
-    """time before the step during which the dithered pressure settles"""
+    """time before the step for the dithered pressure to settle"""
     smoothing: TimeConstant
     """moving average for the step's KPIs; default: one dither period; 0: raw pressure"""
 
@@ -62,7 +62,7 @@ def _from(p: float, par: MotorcycleParameters, options: Options) -> tuple[Case, 
 
 
 def step(options: Options) -> step_response.Setting:
-    """Return the step of the pressure, with its levels taken from the response."""
+    """Return the pressure step, with its levels from the response."""
     return step_response.Setting("p_mc", 0.0, smoothing=options.smoothing)
 
 

@@ -1,4 +1,4 @@
-"""Stribeck curves: the seals' friction torque versus speed at several pressures (2010, Fig. 4)."""
+"""Stribeck curves: seal friction torque versus speed at several pressures (2010, Fig. 4)."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ class Options(ParameterSet):
 
 
 def static(par: MotorcycleParameters, options: Options) -> dict[str, xr.Dataset]:
-    """Return friction torque over pressure and speed.
+    """Return friction torque versus pressure and speed.
 
-    The speeds contain -0 and +0. Their values are the breakaway torques, between which the torque
-    lies at rest.
+    The speeds contain -0 and +0. The torques there are the breakaway torques, which limit the
+    torque at rest.
     """
     side = np.linspace(0.0, options.omega_max, 401)
     speeds = np.concatenate((-side[::-1], side))

@@ -41,7 +41,7 @@ from bywire.identification.measured import joined, split
 from bywire.identification.method import Check, Curve, Effort, Identified, Method
 from bywire.simulation.run import Run, simulate
 
-# Curves of the braking dynamics: magnitude, phase and step; measured, modeled, theoretical.
+# Curves of the braking dynamics: measured, modeled and theoretical magnitude, phase and step.
 
 
 def curves_of(
@@ -70,8 +70,8 @@ def curves_of(
         curves += [
             Curve(
                 f"{region.name}-step" if len(region.steps) == 1 else f"{region.name}-step-{k + 1}",
-                f"Step of the current at {region.name} pressure, dither averaged: measured, "
-                "identified, and eq. (15).",
+                f"Response to a current step at {region.name} pressure, dither averaged out: "
+                "measured, identified, and eq. (15).",
                 _step_curve(step, estimate, par, region.pressure),
                 "time",
             )
@@ -86,7 +86,10 @@ def _bode(region: Region, estimate: Estimate, par: MotorcycleParameters) -> list
     modeled = with_slow_pair(*five_of(estimate).values()).response(f)
     theory = theoretical(par, region.pressure, travel_at(region.pressure, par)).response(f)
     parts = {"measured": measured, "modeled": modeled, "theoretical": theory}
-    caption = f"Pressure over current at {region.name} pressure: measured, identified, eq. (15)."
+    caption = (
+        f"Frequency response from current to pressure at {region.name} pressure: measured, "
+        "identified, and from eq. (15)."
+    )
     axis = ("frequency", f, "Hz", "frequency")
     magnitude, phase = (
         over(axis, {name: part(G) for name, G in parts.items()}, unit, label)
@@ -115,7 +118,7 @@ def _step_curve(
     return over(("time", t, "s", "time after the step"), columns, "Pa", "pressure")
 
 
-# The simulated experiment of Dardanelli et al. (2010), section 5: steps and sines by region.
+# The simulated experiment of Dardanelli et al. (2010), section 5: steps and sines in each region.
 
 Demand = Callable[[Array], Array]
 
@@ -128,7 +131,7 @@ _INTERVAL = 1e-3
 def demands(
     i_step: float, amplitude: float, frequencies: tuple[float, ...]
 ) -> dict[str, tuple[Demand, float, float]]:
-    """Return changes of the current demand [A] by record, with the times before and after t = 0."""
+    """Return current demand changes [A] by record, with the times before and after t = 0."""
     chosen: dict[str, tuple[Demand, float, float]] = {"step": (partial(_step, i_step), REST, STEP)}
     for f in frequencies:
         chosen[f"{f:g}_Hz"] = (partial(_sine, amplitude, f), 0.0, SINES)
@@ -153,17 +156,17 @@ def of_brake(
 ) -> dict[str, xr.Dataset]:
     """Return measured current and pressure of the whole brake, with friction and dither.
 
-    Both pass the same filter and converter, so the lag cancels between them.
+    Both signals pass through the same kind of filter and converter, so their lags cancel.
 
     Parameters
     ----------
     pressures
         Mean pressure [Pa] by region.
     changes
-        As ``demands`` returns.
+        Demand changes as returned by ``demands``.
     sigma_p, sigma_i
-        Noise upstream of the converter [Pa], [A]. The noise of the pressure acts inside the loop,
-        because the dither's amplitude follows the measured pressure.
+        Noise upstream of the converter [Pa], [A]. The pressure noise acts inside the loop, because
+        the dither amplitude follows the measured pressure.
     seed
         Seed of the noise.
     """
@@ -213,7 +216,7 @@ def _case(
 
 
 def _scaled(run: Run, shares: Mapping[str, float]) -> Demand:
-    """Return the stimulus with each channel's noise at its own share of the span."""
+    """Return the stimulus with each channel's noise scaled to its fraction of the span."""
     columns = {run.model.Stimulus._fields.index(name): share for name, share in shares.items()}
 
     def rows(t: Array) -> Array:
@@ -233,9 +236,9 @@ def of_eq22(
     sigma_i: float,
     seed: int,
 ) -> dict[str, xr.Dataset]:
-    """Return current and pressure of a linear brake, exactly eq. (22), dithered by its current.
+    """Return current and pressure of a linear brake that follows eq. (22), with dither current.
 
-    ``models``: pressure at rest [Pa] and transfer function [Pa/A] by region.
+    ``models``: rest pressure [Pa] and transfer function [Pa/A] by region.
     """
     from scipy import signal
 
@@ -267,7 +270,7 @@ def sampled(model: Rational, interval: float) -> tuple[Array, Array]:
 
 
 def eq22_of(par: MotorcycleParameters, p: float, f_zero: float, f_pole: float) -> Rational:
-    """Return eq. (15)'s two slow poles at a pressure [Pa] and an added slow pair [Hz]."""
+    """Return a model with eq. (15)'s two slow poles at a pressure [Pa] and a slow pair [Hz]."""
     model = two_pole(par, p, travel_at(p, par))
     slow, fast = model.poles_hz
     T = [1.0 / (2.0 * math.pi * f) for f in (f_zero, slow, fast, f_pole)]
@@ -284,18 +287,19 @@ _MISFIT_STEP, _MISFIT_SINES = 0.05, 0.1
 
 
 class Options(ParameterSet):
-    """Regions, the two steps of the fit, and the synthetic experiment."""
+    """Pressure regions, the fit's two steps, and the synthetic experiment."""
 
     p_1: Pressure
     """boundary between low and medium pressure"""
     p_2: Pressure
     """boundary between medium and high pressure"""
     model: Literal["eq-22", "eq-21"]
-    """with (eq-22) or without (eq-21) a slow pair of a zero and a pole, in either order"""
+    """with (eq-22) or without (eq-21) a slow pair: a zero and a pole in either order"""
     fit: Literal["two-step", "joint"]
-    """alternate K, tau_L, T_L from steps and T1, T2 from sines, or fit all to all records"""
+    """alternate between K, tau_L, T_L from steps and T1, T2 from sines (two-step), or fit all
+    unknowns to all records (joint)"""
     turns: Annotated[int, Unit("1", 20), Field(ge=1, le=200)]
-    """maximum number of turns of the two steps; the paper uses 1"""
+    """maximum number of iterations of the two-step fit; the paper uses 1"""
     plant: Literal["brake", "eq-22"]
     """synthetic: the whole brake with friction, or a linear model exactly as in eq. (22)"""
     p_low: Pressure
@@ -305,9 +309,9 @@ class Options(ParameterSet):
     p_high: Pressure
     """synthetic: mean pressure of the high region"""
     i_step: Current
-    """synthetic: height of the steps"""
+    """synthetic: step height"""
     amplitude: Current
-    """synthetic: amplitude of the sines"""
+    """synthetic: sine amplitude"""
     f_zero: Frequency
     """synthetic eq-22: zero of the slow pair"""
     f_pole: Frequency
@@ -325,15 +329,15 @@ FREQUENCIES = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0, 10.0, 15.0)
 def identify(
     data: xr.Dataset, par: MotorcycleParameters, options: Options, effort: Effort
 ) -> Identified:
-    """Return eq. (22) by pressure region.
+    """Identify eq. (22) in each pressure region.
 
     Parameters
     ----------
     data
-        ``i``: current [A], ``p_mc``: pressure [Pa], both measured through the same filter, whose
-        lag then cancels. Dither is on, or ``ecu.dither.waveform`` is off. Several records: in each
-        region a step of the current from rest (1 s before, 4 s after it), and sines from 1 to
-        15 Hz in steady state, one or several per record. The mean pressure determines the region.
+        ``i``: current [A], ``p_mc``: pressure [Pa], both measured through the same filter, so that
+        its lag cancels. Either dither is on or ``ecu.dither.waveform`` is off. Each region needs a
+        current step from rest (1 s before, 4 s after the step), and sines from 1 to 15 Hz in
+        steady state, one or several per record. The mean pressure determines a record's region.
 
     Raises
     ------
@@ -378,13 +382,13 @@ def _without_pair(estimates: Mapping[str, Estimate]) -> tuple[str, ...]:
     if not names:
         return ()
     return (
-        f"the data show no slow pair at {' and '.join(names)} pressure. Set model = 'eq-21', "
-        "which determines T1 and T2 better",
+        f"the data show no slow pair at {' and '.join(names)} pressure. Set model = 'eq-21' to "
+        "estimate T1 and T2 more precisely",
     )
 
 
 def pair_shows(estimate: Estimate) -> bool:
-    """Return whether zero and pole of the slow pair differ by more than two standard deviations."""
+    """Return whether the slow pair's zero and pole differ by more than two standard deviations."""
     names = [u.name for u in estimate.unknowns]
     if not {"tau_L", "T_L"} <= set(names):
         return not {"tau_L", "T_L"} & {k.unknown.name for k in estimate.kept}
@@ -396,10 +400,13 @@ def pair_shows(estimate: Estimate) -> bool:
 
 def _described(region: Region) -> str:
     f = region.points.frequencies
-    sines = f"sines at {f.size} frequencies, {f[0]:.3g} to {f[-1]:.3g} Hz" if f.size else "no sines"
+    sines = (
+        f"sines at {f.size} frequencies from {f[0]:.3g} to {f[-1]:.3g} Hz" if f.size else "no sines"
+    )
+    count = len(region.steps)
     return (
-        f"{region.name} pressure, mean {region.pressure / 1e5:.3g} bar; step responses: "
-        f"{len(region.steps)}; {sines}"
+        f"{region.name} pressure (mean {region.pressure / 1e5:.3g} bar): "
+        f"{count} step response{'' if count == 1 else 's'}, {sines}"
     )
 
 
@@ -431,7 +438,7 @@ def _checks(region: Region, estimate: Estimate) -> list[Check]:
             f"{name}.misfit_step",
             error / change,
             limit=_MISFIT_STEP,
-            note="step: rms of computed minus measured, over the change",
+            note="step: rms error relative to the pressure change",
         ),
         Check(
             f"{name}.step_residual_over_noise",
@@ -531,11 +538,11 @@ METHOD = Method(
     ),
     truth=truth,
     further={
-        "K": ("Pa/A", "gain from current to pressure, in each region"),
+        "K": ("Pa/A", "gain from current to pressure in each region"),
         "tau_L": ("s", "zero of the slow pair"),
         "T_L": ("s", "pole of the slow pair"),
         "T1": ("s", "slower pole of the drive"),
         "T2": ("s", "faster pole of the drive"),
-        "p_rest": ("Pa", "pressure before a step, for each step"),
+        "p_rest": ("Pa", "pressure before each step"),
     },
 )

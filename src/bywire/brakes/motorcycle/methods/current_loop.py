@@ -1,7 +1,7 @@
 """Gains of the sampled current PI from steps of the demand (2010, section 3.1, Fig. 3).
 
 Sampling, supply, anti-alias filter and anti-windup are those of the parameter set. The model
-neglects the converter's resolution; its error counts as noise.
+neglects the converter's resolution and treats its quantization error as noise.
 """
 
 from __future__ import annotations
@@ -26,26 +26,26 @@ class Options(LoopOptions):
     """Unknowns, torque that holds the rotor, and the synthetic experiment."""
 
     T_hold: Torque
-    """torque that holds the model's rotor: must exceed the motor's torque"""
+    """torque that locks the model's rotor; must exceed the motor torque"""
     p_start: Pressure
     """synthetic: pressure that the stuck piston holds"""
     i_low: Current
-    """synthetic: size of the steps below the holding current, within breakaway"""
+    """synthetic: step size below the holding current, too small for breakaway"""
     i_high: Current
-    """synthetic: size of the steps above the holding current, within breakaway"""
+    """synthetic: step size above the holding current, too small for breakaway"""
     sigma_i: Annotated[float, Unit("A", 5e-3), Field(ge=0)]
     """synthetic: noise of the measured current, upstream of the converter"""
 
 
 def held(par: MotorcycleParameters, options: Options) -> MotorcycleParameters:
-    """Return the parameters with a rotor that the seals hold."""
+    """Return the parameters with a rotor that seal friction locks."""
     return par.replace(
         {"drive.mode": "current-direct", "adc.law": "ideal", "seal.T_pr": options.T_hold}
     )
 
 
 def at_rest(par: MotorcycleParameters) -> tuple[Any, Any]:
-    """Return state and memory at the start of a record: the chamber without pressure."""
+    """Return state and memory at the start of a record: no pressure in the chamber."""
     return state_at(0.0, par), memory_at(0.0, par)
 
 
@@ -62,7 +62,7 @@ LOOP = CurrentLoop(
 
 
 def synthetic(par: MotorcycleParameters, options: Options, seed: int) -> xr.Dataset:
-    """Return simulated steps of the demand on the whole brake, stuck, with noise in the loop."""
+    """Return simulated demand steps of the whole brake, with a stuck piston and noisy feedback."""
     span = par.current_sensor.i_high - par.current_sensor.i_low
     noisy_par = par.replace({"adc.noise": options.sigma_i / span})
     hold = holding_current(options.p_start, noisy_par)
@@ -87,7 +87,7 @@ def synthetic(par: MotorcycleParameters, options: Options, seed: int) -> xr.Data
 METHOD = LOOP.method(
     name="current-loop",
     assembly="motorcycle-brake",
-    summary="gains of the current PI from steps, rotor locked (2010, section 3.1, Fig. 3)",
+    summary="gains of the current PI from steps with a locked rotor (2010, section 3.1, Fig. 3)",
     experiment="current-step",
     options=Options,
     defaults=Options(

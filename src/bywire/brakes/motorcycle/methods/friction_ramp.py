@@ -41,7 +41,7 @@ from bywire.identification.unknown import Unknown, parameters_of, scattered
 from bywire.plant import seal_friction
 from bywire.simulation.run import simulate
 
-# Curves of an identified friction: torque over speed with its band, and the replayed ramp.
+# Curves of an identified friction: torque versus speed with its band, and the replayed ramp.
 
 _SHARE = 1e-6
 
@@ -49,7 +49,7 @@ _SHARE = 1e-6
 def stribeck_band(
     par: seal_friction.Parameters, estimate: Estimate, pressures: Sequence[float], omega: Array
 ) -> xr.Dataset:
-    """Return friction torque over speed with 95 % bands, at several pressures.
+    """Return friction torque versus speed with 95 % bands, at several pressures.
 
     ``par``: the identified friction; ``estimate``: estimate of ``seal.*`` parameters;
     ``pressures``: [Pa]; ``omega``: shaft speeds [rad/s], shape (n,).
@@ -58,7 +58,7 @@ def stribeck_band(
     -------
     xarray.Dataset
         ``value``, ``low``, ``high`` [N m] over ``pressure`` and ``omega``. NaN at zero speed,
-        where the friction is anywhere between its breakaway torques.
+        where the friction can have any value between its breakaway torques.
 
     References
     ----------
@@ -118,9 +118,9 @@ def replayed(data: xr.Dataset, par: MotorcycleParameters, step: float) -> xr.Dat
     )
 
 
-# What the slips of a ramp determine: friction from their shapes, and from their breakaway currents.
+# Friction from the shapes of a ramp's slips and from their breakaway currents.
 
-_BLOCKS = 250  # at most
+_BLOCKS = 250  # maximum
 
 
 class Whitening:
@@ -129,15 +129,16 @@ class Whitening:
     .. math:: \Sigma = \sigma^2 I + P H H^T P \sigma_i^2
 
     H is the pressure's response to every sample of the current. It is derived from the response to
-    a constant offset, as if the slip responded alike at all times. P projects out a shift in time.
+    a constant offset, as if the slip's response did not change with time. P projects out a time
+    shift.
 
     Parameters
     ----------
-    one
-        A slip of the model.
+    fitted
+        A simulated slip.
     sigma, sigma_i
-        Noise of a sample of the pressure [Pa], and of the current [A] that drives the slip; 0
-        if no measured current drives it.
+        Noise of a pressure sample [Pa], and of a sample of the current [A] that drives the slip;
+        0 if no measured current drives the slip.
     """
 
     def __init__(self, fitted: Fitted, sigma: float, sigma_i: float) -> None:
@@ -188,8 +189,8 @@ class Noise:
     def of_breakaway(self, shot: Shot) -> float:
         """Return the standard deviation of the current [A] measured at the start of a shot.
 
-        It has three parts: the error of the end of a line through some noisy samples; the current's
-        ripple at rest, because it is random which peak frees the piston; and other scatter.
+        It has three parts: the error at the end of a line through a few noisy samples, the current
+        ripple at rest (any of its peaks can free the piston), and other scatter.
         """
         read = 2.0 * self.current / np.sqrt(shot.seen)
         ripple = np.sqrt(max(shot.unrest**2 - self.current**2, 0.0))
@@ -197,16 +198,16 @@ class Noise:
 
 
 class SlipLoss:
-    """Weighted residuals of all slips over friction parameters, current offset and ripple.
+    """Weighted residuals of all slips versus friction parameters, current offset and ripple.
 
     Parameters
     ----------
     shooting, shots, noise
         The model, the measured slips, and their noise.
     weighted_at
-        Values at which the weights are computed. The measured current then drives the slips, and
-        the Jacobian is free of its noise: an instrument. None for the search, in which only the
-        ramp drives the slips: fast, and with few minima.
+        Values at which the weights are computed. The measured current then drives the slips. The
+        Jacobian is free of the current's noise, so it serves as an instrument. None for the search:
+        only the ramp drives the slips, which is fast and gives few minima.
     """
 
     def __init__(
@@ -226,8 +227,8 @@ class SlipLoss:
     def __call__(self, values: Array) -> tuple[Array, Array]:
         """Return residuals and Jacobian: the slips' shapes, then one row for every breakaway.
 
-        ``values``: friction parameters, zero offset of the current sensor [A], and excess of the
-        current at its peaks over its mean [A].
+        ``values``: friction parameters, zero offset of the current sensor [A], and height of the
+        current's peaks above its mean [A].
         """
         seal, zero, ripple = values[: self._shooting.count], float(values[-2]), float(values[-1])
         driven = zero if self._whitenings is not None else None
@@ -250,9 +251,9 @@ class SlipLoss:
 
 _NAMES = ("T_pr", "f_cfr_p", "f_cfr_n", "k_brk_p", "k_brk_n", "c", "mu_T")
 _ZERO, _RIPPLE = "offset.i", "offset.i_ripple"
-# The multistart search has a coarse time step. First it fits the beginnings of slips, which have
-# few minima once the parameters that they hardly determine are fixed. A full fit then refines the
-# best minimum.
+# The multistart search uses a coarse time step. It first fits only the initial part of each slip,
+# with the parameters fixed that this part hardly determines: this fit has few minima. A full fit
+# then refines the best minimum.
 _QUICK_STEP, _BEGINNING, _QUICK_LENGTH = 1e-4, 0.6, 4.0  # s
 _HARDLY_TOLD = ("seal.c", "seal.mu_T")
 _LIMIT_REPLAY, _LIMIT_RESIDUAL, _LIMIT_ZERO, _LIMIT_RIPPLE = 0.1, 1.1, 5.0, 3.0
@@ -262,24 +263,23 @@ class Options(ParameterSet):
     """Definition of a slip, and noise of the measurements."""
 
     least: Pressure
-    """minimum change of pressure that counts as a slip"""
+    """minimum pressure change that counts as a slip"""
     longest: Duration
-    """longest part of a slip that the fit compares"""
+    """maximum duration of each slip that the fit compares"""
     scatter: Current
     """standard deviation of the breakaway current from slip to slip, in addition to measurement
     noise and ripple"""
     zero: Current
     """standard deviation of the current sensor's zero offset, which all slips share"""
     ripple: Current
-    """standard deviation of the current's excess over its mean at breakaway: the piston breaks away
-    at a peak of the current's ripple"""
+    """standard deviation of the breakaway current's height above the mean current: the piston
+    breaks away at a ripple peak"""
     sigma_p: Annotated[float, Unit("Pa", 2e3), Field(ge=0)]
     """noise of the pressure in synthetic measurements"""
     sigma_i: Annotated[float, Unit("A", 1e-2), Field(ge=0)]
-    """noise of the current sensors in synthetic measurements: the recorded one, and the one that
-    the controller uses"""
+    """noise of the current in synthetic measurements, both recorded and used by the controller"""
     step: Duration
-    """substep of the slips' runs"""
+    """substep of the slip simulations"""
 
 
 def identify(
@@ -290,20 +290,21 @@ def identify(
     Parameters
     ----------
     data
-        ``i``: measured motor current [A]; ``p_mc``: pressure [Pa]. The current demand, used instead
-        of the current, biases the estimates: the current lags behind it while the shaft turns fast.
+        ``i``: measured motor current [A]; ``p_mc``: pressure [Pa]. The current demand is no
+        substitute for the current: the current lags it while the shaft turns fast, which biases
+        the estimates.
     par
-        Known parameters. Motor and current controller matter: they make the current dip below its
-        ramp as a slip begins. Dither is off.
+        Known parameters. The motor and the current controller matter: they make the current dip
+        below its ramp as a slip begins. Dither is off.
 
     Raises
     ------
     ParameterError
-        When the record has no slip, or a pressure that the brake cannot reach.
+        When the record contains no slip, or a pressure that the brake cannot reach.
 
     References
     ----------
-    Dardanelli, Alli, Savaresi (2010), section 4.1; the loss is ours, see `SlipLoss`.
+    Dardanelli, Alli, Savaresi (2010), section 4.1. The loss function is `SlipLoss`.
     """
     shots = shots_of(data, options)
     require_reachable(shots, par)
@@ -323,20 +324,20 @@ def identify(
                 "residual_over_noise",
                 best.rms,
                 limit=_LIMIT_RESIDUAL,
-                note="aligned slips: residual over the sensor noise",
+                note="aligned slips: ratio of residual to sensor noise",
             ),
             Check(
                 "replay_nrmse",
                 nrmse,
                 limit=_LIMIT_REPLAY,
-                note="whole ramp: rms of computed minus measured, over the range",
+                note="whole ramp: rms error relative to the pressure range",
             ),
             Check(
                 "zero_over_usual",
                 abs(zero) / options.zero,
                 limit=_LIMIT_ZERO,
-                note="zero offset of the current sensor over its usual size; other causes of a "
-                "large value: offset of the pressure sensor, a wrong unit, the torque constant",
+                note="zero offset of the current sensor relative to its usual size. A pressure "
+                "sensor offset, a wrong unit or a wrong torque constant also increases it",
             ),
             Check("starts_at_minimum", led.reached / effort.starts),
         ),
@@ -382,7 +383,7 @@ def _fitted(
     best = estimate(_problem(data, par, options, unknowns, at), start=at)
     if not any(name.startswith("seal.") for name in best.names):
         raise ParameterError(
-            "the slips do not determine the seal friction with this current. Check the units of "
+            "the slips and this current do not determine the seal friction. Check the units of "
             "i and p_mc, and the known parameters motor.K_e, gear and cylinder",
             name="i",
         )
@@ -422,7 +423,7 @@ def shots_of(data: xr.Dataset, options: Options) -> list[Shot]:
     Raises
     ------
     ParameterError
-        When there is none, or the pressure falls while the current rises.
+        When the record contains no slip, or the pressure falls while the current rises.
     """
     t, p, i = (data[name].values for name in ("time", "p_mc", "i"))
     together = float(np.mean((p - p.mean()) * (i - i.mean())) / max(p.std() * i.std(), 1e-300))
@@ -431,8 +432,8 @@ def shots_of(data: xr.Dataset, options: Options) -> list[Shot]:
     slips = find_slips(p, even_interval(t), options.least)
     if not slips:
         raise ParameterError(
-            f"p_mc has no slip of more than least = {options.least / 1e5:g} bar, so it cannot "
-            "determine friction. Ramp the current slowly, up and down, without dither",
+            f"p_mc contains no slip larger than least = {options.least / 1e5:g} bar, so the record "
+            "does not determine the friction. Ramp the current slowly up and down, without dither",
             name="p_mc",
         )
     return cut_out(t, p, i, slips, options.longest)
@@ -474,7 +475,7 @@ def synthetic(par: MotorcycleParameters, options: Options, seed: int) -> xr.Data
 METHOD = Method(
     name="friction-ramp",
     assembly="motorcycle-brake",
-    summary="seal friction from the slow ramp: breakaway and slips (2010, eqs. 16, 17, Fig. 4)",
+    summary="seal friction from breakaway and slips on a slow ramp (2010, eqs. 16, 17, Fig. 4)",
     experiment="friction-ramp",
     signals={"i": "A", "p_mc": "Pa"},
     options=Options,
@@ -494,6 +495,6 @@ METHOD = Method(
     unknowns=tuple(f"seal.{name}" for name in _NAMES),
     further={
         _ZERO: ("A", "zero offset of the current sensor"),
-        _RIPPLE: ("A", "excess of the current at its peaks over its mean"),
+        _RIPPLE: ("A", "height of the current's peaks above its mean"),
     },
 )

@@ -1,4 +1,4 @@
-"""Resistance, inductance and back-EMF from voltage and current (2010, eq. 1)."""
+"""Resistance, inductance and back-EMF constant from voltage and current (2010, eq. 1)."""
 
 from __future__ import annotations
 
@@ -33,24 +33,24 @@ from bywire.simulation.run import simulate
 
 _NAMES = ("motor.R_m", "motor.L_m", "motor.K_e")
 _TURNS = 1.0  # rad/s: a slower shaft counts as locked
-_STEP = 2e-6  # of the simulated experiment [s]: a coarse step biases L_m if the shaft turns
+_STEP = 2e-6  # s, simulated experiment: a coarse step biases L_m if the shaft turns
 
 
 class Options(ParameterSet):
     """The synthetic experiment."""
 
     rotor: Literal["stuck", "turning"]
-    """shaft: held by friction under pressure, or turning from the retracted end"""
+    """shaft: held by friction under pressure, or turning away from the retracted end"""
     p_start: Pressure
     """pressure that the stuck piston holds"""
     i_low: Current
-    """stuck: size of the steps below the holding current, within breakaway"""
+    """stuck: step size below the holding current, too small for breakaway"""
     i_high: Current
-    """stuck: size of the steps above the holding current, within breakaway"""
+    """stuck: step size above the holding current, too small for breakaway"""
     v_high: Voltage
     """turning: maximum voltage"""
     dwell: Duration
-    """time from one step of the voltage to the next"""
+    """time from one voltage step to the next"""
     duration: Duration
     """length of the record"""
     interval: Duration
@@ -70,7 +70,7 @@ def identify(
     ----------
     data
         ``v``: voltage at the motor, held between samples [V]; ``omega``: speed [rad/s], zero while
-        the rotor is locked or sticks; ``i``: current [A] after the anti-alias filter, whose corner
+        the rotor is locked or sticks; ``i``: current [A] after the anti-alias filter, whose cutoff
         is ``anti_alias.f_aa``. One or several records.
 
     Raises
@@ -95,7 +95,10 @@ def identify(
     notes = (
         ()
         if turning
-        else ("the shaft does not turn, so K_e is undetermined. Turn it, and measure its speed",)
+        else (
+            "the shaft does not turn, so the data do not determine K_e. Turn the shaft and "
+            "measure its speed",
+        )
     )
     return Identified(
         estimates={"winding": fit},
@@ -107,7 +110,7 @@ def identify(
 
 
 def synthetic(par: MotorcycleParameters, options: Options, seed: int) -> xr.Dataset:
-    """Return simulated steps of the voltage on the whole brake, with sensor noise."""
+    """Return simulated voltage steps of the whole brake, with sensor noise."""
     random = np.random.default_rng(seed)
     stuck = options.rotor == "stuck"
     source_par = par.replace({"drive.T_source": options.interval, "adc.law": "ideal"})
@@ -143,7 +146,7 @@ def synthetic(par: MotorcycleParameters, options: Options, seed: int) -> xr.Data
 METHOD = Method(
     name="motor-winding",
     assembly="motorcycle-brake",
-    summary="R_m and L_m from voltage steps, K_e if the shaft turns (2010, eq. 1)",
+    summary="R_m and L_m from voltage steps, also K_e if the shaft turns (2010, eq. 1)",
     experiment="motor-open-loop",
     signals={"v": "V", "omega": "rad/s", "i": "A"},
     options=Options,
@@ -165,5 +168,5 @@ METHOD = Method(
     several=True,
     simulated=tuple(Options.model_fields),
     bench_note="the record comes from a voltage source, with the rotor locked or at a set speed. "
-    "The bench's shaft is free and cannot replay it. Use only the values",
+    "The bench's shaft turns freely, so the bench cannot replay the record. Use only the values",
 )

@@ -1,4 +1,4 @@
-"""Eq. (22) fitted to records of current and pressure under dither, pressure region by region."""
+"""Fit of eq. (22) to current and pressure records with dither, in each pressure region."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ from bywire.identification.unknown import Unknown, moved
 
 Complex = NDArray[np.complex128]
 
-_LEAST = 0.1  # of the strongest line: smallest peak that counts as a line
+_LEAST = 0.1  # minimum height of a peak that counts as a line, relative to the strongest line
 _FINER = 4  # zero padding of the transform that detects the lines
 _ROUNDS = 5  # Newton iterations for their frequencies
-_STILL = 1e-9  # of a signal: changes from rounding alone
+_STILL = 1e-9  # relative to a signal's magnitude: a smaller change is rounding
 _HARMONICS = 3  # of the dither
 
 
@@ -39,10 +39,10 @@ class Points:
     frequencies
         [Hz], shape (n,).
     log_gain
-        Logarithm of output over input, SI: magnitude in the real, phase [rad] in the imaginary
-        part; shape (n,).
+        Logarithm of the output-to-input ratio, SI: magnitude in the real part, phase [rad] in the
+        imaginary part; shape (n,).
     deviation
-        Standard deviation of either part, from both signals' residuals; shape (n,).
+        Standard deviation of each part, from both signals' residuals; shape (n,).
     """
 
     frequencies: Array
@@ -55,7 +55,7 @@ def lines(
 ) -> Array:
     """Return the frequencies [Hz] of a signal's sines within a band, shape (n,).
 
-    ``u``: shape (rows,); ``interval``: sample time [s]; ``low``, ``high``: ends of the band [Hz];
+    ``u``: shape (rows,); ``interval``: sample time [s]; ``low``, ``high``: limits of the band [Hz];
     ``others``: lines outside the band, with three harmonics, such as a dither [Hz].
     """
     n = u.size
@@ -81,7 +81,7 @@ def lines(
 
 
 def _refined(u: Array, t: Array, frequencies: Array, base: Array) -> Array:
-    """Return the sines' frequencies with the least residual of a signal (Gauss-Newton)."""
+    """Return the sine frequencies that minimize a signal's residual (Gauss-Newton)."""
     w = 2.0 * math.pi * frequencies
     for _ in range(_ROUNDS):
         waves = _waves(w, t)
@@ -110,7 +110,7 @@ def _waves(w: Array, t: Array) -> Array:
 
 
 def _mixed(carriers: Array, alone: Array) -> Array:
-    """Return carriers and their side bands [rad/s]: a dither's size follows the pressure."""
+    """Return carriers and their sidebands [rad/s]: a dither's amplitude follows the pressure."""
     sides = [np.concatenate((w - alone, [w], w + alone)) for w in carriers]
     return np.concatenate(sides) if sides else np.empty(0)
 
@@ -118,10 +118,10 @@ def _mixed(carriers: Array, alone: Array) -> Array:
 def measured_points(
     u: Array, y: Array, interval: float, frequencies: Array, others: Sequence[float] = ()
 ) -> Points:
-    """Return output over input at given lines, with drift and other lines removed from both.
+    """Return the output-to-input ratio at certain lines, without drift and other lines.
 
     ``u``, ``y``: input and output in steady state, shape (rows,); ``interval``: sample time [s];
-    ``frequencies``: lines [Hz]; ``others``: further lines of both signals, with three harmonics,
+    ``frequencies``: lines [Hz]; ``others``: other lines of both signals, with three harmonics,
     such as a dither [Hz].
     """
     t = _centered(u.size, interval)
@@ -135,7 +135,7 @@ def measured_points(
     n = frequencies.size
     amplitude = coefficients[: 2 * n : 2] - 1j * coefficients[1 : 2 * n : 2]
     relative = 2.0 * variance / u.size / np.abs(amplitude) ** 2
-    # Of a complex amplitude's error, half of the variance lies in each part.
+    # Each part contains half of the variance of a complex amplitude's error.
     return Points(
         frequencies, np.log(amplitude[:, 1] / amplitude[:, 0]), np.sqrt(relative.sum(axis=1))
     )
@@ -147,34 +147,34 @@ REGIONS = ("low", "medium", "high")
 BAND = (1.0, 15.0)
 """frequencies [Hz] of the paper's second step"""
 
-_STEP = 0.9  # of the demand's variance that two levels must explain: at most 0.81 for a sine
-_REST = 10  # blocks of rest before a step, at least
-_LONGEST = 0.1  # s: longest block of dither periods
+_STEP = 0.9  # fraction of the demand's variance that two levels must explain (sine: at most 0.81)
+_REST = 10  # minimum number of blocks of rest before a step
+_LONGEST = 0.1  # s: maximum duration of a block of dither periods
 
 
 @dataclass(frozen=True)
 class StepRecord:
-    """A step of the current from rest, dither averaged.
+    """A current step from rest, with the dither averaged out.
 
     Parameters
     ----------
     label
         Name of the record.
     u
-        Current minus its mean before the step [A], as moving average over a block, from the end
-        of the first block on, shape (n - block + 1,).
+        Current minus its mean before the step [A], as a moving average over a block, starting at
+        the end of the first block, shape (n - block + 1,).
     interval
         Sample time [s].
     block
-        Samples per mean of the pressure: whole dither periods.
+        Samples per pressure mean: whole dither periods.
     pressure
-        Mean pressure of every block [Pa], shape (n // block,).
+        Mean pressure in every block [Pa], shape (n // block,).
     rest
         Mean pressure before the step [Pa].
     sigma
         Standard deviation of a block's noise [Pa].
     sigma_i
-        Standard deviation of a sample's noise of the current [A].
+        Standard deviation of a current sample's noise [A].
     before
         Samples before the step.
     """
@@ -207,7 +207,7 @@ class Region:
 def regions_of(
     records: Mapping[str, xr.Dataset], borders: tuple[float, float], f_dit: float | None
 ) -> tuple[Region, ...]:
-    """Return the records, sorted by pressure region and kind.
+    """Sort the records by pressure region and kind.
 
     Parameters
     ----------
@@ -215,7 +215,7 @@ def regions_of(
         ``i`` [A] and ``p_mc`` [Pa] over ``time`` [s], by label. A record is a step if two levels
         explain its current. Otherwise it has one or several simultaneous sines in steady state.
     borders
-        Between low and medium, and medium and high pressure [Pa].
+        Boundaries between low and medium pressure, and between medium and high pressure [Pa].
     f_dit
         Frequency of the dither [Hz]; None if it is off.
 
@@ -223,7 +223,7 @@ def regions_of(
     ------
     ParameterError
         When time is not evenly spaced, a dither period is not a whole number of samples, no rest
-        precedes a step, or a record has neither step nor sine.
+        precedes a step, or a record contains neither a step nor a sine.
     """
     steps: dict[str, list[StepRecord]] = {name: [] for name in REGIONS}
     points: dict[str, list[Points]] = {name: [] for name in REGIONS}
@@ -249,7 +249,7 @@ def regions_of(
 
 
 def block_of(interval: float, f_dit: float | None) -> int:
-    """Return the number of samples of one or a few whole dither periods.
+    """Return the number of samples in one or a few whole dither periods.
 
     Raises
     ------
@@ -264,7 +264,7 @@ def block_of(interval: float, f_dit: float | None) -> int:
             return round(samples)
     raise ParameterError(
         f"one or a few dither periods of {1.0 / f_dit:g} s must be a whole number of sample times "
-        f"of {interval:g} s, so that the ripple can be averaged. Resample the record to 1 kHz",
+        f"of {interval:g} s, so that the ripple averages out. Resample the record to 1 kHz",
         name="sample time",
         value=f"{interval:g} s",
     )
@@ -277,15 +277,15 @@ def averaged(values: Array, block: int) -> Array:
 
 
 def _moving_average(values: Array, block: int) -> Array:
-    """Return the moving mean over the last samples, from the first whole block on.
+    """Return the moving mean over the last samples, starting at the end of the first whole block.
 
-    The same average of current and pressure keeps their relation and removes the dither.
+    Averaging current and pressure the same way preserves their relation and removes the dither.
     """
     return np.convolve(values, np.full(block, 1.0 / block), mode="valid")
 
 
 def step_at(means: Array) -> int | None:
-    """Return the first block after the current's step, by the best fit of two levels, or None."""
+    """Return the first block after the current step, from the best fit of two levels, or None."""
     n = means.size
     if n < 3:
         return None
@@ -303,9 +303,9 @@ def _step(label: str, i: Array, p: Array, interval: float, block: int, onset: in
     if rest < _REST:
         least = f">= {_REST * block * interval:g} s"
         raise ParameterError(
-            f"record {label or 'of the step'}: the rest before its step is "
-            f"{max(rest, 0) * block * interval:g} s, but it must be {least} to show the "
-            "initial pressure. Record more before the step",
+            f"record {label or 'with the step'}: the rest before the step lasts "
+            f"{max(rest, 0) * block * interval:g} s. It must be {least} to show the initial "
+            "pressure. Start recording earlier",
             name="rest",
             value=f"{max(rest, 0) * block * interval:g} s",
             valid=least,
@@ -333,7 +333,7 @@ def _scatter(means: Array) -> float:
 
 
 def _around_line(means: Array) -> float:
-    """Return the noise of values with no more than a drift."""
+    """Return the noise of values that otherwise only drift."""
     k = np.arange(means.size)
     left = means - np.polyval(np.polyfit(k, means, 1), k)
     return math.sqrt(float(left @ left) / (means.size - 2))
@@ -344,7 +344,7 @@ def _sines(label: str, i: Array, p: Array, interval: float, f_dit: float | None)
     spectrum = lines(i, interval, *BAND, others)
     if not spectrum.size:
         raise ParameterError(
-            f"the current of record {label} has neither a step nor a sine from {BAND[0]:g} to "
+            f"the current of record {label} contains neither a step nor a sine from {BAND[0]:g} to "
             f"{BAND[1]:g} Hz, so it does not determine any unknown. Apply a step or a sine to the "
             "current demand",
             name="i",
@@ -372,7 +372,7 @@ _STATES, _INPUTS = 6, 2
 
 
 def response(values: Array, u: Array, interval: float, every: int) -> tuple[Array, Array]:
-    r"""Return the response and its derivatives at every n-th sample.
+    r"""Return the response and its derivatives at every nth sample.
 
     .. math::
         G = K \frac{1 + s \tau_L}{(1 + s T_1)(1 + s T_2)(1 + s T_L)}, \quad
@@ -419,7 +419,7 @@ def response(values: Array, u: Array, interval: float, every: int) -> tuple[Arra
 
 
 def _impulse(values: Array, n: int, interval: float) -> Array:
-    """Return the response of samples to a sample of the input, shape (n,).
+    """Return the response of samples to one sample of the input, shape (n,).
 
     Parameters
     ----------
@@ -459,7 +459,7 @@ def _output_row(K: float, tau_L: float, T_L: float) -> Array:
 
 
 def _outputs(values: Array) -> Array:
-    """Return rows of the output and of its derivatives by the five values."""
+    """Return rows of the output and of its derivatives with respect to the five values."""
     K, tau_L, T_1, T_2, T_L = values
     y = _output_row(K, tau_L, T_L)
     rows = [y, y / K, _output_row(K, 1.0, T_L) - _output_row(K, 0.0, T_L)]
@@ -471,7 +471,7 @@ def _outputs(values: Array) -> Array:
 
 
 def _first_order_hold(A: Array, B: Array, interval: float) -> tuple[Array, Array, Array]:
-    """Return the transition matrix, and the input's weights at begin and end of an interval."""
+    """Return the transition matrix, and the input's weights at the start and end of an interval."""
     from scipy import linalg
 
     n = _STATES
@@ -485,7 +485,7 @@ def _first_order_hold(A: Array, B: Array, interval: float) -> tuple[Array, Array
 def log_response(values: Array, frequencies: Array) -> tuple[NDArray[np.complex128], Array]:
     r"""Return :math:`\ln G` at frequencies [Hz], and its derivatives, complex.
 
-    The real part is the logarithm of the magnitude, the imaginary part the phase [rad].
+    The real part is the logarithm of the magnitude; the imaginary part is the phase [rad].
 
     Returns
     -------
@@ -500,7 +500,7 @@ def log_response(values: Array, frequencies: Array) -> tuple[NDArray[np.complex1
     return np.asarray(G), np.column_stack(slopes)
 
 
-# --- Two fits that share unknowns, alternating until they agree
+# --- Two fits that share unknowns and alternate until they agree
 
 _SETTLED = 1e-6  # of a value
 
@@ -508,20 +508,20 @@ _SETTLED = 1e-6  # of a value
 def _in_turn(
     problems: tuple[Problem, Problem], groups: tuple[Sequence[int], Sequence[int]], most: int
 ) -> Estimate:
-    r"""Estimate some unknowns by one fit and the others by another, each with the other's values.
+    r"""Estimate some unknowns with one fit and the rest with another, using each other's values.
 
-    At the end :math:`Z^T r = 0`, where Z holds the derivatives of either fit by its own unknowns
-    alone. This is an instrumental-variable estimate; its covariance includes the effect of one
-    fit's error on the other.
+    At the end :math:`Z^T r = 0`, where Z contains each fit's derivatives with respect to its own
+    unknowns only. This is an instrumental-variable estimate. Its covariance includes the effect of
+    one fit's error on the other.
 
     Parameters
     ----------
     problems
         Both with the same unknowns.
     groups
-        Indices of the unknowns that each fit estimates; together they cover all.
+        Indices of the unknowns that each fit estimates; together they cover all unknowns.
     most
-        Largest number of turns. With one, the first fit does not use the second fit's values.
+        Maximum number of iterations. With one, the first fit does not use the second fit's values.
 
     Raises
     ------
@@ -541,14 +541,15 @@ def _in_turn(
             parts.append(part)
         size = np.abs(values) + np.array([u.scale for u in unknowns])
         change, turns = float(np.max(np.abs(values - before) / size)), turns + 1
-    notes = [f"{turns} turn{'s' if turns > 1 else ''} of two steps"]
+    notes = [f"{turns} iteration{'s' if turns > 1 else ''} of the two-step fit"]
     if change <= _SETTLED:
         best = _combined(problems, parts, values)
     else:
         best = _apart(problems, parts)
         notes.append(
-            f"the two steps have not converged: the last turn changed the values by {change:.2g} "
-            "of their size; each step's intervals take the other step's values as known"
+            "the two-step fit did not converge: its last iteration changed the values by "
+            f"{change:.2g} of their size. Each step's intervals assume that the other step's "
+            "values are exact"
         )
     return best.noted((*notes, *notes_of(best)))
 
@@ -558,14 +559,14 @@ def _index(problem: Problem, label: str) -> int:
 
 
 def restricted(problem: Problem, mine: Sequence[int], values: Array) -> Problem:
-    """Return a problem in some of its unknowns, with the others fixed.
+    """Return a problem with some unknowns free and the others fixed.
 
     Parameters
     ----------
     mine
         Indices of the unknowns that remain free.
     values
-        Values of all unknowns: starts of the free ones, constants of the fixed ones.
+        Values of all unknowns: starting values of the free ones, constants for the fixed ones.
     """
     chosen = list(mine)
     begin = moved([problem.unknowns[k] for k in chosen], values[chosen])
@@ -602,7 +603,7 @@ def _apart(problems: tuple[Problem, Problem], parts: Sequence[Estimate]) -> Esti
 
 
 def _original(problem: Problem, parts: Sequence[Estimate]) -> tuple[Unknown, ...]:
-    """Return the parts' unknowns with their starts from before the first turn."""
+    """Return the parts' unknowns with their starting values from before the first iteration."""
     return tuple(problem.unknowns[_index(problem, label)] for part in parts for label in part.names)
 
 
@@ -650,10 +651,10 @@ def _combined(
 # --- The fit
 
 _DECADE = 10.0  # tau_L and T_L begin one decade below T1
-_FAR = 1e3  # largest ratio of a time constant to its start
+_FAR = 1e3  # maximum ratio of a time constant to its starting value
 _UNITS = {"K": "Pa/A"}
-_WEIGHED = 2  # fits: the starting model weighs the noise, then the model from the first fit
-_MOVES = 5.0  # of a block's noise: smallest change of pressure that a step must cause
+_WEIGHED = 2  # fits: the starting model weights the noise in the first, its result in the second
+_MOVES = 5.0  # minimum pressure change that a step must cause, relative to a block's noise
 
 
 class _Whitening:
@@ -662,18 +663,19 @@ class _Whitening:
     .. math::
         \Sigma = \sigma^2 I + \sigma_u^2 (H - H 1 w^T)(H - H 1 w^T)^T
 
-    H is the response of the means to every sample of the input; w takes the mean before the step,
-    which is subtracted from the input. A model driven by a measured current also responds to its
-    noise. Its response is as slow as the brake's, so residuals correlate over seconds.
+    H is the response of the means to every sample of the input. w averages the samples before the
+    step, whose mean is subtracted from the input. A model driven by a measured current also
+    responds to the current's noise. That response is as slow as the brake's, so residuals correlate
+    over seconds.
 
     Parameters
     ----------
     values
-        K, tau_L, T1, T2, T_L of the model that responds; SI, shape (5,).
+        K, tau_L, T1, T2, T_L of the responding model; SI, shape (5,).
     blocks, block
-        Number of means, and samples in each.
+        Number of means, and number of samples in each.
     rest
-        Samples before the step whose mean is subtracted.
+        Number of samples before the step whose mean is subtracted.
     sigma, sigma_u
         Noise of a mean of the output, and of a sample of the input.
     interval
@@ -710,7 +712,7 @@ class _Whitening:
 
 
 def _starts_of(par: MotorcycleParameters, p: float) -> dict[str, float]:
-    """Return the fit's starts as in the paper: eq. (15), and the slow pair one decade below.
+    """Return the paper's starting values: eq. (15), and a slow pair one decade below.
 
     ``p``: pressure [Pa].
 
@@ -725,7 +727,7 @@ def _starts_of(par: MotorcycleParameters, p: float) -> dict[str, float]:
 
 
 def unknowns_of(region: Region, starts: dict[str, float]) -> tuple[Unknown, ...]:
-    """Return the five unknowns of eq. (22), and the pressure at rest before every step."""
+    """Return the five unknowns of eq. (22), and the rest pressure before every step."""
     five = [
         Unknown(
             name,
@@ -754,7 +756,7 @@ def unknowns_of(region: Region, starts: dict[str, float]) -> tuple[Unknown, ...]
 def _over_time(region: Region, unknowns: tuple[Unknown, ...], near: Array) -> Problem:
     """Return the fit to the step responses, with one residual per block of time.
 
-    ``near``: K, tau_L, T1, T2, T_L of the model that weighs the measured current's noise, shape
+    ``near``: K, tau_L, T1, T2, T_L of the model that weights the measured current's noise, shape
     (5,).
     """
     whitenings = [
@@ -807,20 +809,22 @@ def fit(
     Parameters
     ----------
     region
-        Its records.
+        Records of the region.
     par
-        Parameters for the starts, see ``_starts_of``.
+        Parameters for the starting values (see ``_starts_of``).
     joint
-        Fit all unknowns to all data; otherwise K, tau_L and T_L to steps, T1 and T2 to sines.
+        True: fit all unknowns to all data. False: fit K, tau_L and T_L to steps, and T1 and T2 to
+        sines.
     turns
-        Largest number of turns of the two steps; the paper uses one.
+        Maximum number of iterations of the two-step fit; the paper uses one.
     pair
-        With a slow pair, eq. (22); otherwise tau_L = T_L, eq. (21).
+        True: with a slow pair, eq. (22). False: tau_L = T_L, eq. (21).
 
     Raises
     ------
     ParameterError
-        When the records cannot determine the unknowns; the message names the experiment that can.
+        When the records cannot determine the unknowns. The message describes an experiment that
+        can.
     """
     _require(region, joint)
     starts = _starts_of(par, region.pressure)
@@ -835,7 +839,7 @@ def fit(
 def _fitted(
     region: Region, unknowns: tuple[Unknown, ...], near: Array, *, turns: int, pair: bool
 ) -> Estimate:
-    """Return the estimate, by turns of two steps or, without turns, from all data together."""
+    """Return the estimate from alternating steps or, with 0 turns, from all data together."""
     time, frequency = _over_time(region, unknowns, near), over_frequency(region, unknowns)
     rests = range(len(NAMES), len(unknowns))
     by_steps = [0, *((1, 4) if pair else ()), *rests]
@@ -851,7 +855,7 @@ def _fitted(
 
 
 def five_of(fitted: Estimate) -> dict[str, float]:
-    """Return K, tau_L, T1, T2 and T_L of an estimate, including those kept at their start."""
+    """Return K, tau_L, T1, T2 and T_L of an estimate, including those fixed at their start."""
     values = {u.name: float(v) for u, v in zip(fitted.unknowns, fitted.values, strict=True)}
     values |= {k.unknown.name: k.unknown.start for k in fitted.kept}
     if "T_L" not in values and "tau_L" not in values:  # eq. (21): any pair that cancels
@@ -863,26 +867,28 @@ def _require(region: Region, joint: bool) -> None:
     where = f"{region.name} pressure"
     if not region.steps:
         raise ParameterError(
-            f"no step response at {where}, so K, tau_L and T_L cannot be estimated. Apply a step "
-            "of the current demand from rest at that pressure, and record 4 s or more",
+            f"the data contain no step response at {where}, so K, tau_L and T_L cannot be "
+            "estimated. Apply a current demand step from rest at that pressure, and record 4 s or "
+            "more",
             name=where,
         )
     for step in region.steps:
         change = float(np.ptp(step.pressure))
         if not change > _MOVES * step.sigma or float(np.ptp(step.u)) == 0.0:
             raise ParameterError(
-                f"the pressure hardly responds to the step at {where} (it changes by "
-                f"{change / 1e5:.2g} bar, its noise is {step.sigma / 1e5:.2g} bar), so none "
-                f"of {', '.join(NAMES)} can be estimated. Use a larger step, with dither",
+                f"the pressure hardly responds to the step at {where}: it changes by "
+                f"{change / 1e5:.2g} bar, with {step.sigma / 1e5:.2g} bar of noise. None of "
+                f"{', '.join(NAMES)} can be estimated. Use a larger step, with dither",
                 name=where,
                 value=f"{change / 1e5:.2g} bar",
             )
     count = region.points.frequencies.size
     if not joint and count < 2:
         raise ParameterError(
-            f"{count or 'no'} sine{'s' if count != 1 else ''} from {BAND[0]:g} to {BAND[1]:g} Hz "
-            f"at {where}, so T1 and T2 cannot be estimated from the frequency response: "
-            "record sines of the current demand at two frequencies or more, or set fit = 'joint'",
+            f"the data contain {count or 'no'} sine{'s' if count != 1 else ''} from {BAND[0]:g} to "
+            f"{BAND[1]:g} Hz at {where}, so T1 and T2 cannot be estimated from the frequency "
+            "response. Record current demand sines at two or more frequencies, or set "
+            "fit = 'joint'",
             name=where,
             value=f"{count or 'no'} sine",
         )

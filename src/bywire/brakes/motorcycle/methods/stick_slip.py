@@ -1,4 +1,4 @@
-"""Stick-slip in a measured signal: simulation of every slip from its own rest, time-aligned."""
+"""Stick-slip in a measured signal: simulation of every slip from its rest, aligned in time."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ _PAUSE = 0.05  # s: shorter rests belong to the slip around them
 
 @dataclass(frozen=True)
 class Slip:
-    """A stretch of motion between two rests.
+    """A period of motion between two rests.
 
-    ``begin``, ``end``: samples at which the motion begins and ends (or the record does);
+    ``begin``, ``end``: samples at which the motion (or the record) begins and ends;
     ``direction``: 1 for rising, -1 for falling; ``rest``: level of the preceding rest.
     """
 
@@ -42,9 +42,9 @@ class Slip:
 
 
 def find_slips(values: Array, interval: float, least: float) -> list[Slip]:
-    """Return the slips of a signal.
+    """Return the slips in a signal.
 
-    ``values``: shape (n,); ``interval``: sample time [s]; ``least``: smallest change that counts,
+    ``values``: shape (n,); ``interval``: sample time [s]; ``least``: minimum change that counts,
     provided that it exceeds the noise of the preceding rest.
     """
     width = max(round(_WINDOW / interval), 1)
@@ -84,7 +84,7 @@ def _stretches(moving: NDArray[np.bool_], pause: int) -> list[tuple[int, int]]:
 
 
 def _one_way(values: Array, begin: int, end: int, least: float) -> list[tuple[int, int]]:
-    """Split a stretch where it reverses by more than the smallest change of a slip."""
+    """Split a period of motion where it reverses by more than the minimum change of a slip."""
     part = values[begin:end]
     top, low = int(np.argmax(part)), int(np.argmin(part))
     rise, fall = part[top] - part[0], part[0] - part[low]
@@ -103,8 +103,8 @@ BEFORE = 0.01
 """rest before the model breaks away [s]"""
 _LEAST = 8  # samples
 _COARSEST = 4e-3  # s
-_RESTED = 1.0  # s of rest that determine its pressure and the ramp of the current
-_COMPARED = 0.9  # of a slip's travel: the current's ripple decides its end, like its beginning
+_RESTED = 1.0  # s of rest that determine the rest pressure and the current's ramp
+_COMPARED = 0.9  # fraction of a slip's travel: current ripple decides when it begins and ends
 _SMOOTHED = 0.02  # s
 _SEEN = 0.016  # s: span of the line through the current, short because of the ripple
 
@@ -118,9 +118,9 @@ class Shot:
     slip
         Its rows and direction.
     time, pressure, current
-        Measured signals, from a little before its onset; shape (n,), SI.
+        Measured signals, starting shortly before the onset; shape (n,), SI.
     rate
-        Slope of the current's ramp while the piston rested [A/s].
+        Slope of the current ramp while the piston rests [A/s].
     unrest
         Standard deviation of the current from that ramp [A].
     before, slope
@@ -129,7 +129,7 @@ class Shot:
     seen
         Number of samples of that line.
     steep
-        Rows of the first half of the travel.
+        Number of rows in the first half of the travel.
     """
 
     slip: Slip
@@ -159,8 +159,8 @@ def cut_out(
 ) -> list[Shot]:
     """Return the measured slips with their surroundings, up to the next onset.
 
-    The function skips slips of too few samples, without a preceding rest, or without a ramp of the
-    current toward them.
+    The function skips slips that have too few samples, no preceding rest, or no current ramp in
+    their direction.
 
     Raises
     ------
@@ -210,18 +210,19 @@ def cut_out(
         shots.append(shot)
     if not shots:
         raise ParameterError(
-            f"none of the {len(slips)} slips has {_LEAST} samples, a rest before it, and a current "
-            "that ramps toward it: they are noise, or the signal's unit is wrong; check the unit, "
-            f"and raise the smallest rise of a slip ({option('options', {'least': '...'})})",
+            f"none of the {len(slips)} slips has {_LEAST} samples, a preceding rest and a current "
+            "ramp in its direction. Either they are noise or the signal's unit is wrong. Check the "
+            "unit, and increase the minimum pressure change of a slip "
+            f"({option('options', {'least': '...'})})",
             name="least",
         )
     return shots
 
 
 def _passed(values: Array, slip: Slip, rest: int, share: float) -> int:
-    """Return the sample at which a slip has covered a share of its travel.
+    """Return the sample at which a slip has covered a fraction of its travel.
 
-    The values must be smooth: noise would put the first sample beyond the share too early.
+    The values must be smooth: noise would exceed the fraction too early.
     """
     end = float(values[slip.end : slip.end + rest].mean())
     beyond = slip.direction * (values[slip.begin :] - slip.rest) > share * abs(end - slip.rest)
@@ -240,9 +241,9 @@ def _lines_before(values: Array, first: int, last: int, seen: int) -> tuple[Arra
 
 
 def onset_of(shot: Shot, shift: float) -> tuple[float, float]:
-    """Return level [A] and rate [A/s] of the measured current at an instant of a shot.
+    """Return level [A] and rate [A/s] of the measured current at one time of a shot.
 
-    The rate is at least that of the ramp, which drives the piston to breakaway and beyond.
+    The rate is at least the ramp's rate, because the ramp drives the piston past breakaway.
     """
     level, slope = (float(np.interp(shift, shot.clock, v)) for v in (shot.before, shot.slope))
     way = float(np.sign(shot.rate)) or float(shot.slip.direction)
@@ -252,14 +253,15 @@ def onset_of(shot: Shot, shift: float) -> tuple[float, float]:
 def require_calm(shots: Sequence[Shot], noise: float, most: float) -> None:
     """Reject a current that does not follow its ramp while the piston rests.
 
-    ``noise``: standard deviation of the current's measurement [A]; ``most``: largest standard
+    ``noise``: standard deviation of the measurement noise [A]; ``most``: maximum standard
     deviation of the current itself [A].
     """
     unrest = float(np.median([np.sqrt(max(s.unrest**2 - noise**2, 0.0)) for s in shots]))
     if unrest > most:
         raise ParameterError(
-            f"between the slips the current varies by {unrest:.3g} A (standard deviation) around "
-            f"its ramp: it must be <= {most:.3g} A; switch the dither off, and check the unit of i",
+            f"between the slips, the current deviates from its ramp by {unrest:.3g} A (standard "
+            f"deviation). The deviation must be <= {most:.3g} A. Switch off the dither, and check "
+            "the unit of i",
             name="i",
             value=f"{unrest:.3g} A",
             valid=f"<= {most:.3g} A",
@@ -267,14 +269,14 @@ def require_calm(shots: Sequence[Shot], noise: float, most: float) -> None:
 
 
 def require_reachable(shots: Sequence[Shot], par: MotorcycleParameters) -> None:
-    """Reject rests at a pressure that the brake with these parameters cannot hold."""
+    """Reject rests at pressures that the brake cannot hold with these parameters."""
     highest = max(shot.slip.rest for shot in shots)
     try:
         state_at(max(highest, 0.0), par)
     except ParameterError as error:
         raise ParameterError(
             f"the measured pressure rests at {highest / 1e5:.4g} bar, but this brake cannot "
-            f"hold it. Check the unit of p_mc, and the parameters ({error})",
+            f"hold that pressure. Check the unit of p_mc, and the parameters ({error})",
             name="p_mc",
             value=f"{highest / 1e5:.4g} bar",
             valid=error.valid,
@@ -302,7 +304,7 @@ def overlaid(shot: Shot, p: Array) -> tuple[Array, Array, float]:
 def _best_shift(shot: Shot, p: Array, rows: int) -> float:
     """Return the delay [s] of the computed slip that fits the measured one best (Gauss-Newton).
 
-    ``rows``: number of rows compared, from the first on.
+    ``rows``: number of rows to compare, starting with the first.
     """
     t = shot.clock
     shift = _half_way(t, shot.pressure, shot.slip) - _half_way(t, p, shot.slip)
@@ -319,7 +321,7 @@ def _best_shift(shot: Shot, p: Array, rows: int) -> float:
 
 
 def _laid_over(shot: Shot, p: Array, shift: float) -> tuple[Array, Array]:
-    """Return computed, delayed by ``shift``, minus measured pressure, and the computed speed."""
+    """Return computed (delayed by ``shift``) minus measured pressure, and the computed speed."""
     t = shot.clock
     at = t - shift
     v = np.interp(at, t, np.gradient(p, shot.interval))
@@ -335,36 +337,36 @@ def _half_way(t: Array, p: Array, slip: Slip) -> float:
 
 
 # --- Shooting
-# A fit to the whole pressure curve fails from starts a few percent off: a slip at the wrong time
-# costs as much as a missing one. So each slip is simulated alone, from the measured rest and the
-# model's breakaway on, and shifted in time until it fits the measured slip best. The current at
+# A fit to the whole pressure curve fails if it starts a few percent off: a slip at the wrong time
+# costs as much as a missing one. So each slip is simulated alone, starting at the measured rest and
+# the model's breakaway, and shifted in time until it fits the measured slip best. The current at
 # breakaway is a separate residual.
 #
 # The run's demand ramps through the model's own breakaway current. The modeled controller responds
-# to the motor's induced voltage, so that the current dips as on the bench, at the right time. After
-# the slip has begun, the demand is corrected by the difference between measured and computed
+# to the motor's back-EMF, so the current dips as on the bench, at the right time. Once the slip
+# has begun, the demand is corrected by the difference between measured and computed
 # current.
 
 _SMOOTHED_SHOT = 0.01  # s: moving average of the measured current
-_BEGUN = 0.02  # of a slip: earlier, the current's noise would decide when the model breaks away
+_BEGUN = 0.02  # of a slip: earlier, current noise would decide when the model breaks away
 _BEGUN_AT = 2e3  # Pa: the same for a long slip
 _ALIGNED = 2  # iterations that align the measured current with the slip that it drives
-_DIP = 0.1  # s: length of the current's dip as a slip begins
+_DIP = 0.1  # s: duration of the current's dip as a slip begins
 _LEAST_LATE = 20  # samples needed to fit a line
 _I_SET = MotorcycleBrake().Stimulus._fields.index("i_set")
 
 
 @dataclass(frozen=True)
 class Driven:
-    """A slip's runs with the measured current.
+    """Simulations of a slip with the measured current.
 
     Parameters
     ----------
     calm
-        Driven by a line through the current after its dip. Its derivatives are therefore free of
-        the current's noise, which would bias the estimates.
+        Run driven by a line through the current after its dip. Its derivatives are therefore free
+        of the current's noise, which would bias the estimates.
     sampled
-        Driven by the current as measured.
+        Run driven by the measured current.
     first
         First row with the measured current.
     onset
@@ -437,11 +439,12 @@ class Fitted:
     residuals
         Computed minus measured pressure [Pa], shape (n,).
     slopes
-        Their derivatives by the unknowns, at the best shift, shape (n, p).
+        Derivatives of the residuals by the unknowns, at the best shift, shape (n, p).
     by_current
         Derivative of the residuals by an offset of the current along the slip [Pa/A], shape (n,).
     answer, speed
-        The same at a fixed shift [Pa/A], and the rate of the pressure [Pa/s], shape (n,).
+        The same derivative at a fixed shift [Pa/A], and the rate of the pressure [Pa/s], shape
+        (n,).
     breakaway, breakaway_slopes
         Measured minus computed current at breakaway [A], and its derivatives, shape (p,).
     """
@@ -484,8 +487,8 @@ class Shooting:
     def breakaway(self, rest: float, direction: int, values: Array) -> tuple[float, Array]:
         """Return the breakaway current [A] from a rest [Pa], and its derivatives.
 
-        At this current, motor, pressure and breakaway torque balance: the equation of motion at
-        standstill, which is affine in the current.
+        At this current, the motor, pressure and breakaway torques balance. The equation of motion
+        at standstill is affine in the current.
         """
         columns = self._error.at(
             state_at(max(rest, 0.0), self._source)._replace(omega=direction * 1e-12),
@@ -530,7 +533,7 @@ class Shooting:
             Values of the unknowns.
         zero
             Zero offset of the current sensor [A]. If given, the measured current drives the slip
-            once it has begun; otherwise only its ramp does.
+            once the slip has begun; otherwise only the ramp does.
         """
         run, current, current_slopes = self.run(shot, values)
         driven = None if zero is None else _driven_by(run, shot, current, zero)

@@ -41,7 +41,7 @@ LOCKED = {"seal.T_pr": 10.0}
 """overrides that lock the rotor: no torque of this motor overcomes 10 N m"""
 LOOP_BAND = (0.1, 450.0)
 P_LOOP = 25e5
-"""operating point of the small-signal responses [Pa]; they are insensitive to it"""
+"""operating point of the small-signal responses [Pa]; they hardly depend on it"""
 
 
 def fig3(runs: Runs) -> Part:
@@ -52,49 +52,50 @@ def fig3(runs: Runs) -> Part:
             "fig3.bandwidth",
             FACTS["fig3_bandwidth"],
             small_signal(MAIN, "locked", "i_meas"),
-            note="-3 dB of the measured current after the 180 Hz filter, small signal, rotor "
-            "locked",
+            note="-3 dB of the measured current after the 180 Hz filter, small signal, locked "
+            "rotor",
             tuned="calibrated",
         ),
         compared(
             "fig3.bandwidth.motor_current",
             FACTS["fig3_bandwidth"],
             small_signal(MAIN, "locked", "i"),
-            note="the same gains, the motor current before the filter, rotor locked",
+            note="the same gains, motor current before the filter, locked rotor",
             tuned="calibrated",
         ),
         compared(
             "fig3.bandwidth.free",
             FACTS["fig3_bandwidth"],
             small_signal(MAIN, "free", "i_meas"),
-            note="measured current, rotor free: the back-EMF of the moving shaft slows it",
+            note="measured current, free rotor: the moving shaft's back-EMF slows the current",
         ),
         compared(
             "fig3.bandwidth.free@table1",
             FACTS["fig3_bandwidth"],
             small_signal(PRINTED, "free", "i_meas"),
-            note="measured current, rotor free: Table 1's light rotor moves with the current",
+            note="measured current, free rotor: Table 1's light rotor moves with the current",
         ),
         compared(
             "fig3.peak",
             FACTS["fig3_top"],
             kpis(locked)["peak_current"],
-            note="motor current after the step of 0.73 A, rotor locked",
+            note="motor current after the step of 0.73 A, locked rotor",
         ),
-        *_step_items("fig3", step, "motor current; the piston breaks away and moves"),
-        *_step_items("fig3.locked", locked, "motor current; rotor locked"),
+        *_step_items("fig3", step, "motor current while the piston breaks away and moves"),
+        *_step_items("fig3.locked", locked, "motor current, locked rotor"),
     ]
     text = (
-        "The paper identifies the motor and tunes a PI for 100 Hz, but prints neither motor nor "
-        "gains. Our gains give the measured current a bandwidth of 100 Hz (-3 dB) with the rotor "
-        "locked. If the rotor moves, its back-EMF disturbs the loop. So 'i equals i_set', on which "
-        "the paper's identification relies, is true only for a locked or heavy rotor."
+        "The paper identifies the motor and tunes a PI for 100 Hz, but prints neither the motor "
+        "data nor the gains. Our gains give the measured current a bandwidth of 100 Hz (-3 dB) "
+        "with the rotor locked. If the rotor moves, its back-EMF disturbs the loop. So 'i equals "
+        "i_set', on which the paper's identification relies, holds only for a locked or heavy "
+        "rotor."
     )
     exhibits = (
         Exhibit(
             "fig3",
             lambda: step_response(locked.recordings["run"], "i", "i_ref"),
-            "Fig. 3: current after a step of its set point to 0.73 A, rotor locked.",
+            "Fig. 3: current after a set point step to 0.73 A, locked rotor.",
         ),
         Exhibit(
             "fig3-free",
@@ -131,7 +132,7 @@ def _step_items(prefix: str, step: Result, note: str) -> list[Item]:
     values = kpis(step)
     return [
         found(f"{prefix}.overshoot", "%", values["overshoot"], note),
-        found(f"{prefix}.rise_time", "s", values["rise_time"], f"10 to 90 %; {note}"),
+        found(f"{prefix}.rise_time", "s", values["rise_time"], f"10 to 90 %, {note}"),
     ]
 
 
@@ -167,7 +168,7 @@ def fig7(runs: Runs) -> Part:
             "fig7.bandwidth.3bar",
             "Hz",
             _bandwidth(_closed_loop(MAIN).isel(amplitude=1)),
-            "the same with sines of 3 bar: friction makes it depend on the amplitude",
+            "the same with sines of 3 bar: friction makes the bandwidth depend on the amplitude",
         )
     )
     items += _linear_loop()
@@ -181,12 +182,13 @@ def fig7(runs: Runs) -> Part:
             "fig7.hunting",
             "bar",
             float(np.ptp(late)) / BAR,
-            f"peak to peak in the last fifth of {_HUNTING:g} s of braking, dither off: limit cycle",
+            f"limit cycle without dither, peak to peak in the last fifth of {_HUNTING:g} s of "
+            "braking",
         )
     )
     text = (
-        "The paper does not print the PID's gains. We tuned ours on Table 4's medium model with "
-        "filters, current loop and sampling for a crossover of 10 Hz. The nonlinear brake meets "
+        "The paper does not print the PID gains. We tuned ours on Table 4's medium model, with "
+        "filters, current loop and sampling, for a crossover of 10 Hz. The nonlinear brake meets "
         "the requirements on overshoot and steady state. Its small-signal bandwidth is far below "
         "10 Hz, because dither turns friction into damping, which Table 4's models lack."
     )
@@ -229,20 +231,20 @@ def _hard_braking(result: Result, suffix: str) -> list[Item]:
 
 def _tracking(result: Result, suffix: str) -> list[Item]:
     values = kpis(result)
-    note = "built-in ride over 5 to 30 bar; the ride of Fig. 7b is not published"
+    note = "built-in ride from 5 to 30 bar, because Fig. 7b's ride is not published"
     return [
-        found(f"fig7b.lag{suffix}", "s", values["tracking_lag"], f"best-fit delay; {note}"),
+        found(f"fig7b.lag{suffix}", "s", values["tracking_lag"], f"best-fit delay, {note}"),
         found(
             f"fig7b.rms{suffix}",
             "bar",
             values["tracking_rms"] / BAR,
-            f"pressure minus set point; {note}",
+            f"pressure minus set point, {note}",
         ),
         found(
             f"fig7b.rms_without_lag{suffix}",
             "bar",
             values["tracking_rms_without_lag"] / BAR,
-            f"pressure minus delayed set point; {note}",
+            f"pressure minus delayed set point, {note}",
         ),
     ]
 
@@ -261,29 +263,29 @@ def _linear_loop() -> list[Item]:
     loops = {r: PressureLoop(par, table4_model(r), p) for r, p in REGIONS.items()}
     medium = loops["medium"]
     chain = "linear model, exact sampled loop with the 80 Hz filter, current PI and 180 Hz filters"
-    tuned = "gains tuned to it"
+    tuned = "gains tuned on it"
     items = [
         compared(
             "fig7.crossover",
             FACTS["bandwidth"],
             medium.margin().crossover,
             ALLOWANCES["round"],
-            f"Table 4, medium; {chain}; {tuned}",
+            f"Table 4's medium {chain}, {tuned}",
             tuned="calibrated",
         ),
         compared(
             "fig7.phase_margin",
             FACTS["phase_margin"],
             medium.margin().phase,
-            note=f"at the crossover; Table 4, medium; {chain}; {tuned}",
+            note=f"at the crossover of Table 4's medium {chain}, {tuned}",
             tuned="calibrated",
         ),
         found(
             "fig7.bandwidth.table4",
             "Hz",
             bandwidth(medium.closed, BAND),
-            f"-3 dB, set point to pressure, same gains; Table 4, medium; {chain}; D on the "
-            "measurement: a crossover of 10 Hz is not yet a bandwidth of 10 Hz",
+            f"-3 dB from set point to pressure with the same gains, D on the measurement, on Table "
+            f"4's medium {chain}. A crossover of 10 Hz does not imply a bandwidth of 10 Hz",
         ),
     ]
     for region in ("low", "high"):
@@ -293,7 +295,8 @@ def _linear_loop() -> list[Item]:
                 f"fig7.phase_margin.{region}",
                 "deg",
                 other.phase,
-                f"same gains; Table 4, {region}, at its crossover of {other.crossover:.2f} Hz",
+                f"same gains on Table 4's {region} model, at its crossover of "
+                f"{other.crossover:.2f} Hz",
             )
         )
     T1 = 1.0 / (2.0 * math.pi * FACTS["table4.medium.T1"].value)
@@ -303,7 +306,7 @@ def _linear_loop() -> list[Item]:
             "fig7.phase_margin.pi",
             "deg",
             pi.margin().phase,
-            "a PI that cancels T1, crossover 10 Hz, Table 4, medium: the derivative is needed",
+            "a PI that cancels T1, crossover at 10 Hz on Table 4's medium model: the loop needs D",
         )
     )
     return items
@@ -338,7 +341,7 @@ def _exhibits(runs: Runs, tests: dict[str, xr.Dataset]) -> tuple[Exhibit, ...]:
         Exhibit(
             "fig7b",
             lambda: tracking(runs.bench("pedal-tracking", MAIN).recordings["run"], "p_mc", "p_ref"),
-            "Fig. 7b: the pressure follows the pedal; our own ride over the paper's range.",
+            "Fig. 7b: the pressure follows the pedal on our own ride, within the paper's range.",
         ),
         Exhibit(
             "fig7-bode",
@@ -358,7 +361,7 @@ _P_SINES, _STEP = 20e5, 31e5
 
 
 def requirements(runs: Runs) -> Part:
-    """Return the four requirements, judged with friction, dither, converter and limits on."""
+    """Return the four requirements, judged with friction, dither, converter and limits."""
     loop = LOOPS.find("pressure")
     items: list[Item] = []
     for name, suffix in _GAINS.items():
@@ -377,7 +380,7 @@ def requirements(runs: Runs) -> Part:
                     f"requirements.bandwidth.{bar}bar{suffix}",
                     FACTS["bandwidth"],
                     response.bandwidth,
-                    note=f"-3 dB, sine of {bar} bar around 20 bar, with dither; {note}",
+                    note=f"-3 dB, sine of {bar} bar around 20 bar with dither, {note}",
                     tuned=tuned,
                 )
             )
@@ -386,7 +389,7 @@ def requirements(runs: Runs) -> Part:
                 f"requirements.phase_margin{suffix}",
                 FACTS["phase_margin"],
                 margins(loop, par, _P_SINES).phase,
-                note=f"exact sampled loop without friction, cut at the measured pressure; {note}",
+                note=f"exact sampled loop without friction, cut at the measured pressure, {note}",
                 tuned=tuned,
             ),
             compared(
@@ -405,11 +408,11 @@ def requirements(runs: Runs) -> Part:
             ),
         ]
     text = (
-        "The paper does not print the gains. The gains of Fig. 7's bench, designed on the linear "
-        "model, lose most of their bandwidth to friction at small amplitudes, with or without "
-        "dither. One set of gains meets all four requirements on the nonlinear bench, with small "
-        "margins. It was tuned for exactly that, so its agreement proves only that such a set "
-        "exists."
+        "The paper does not print the gains. With the gains of Fig. 7's bench, designed on the "
+        "linear model, friction removes most of the bandwidth at small amplitudes, with or "
+        "without dither. One set of gains meets all four requirements on the nonlinear bench, "
+        "with small margins. It was tuned for exactly that, so its agreement proves only that "
+        "such a set exists."
     )
 
     def draw() -> Figure:
@@ -419,7 +422,7 @@ def requirements(runs: Runs) -> Part:
     figure = Exhibit(
         "requirements",
         draw,
-        "Pressure over its set point around 20 bar, with friction, dither and converter.",
+        "Response from set point to pressure around 20 bar, with friction, dither and converter.",
     )
     return Part("Requirements of section 6 on the nonlinear bench", text, tuple(items), (figure,))
 

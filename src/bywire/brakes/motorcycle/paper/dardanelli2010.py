@@ -22,9 +22,9 @@ def _tables(q: Quoted) -> RootCause:
     return RootCause(
         "Tables 1 and 2 contradict each other: Table 1 in eq. (15) gives a gain of "
         f"{t1[0]}, a zero of {t1[1]} and slow poles of {t1[2]} and {t1[3]}, where "
-        f"Table 2 prints {t2[0]}, {t2[1]}, {t2[2]} and {t2[3]}; the calibrated set "
+        f"Table 2 prints {t2[0]}, {t2[1]}, {t2[2]} and {t2[3]}. The calibrated set "
         f"changes five values, such as A_mc from {q.stated('calibrated.A_mc')} to "
-        f"{q('calibrated.A_mc')}; with Table 1's light rotor, free to move, the "
+        f"{q('calibrated.A_mc')}. With Table 1's light rotor, free to move, the "
         f"current loop's bandwidth falls from {q.stated('fig3.bandwidth.free')} to "
         f"{q('fig3.bandwidth.free@table1')}.",
         ("table2.*@table1", "fig3.bandwidth.free@table1"),
@@ -37,7 +37,7 @@ def _gear(q: Quoted) -> RootCause:
     return RootCause(
         "Eq. (8) lets the gear create energy when the load drives it: a slow release "
         f"from 37 bar returns {q(paper)} of {q.stated(paper)} stored "
-        f"({q.share(paper)}; with Table 1 {q.share(f'{paper}@table1')}), where a loss "
+        f"({q.share(paper)}; with Table 1 {q.share(f'{paper}@table1')}), whereas a loss "
         f"that depends on direction returns {q(ours)} ({q.share(ours)}).",
         ("gear.returned.paper*",),
         is_within_source=True,
@@ -64,11 +64,11 @@ def _bandwidth(q: Quoted) -> RootCause:
         f"model with dither the small-signal bandwidth is {q('fig7.bandwidth')} "
         f"({q('fig7.bandwidth@table1')} with Table 1) instead of the required "
         f"{q.stated('fig7.bandwidth')}, and without control {q('table4.medium.corner')} instead "
-        f"of {q.stated('table4.medium.corner')}; on Table 4's linear model, to which our gains "
-        f"are tuned, a crossover of {q('fig7.crossover')} and a phase margin of "
+        f"of {q.stated('table4.medium.corner')}. On Table 4's linear model, on which our gains "
+        f"are tuned, the crossover is {q('fig7.crossover')} and the phase margin "
         f"{q('fig7.phase_margin')} (required {q.stated('fig7.crossover')}, "
-        f"{q.stated('fig7.phase_margin')}) are reached, but only "
-        f"{q('fig7.bandwidth.table4')} at -3 dB. Gains tuned on the nonlinear bench itself meet "
+        f"{q.stated('fig7.phase_margin')}), but the -3 dB bandwidth is only "
+        f"{q('fig7.bandwidth.table4')}. Gains tuned on the nonlinear bench itself meet "
         f"all four requirements, with an overshoot of {q('requirements.overshoot@retuned')}.",
         (
             "fig7.bandwidth*",
@@ -83,9 +83,9 @@ def _slow_pair(q: Quoted) -> RootCause:
     zero, pole = q.stated("table4.medium.zero"), q.stated("table4.medium.T_L")
     return RootCause(
         f"Table 4 has the zero of its slow pair below the pole ({zero} and {pole} at "
-        f"medium pressure), so that its step overshoots by {q.stated('table4.air')} "
-        "and falls. The paper attributes this to air, but 1 ml of air gives "
-        f"{q('table4.air')}. On our brake, without air, the paper's two steps give "
+        f"medium pressure), so its step response overshoots by {q.stated('table4.air')} "
+        "and then falls. The paper attributes this to air, but 1 ml of air gives "
+        f"{q('table4.air')}. On our brake, without air, the paper's two-step fit gives "
         f"{q('table4.medium.identified.zero')} and "
         f"{q('table4.medium.identified.T_L')}.",
         ("table4.air", "table4.*.identified.zero", "table4.*.identified.T_L"),
@@ -96,7 +96,7 @@ def _slow_pair(q: Quoted) -> RootCause:
 def _hysteresis(q: Quoted) -> RootCause:
     ratio, slow = "fig5.loop_area_ratio", "fig5.loop_area_ratio.slow"
     return RootCause(
-        "Some hysteresis remains under dither, which the paper calls 'totally "
+        "Some hysteresis remains with dither, although the paper calls it 'totally "
         f"removed'. It is mostly delay: {q(ratio)} of the loop's area without dither "
         f"({q(f'{ratio}@table1')} with Table 1), but {q(slow)} "
         f"({q(f'{slow}@table1')}) on a ramp ten times slower.",
@@ -106,13 +106,14 @@ def _hysteresis(q: Quoted) -> RootCause:
 
 def _single(q: Quoted) -> RootCause:
     top, end, ripple = "fig4.top_tick", "fig5.p_max.dither", "fig5.i_max.dither"
-    textbook = f"{FACTS['k_lf'].value:g} where Hagen and Poiseuille's law has "
+    textbook = f"{FACTS['k_lf'].value:g}, whereas Hagen and Poiseuille's law has "
     return RootCause(
-        f"Single numbers: eq. (12)'s laminar coefficient is {textbook}{q('laminar.coefficient')}; "
-        f"the text's mu of {q.stated('section3.mu')} is {q('section3.mu')} by Table 3; eq. (19)'s "
-        f"{q.stated('eq19.A_dit')} at 25 bar omits eta_g ({q('eq19.A_dit')}); and the axes "
-        f"of Figs. 4 and 5 are too short for Table 3's friction and dither ({q(top)} of "
-        f"{q.stated(top)}, {q(end)} of {q.stated(end)}, {q(ripple)} of {q.stated(ripple)}).",
+        f"Individual numbers: eq. (12)'s laminar coefficient is {textbook}"
+        f"{q('laminar.coefficient')}. The text's mu of {q.stated('section3.mu')} is "
+        f"{q('section3.mu')} according to Table 3. Eq. (19)'s {q.stated('eq19.A_dit')} at 25 bar "
+        f"omits eta_g ({q('eq19.A_dit')}). The axes of Figs. 4 and 5 are too short for Table 3's "
+        f"friction and dither ({q(top)} of {q.stated(top)}, {q(end)} of {q.stated(end)}, "
+        f"{q(ripple)} of {q.stated(ripple)}).",
         ("laminar.*", "section3.mu", "eq19.*", "fig4.*", "fig5.p_max.dither", "fig5.i_max.*"),
         is_within_source=True,
     )
@@ -139,7 +140,7 @@ NAMES = {
     "table1": "Table 1 as printed (ids with @table1)",
     "retuned": "Gains retuned on the bench (ids with @retuned)",
 }
-"""titles of the parameter sets, by the text after @ in an item's id"""
+"""titles of the parameter sets, keyed by the text after @ in an item's id"""
 
 SOURCE = Source(
     name=MAIN,

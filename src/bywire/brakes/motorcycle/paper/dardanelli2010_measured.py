@@ -1,4 +1,4 @@
-"""The same brake as measured: Dardanelli et al.'s (2010) measurements and their best fit."""
+"""The motorcycle brake as measured: Dardanelli et al.'s (2010) measurements and their best fit."""
 
 from __future__ import annotations
 
@@ -45,19 +45,19 @@ def _best() -> Appraisal:
 
 
 def statements(runs: Runs) -> Part:
-    """Return every statement with the counterparts from the sets."""
+    """Return every statement with its counterparts from the parameter sets."""
     others = (MAIN, PRINTED)
     values: Values = {NAME: _best().computed}
     values |= dict(zip(others, predicted([parameters(name) for name in others]), strict=True))
     items = [_item(s, name, values[name][s.name]) for name in SETS for s in STATEMENTS]
     text = (
-        "Table 4, Figs. 5 to 7 and the friction of Table 3 count as measured on the real brake; "
-        "Tables 1 and 2, data sheets and theory, do not. One fit estimates all free parameters. It "
-        "minimizes the sum of soft_l1 losses of the residuals over their tolerances. The "
-        "statements contradict each other, so squares would let the largest residual dominate. A "
-        "statement that is met proves nothing, because the fit used it. A statement that is not "
-        "met contradicts the others, or is beyond the model's structure. The converter counts as "
-        "ideal here."
+        "Table 4, Figs. 5 to 7 and the friction of Table 3 count as measured on the real brake. "
+        "Tables 1 and 2 come from data sheets and theory, so they do not count. One fit estimates "
+        "all free parameters. It minimizes the sum of the soft_l1 losses of the residuals, "
+        "relative to their tolerances. The statements contradict each other, so squares would let "
+        "the largest residual dominate. Agreement with a statement proves nothing, because the "
+        "fit used it. Disagreement means that the statement contradicts the others, or that the "
+        "model's structure cannot reproduce it. Here the converter is ideal."
     )
     return Part(
         "Measurements",
@@ -68,7 +68,7 @@ def statements(runs: Runs) -> Part:
 
 
 def _item(s: Statement, name: str, value: float) -> Item:
-    """Return a statement against a set; a fitted statement is not evidence for the set."""
+    """Compare a statement with a set; a fitted statement is not evidence for the set."""
     r = s.residual(value)
     met = abs(r) <= 1.0
     fitted = name == NAME and met
@@ -110,7 +110,7 @@ def _side_by_side(values: Values) -> Table:
 
 
 def estimates(runs: Runs) -> Part:
-    """Return the parameters with intervals and deciding statements, and the undetermined ones."""
+    """Return the parameters with intervals and decisive statements, and the undetermined ones."""
     best = _best()
     names = best.estimate.names
     ends = dict(zip(names, best.estimate.intervals().tolist(), strict=True))
@@ -120,19 +120,19 @@ def estimates(runs: Runs) -> Part:
             f"estimated.{u.name}",
             u.unit,
             best.estimate[u.name],
-            f"95 % interval {ends[u.name][0]:.3g} to {ends[u.name][1]:.3g}; Table 1's set has "
-            f"{prior[u.name]:.3g}; determined by {' and '.join(best.deciding_statements(u.name))}",
+            f"95 % interval {ends[u.name][0]:.3g} to {ends[u.name][1]:.3g} (Table 1's set: "
+            f"{prior[u.name]:.3g}), determined by {' and '.join(best.deciding_statements(u.name))}",
         )
         for u in best.estimate.unknowns
     ]
     kept = [k.unknown.name for k in best.estimate.kept]
     text = (
         "The intervals treat the residuals as random, although most of them are contradictions. "
-        "They show how firmly the statements together fix a value, not how certain it is. No "
-        f"statement determines {' nor '.join(kept) or 'nothing'}, which stay at Table 1's values. "
-        "In a product with a free parameter, such as A_mc k_g, the free parameter stands for the "
-        "whole product. A change of 1 % in any one parameter reduces the misfit by at most "
-        f"{100.0 * max(best.gain(), 0.0):.1g} %."
+        "They show how tightly the statements together constrain a value, not how certain the "
+        f"value is. No statement determines {' nor '.join(kept) or 'nothing'}, which stay at Table "
+        "1's values. In a product with a free parameter, such as A_mc k_g, the free parameter "
+        "stands for the whole product. A change of 1 % in any one parameter reduces the misfit by "
+        f"at most {100.0 * max(best.gain(), 0.0):.1g} %."
     )
     more = best.estimate.notes
     tables = {
@@ -179,32 +179,32 @@ def _bounds() -> Table:
 
 
 def beyond(runs: Runs) -> Part:
-    """Return results that the paper does not state, but that the root causes refer to."""
+    """Return results that the root causes quote but the paper does not state."""
     par = parameters(NAME)
     printed = FACTS["table3.k_brk_p"].value
     softer = par.replace({"seal.k_brk_p": printed, "ecu.est_par.k_brk_p": printed})
     height = FACTS["fig6_step"].value
     small, paper = overshoots(par, "medium", (_SMALL, height))
     (without,) = overshoots(softer, "medium", (height,))
-    of = "step from 25 bar, dither averaged, highest point minus final value"
+    of = "peak minus final value of a step from 25 bar, dither averaged out"
     items = (
-        found("step.small.overshoot", "bar", small, f"{of}; {_SMALL:g} A"),
-        found("step.overshoot", "bar", paper, f"{of}; {height:g} A as in Fig. 6"),
+        found("step.small.overshoot", "bar", small, f"{of}: {_SMALL:g} A"),
+        found("step.overshoot", "bar", paper, f"{of}: {height:g} A as in Fig. 6"),
         found(
             "step.overshoot_by_table3",
             "bar",
             without,
-            f"{of}; {height:g} A with k_brk_p = {printed:g} as printed",
+            f"{of}: {height:g} A with k_brk_p = {printed:g} as printed",
         ),
         found(
-            "ramp.p_max_without_dither", "bar", stuck_at(par), "highest pressure of the ramp (17)"
+            "ramp.p_max_without_dither", "bar", stuck_at(par), "maximum pressure of the ramp (17)"
         ),
     )
     text = (
-        "A slow pair overshoots in proportion to the step. This brake's steps overshoot by nearly "
-        "the same pressure at any height. With the printed k_brk_p, from which the ECU computes "
-        "the dither, they hardly overshoot. At the height of Fig. 6 the overshoot equals Table "
-        "4's, but a slow pair is not its cause."
+        "With a slow pair, the overshoot is proportional to the step. This brake overshoots by "
+        "nearly the same pressure at any step height. With the printed k_brk_p, from which the "
+        "ECU computes the dither, its steps hardly overshoot. At the height of Fig. 6 the "
+        "overshoot equals Table 4's, but a slow pair is not its cause."
     )
     return Part("Beyond the statements", text, items)
 
@@ -213,9 +213,9 @@ def _fast_pole(q: Quoted) -> RootCause:
     one, other, slow = "table4.medium.T2", "table4.high.T2", "table4.medium.T1"
     return RootCause(
         "Eq. (20)'s dither turns Table 3's friction into so much damping that the two "
-        f"poles lie apart: T2 is {q(one)} instead of {q.stated(one)} at medium and "
-        f"{q(other)} instead of {q.stated(other)} at high pressure. Where more dither "
-        "reduces the damping, T2 approaches its stated value and T1 departs from it: T1 is "
+        f"poles are far apart: T2 is {q(one)} instead of {q.stated(one)} at medium pressure, and "
+        f"{q(other)} instead of {q.stated(other)} at high pressure. Where more dither reduces "
+        "the damping, T2 approaches its stated value and T1 departs from it: T1 is "
         f"{q(slow)} instead of {q.stated(slow)} at medium pressure.",
         ("table4.*.T2*", "table4.medium.T1", "table4.high.T1"),
     )
@@ -224,7 +224,7 @@ def _fast_pole(q: Quoted) -> RootCause:
 def _slow_pair(q: Quoted) -> RootCause:
     name = "table4.low.overshoot"
     return RootCause(
-        "Eqs. (13) have no slow zero below its pole: the step overshoots by "
+        "Eqs. (13) have no slow zero below a slow pole: the step overshoots by "
         f"{q(name)} instead of {q.stated(name)} at low pressure. The overshoot at medium and "
         "high pressure does not come from a slow pair, because it hardly grows with the step: "
         f"{q('step.small.overshoot')} of a step of {_SMALL:g} A from 25 bar, and "
@@ -237,9 +237,9 @@ def _slow_pair(q: Quoted) -> RootCause:
 def _break_away(q: Quoted) -> RootCause:
     name = "table3.k_brk_p"
     return RootCause(
-        "Overshoot and Table 3 contradict each other: the ECU dithers in proportion "
-        f"to k_brk_p, {q(name)} instead of {q.stated(name)}, which reduces the damping; "
-        "with Table 3's value the step of Fig. 6 overshoots by "
+        "Overshoot and Table 3 contradict each other. The ECU dithers in proportion "
+        f"to k_brk_p, which is {q(name)} instead of {q.stated(name)} and reduces the damping. "
+        "With Table 3's value the step of Fig. 6 overshoots by "
         f"{q('step.overshoot_by_table3')} instead of {q('step.overshoot')}.",
         (name,),
         is_within_source=True,
@@ -248,8 +248,8 @@ def _break_away(q: Quoted) -> RootCause:
 
 def _braking(q: Quoted) -> RootCause:
     return RootCause(
-        "Only dithered friction damps this piston, because k_damp is zero. So "
-        f"hard braking reaches {q('fig7.peak')}, where Fig. 7a's axis allows "
+        "Only dithered friction damps this piston, because k_damp is zero. Therefore "
+        f"hard braking reaches {q('fig7.peak')}, whereas Fig. 7a's axis allows "
         f"{q.stated('fig7.peak')} within half a label. More damping would remove the "
         "overshoot of the steps.",
         ("fig7.peak",),
@@ -258,8 +258,8 @@ def _braking(q: Quoted) -> RootCause:
 
 def _ramp(q: Quoted) -> RootCause:
     return RootCause(
-        "Table 4's gain contradicts Fig. 5: with it the ramp to 5 A ends at "
-        f"{q('fig5.p_max')}, where the figure's axis allows {q.stated('fig5.p_max')} "
+        "Table 4's gain contradicts Fig. 5: with this gain the ramp to 5 A ends at "
+        f"{q('fig5.p_max')}, whereas the figure's axis allows {q.stated('fig5.p_max')} "
         "within half a label.",
         ("fig5.p_max*",),
         is_within_source=True,
@@ -269,7 +269,7 @@ def _ramp(q: Quoted) -> RootCause:
 def _ripple(q: Quoted) -> RootCause:
     return RootCause(
         "Eq. (20)'s dither exceeds the range of Fig. 5: after the 20 Hz "
-        f"low-pass the measured current reaches {q('fig5.i_max')} instead of "
+        f"low-pass filter the measured current reaches {q('fig5.i_max')} instead of "
         f"{q.stated('fig5.i_max')}.",
         ("fig5.i_max*",),
         is_within_source=True,
@@ -278,17 +278,18 @@ def _ripple(q: Quoted) -> RootCause:
 
 def _stuck(q: Quoted) -> RootCause:
     return RootCause(
-        "The remaining loop under dither is delay of the dithered brake on the ramp, and "
+        "The remaining loop with dither comes from the dithered brake's delay on the ramp, and "
         f"friction bends its ends. Its area is {q('fig5.loop_area_ratio')} of the loop "
-        "without dither, where the piston jumps, then sticks at "
-        f"{q('ramp.p_max_without_dither')} and draws a small loop.",
+        "without dither, in which the piston jumps, then sticks at "
+        f"{q('ramp.p_max_without_dither')} and traces a small loop.",
         ("fig5.loop_area_ratio*",),
     )
 
 
 SOURCE = Source(
     name=NAME,
-    summary="the same brake as measured: all parameters from Table 4, Figs. 5 to 7 and Table 3",
+    summary="the motorcycle brake as measured: all parameters from Table 4, Figs. 5 to 7 and "
+    "Table 3",
     reproduce=lambda progress: reproduced(
         Reproduction(NAME, CITATION, allowances=allowances(), sets=TITLES),
         Runs(progress),

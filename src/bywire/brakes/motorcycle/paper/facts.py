@@ -1,4 +1,4 @@
-"""What Dardanelli, Alli, Savaresi (2010) print, our tolerances, and the models of their tables."""
+"""Statements of Dardanelli, Alli, Savaresi (2010), our tolerances, and models from their tables."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ FILE = SourceFile(Path(__file__).with_name("dardanelli2010.toml"))
 FACTS, ALLOWANCES = FILE.facts, FILE.allowances
 
 REGIONS = {"low": 5e5, "medium": 25e5, "high": 37e5}
-"""a pressure [Pa] inside each region of Table 4, ours; 25 bar is where Fig. 6 begins"""
+"""a pressure [Pa] inside each region of Table 4, our choice; Fig. 6 begins at 25 bar"""
 
 
 def table2_model() -> Rational:

@@ -30,10 +30,10 @@ from bywire.reproduction.reproduction import Exhibit, Part, kpis, peak, selected
 from bywire.simulation.run import simulate
 
 P_EQ19 = 25e5
-"""pressure at which eq. (19) is checked [Pa], that of Fig. 6"""
+"""pressure at which eq. (19) is checked [Pa], as in Fig. 6"""
 SEED = 1
 OFF = {"k_brk_p": 0.9, "f_cfr_p": 0.8, "c": 1.2, "f_cfr_n": 1.2, "k_brk_n": 1.1, "T_pr": 1.2}
-"""starts of the search, relative to the true values"""
+"""starting values of the search, relative to the true values"""
 
 
 def table3(runs: Runs) -> Part:
@@ -52,9 +52,9 @@ def table3(runs: Runs) -> Part:
             "fig4.top_tick",
             FACTS["fig4_top"],
             float(np.max(torque)),
-            note=f"breakaway torque at 40 bar from Table 3 with T_pr = {par.seal.T_pr:g} N m, "
-            f"chosen; {bare:.3g} N m even without it: the curves are not those of the printed "
-            "values",
+            note="breakaway torque at 40 bar from Table 3 with the chosen T_pr = "
+            f"{par.seal.T_pr:g} N m; "
+            f"{bare:.3g} N m without T_pr. The curves do not come from the printed values",
         ),
         compared(
             "fig4.bottom_tick",
@@ -67,13 +67,14 @@ def table3(runs: Runs) -> Part:
         *_identified_items(),
     ]
     text = (
-        "We use Table 3 as published; only the preload T_pr, which it omits, is ours. Where the "
-        "curves are vertical, the piston sticks: the torque is anywhere between both ends."
+        "We use Table 3 as published. Only the preload T_pr, which Table 3 omits, is our choice. "
+        "Where the curves are vertical, the piston sticks, and the torque can have any value "
+        "between both ends."
     ) + _undetermined()
     exhibit = Exhibit(
         "fig4",
         lambda: stribeck_curve(curve),
-        "Fig. 4: friction torque at the motor shaft over speed.",
+        "Fig. 4: friction torque at the motor shaft versus speed.",
     )
     return Part(
         "Table 3 and Figure 4: friction", text, tuple(items), (exhibit, _identified_exhibit())
@@ -81,19 +82,19 @@ def table3(runs: Runs) -> Part:
 
 
 def _viscous(mu_F: float) -> Item:
-    """Return the viscous coefficient of the text against that of Table 3."""
+    """Compare the text's viscous coefficient with Table 3's."""
     return compared(
         "section3.mu",
         FACTS["mu_text"],
         mu_F,
-        note="one effect, two values: Table 3's "
-        "torque per shaft speed mu_T gives the force per shaft speed mu_F = mu_T/k_g; "
-        "either is negligible beside k_damp; the models use Table 3's",
+        note="two values for one effect: Table 3's torque per shaft speed mu_T gives the force per "
+        "shaft speed mu_F = mu_T/k_g. Both are negligible compared with k_damp. The models use "
+        "Table 3's value",
     )
 
 
 def _eq19() -> Item:
-    """Return the breakaway current by eq. (8), against eq. (19)'s."""
+    """Compare the breakaway current according to eq. (8) with eq. (19)'s."""
     bare = {"seal.T_pr": 0.0, "ecu.est_par.T_pr": 0.0}  # not printed
     par = parameters(MAIN).replace(bare)
     seal = seal_friction.output(seal_friction.Input(0.0, P_EQ19), par.seal)
@@ -105,13 +106,13 @@ def _eq19() -> Item:
         Fact(stated, "A", "eq. (19) at 25 bar with Tables 1 and 3, T_pr = 0"),
         needed,
         ALLOWANCES["printed"],
-        "current above the holding current for breakaway by eq. (8): eq. (19) omits eta_g",
+        "breakaway current above the holding current according to eq. (8): eq. (19) omits eta_g",
     )
 
 
 @cache
 def _identified() -> Identified:
-    """Return the friction identified from a simulated ramp (17), with a start off the truth."""
+    """Identify the friction from a simulated ramp (17), starting away from the true values."""
     par = parameters(MAIN)
     seal = par.seal.flat()
     start = par.replace({f"seal.{name}": share * seal[name] for name, share in OFF.items()})
@@ -121,7 +122,7 @@ def _identified() -> Identified:
 
 
 def _identified_items() -> list[Item]:
-    """Return the estimates against Table 3's values, the truth of the simulation."""
+    """Compare the estimates with Table 3's values, which the simulation uses."""
     estimate = _identified().estimates["seal friction"]
     ends = dict(zip(estimate.names, estimate.intervals().tolist(), strict=True))
     rows: list[Item] = []
@@ -136,8 +137,8 @@ def _identified_items() -> list[Item]:
                 fact,
                 estimate[label],
                 None,
-                "identified from our own ramp, simulated with this value; 95 % interval "
-                f"{low:.4g} to {high:.4g}; the search started "
+                "identified from our own ramp, simulated with this value. 95 % interval "
+                f"{low:.4g} to {high:.4g}. The search started "
                 f"{100.0 * (OFF[name] - 1.0):+.0f} % off",
             )
         )
@@ -160,8 +161,8 @@ def _identified_exhibit() -> Exhibit:
     return Exhibit(
         "fig4-identified",
         lambda: method_curve(curve),
-        "Fig. 4 as identified on our own brake from one ramp with sensor noise; "
-        f"bands: 95 % confidence, {widest:.1g} N m to either side at most.",
+        "Fig. 4 as identified on our own brake from one ramp with sensor noise. Bands: 95 % "
+        f"confidence, at most {widest:.1g} N m on either side.",
     )
 
 
@@ -169,7 +170,7 @@ def _identified_exhibit() -> Exhibit:
 
 _WITHOUT, _WITH = "without-dither", "with-dither"
 _REMOVED = 0.1
-"""width, as a share of the undithered loop's at mid-height, below which a loop counts as removed"""
+"""width below which a loop counts as removed, relative to the undithered loop's at mid-height"""
 _SLOWER = 10.0
 """how many times slower than eq. (17) the slow ramp is"""
 _LEVELS = np.arange(ALLOWANCES["level"].size, 45.0, 0.1) * BAR
@@ -177,12 +178,12 @@ _LEAST_RISE = (
     0.1e5  # Pa: smaller steps, for example from the converter's resolution, are creep, not jumps
 )
 _DAMPINGS = (0.5, 1.0)
-"""other damping ratios of the 80 Hz filter: the paper prints none"""
+"""other damping ratios of the 80 Hz filter, because the paper prints none"""
 
 
 @dataclass(frozen=True)
 class _Loops:
-    """The two loops of a parameter set, and figures measured on them."""
+    """The two loops of a parameter set, and their key figures."""
 
     result: Result
 
@@ -197,7 +198,7 @@ class _Loops:
         return 100.0 * self.values["loop_area_ratio"]
 
     def p_max(self, label: str) -> float:
-        """Return the largest pressure [bar]."""
+        """Return the maximum pressure [bar]."""
         return peak(self.result.recordings[label], "p_mc") / BAR
 
     @property
@@ -210,7 +211,7 @@ class _Loops:
 
     @property
     def dither_passed(self) -> float:
-        """Motor current's share [%] of the dither amplitude, halfway up the ramp."""
+        """Motor current amplitude relative to the dither amplitude [%], halfway up the ramp."""
         recording = self.result.recordings[_WITH]
         t = recording["time"].values
         inside = (t > 12.0 - 1e-9) & (t < 12.5 - 1e-9)
@@ -227,7 +228,7 @@ def fig5(runs: Runs) -> Part:
         items += _set_items(name, suffix, _Loops(runs.bench("friction-ramp", name)))
     for zeta in _DAMPINGS:
         other = _Loops(runs.bench("friction-ramp", MAIN, {"ecu.filter.zeta": zeta}))
-        note = f"with the 80 Hz filter's damping ratio {zeta:g}; ours is 1/sqrt(2)"
+        note = f"with a damping ratio of {zeta:g} for the 80 Hz filter; ours is 1/sqrt(2)"
         items += [
             found(f"fig5.p_max.dither.zeta{zeta:g}", "bar", other.p_max(_WITH), note),
             found(f"fig5.loop_area_ratio.zeta{zeta:g}", "%", other.area_ratio, note),
@@ -238,16 +239,17 @@ def fig5(runs: Runs) -> Part:
             "fig5.p_max.ideal_adc",
             "bar",
             ideal.p_max(_WITHOUT),
-            "without dither, converters of infinite resolution: the jumps are a little higher",
+            "without dither, with converters of infinite resolution: the jumps are slightly higher",
         )
     )
     text = (
         "Without dither the pressure climbs in stick-slip jumps. With dither the loop shrinks to "
-        "a fraction. Most of the remaining loop is not friction hysteresis but delay: with a ramp "
-        "ten times slower almost nothing remains. Dither turns dry friction into damping, which "
-        "makes the brake slower. It also lowers the gain, because seals rub more while applying. "
-        "The largest pressure depends on how much of the dither reaches the motor, and so on the "
-        "damping of the 80 Hz filter, which the paper does not print."
+        "a fraction. Most of the remaining loop is delay, not friction hysteresis: on a ramp that "
+        "is ten times slower, almost nothing remains. Dither turns dry friction into damping, "
+        "which makes the brake slower. It also lowers the gain, because the seals have more "
+        "friction while applying. The maximum pressure depends on how much of the dither reaches "
+        "the motor, and therefore on the damping of the 80 Hz filter, which the paper does not "
+        "print."
     )
     recordings = {
         f"fig5-{label}{suffix}": selected(
@@ -275,9 +277,9 @@ def _exhibit(runs: Runs, name: str, suffix: str) -> Exhibit:
     return Exhibit(
         f"fig5{suffix.replace('@', '-')}",
         lambda: hysteresis_loop(recordings, "p_mc", "i_filtered", "i_star", average=0.02),
-        "Fig. 5 with the axes swapped: pressure over measured current (low-passed at 20 Hz) "
-        "during the slow ramp, averaged over one dither period; pale: with ripple. Parameter set "
-        f"{name}.",
+        "Fig. 5 with the axes swapped: pressure versus measured current (20 Hz low-pass filter) "
+        "during the slow ramp, averaged over one dither period. Pale lines include the ripple. "
+        f"Parameter set {name}.",
     )
 
 
@@ -297,56 +299,56 @@ def _set_items(name: str, suffix: str, loops: _Loops) -> list[Item]:
             f"fig5.loop_area_ratio{suffix}",
             FACTS["fig5_loop"],
             loops.area_ratio,
-            note="area with dither over the area without, averaged over one dither period; mostly "
-            "delay",
+            note="ratio of the loop area with dither to the area without, averaged over one dither "
+            "period: mostly delay",
         ),
         compared(
             f"fig5.loop_area_ratio.slow{suffix}",
             FACTS["fig5_loop"],
             slow,
-            note=f"the same with dither, on a ramp {_SLOWER:g} times slower: friction alone",
+            note=f"the same on a ramp that is {_SLOWER:g} times slower: friction alone",
         ),
         compared(
             f"fig5.removed_above{suffix}",
             FACTS["fig5_removed"],
             loops.removed_above,
             note=f"pressure above which the width stays below {100 * _REMOVED:g} % of the "
-            f"undithered loop's at mid-height; {ALLOWANCES['level'].size:g} bar is the lowest "
-            "level evaluated",
+            "undithered loop's at mid-height. The lowest evaluated level is "
+            f"{ALLOWANCES['level'].size:g} bar",
         ),
         compared(
             f"fig5.i_max.dither{suffix}",
             FACTS["fig5_current"],
             peak(loops.result.recordings[_WITH], "i_filtered"),
-            note="measured current after the 20 Hz low-pass: the ripple from eq. (20)'s dither "
-            "exceeds the range of the figure",
+            note="measured current after the 20 Hz low-pass filter: the ripple from eq. (20)'s "
+            "dither exceeds the range of the figure",
         ),
         found(f"fig5.jumps{suffix}", "1", float(jumps.size), f"ending at {levels} bar"),
         found(
             f"fig5.share_stuck{suffix}",
             "%",
             100.0 * values["share_stuck_undithered"],
-            "of the time, without dither",
+            "fraction of time stuck, without dither",
         ),
         found(
             f"fig5.share_stuck.dither{suffix}",
             "%",
             100.0 * values["share_stuck_dithered"],
-            "of the time, with dither",
+            "fraction of time stuck, with dither",
         ),
         found(
             f"fig5.dither_passed{suffix}",
             "%",
             loops.dither_passed,
-            "motor current at 50 Hz "
-            "over the dither, through the 80 Hz filter and the current loop; section 4.2, "
-            "without a number: the loop correctly tracks the dither",
+            "motor current at 50 Hz relative to the dither, through the 80 Hz filter and the "
+            "current loop. Section 4.2 states without a number that the loop tracks the dither "
+            "correctly",
         ),
     ]
 
 
 def _slow_area(name: str) -> float:
-    """Return the dithered loop's area [A Pa] on a slower ramp, from two signals only."""
+    """Return the dithered loop's area [A Pa] on a slower ramp from only two signals."""
     slope = FACTS["ramp_peak"].value / 25.0 / _SLOWER
     bench = Bench("friction-ramp", name, options={"slope": slope})
     case = next(c for c in bench.cases() if c.label == _WITH)
@@ -365,7 +367,7 @@ def _ripple(t: NDArray[np.float64], y: NDArray[np.float64]) -> complex:
 
 
 def _jump_levels(recording: xr.Dataset) -> Array:
-    """Return the pressures [Pa] at which slips between two phases of stick ended, shape (n,)."""
+    """Return the pressures [Pa] at which slips between two sticking phases ended, shape (n,)."""
     p, stuck = recording["p_mc"].values, recording["stuck"].values > 0.5
     begins = np.flatnonzero(stuck[:-1] & ~stuck[1:])
     ends = np.flatnonzero(~stuck[:-1] & stuck[1:]) + 1
@@ -379,20 +381,20 @@ def _jump_levels(recording: xr.Dataset) -> Array:
 
 _WAVEFORMS = ("sine", "square", "triangle")
 _P_START = 25e5
-"""pressure of the equilibrium at which the brake starts and rests under dither [Pa]"""
+"""equilibrium pressure at which the brake starts and rests with dither [Pa]"""
 
 
 def waveforms(runs: Runs) -> Part:
-    """Return loop, distortion and ripple for the three waveforms."""
+    """Return loop area, distortion and ripple for the three waveforms."""
     items: list[Item] = []
     for waveform in _WAVEFORMS:
         items += _items(runs, waveform)
     text = (
         "The paper prefers the sine for its low total harmonic distortion. Here the waveforms "
-        "have equal amplitude. The 80 Hz filter and the current loop remove most of the harmonics, "
-        "so at the motor the waveforms differ less in distortion than in amplitude. The square's "
-        "fundamental is larger than the sine's (4/pi), the triangle's smaller (8/pi^2): "
-        "the square frees the piston best and causes the largest pressure ripple."
+        "have equal amplitudes. The 80 Hz filter and the current loop remove most of the "
+        "harmonics, so at the motor the waveforms differ less in distortion than in amplitude. "
+        "The fundamental of the square wave is 4/pi times that of the sine, and the triangle's is "
+        "8/pi^2 times. The square wave frees the piston best and causes the most pressure ripple."
     )
     loops = {
         waveform: runs.bench("friction-ramp", MAIN, _chosen(waveform)).recordings[_WITH]
@@ -401,7 +403,7 @@ def waveforms(runs: Runs) -> Part:
     exhibit = Exhibit(
         "dither-waveforms",
         lambda: hysteresis_loop(loops, "p_mc", "i_filtered", "i_star", average=0.02),
-        "The ramp of eq. (17) with dither of three waveforms, averaged over one dither period.",
+        "The ramp of eq. (17) with three dither waveforms, averaged over one dither period.",
     )
     return Part("Section 4.2: waveform of the dither", text, tuple(items), (exhibit,))
 
@@ -422,25 +424,25 @@ def _items(runs: Runs, waveform: str) -> list[Item]:
     sent, got = (100.0 * total_distortion(t, window[name].values, f) for name in ("i_dit", "i"))
     prefix = f"dither.{waveform}"
     return [
-        found(f"{prefix}.thd", "%", sent, "harmonic distortion of the dither as sampled"),
+        found(f"{prefix}.thd", "%", sent, "harmonic distortion of the sampled dither"),
         found(f"{prefix}.thd.motor", "%", got, "harmonic distortion of the motor current"),
         found(
             f"{prefix}.ripple",
             "bar",
             float(np.ptp(window["p_mc"].values)) / BAR,
-            "pressure ripple, peak to peak, at the current that holds 25 bar without friction",
+            "peak-to-peak pressure ripple at the current that holds 25 bar without friction",
         ),
         found(f"{prefix}.p_max", "bar", loops.p_max(_WITH), "on the ramp of eq. (17)"),
         found(
             f"{prefix}.loop_area_ratio",
             "%",
             loops.area_ratio,
-            "area with dither over the area without, on the ramp of eq. (17)",
+            "ratio of the loop area with dither to the area without, on the ramp of eq. (17)",
         ),
         found(
             f"{prefix}.share_stuck",
             "%",
             100.0 * loops.values["share_stuck_dithered"],
-            "of the time, on the ramp of eq. (17)",
+            "fraction of time stuck, on the ramp of eq. (17)",
         ),
     ]

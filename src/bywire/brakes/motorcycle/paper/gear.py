@@ -14,9 +14,9 @@ from bywire.reproduction.item import Fact, Item, compared, found
 from bywire.reproduction.reproduction import Exhibit, Part, selected
 
 P_FROM = 37e5
-"""pressure from which the brake is released [Pa], that of Fig. 7a"""
+"""pressure at which the release begins [Pa], as in Fig. 7a"""
 T_RELEASE = 200.0
-"""time of the release [s]: slow compared with every pole, so that damping losses vanish"""
+"""duration of the release [s]: slow compared with every pole, so that damping losses vanish"""
 MECHANICAL = {
     "E_gear": "gear and screw",
     "E_damping": "fluid damping",
@@ -27,7 +27,7 @@ LAWS = ("paper", "directional")
 
 
 def part(runs: Runs) -> Part:
-    """Return the energy that a slow release returns, for both laws of the gear."""
+    """Return the energy that a slow release returns, for both gear laws."""
     items: list[Item] = []
     for name, suffix in SETS.items():
         for law in LAWS:
@@ -38,20 +38,20 @@ def part(runs: Runs) -> Part:
                 f"gear.stored.pads{suffix}",
                 "J",
                 pads,
-                "stored in the pads alone: (A_pd p)^2/(2 K_pd)",
+                "energy stored in the pads alone: (A_pd p)^2/(2 K_pd)",
             )
         )
     par = parameters(MAIN)
     text = (
         "Eq. (8) multiplies the motor's torque by a constant efficiency. While the motor drives, "
         "this is a loss. While the load drives the shaft backward, it is a gain: the motor "
-        "receives 1/eta_g of the "
-        f"stored energy (eta_g = {par.gear.eta_g:g}). The catalog keeps the paper's law; "
-        "gear.law = 'directional' makes the loss a friction that depends on direction."
+        f"receives 1/eta_g times the stored energy (eta_g = {par.gear.eta_g:g}). The catalog uses "
+        "the paper's law. gear.law = 'directional' makes the loss a friction that depends on "
+        "direction."
     )
     releases = {law: _release(runs, MAIN, law) for law in LAWS}
     caption = (
-        "Mechanical energy of a slow release from 37 bar without dry friction, law '{}'; the "
+        "Mechanical energy of a slow release from 37 bar without dry friction, law '{}'. The "
         "source is the motor's shaft."
     )
     exhibits = tuple(
@@ -80,14 +80,14 @@ def _items(release: xr.Dataset, law: str, suffix: str) -> list[Item]:
     )
     note = f"law '{law}', {'eq. (8)' if law == 'paper' else 'ours'}"
     return [
-        found(f"gear.stored.{law}{suffix}", "J", stored, f"at 37 bar, frictionless; {note}"),
+        found(f"gear.stored.{law}{suffix}", "J", stored, f"at 37 bar, without friction, {note}"),
         compared(
             f"gear.returned.{law}{suffix}",
             bound,
             returned,
             "<=",
             f"work at the motor's shaft during a slow release, {100.0 * returned / stored:.1f} % "
-            f"of the stored energy; {note}",
+            f"of the stored energy, {note}",
         ),
     ]
 

@@ -1,6 +1,6 @@
 """The paper's measurements with tolerances, and the parameters that explain them best.
 
-Table 1 and Table 2 are theory and data sheets, so they do not count.
+Tables 1 and 2 come from theory and data sheets, so they do not count.
 """
 
 from __future__ import annotations
@@ -47,14 +47,14 @@ from bywire.simulation.run import Run, Trajectory, simulate
 
 @dataclass(frozen=True)
 class Statement:
-    """A measured number of the paper.
+    """A measured number in the paper.
 
     Parameters
     ----------
     name
         Name of the statement, and of its counterpart in ``computed``.
     fact
-        Number and place of the statement, its tolerance, and the computation of its counterpart.
+        Stated number and its place, its tolerance, and how the counterpart is computed.
     """
 
     name: str
@@ -80,7 +80,7 @@ _TIME = replace(ALLOWANCES["corner"], what="time constants of Table 4")
 
 
 def _table4(region: str) -> Iterator[Statement]:
-    """Yield the row of a region: gain, two time constants, and overshoot."""
+    """Yield a region's row: gain, two time constants, and overshoot."""
     row, model = FACTS.table(f"table4.{region}"), table4_model(region)
     height = FACTS["fig6_step"].value
     _, high = step_peak(model, height)
@@ -93,7 +93,7 @@ def _table4(region: str) -> Iterator[Statement]:
             "ms",
             f"{where}: 1/(2 pi {corner:g} Hz)",
             tolerance=_TIME,
-            note="eq. (21) with that gain, fitted to sines of 0.1 A, 1 to 15 Hz",
+            note="eq. (21) with that gain, fitted to sines of 0.1 A from 1 to 15 Hz",
         )
         yield Statement(f"table4.{region}.{key}", time)
     overshoot = Fact(
@@ -101,8 +101,8 @@ def _table4(region: str) -> Iterator[Statement]:
         "%",
         f"{where}, eq. (22)",
         tolerance=ALLOWANCES["overshoot"],
-        note="highest point of the step minus its value after 4 s: the effect of "
-        "the slow pair, whose zero and pole have no counterpart",
+        note="peak of the step response minus its value after 4 s: the effect of the slow pair, "
+        "whose zero and pole have no counterpart",
     )
     yield Statement(f"table4.{region}.overshoot", overshoot)
 
@@ -113,7 +113,7 @@ def _statements() -> Iterator[Statement]:
     for name, fact in FACTS.table("table3").items():
         digit = _FILE.allowances[name]
         yield Statement(f"table3.{name}", replace(fact, tolerance=digit, note="the parameter"))
-    ratio = "area of the loop with dither over the area without, averaged over a dither period"
+    ratio = "ratio of the loop area with dither to the area without, averaged over a dither period"
     error = "mean of the last 0.24 s of hard braking minus 37 bar"
     read = _FILE.facts
     for name, fact in (
@@ -132,7 +132,7 @@ STATEMENTS = tuple(_statements())
 
 
 def allowances() -> tuple[Allowance, ...]:
-    """Return the tolerances in use, each once."""
+    """Return the tolerances in use, without duplicates."""
     return tuple(dict.fromkeys(statement.allowance for statement in STATEMENTS))
 
 
@@ -142,24 +142,24 @@ def allowances() -> tuple[Allowance, ...]:
 Par = MotorcycleParameters
 
 _FREQUENCIES = (1.0, 2.0, 4.0, 8.0, 15.0)
-"""sines [Hz]; the paper's second step reaches from 1 to 15 Hz"""
+"""sines [Hz]; the paper's second step uses 1 to 15 Hz"""
 _AMPLITUDE = 0.1
-"""of the sines [A]"""
+"""amplitude of the sines [A]"""
 
 _BAR, _SUBSTEP = 1e5, 20e-6
-_SETTLE, _ROUNDS, _AWAY = 3.0, 3, 1.15  # s; corrections of the current; their start
-_WINDOW, _AFTER, _LATE = 2.0, 4.0, 0.6  # s: of a sine, of a step, and for the means of levels
+_SETTLE, _ROUNDS, _AWAY = 3.0, 3, 1.15  # s; corrections of the current; their starting factor
+_WINDOW, _AFTER, _LATE = 2.0, 4.0, 0.6  # s: windows of a sine, of a step, and of the level means
 _FIRST, _SECOND = 1.0, 10.0  # Hz: start of the search for T1 and T2
 _END = 0.24  # s: window for the end of hard braking
 
 
 def computed(brakes: Sequence[Par]) -> list[dict[str, float]]:
-    """Return each brake's counterparts of all statements but Table 3's, in the statement's unit.
+    """Return each brake's counterparts of all statements except Table 3's, in the statement's unit.
 
     Parameters
     ----------
     brakes
-        Parameter sets of one structure: they may differ only in numbers.
+        Parameter sets that differ only in numbers, not in choices.
 
     Raises
     ------
@@ -172,7 +172,7 @@ def computed(brakes: Sequence[Par]) -> list[dict[str, float]]:
 
 
 def _together(runs: Sequence[Run], signals: Sequence[str]) -> Sequence[Trajectory]:
-    """Return runs side by side where that is possible."""
+    """Simulate runs side by side where that is possible."""
     if fit_lanes(runs):
         return simulate_group(runs, signals)
     return [simulate(run, signals) for run in runs]
@@ -189,7 +189,7 @@ def _step(before: float, after: float, t: Array) -> Array:
 def _driven(
     par: Par, p: float, demand: Callable[[Array], Array], duration: float, settle: float
 ) -> Run:
-    """Return a run from rest at ``p`` [Pa] under a current demand [A]."""
+    """Return a run from rest at ``p`` [Pa] with a current demand [A]."""
     case = case_from_rest(
         "run",
         par,
@@ -204,7 +204,7 @@ def _driven(
 
 
 def _settled(brakes: Sequence[Par], p: float) -> list[float]:
-    """Return the equilibria [Pa] without friction whose currents let each brake settle at p.
+    """Return the frictionless equilibria [Pa] at whose currents each brake settles at ``p``.
 
     A fixed number of corrections, unlike ``settled_start``, keeps the result smooth.
     """
@@ -224,7 +224,7 @@ def _settled(brakes: Sequence[Par], p: float) -> list[float]:
 
 
 def _region(brakes: Sequence[Par], name: str) -> list[dict[str, float]]:
-    """Return gain, time constants and overshoot of a pressure region; Fig. 6's peak."""
+    """Return gain, time constants and overshoot of a pressure region, and Fig. 6's peak."""
     p, height = REGIONS[name], FACTS["fig6_step"].value
     starts = _settled(brakes, p)
     holds = [holding_current(start, par) for par, start in zip(brakes, starts, strict=True)]
@@ -273,7 +273,7 @@ def overshoots(par: Par, name: str, heights: Sequence[float]) -> list[float]:
 
 
 def _levels(step: Trajectory, par: Par) -> tuple[float, float, float]:
-    """Return the pressure [Pa] before a step, at its end, and its highest, dither averaged."""
+    """Return the pressure [Pa] before a step, at its end and at its peak, dither averaged out."""
     t = step.time - _SETTLE
     p = _averaged(step, par)
     before, after = (t >= -_LATE) & (t < -0.02), t >= _AFTER - _LATE
@@ -285,7 +285,7 @@ def _averaged(run: Trajectory, par: Par) -> Array:
 
 
 def _line(sine: Trajectory, f: float) -> complex:
-    """Return pressure over current at the sine's frequency [Pa/A]."""
+    """Return the response from current to pressure at the sine's frequency [Pa/A]."""
     inside = np.flatnonzero(sine.time >= _WINDOW - 1e-9)[:-1]
     wave = np.exp(-2j * math.pi * f * sine.time[inside])
     pressure, current = (sine[name][inside] @ wave for name in ("p_mc", "i"))
@@ -293,7 +293,7 @@ def _line(sine: Trajectory, f: float) -> complex:
 
 
 def _time_constants(K: float, lines: Complex) -> tuple[float, float]:
-    """Return T1 and T2 of eq. (21) [s] from magnitude and phase at the sines, for a known gain.
+    """Return T1 and T2 of eq. (21) [s] from the sines' magnitude and phase, for a known gain.
 
     This is the paper's second step; the gain comes from the step response.
     """
@@ -309,7 +309,7 @@ def _time_constants(K: float, lines: Complex) -> tuple[float, float]:
 
 
 def _ramps(brakes: Sequence[Par]) -> list[dict[str, float]]:
-    """Return the counterparts of Fig. 5, the ramp (17)."""
+    """Return the counterparts of Fig. 5 on the ramp (17)."""
     options = friction_ramp.Options.model_validate(friction_ramp.EXPERIMENT.defaults.model_dump())
     pairs = [friction_ramp.cases(par, options) for par in brakes]
     both = [_runs((pair[k] for pair in pairs), ("i_meas", "p_mc")) for k in (0, 1)]
@@ -335,7 +335,7 @@ def _ramps(brakes: Sequence[Par]) -> list[dict[str, float]]:
 
 
 def stuck_at(par: Par) -> float:
-    """Return the highest pressure [bar] of the ramp (17) without dither."""
+    """Return the maximum pressure [bar] of the ramp (17) without dither."""
     options = friction_ramp.Options.model_validate(friction_ramp.EXPERIMENT.defaults.model_dump())
     without = friction_ramp.cases(par.replace({"adc.law": "ideal"}), options)[0]
     return float(_runs([without], ("p_mc",))[0]["p_mc"].max()) / _BAR
@@ -351,7 +351,7 @@ def _low_passed(run: Trajectory, f: float) -> Array:
 
 
 def _braking(brakes: Sequence[Par]) -> list[dict[str, float]]:
-    """Return the counterparts of Fig. 7a, hard braking."""
+    """Return the counterparts of Fig. 7a in hard braking."""
     options = hard_braking.Options.model_validate(hard_braking.EXPERIMENT.defaults.model_dump())
     runs = _runs((hard_braking.cases(par, options)[0] for par in brakes), ("p_mc",))
     rows = []
@@ -369,17 +369,17 @@ def _braking(brakes: Sequence[Par]) -> list[dict[str, float]]:
 # --- All free parameters from all statements together
 
 PRIOR = PRINTED
-"""set of the starts, and of the parameters that no statement determines: Table 1 as printed"""
+"""set of the starting values and of the undetermined parameters: Table 1 as printed"""
 P_NOMINAL = 20e5
-"""pressure [Pa] at which the piston stands at its nominal position, as in the other sets"""
+"""pressure [Pa] at which the piston is at its nominal position, as in the other sets"""
 
-_TENFOLD = "a tenth to ten times Table 1: beyond it is another brake"
-_TABLE3 = "a fifth to five times Table 3"
+_TENFOLD = "0.1 to 10 times Table 1: a value outside belongs to a different brake"
+_TABLE3 = "0.2 to 5 times Table 3"
 
 
 @dataclass(frozen=True)
 class _Free:
-    """A free parameter: bounds [SI], their reason, and the magnitude where it may be zero."""
+    """A free parameter: bounds [SI], their reason, and its magnitude if it may be zero."""
 
     low: float
     high: float
@@ -389,57 +389,58 @@ class _Free:
 
 FREE: Mapping[str, _Free] = {
     "master_cylinder.A_mc": _Free(0.4e-4, 3e-4, "bores of 7 to 20 mm"),
-    "gear.eta_g": _Free(0.5, 1.0, "ball screw and gear; no machine returns more than its input"),
+    "gear.eta_g": _Free(0.5, 1.0, "ball screw and gear: output energy <= input energy"),
     "gear.J_mot": _Free(2e-6, 2e-4, "a motor of 20 to 80 mm"),
-    "master_cylinder.k_damp": _Free(0.0, 2e5, "none to ten times Table 1"),
+    "master_cylinder.k_damp": _Free(0.0, 2e5, "zero to ten times Table 1"),
     "caliper.K_pd": _Free(1e5, 1e7, _TENFOLD),
     "fluid.V_air": _Free(
-        0.0, 6e-7, "none to the largest volume that fits the nominal position", 1e-7
+        0.0, 6e-7, "zero to the maximum volume that fits the nominal position", 1e-7
     ),
-    "master_cylinder.s_mc": _Free(15.5e-3, 60e-3, "beyond the end stop; three times our choice"),
-    "seal.T_pr": _Free(0.0, 3e-2, "none to Fig. 4's torque at low pressure"),
+    "master_cylinder.s_mc": _Free(15.5e-3, 60e-3, "end stop to three times our choice"),
+    "seal.T_pr": _Free(0.0, 3e-2, "zero to Fig. 4's torque at low pressure"),
     "seal.f_cfr_p": _Free(3.2e-9, 8e-8, _TABLE3),
     "seal.f_cfr_n": _Free(1.08e-9, 2.7e-8, _TABLE3),
-    "seal.k_brk_p": _Free(1.0, 13.0, "no less than Coulomb friction; five times Table 3"),
-    "seal.k_brk_n": _Free(1.0, 11.5, "no less than Coulomb friction; five times Table 3"),
+    "seal.k_brk_p": _Free(1.0, 13.0, "Coulomb friction to five times Table 3"),
+    "seal.k_brk_n": _Free(1.0, 11.5, "Coulomb friction to five times Table 3"),
     "seal.c": _Free(1.0, 25.0, _TABLE3),
-    "seal.mu_T": _Free(0.0, 2e-3, "none to the text's 1e-2 N m s/rad in place of Table 3's", 2e-7),
-    "ecu.filter.zeta": _Free(0.3, 1.5, "second-order low-passes in use"),
+    "seal.mu_T": _Free(0.0, 2e-3, "zero to the text's 1e-2 N m s/rad, instead of Table 3's", 2e-7),
+    "ecu.filter.zeta": _Free(0.3, 1.5, "second-order low-pass filters in use"),
 }
-"""parameters that are estimated together"""
+"""parameters that the fit estimates together"""
 
 TIED: Mapping[str, str] = {
     "ecu.est_par.T_pr": "seal.T_pr",
     "ecu.est_par.f_cfr_p": "seal.f_cfr_p",
     "ecu.est_par.k_brk_p": "seal.k_brk_p",
 }
-"""friction that the ECU assumes for the dither, and the parameter with the same value"""
+"""friction that the ECU assumes for the dither, and the parameter that has the same value"""
 
 HELD: Mapping[str, str] = {
     "gear.k_g": "acts only through A_mc k_g, k_damp k_g^2 and the chamber's volume, which A_mc, "
-    "k_damp and s_mc cover",
-    "gear.M_mc": "adds to the inertia, which J_mot covers",
-    "motor.K_e": "acts through eta_g K_e, which eta_g covers, and hardly in the back-EMF",
-    "caliper.A_pd": "acts only through A_pd^2/K_pd, which K_pd covers",
-    "fluid.beta": "acts only through the chamber's volume over it, which s_mc covers",
-    "pipeline.d_pl": "the misfit only falls as the pipeline gets wider, until its resistance is "
-    "negligible and the misfit no longer depends on d_pl: the statements give a lower bound",
+    "k_damp and s_mc represent",
+    "gear.M_mc": "adds to the inertia, which J_mot represents",
+    "motor.K_e": "acts through eta_g K_e, which eta_g represents, and hardly through the back-EMF",
+    "caliper.A_pd": "acts only through A_pd^2/K_pd, which K_pd represents",
+    "fluid.beta": "acts only through the chamber's volume/beta ratio, which s_mc represents",
+    "pipeline.d_pl": "the misfit falls as the pipeline gets wider, until its resistance is "
+    "negligible and the misfit no longer depends on d_pl: the statements determine only a lower "
+    "bound",
     "fluid.nu": "acts only through the pipeline's resistance, as d_pl does",
     "fluid.rho": "acts only through the pipeline's resistance, as d_pl does",
     "pipeline.L_pl": "acts only through the pipeline's resistance, as d_pl does",
     "pipeline.k_lf": "acts only through the pipeline's resistance, as d_pl does",
 }
-"""parameters that keep their value of Table 1, with the reason: most of them act only in a product
-with a free one"""
+"""parameters fixed at their value in Table 1, with the reason: most of them act only in a product
+with a free parameter"""
 
 
 def prior() -> Par:
-    """Return the start of the search: Table 1 as printed, with the law of entrained air on."""
+    """Return the start of the search: Table 1 as printed, with entrained air switched on."""
     return parameters(PRIOR).replace({"fluid.air": "entrained", "fluid.V_air": 0.0})
 
 
 def unknowns() -> tuple[Unknown, ...]:
-    """Return the free parameters as unknowns, within their bounds, from Table 1."""
+    """Return the free parameters as unknowns within their bounds, starting at Table 1."""
     known, fields = prior().leaves(), leaf_fields(Par)
     return tuple(
         Unknown(
@@ -455,15 +456,15 @@ def unknowns() -> tuple[Unknown, ...]:
 
 
 def brake(values: Mapping[str, float]) -> Par:
-    """Return the brake with some of the free parameters changed, the others as in Table 1.
+    """Return the brake with some free parameters changed and the others as in Table 1.
 
-    The retracted end follows, so that the piston is at its nominal position at 20 bar, and so does
-    the friction that the ECU assumes.
+    The retracted end is adjusted so that the piston is at its nominal position at 20 bar. The
+    friction that the ECU assumes is adjusted, too.
 
     Parameters
     ----------
     values
-        By name, SI.
+        Changed values by name, SI.
 
     Raises
     ------
@@ -476,14 +477,14 @@ def brake(values: Mapping[str, float]) -> Par:
     x_rest = near.master_cylinder.x_rest
     for _ in range(
         20
-    ):  # the travel hardly depends on the volume behind it: a few rounds are enough
+    ):  # the travel hardly depends on the volume behind it, so a few iterations are enough
         missing = nominal - travel_at(P_NOMINAL, near)
         x_rest += missing
         if not x_rest > 0.0:
             limit = f"< {nominal * 1e3:g} mm"
             raise ParameterError(
-                f"the stroke to {P_NOMINAL / 1e5:g} bar must be {limit}, the nominal travel: "
-                "reduce fluid.V_air, or raise caliper.K_pd or master_cylinder.A_mc",
+                f"the stroke to {P_NOMINAL / 1e5:g} bar must be {limit}, the nominal travel. "
+                "Reduce fluid.V_air, or increase caliper.K_pd or master_cylinder.A_mc",
                 name="stroke",
                 valid=limit,
             )
@@ -496,15 +497,15 @@ def brake(values: Mapping[str, float]) -> Par:
 # --- The misfit
 
 LOSS: Loss = "soft_l1"
-"""weight of large residuals: the statements contradict each other, and with squares the largest
+"""weight of large residuals: the statements contradict each other, so with squares the largest
 residual would dominate"""
 _STEP = 0.01
-"""step of the differences as a share of an unknown's scale: larger steps add the curvature of the
-gain, smaller ones the roughness of stick-slip"""
+"""difference step relative to an unknown's scale: larger steps add the gain's curvature, smaller
+steps add roughness from stick-slip"""
 _PARTS = tuple(Part(s.name, "", 1, s.fact.unit, s.tolerance) for s in STATEMENTS)
 """one part per residual"""
 
-_RESOLVED = 1e-4  # of the misfit: smaller changes are roughness from stick-slip
+_RESOLVED = 1e-4  # relative to the misfit: smaller changes are roughness from stick-slip
 
 
 def predicted(brakes: Sequence[Par]) -> list[dict[str, float]]:
@@ -534,16 +535,16 @@ def residuals(brakes: Sequence[Par]) -> Array:
 def problem(free: tuple[Unknown, ...] | None = None) -> Problem:
     """Return the misfit as a function of the free parameters.
 
-    Derivatives are central differences, one-sided at the bounds. All brakes that they need are
+    Derivatives are central differences, one-sided at the bounds. All brakes that they require are
     computed side by side.
 
     Parameters
     ----------
     free
-        Unknowns; all of them by default.
+        Unknowns. Default: all of them.
     """
     free = unknowns() if free is None else free
-    last: dict[bytes, tuple[Array, Array]] = {}  # a fixed parameter needs no further runs
+    last: dict[bytes, tuple[Array, Array]] = {}  # a fixed parameter needs no additional runs
 
     def evaluate(values: Array) -> tuple[Array, Array]:
         if (key := values.tobytes()) not in last:
@@ -557,7 +558,7 @@ def problem(free: tuple[Unknown, ...] | None = None) -> Problem:
             r, lower, upper, ends = _around(free, values)
         except (
             ParameterError
-        ) as error:  # the trial step was too long: the search takes a shorter one
+        ) as error:  # the trial step was too long: the search uses a shorter one
             raise SolverError(str(error)) from error
         return r, slopes(values, r, lower, upper, ends)
 
@@ -565,10 +566,10 @@ def problem(free: tuple[Unknown, ...] | None = None) -> Problem:
 
 
 def slopes(values: Array, r: Array, lower: Array, upper: Array, ends: tuple[Array, Array]) -> Array:
-    """Return the derivatives of the residuals, shape (statements, unknowns), from both sides.
+    """Return the residuals' derivatives from both sides, shape (statements, unknowns).
 
-    Where a statement has no counterpart on one side, such as the area of a loop when the piston
-    sticks, the derivative is one-sided.
+    Where a statement has no counterpart on one side, such as a loop's area when the piston sticks,
+    the derivative is one-sided.
     """
     sides = []
     for side, end in zip((lower, upper), ends, strict=True):
@@ -583,7 +584,7 @@ def slopes(values: Array, r: Array, lower: Array, upper: Array, ends: tuple[Arra
 def _around(
     free: Sequence[Unknown], values: Array
 ) -> tuple[Array, Array, Array, tuple[Array, Array]]:
-    """Return the residuals here, one step below and above in each unknown, and these values."""
+    """Return the residuals here, one step below and one above in each unknown, and the steps."""
     size = _STEP * np.array([u.scale for u in free])
     low, high = (np.array([getattr(u, end) for u in free]) for end in ("low", "high"))
     ends = np.maximum(values - size, low), np.minimum(values + size, high)
@@ -600,23 +601,23 @@ def _named(free: Sequence[Unknown], values: Array) -> Mapping[str, float]:
 
 
 def misfit(r: Array) -> float:
-    """Return the cost of the fit: half the sum of the losses of residuals in tolerances."""
+    """Return the fit's cost: half the sum of the losses of residuals in tolerances."""
     return 0.5 * float(rho(r**2, LOSS)[0].sum())
 
 
 def _sized(values: Array) -> tuple[Unknown, ...]:
-    """Return the unknowns, each scaled by its prior or its estimate, whichever is larger."""
+    """Return the unknowns, each scaled by the larger of its prior and its estimate."""
     return tuple(
         replace(u, scale=max(u.scale, abs(float(v))))
         for u, v in zip(unknowns(), values, strict=True)
     )
 
 
-# --- Uncertainty of a brake that is assumed to be the best
+# --- Uncertainty of a brake that counts as the best
 
 
 def appraised(par: Par) -> Appraisal:
-    """Return the uncertainty of a brake's free parameters, assumed to be the misfit's minimum.
+    """Return the uncertainty of a brake's free parameters, which must minimize the misfit.
 
     Parameters that the statements do not determine count as fixed at their values.
 
@@ -643,13 +644,13 @@ class Appraisal:
     Parameters
     ----------
     estimate
-        Parameters that the statements determine, p of them, with intervals, and the others.
+        The p parameters that the statements determine, with intervals, and the others.
     residuals
-        In tolerances, shape (statements,).
+        Residuals in tolerances, shape (statements,).
     jacobian
-        Of the residuals by the p parameters, each in its scale, shape (statements, p).
+        Derivatives of the residuals by the p parameters, each in its scale, shape (statements, p).
     beside
-        Residuals with each parameter 1 % of its scale lower, and higher, shape (2, p, statements).
+        Residuals with each parameter lower or higher by 1 % of its scale, shape (2, p, statements).
     """
 
     estimate: Estimate
@@ -659,7 +660,7 @@ class Appraisal:
 
     @property
     def computed(self) -> dict[str, float]:
-        """The brake's counterpart of every statement, by the statement's name, in its unit."""
+        """Counterpart of every statement by the statement's name, in its unit."""
         rows = zip(STATEMENTS, self.residuals, strict=True)
         return {s.name: s.fact.value + s.tolerance * float(r) for s, r in rows}
 
@@ -669,7 +670,7 @@ class Appraisal:
         return misfit(self.residuals)
 
     def gain(self) -> float:
-        """Return the misfit's largest relative reduction by a step of 1 % in one parameter.
+        """Return the misfit's maximum relative reduction by a 1 % step in one parameter.
 
         At a minimum only the roughness from stick-slip remains.
         """
@@ -677,14 +678,15 @@ class Appraisal:
         return 1.0 - float(np.nanmin(misfits)) / self.misfit
 
     def deciding_statements(self, name: str, most: int = 3) -> tuple[str, ...]:
-        """Return the statements whose shift by one tolerance moves a parameter most.
+        """Return the statements whose shift by one tolerance changes a parameter most.
 
         Parameters
         ----------
         name
             Name of the parameter.
         most
-            Largest number of statements; omits those with less than a third of the first.
+            Maximum number of statements. The function omits statements with less than a third of
+            the first one's effect.
         """
         _, steep = influence(self.residuals, LOSS)
         weighed = self.jacobian * steep[:, None]
@@ -697,9 +699,9 @@ class Appraisal:
 # --- The search
 
 _SPREAD = 0.3
-"""largest distance of the other starts from Table 1, as a share of it"""
+"""maximum distance of the other starts from Table 1, relative to Table 1"""
 
-_SEARCHES = 6  # of fixing parameters and searching: two were enough
+_SEARCHES = 6  # rounds of fixing parameters and searching: two were enough
 
 
 def estimated(
@@ -707,10 +709,10 @@ def estimated(
 ) -> Estimate:
     """Return the free parameters that explain the statements best.
 
-    From the end of the best start, the least determined parameter returns to Table 1. The search
-    continues without it until the data determine all others. Then a search with all parameters
-    free follows, and `settled`. Parameters that the statements do not determine stay at Table 1;
-    the result lists them with the reason.
+    At the end of the best search, the least determined parameter returns to Table 1. The search
+    continues without this parameter until the data determine all others. Then a search with all
+    parameters free follows, and `settled`. Parameters that the statements do not determine stay at
+    Table 1; the result lists them with the reason.
 
     Parameters
     ----------
@@ -719,9 +721,9 @@ def estimated(
     seed
         Seed of their random numbers.
     progress
-        Called with a label and the finished share.
+        Called with a label and the finished fraction.
     store
-        File that keeps every finished start.
+        File that stores every finished start.
 
     Returns
     -------
@@ -745,9 +747,9 @@ def estimated(
 def settled(values: Array) -> Appraisal:
     """Return the nearby minimum whose undetermined parameters are at Table 1.
 
-    Which parameters the statements determine depends on the brake. So the undetermined ones return
-    to Table 1, and the search repeats for the others, until the undetermined parameters of the
-    minimum are the fixed ones. If that never happens, the lowest minimum counts.
+    The brake decides which parameters the statements determine. So the undetermined parameters
+    return to Table 1, and the search repeats for the others, until the minimum's undetermined
+    parameters are the fixed ones. If that never happens, the lowest minimum counts.
 
     Parameters
     ----------
@@ -773,7 +775,7 @@ def settled(values: Array) -> Appraisal:
 
 
 def _searched(values: Array, held: tuple[int, ...]) -> Array:
-    """Return the nearby minimum with the unknowns of some indices fixed at Table 1."""
+    """Return the nearby minimum with the unknowns at some indices fixed at Table 1."""
     table1 = np.array([u.start for u in unknowns()])
     free = np.setdiff1d(np.arange(values.size), held)
     begin = np.where(np.isin(np.arange(values.size), held), table1, values)

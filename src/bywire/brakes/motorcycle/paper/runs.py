@@ -1,4 +1,4 @@
-"""Runs that several tables and figures of Dardanelli et al. (2010) share."""
+"""Runs shared by several tables and figures of Dardanelli et al. (2010)."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from bywire.reproduction import reproduction
 MAIN = "dardanelli2010"
 PRINTED = "dardanelli2010-table1"
 SETS = {MAIN: "", PRINTED: "@table1"}
-"""parameter sets, with the suffix of an item's id"""
+"""parameter sets, with the suffix that each adds to an item's id"""
 BAR = 1e5
 
 FRICTIONLESS = {
@@ -44,10 +44,9 @@ class Runs(reproduction.Runs):
     """Bench results, each computed once; see `bywire.reproduction.reproduction.Runs`."""
 
     def settled_step(self, name: str, p: float, i_step: float) -> Result:
-        """Return a current step that begins where the dithered pressure has settled at ``p``.
+        """Return a current step from a dithered pressure that has settled at ``p``.
 
-        ``name``: parameter set; ``p``: pressure before the step [Pa]; ``i_step``: height of the
-        step [A].
+        ``name``: parameter set; ``p``: pressure before the step [Pa]; ``i_step``: step height [A].
         """
         return self.bench("pressure-step", name, options={"p_start": p, "i_step": i_step})
 
@@ -61,14 +60,14 @@ def before(step: Result) -> float:
 # --- Sines
 
 WINDOW = 4.0
-"""shortest time for evaluating a sine [s]: averages slow creep under dither"""
+"""minimum time for evaluating a sine [s]: averages out slow creep under dither"""
 
 
 @cache
 def of_set_point(
     name: str, p: float, amplitudes: tuple[float, ...], frequencies: tuple[float, ...]
 ) -> xr.Dataset:
-    """Return pressure over its set point, dimensions amplitude and frequency.
+    """Return the response from set point to pressure, with dimensions amplitude and frequency.
 
     ``name``: parameter set; ``p``: mean pressure [Pa]; ``amplitudes``: of the set point [Pa];
     ``frequencies``: in Hz.
@@ -81,7 +80,7 @@ def of_set_point(
 def of_current(
     name: str, p: float, amplitudes: tuple[float, ...], frequencies: tuple[float, ...]
 ) -> xr.Dataset:
-    """Return pressure over the current demand [Pa/A], likewise; the mean demand holds ``p``."""
+    """Return the response from current demand to pressure [Pa/A]; the mean demand holds ``p``."""
     par = parameters(name).replace({"drive.mode": "current"})
     stimulus = zeros(Stimulus)._replace(i_set=holding_current(p, par))
     point = Point(MotorcycleBrake(), par, state_at(p, par), memory_at(p, par), stimulus)

@@ -68,26 +68,26 @@ def table1(runs: Runs) -> Part:
                 f"table1.x_mc{suffix}",
                 FACTS["table1.x_mc"],
                 x,
-                note="at 20 bar, a reading: x_rest is derived from it",
+                note="at 20 bar, our interpretation: x_rest is derived from it",
                 tuned="calibrated",
             ),
             compared(
                 f"table1.Re{suffix}",
                 FACTS["re_laminar"],
                 peak(hard, "Re"),
-                note="largest Reynolds number during hard braking, Fig. 7a",
+                note="maximum Reynolds number during hard braking, Fig. 7a",
             ),
             compared(
                 f"table1.eq11{suffix}",
                 FACTS["eq11"],
                 ratio,
-                note="beta A_pd^2/(V_pd K_pd) = beta/p_pd at 37 bar; turns (10) into (11)",
+                note="beta A_pd^2/(V_pd K_pd) = beta/p_pd at 37 bar; reduces (10) to (11)",
             ),
         ]
     text = (
-        "Table 1 gives most physical parameters. The paper does not print the piston's stroke "
-        "s_mc, the seals' preload T_pr, the motor's winding, the controllers' gains and the pedal "
-        "map. These are our choices, marked as such in the catalog."
+        "Table 1 lists most physical parameters. The paper does not print the piston stroke s_mc, "
+        "the seal preload T_pr, the motor winding's data, the controller gains or the pedal map. "
+        "These are our choices, marked as such in the catalog."
     )
     appendix = {
         f"All parameters of {name}": parameter_table(
@@ -102,7 +102,7 @@ def table1(runs: Runs) -> Part:
 # --- Table 2
 
 _TWO_POLES_TO = 50.0
-"""upper end of the band [Hz] for judging eq. (21): five times the required bandwidth"""
+"""upper limit of the band [Hz] for judging eq. (21): five times the required bandwidth"""
 
 
 def _numbers(model: Rational) -> dict[str, float]:
@@ -118,37 +118,37 @@ def _numbers(model: Rational) -> dict[str, float]:
 
 
 def table2(runs: Runs) -> Part:
-    """Return Table 2 from the calibrated and from the printed parameters."""
+    """Return Table 2 from the calibrated and the printed parameters."""
     items: list[Item] = []
     for name, suffix in SETS.items():
         computed = _numbers(theoretical(parameters(name)))
         for key, fact in FACTS.table("table2").items():
-            note = "s_mc, which moves it, is not printed" if key == "pole3" else ""
+            note = "depends on s_mc, which is not printed" if key == "pole3" else ""
             items.append(
                 compared(
                     f"table2.{key}{suffix}",
                     fact,
                     computed[key],
-                    note=f"Table 1 in (15){'; ' if note else ''}{note}" if suffix else "",
+                    note=f"Table 1 in (15){', ' if note else ''}{note}" if suffix else "",
                     tuned="" if suffix else "calibrated",
                 )
             )
     items += _two_poles()
     text = (
-        "Table 1 in eq. (15) does not give Table 2. A few plausible changes repair it: the "
-        "calibrated set. It is tuned to Table 2, so its agreement proves only that such a set "
+        "Table 1 in eq. (15) does not give Table 2. The calibrated set repairs this with a few "
+        "plausible changes. It is tuned to Table 2, so its agreement proves only that such a set "
         "exists. The figure also shows Table 4's model, which the authors identified with dither."
     )
     return Part("Table 2: theoretical transfer function", text, tuple(items), (_three_models(),))
 
 
 def _two_poles() -> list[Item]:
-    """Return the error of eq. (21) against eq. (15)."""
+    """Return the error of eq. (21) relative to eq. (15)."""
     items: list[Item] = []
     for name, suffix in SETS.items():
         error = two_pole_error(parameters(name), high=_TWO_POLES_TO)
         note = (
-            f"largest from 0 to {_TWO_POLES_TO:g} Hz: eq. (21) is (15) without zero and fast pole"
+            f"maximum from 0 to {_TWO_POLES_TO:g} Hz: eq. (21) is (15) without zero and fast pole"
         )
         items += [
             found(f"eq21.gain_error{suffix}", "dB", error.gain, note),
@@ -172,8 +172,8 @@ def _three_models() -> Exhibit:
     return Exhibit(
         "table2-bode",
         lambda: bode(responses, gain_unit="bar/A"),
-        "Pressure over motor current: eq. (15) from the two parameter sets, the "
-        "transfer function that Table 2 prints (points), and Table 4's model.",
+        "Response from motor current to pressure: eq. (15) from the two parameter sets, the "
+        "transfer function printed in Table 2 (points), and Table 4's model.",
     )
 
 
@@ -184,8 +184,8 @@ def _three_models() -> Exhibit:
 class _Change:
     """A value of Table 1 that the calibrated set changes.
 
-    ``name``: parameter; ``symbol``: its symbol in Table 1; ``unit``, ``factor``: unit at the edge,
-    and how many of it one SI unit is.
+    ``name``: parameter; ``symbol``: its symbol in Table 1; ``unit``, ``factor``: display
+    unit, and its number per SI unit.
     """
 
     name: str
@@ -210,9 +210,9 @@ def repair(runs: Runs) -> Part:
     items.append(_laminar(parameters(PRINTED)))
     text = (
         "The calibrated set changes five values, each as little and as plausibly as "
-        "possible. The stroke alone cannot repair Table 1: s_mc moves only the fastest pole. "
-        "A stroke that fits this pole to Table 2 lets the piston meet the chamber's end within "
-        "the pressure sensor's range, and the other numbers stay wrong."
+        "possible. The stroke alone cannot repair Table 1, because s_mc moves only the fastest "
+        "pole. With a stroke that fits this pole to Table 2, the piston reaches the chamber's end "
+        "within the pressure sensor's range, and the other numbers remain wrong."
     )
     return Part("How Table 1 was repaired", text, tuple(items))
 
@@ -222,15 +222,15 @@ def _change(change: _Change) -> Item:
     cited = PARAMETER_SETS.find(MAIN).values[change.name]
     new, name = change.factor * float(cited.value), f"calibrated.{change.symbol}"
     if change.symbol not in FACTS.table("table1"):
-        return found(name, change.unit, new, f"calibrated; not printed; {cited.where}")
+        return found(name, change.unit, new, f"calibrated, not printed: {cited.where}")
     fact = FACTS.table("table1")[change.symbol]
     share = new / fact.value
-    note = f"{share:.3g} times the printed value, our change; {cited.where}"
+    note = f"{share:.3g} times the printed value, our change: {cited.where}"
     return compared(name, fact, new, None, note, tuned="calibrated")
 
 
 def _short_stroke() -> list[Item]:
-    """Return the stroke that gives Table 1 the fastest pole of Table 2, and its drawbacks."""
+    """Return the stroke for which Table 1 gives Table 2's fastest pole, and its drawbacks."""
     printed = parameters(PRINTED)
     stated = FACTS["table2.pole3"].value
 
@@ -243,7 +243,12 @@ def _short_stroke() -> list[Item]:
     par = par.replace({"master_cylinder.x_rest": _rest(par)})
     p_end = float(brentq(lambda p: travel_at(p, par) - s_mc, P_NOMINAL, 60e5))
     return [
-        found("short_stroke.s_mc", "mm", 1e3 * s_mc, "gives Table 1 in (15) the pole 3 of Table 2"),
+        found(
+            "short_stroke.s_mc",
+            "mm",
+            1e3 * s_mc,
+            "with this stroke, Table 1 in (15) gives Table 2's pole 3",
+        ),
         compared(
             "short_stroke.pole3",
             FACTS["table2.pole3"],
@@ -255,8 +260,8 @@ def _short_stroke() -> list[Item]:
             "short_stroke.p_end",
             FACTS["sensor_range"],
             p_end / BAR,
-            note="pressure at which the piston meets the chamber's end with that stroke: within "
-            "the range; not judged, because the stroke is only our trial",
+            note="pressure at which the piston reaches the chamber's end with that stroke, within "
+            "the range. Not judged, because the stroke is only our trial",
         ),
     ]
 
@@ -276,7 +281,7 @@ def _rest(par: MotorcycleParameters) -> float:
 
 
 def _laminar(par: MotorcycleParameters) -> Item:
-    """Return the coefficient of the Hagen-Poiseuille law in the form of eq. (12)."""
+    """Return the Hagen-Poiseuille law's coefficient in the form of eq. (12)."""
     d, nu, rho = par.pipeline.d_pl, par.fluid.nu, par.fluid.rho
     textbook = 128.0 * nu * rho * par.pipeline.L_pl / (math.pi * d**4)
     coefficient = par.pipeline.k_lf * textbook / pipeline.resistance(par.pipeline, par.fluid)
@@ -284,8 +289,8 @@ def _laminar(par: MotorcycleParameters) -> Item:
         "laminar.coefficient",
         FACTS["k_lf"],
         coefficient,
-        note="128 nu rho L/(pi d^4) of Hagen and Poiseuille, written as k nu rho pi L/A^2: "
-        "a quarter; the models use the paper's",
+        note="128 nu rho L/(pi d^4) of Hagen and Poiseuille, written as k nu rho pi L/A^2, "
+        "gives a quarter of the paper's k. The models use the paper's k",
     )
 
 
@@ -297,13 +302,13 @@ _KEYS = {"zero": "tau_L", "T1": "T1", "T2": "T2", "T_L": "T_L"}  # of Table 4, o
 
 @cache
 def identified(model: str) -> Identified:
-    """Return the result of section 5's experiment on our brake.
+    """Return the result of the experiment in section 5 with our brake.
 
     Parameters
     ----------
     model
-        ``"eq-22"``: the paper's two steps, taken once from the paper's starts. ``"eq-21"``: no slow
-        pair, fitted to all records together.
+        ``"eq-22"``: one iteration of the paper's two-step fit from the paper's starting values.
+        ``"eq-21"``: no slow pair, fitted to all records together.
     """
     par = parameters(MAIN)
     p = REGIONS
@@ -323,12 +328,12 @@ def identified(model: str) -> Identified:
 
 
 def identified_model(region: str) -> Rational:
-    """Return eq. (22) identified on our brake [Pa/A]."""
+    """Return eq. (22) as identified on our brake [Pa/A]."""
     return with_slow_pair(*five_of(identified("eq-22").estimates[region]).values())
 
 
 def _identified_items() -> list[Item]:
-    """Return Table 4 against its experiment on our brake."""
+    """Compare Table 4 with its experiment on our brake."""
     rows: list[Item] = []
     for region in REGIONS:
         row, estimate = FACTS.table(f"table4.{region}"), identified("eq-22").estimates[region]
@@ -350,7 +355,7 @@ def _identified_items() -> list[Item]:
             step = "second step, sines of 0.1 A" if key in ("T1", "T2") else "first step"
             if key == "T1":
                 zero = 1.0 / (2.0 * math.pi * five["tau_L"])
-                step += f"; the slow pair's zero at {zero:.3g} Hz nearly cancels it"
+                step += f" (the slow pair's zero at {zero:.3g} Hz nearly cancels it)"
             rows.append(
                 compared(
                     f"{prefix}.{key}",
@@ -368,7 +373,7 @@ def _interval(value: float, deviation: float) -> str:
 
 
 def _without_pair(region: str) -> list[Item]:
-    """Return the corners of eq. (21), which is sufficient for our brake."""
+    """Return gain and corner frequencies of eq. (21), which is sufficient for our brake."""
     five = five_of(identified("eq-21").estimates[region])
     note = "eq. (21) without a slow pair, fitted to step and sines together"
     return [
@@ -379,7 +384,7 @@ def _without_pair(region: str) -> list[Item]:
 
 
 def _identified_exhibit() -> Exhibit:
-    """Return the medium region's frequency response: measured, identified, theory, Table 4."""
+    """Return the medium region's frequency responses: measured, identified, theory, Table 4."""
     f = np.geomspace(0.02, 20.0, 300)
     gain, phase = (
         next(c.data for c in identified("eq-22").curves if c.name == f"medium-{part}")
@@ -395,8 +400,8 @@ def _identified_exhibit() -> Exhibit:
     return Exhibit(
         "table4-identified",
         lambda: bode(responses, gain_unit="bar/A"),
-        "Pressure over measured current at 25 bar: eq. (22) identified on our nonlinear "
-        "brake by the paper's two steps (points: sines of 0.1 A), Table 4's medium "
+        "Response from measured current to pressure at 25 bar: eq. (22) identified on our "
+        "nonlinear brake with the paper's two-step fit (points: sines of 0.1 A), Table 4's medium "
         "model, and eq. (15).",
     )
 
@@ -405,13 +410,13 @@ def _identified_exhibit() -> Exhibit:
 
 _EQ22 = "eq. (22) with the numbers of Table 4, medium"
 _AMPLITUDE = 0.1
-"""of the sines of the current demand [A]"""
+"""amplitude of the current demand sines [A]"""
 _FREQUENCIES = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0, 10.0, 15.0)
-"""sines of the test [Hz]; the paper's reach from 1 to 15 Hz"""
+"""sines of the test [Hz]; the paper uses 1 to 15 Hz"""
 
 
 def table4(runs: Runs) -> Part:
-    """Return Table 4 against eq. (15) and against the nonlinear brake with dither."""
+    """Compare Table 4 with eq. (15) and with the nonlinear brake with dither."""
     items: list[Item] = []
     for region, p in REGIONS.items():
         items += _region(runs, region, p)
@@ -426,16 +431,17 @@ def table4(runs: Runs) -> Part:
             FACTS["fig5_top"],
             K.value * FACTS["ramp_peak"].value,
             None,
-            "Table 4's gain times the ramp's 5 A; paper against paper, not judged",
+            "Table 4's gain times the ramp's 5 A: compares the paper with itself, not judged",
         )
     )
     text = (
-        "Table 4's gains fit neither Fig. 5 nor the published friction with the published dither: "
-        "f_cfr,p exceeds f_cfr,n, so a mean friction against applying remains under dither. Dither "
-        "also adds damping, so the brake is slower than eq. (15). Table 4's slow pair has its zero "
-        "below its pole: its step overshoots and falls. Air that fills slowly does not do that. "
-        "On our brake, which has no air, the paper's own two steps place the pair's pole at the "
-        "first pole of the dithered brake, and its zero next to T1."
+        "Table 4's gains fit neither Fig. 5 nor the published friction with the published dither. "
+        "Because f_cfr,p exceeds f_cfr,n, a mean friction against applying remains with dither. "
+        "Dither also adds damping, so the brake is slower than eq. (15). In Table 4's slow pair "
+        "the zero is below the pole, so its step response overshoots and then falls. Air that "
+        "fills slowly does not cause that. On our brake, which has no air, the paper's own "
+        "two-step fit places the pair's pole at the first pole of the dithered brake, and its "
+        "zero next to T1."
     )
     return Part(
         "Table 4: identified models",
@@ -468,18 +474,18 @@ def _region(runs: Runs, region: str, p: float) -> list[Item]:
                 f"{prefix}.{key}",
                 row[key],
                 float(pole),
-                note="pole of eq. (15), tuned to Table 2: start of the paper's fit",
+                note="pole of eq. (15), tuned to Table 2: starting value of the paper's fit",
                 tuned="calibrated",
             )
         )
-    note = "low-frequency pair, attributed to air in the fluid; eqs. (13) to (15) have none"
+    note = "low-frequency pair, attributed to air in the fluid; eqs. (13) to (15) have no such pair"
     return [*items, *(quoted(f"{prefix}.{key}", row[key], note) for key in ("zero", "T_L"))]
 
 
 def step_peak(model: Rational, height: float) -> tuple[float, float]:
-    """Return time [s] and height of the highest point of a step response.
+    """Return time [s] and height of a step response's peak.
 
-    ``model``: linear model; ``height``: height of the step, in the input's unit.
+    ``model``: linear model; ``height``: step height, in the input's unit.
     """
     t = np.arange(0.0, 10.0, 1e-3)
     y = height * model.step(t)
@@ -488,7 +494,7 @@ def step_peak(model: Rational, height: float) -> tuple[float, float]:
 
 
 def _medium_step() -> list[Item]:
-    """Return the step of Fig. 6 on the medium model, and its shape."""
+    """Return the medium model's response to the step of Fig. 6, and its shape."""
     model, height = table4_model("medium"), FACTS["fig6_step"].value
     t_peak, high = step_peak(model, height)
     final = height * model.gain
@@ -502,22 +508,22 @@ def _medium_step() -> list[Item]:
             "table4.medium.zero_below_pole",
             "1",
             row["zero"].value / row["T_L"].value,
-            "zero over pole of the slow pair: below 1 the step overshoots and falls; a leak or "
-            "air that fills slowly needs more than 1",
+            "ratio of the slow pair's zero to its pole: below 1 the step response overshoots and "
+            "falls. A leak or air that fills slowly requires more than 1",
         ),
         compared(
             "table4.air",
             Fact(100.0 * (high / final - 1.0), "%", _EQ22),
             air,
             ALLOWANCES["overshoot"],
-            "overshoot of the step; computed: eq. (15) with 1 ml of air in the chamber. Air "
-            "moves the slow pole and adds no pair below it: it does not explain Table 4",
+            "overshoot of the step response. Computed: eq. (15) with 1 ml of air in the chamber. "
+            "Air moves the slow pole and adds no pair below it, so it does not explain Table 4",
         ),
     ]
 
 
 def _with_air(height: float) -> float:
-    """Return the overshoot [%] of eq. (15) with air in the chamber."""
+    """Return eq. (15)'s overshoot [%] with air in the chamber."""
     par = parameters(MAIN).replace(
         {"fluid.air": "entrained", "fluid.V_air": 1e-6, "master_cylinder.s_mc": 20e-3}
     )
@@ -537,7 +543,7 @@ def _sines(runs: Runs) -> dict[str, xr.Dataset]:
 
 
 def _corner(runs: Runs, measured: dict[str, xr.Dataset]) -> list[Item]:
-    """Return the -3 dB frequency of the response, relative to the static gain, against Table 4."""
+    """Compare the -3 dB frequency, relative to the static gain, with Table 4."""
     f = np.geomspace(0.05, 20.0, 4000)
     model = table4_model("medium")
     response = np.abs(model.response(f)) / model.gain
@@ -548,7 +554,7 @@ def _corner(runs: Runs, measured: dict[str, xr.Dataset]) -> list[Item]:
         step = runs.settled_step(name, REGIONS["medium"], FACTS["fig6_step"].value)
         test, static = measured[name], kpis(step)["static_gain"]
         corner = fall(test["gain"].values, test["frequency"].values, static)
-        note = "-3 dB; computed: nonlinear brake with dither, sines of 0.1 A at 25 bar"
+        note = "-3 dB. Computed: nonlinear brake with dither, sines of 0.1 A at 25 bar"
         items.append(
             compared(f"table4.medium.corner{suffix}", fact, corner, ALLOWANCES["corner"], note)
         )
@@ -573,9 +579,9 @@ def _measured_figure(measured: dict[str, xr.Dataset]) -> Exhibit:
     return Exhibit(
         "table4-bode",
         lambda: bode(responses, gain_unit="bar/A"),
-        "Pressure over current demand at 25 bar: Table 4's medium model, eq. (15), and "
-        "the nonlinear brake with friction and dither (points: sines of 0.1 A through "
-        "the 80 Hz filter and the current loop).",
+        "Response from current demand to pressure at 25 bar: Table 4's medium model, eq. (15), and "
+        "the nonlinear brake with friction and dither (points: sines of 0.1 A through the 80 Hz "
+        "filter and the current loop).",
     )
 
 
@@ -586,7 +592,7 @@ START = FACTS["fig6_start"].value * BAR
 
 
 def fig6(runs: Runs) -> Part:
-    """Return the step on the nonlinear, the theoretical and the identified model."""
+    """Return the step responses of the nonlinear, theoretical and identified models."""
     model = table4_model("medium")
     final = Fact(HEIGHT * model.gain / BAR, "bar", "eq. (22) with the numbers of Table 4, medium")
     _, high = step_peak(model, HEIGHT)
@@ -595,15 +601,15 @@ def fig6(runs: Runs) -> Part:
             "fig6.peak",
             FACTS["fig6_top"],
             (START + high) / BAR,
-            note="highest pressure of Table 4's medium model from 25 bar; paper against paper, not "
-            "judged",
+            note="maximum pressure of Table 4's medium model from 25 bar: compares the paper with "
+            "itself, not judged",
         ),
         compared(
             "fig6.change.theoretical",
             final,
             HEIGHT * theoretical(parameters(MAIN)).gain_bar,
             None,
-            "final change of pressure by eq. (15)",
+            "final pressure change according to eq. (15)",
             tuned="calibrated",
         ),
         compared(
@@ -611,7 +617,7 @@ def fig6(runs: Runs) -> Part:
             final,
             HEIGHT * theoretical(parameters("dardanelli2010-table1")).gain_bar,
             None,
-            "final change of pressure by eq. (15), Table 1; judged as table2.K@table1",
+            "final pressure change according to eq. (15) with Table 1, judged as table2.K@table1",
         ),
     ]
     rise = Fact(_rise_time(model), "s", "eq. (22) with the numbers of Table 4, medium")
@@ -620,10 +626,10 @@ def fig6(runs: Runs) -> Part:
     step = runs.settled_step(MAIN, START, HEIGHT)
     items.append(_misfit(step.recordings["run"], before(step)))
     text = (
-        "The nonlinear brake, with dither on, starts settled at 25 bar. Its pressure rises "
-        "less and more slowly than that of Table 4's model. Eq. (15), which has no friction, has "
-        "Table 4's gain. At the current that holds 25 bar without friction, the dithered brake "
-        "settles several bar lower."
+        "The nonlinear brake, with dither on, starts settled at 25 bar. Its pressure rises less, "
+        "and more slowly, than Table 4's model. Eq. (15), which has no friction, has Table 4's "
+        "gain. At the current that holds 25 bar without friction, the dithered brake settles "
+        "several bar lower."
     )
     exhibits = tuple(
         _exhibit(runs.settled_step(name, START, HEIGHT), name, f"fig6{suffix.replace('@', '-')}")
@@ -636,7 +642,7 @@ def fig6(runs: Runs) -> Part:
 
 
 def _nonlinear(runs: Runs, name: str, suffix: str, final: Fact, rise: Fact) -> list[Item]:
-    """Return the nonlinear brake's step, and its loss of pressure from dither."""
+    """Return the nonlinear brake's step response, and its pressure loss from dither."""
     values = kpis(runs.settled_step(name, START, HEIGHT))
     frictionless = {"p_start": START, "start": "frictionless"}
     bias = before(runs.bench("pressure-step", name, options=frictionless)) / BAR
@@ -646,7 +652,7 @@ def _nonlinear(runs: Runs, name: str, suffix: str, final: Fact, rise: Fact) -> l
             final,
             values["static_gain"] * HEIGHT / BAR,
             None,
-            "final change of pressure, nonlinear brake with dither; judged as "
+            "final pressure change of the nonlinear brake with dither, judged as "
             f"table4.medium.K{suffix}",
         ),
         compared(
@@ -654,20 +660,20 @@ def _nonlinear(runs: Runs, name: str, suffix: str, final: Fact, rise: Fact) -> l
             rise,
             values["rise_time"],
             None,
-            "10 to 90 % of the change, nonlinear brake with dither; judged as "
+            "10 to 90 % of the change of the nonlinear brake with dither, judged as "
             f"table4.medium.corner{suffix}",
         ),
         found(
             f"fig6.bias{suffix}",
             "bar",
             bias,
-            "pressure under dither at the current that holds 25 bar without friction",
+            "pressure with dither at the current that holds 25 bar without friction",
         ),
     ]
 
 
 def _rise_time(model: Rational) -> float:
-    """Return the rise time (10 to 90 %) of a step on a linear model [s]."""
+    """Return a linear model's rise time (10 to 90 %) after a step [s]."""
     t = np.arange(0.0, 20.0, 1e-3)
     response = xr.Dataset({"p": ("time", model.step(t))}, {"time": t})
     setting = step_response.Setting("p", 0.0, 0.0, model.gain)
@@ -675,7 +681,7 @@ def _rise_time(model: Rational) -> float:
 
 
 def _own(name: str, start: float, t: Array) -> list[tuple[str, Array, str]]:
-    """Return the step of the model identified on our brake, which has the main set."""
+    """Return the step response of the model identified on our brake, which uses the main set."""
     if name != MAIN:
         return []
     step = start + HEIGHT * identified_model("medium").step(t)
@@ -698,7 +704,7 @@ def _misfit(run: xr.Dataset, start: float) -> Item:
         "fig6.misfit.identified",
         "bar",
         float(np.sqrt(np.mean(means**2))) / BAR,
-        "rms over 4 s, dither averaged: nonlinear brake minus the model identified on it",
+        "rms over 4 s, dither averaged out: nonlinear brake minus the model identified on it",
     )
 
 
@@ -735,5 +741,5 @@ def _exhibit(step: Result, name: str, label: str) -> Exhibit:
     return Exhibit(
         label,
         lambda: time_traces(shown, panels=(panel,)),
-        f"Fig. 6: step of the current demand by 0.35 A from 25 bar, parameter set {name}.",
+        f"Fig. 6: current demand step of 0.35 A from 25 bar, parameter set {name}.",
     )

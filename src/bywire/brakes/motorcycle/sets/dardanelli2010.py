@@ -1,11 +1,11 @@
 """Parameter sets of Dardanelli et al. (2010), whose values are in TOML files.
 
-``dardanelli2010-measured`` is the brake that best explains the paper's measurements. Its free
-parameters are estimated together from Table 4, Figs. 5 to 7 and the friction of Table 3, by
-``paper.measured``: six starts, then random steps from the best one, then ``settled``.
-``docs/identification.md`` describes the procedure and the misfits, and
-``bywire reproduce dardanelli2010-measured`` lists which statements the set explains. The gear's
-loss and the piston's damping are at their bound zero. The other parameters come from Table 1.
+``dardanelli2010-measured`` is the brake that best explains the paper's measurements.
+``paper.measured`` estimates its free parameters together from Table 4, Figs. 5 to 7 and the
+friction of Table 3: six starts, then random steps from the best one, then ``settled``.
+``docs/identification.md`` describes the procedure and the misfits, and ``bywire reproduce
+dardanelli2010-measured`` lists which statements the set explains. The gear's loss and the piston's
+damping are at their lower bound, zero. The other parameters come from Table 1.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ _MEASURED = CitedSet(
         **_TABLE1.values,
         **ESTIMATED,
         **{name: chosen(_TABLE1.values[name].value, _AS_TABLE1) for name in UNDETERMINED},
-        "fluid.air": chosen("entrained", "its volume is a free parameter, which may be zero"),
+        "fluid.air": chosen("entrained", "the air volume is a free parameter, which may be zero"),
         "master_cylinder.x_rest": calibrated(
             0.00464067, _TABLE1.values["master_cylinder.x_rest"].where
         ),

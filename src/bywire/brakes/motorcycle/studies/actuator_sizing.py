@@ -1,4 +1,4 @@
-"""Sizing of the motorcycle actuator: gear ratio and motor power for a bandwidth and a pressure.
+"""Sizing of the motorcycle actuator: gear ratio and motor power for bandwidth and pressure.
 
 The pressure is a specified function of time. Flow, travel, torque, current and voltage follow from
 the plant's equations without simulation.
@@ -42,7 +42,8 @@ class Course:
     """A demanded pressure p_mc, its derivatives, and the caliper pressure, shape (n,) each.
 
     ``t``: times [s]; ``p``, ``rate``, ``bend``: pressure [Pa] and its first and second derivatives;
-    ``p_pd``: caliper pressure [Pa]; ``middle``: pressure [Pa] at which the compliances are taken.
+    ``p_pd``: caliper pressure [Pa]; ``middle``: pressure [Pa] at which the compliances are
+    evaluated.
     """
 
     t: Array
@@ -57,10 +58,10 @@ class Course:
 class Motion:
     """Motion of the motor, shape (n,) each, SI.
 
-    ``omega``: speed [rad/s]; ``torque``: electromagnetic torque [N m]; ``inertia``: part of it that
-    accelerates rotor and piston [N m]; ``current``, ``voltage``: current [A] and voltage of the
-    winding [V], without its inductance; ``available``: voltage that the bridge can give at this
-    current [V].
+    ``omega``: speed [rad/s]; ``torque``: electromagnetic torque [N m]; ``inertia``: part of the
+    torque that accelerates rotor and piston [N m]; ``current``, ``voltage``: current [A] and
+    voltage [V] of the winding, without its inductance; ``available``: voltage that the bridge can
+    supply at this current [V].
     """
 
     omega: Array
@@ -82,7 +83,7 @@ class Motion:
 
 
 def sine(par: Par, top: float, amplitude: float, f: float) -> Course:
-    """Return one period of a sine of a frequency [Hz] whose crest is at a pressure ``top`` [Pa]."""
+    """Return one period of a sine with a frequency [Hz], whose crest is at ``top`` [Pa]."""
     middle, w = top - amplitude, 2.0 * math.pi * f
     t = np.linspace(0.0, 1.0 / f, _POINTS)
     lagging = amplitude * np.exp(1j * w * t) / (1.0 + 1j * w * _lag(par, middle))
@@ -97,7 +98,7 @@ def sine(par: Par, top: float, amplitude: float, f: float) -> Course:
 
 
 def step(par: Par, p_from: float, p_to: float, bandwidth: float) -> Course:
-    r"""Return the response of a double pole with a bandwidth [Hz] to a step of the pressure [Pa].
+    r"""Return the response of a double pole with a bandwidth [Hz] to a pressure step [Pa].
 
     .. math:: p = p_0 + \Delta (1 - (1 + w t) e^{-w t}), \quad w = 2 \pi f / \sqrt{\sqrt 2 - 1}
     """
@@ -119,7 +120,7 @@ def step(par: Par, p_from: float, p_to: float, bandwidth: float) -> Course:
 
 
 def motion(par: Par, course: Course) -> Motion:
-    r"""Return the motion of the motor while the pressure follows its course.
+    r"""Return the motor's motion while the pressure follows its course.
 
     .. math::
         A_{mc} v = C_{mc} \dot p_{mc} + q, \quad q = (p_{mc} - p_{pd})/K_{lf}, \quad
@@ -160,7 +161,7 @@ def motion(par: Par, course: Course) -> Motion:
 
 
 def breakaway_current(par: Par, p: float) -> float:
-    """Return the current [A] that holds a pressure [Pa] and breaks the piston away."""
+    """Return the current [A] that holds a pressure [Pa] and starts the piston moving."""
     load, rest = _load(par, p, 0.0, 0.0)
     limit = ball_screw_gear.friction_bounds(rest.T_p, rest.T_n, load, par.gear)
     efficiency = par.gear.eta_g if par.gear.law == "paper" else 1.0
@@ -168,11 +169,12 @@ def breakaway_current(par: Par, p: float) -> float:
 
 
 def geared(par: Par, k_g: float) -> Par:
-    """Return the brake with another gear ratio [m/rad], seals and pistons unchanged.
+    """Return the brake with another gear ratio [m/rad] and the same seals and pistons.
 
     Parameters state the seals' friction as a torque at the shaft. Physically it is a force, so this
-    torque grows with the ratio, and its viscous part with the square. The pressure controller's
-    gains, current per pressure, also grow with the ratio, to keep the loop gain at low frequency.
+    torque increases with the ratio, and its viscous part with the ratio's square. The pressure
+    controller's gains, current per pressure, also increase with the ratio, to preserve the
+    low-frequency loop gain.
     """
     r = k_g / par.gear.k_g
     powers = {
@@ -221,19 +223,19 @@ def _chamber_compliance(par: Par, p: float) -> float:
 _WITHOUT_DITHER = {"ecu.dither.waveform": "off"}
 _STEP = 20e-6
 _SETTLE_PERIODS, _PERIODS = 10, 4
-_HARMONICS = 5  # of the recorded sine that the fit takes into account
+_HARMONICS = 5  # of the recorded sine that the fit includes
 _ROUNDS, _CLOSE = 8, 0.01  # corrections of the demand's amplitude; relative error that ends them
 
 
 def sine_figures(label: str, par: Par, top: float, amplitude: float, f: float) -> list[Kpi]:
-    """Return key figures of a sine in pressure on the bench, relative to the calculation.
+    """Return key figures of a pressure sine on the bench, relative to the calculation.
 
     The loop may be slower than the frequency [Hz] of the sine. So the function corrects mean and
     amplitude of the demand until the pressure, without dither, has the required values.
     """
     mean, swing = top - amplitude, amplitude
     run, reached = _sine_run(par, mean, swing, f), 0.0
-    # The fundamental is nearly proportional to the demand: two or three corrections are enough.
+    # The fundamental is nearly proportional to the demand, so two or three corrections are enough.
     for _ in range(_ROUNDS):
         run = _sine_run(par, mean, swing, f)
         middle, reached = _fitted(run, f)
@@ -245,36 +247,42 @@ def sine_figures(label: str, par: Par, top: float, amplitude: float, f: float) -
         mean += offset
     calculated = motion(par, sine(par, top, amplitude, f))
     power = run["voltage"] * run["i"]
-    note = "" if abs(reached / amplitude - 1.0) < 3 * _CLOSE else "the amplitude is not reached"
+    note = "" if abs(reached / amplitude - 1.0) < 3 * _CLOSE else "did not reach the amplitude"
     text = "on the bench with dither off, relative to the calculation"
     return [
-        Kpi(f"{label}_bench_amplitude", reached, "Pa", "Reached amplitude of the pressure.", note),
+        Kpi(
+            f"{label}_bench_amplitude",
+            reached,
+            "Pa",
+            "Pressure amplitude reached on the bench.",
+            note,
+        ),
         Kpi(
             f"{label}_bench_current",
             float(run["i"].max()) / float(calculated.current.max()),
             "1",
-            f"Maximum current of that sine {text}.",
+            f"Maximum current of this sine {text}.",
             note,
         ),
         Kpi(
             f"{label}_bench_speed",
             float(np.abs(run["omega"]).max()) / float(np.abs(calculated.omega).max()),
             "1",
-            f"Maximum speed of that sine {text}.",
+            f"Maximum speed of this sine {text}.",
             note,
         ),
         Kpi(
             f"{label}_bench_power",
             float(power.max()) / float(calculated.electrical.max()),
             "1",
-            f"Maximum electrical power of that sine {text}.",
+            f"Maximum electrical power of this sine {text}.",
             note,
         ),
     ]
 
 
 def braking_figures(label: str, par: Par, p_from: float, p_to: float) -> list[Kpi]:
-    """Return key figures of experiment hard-braking between two pressures [Pa], dither as set."""
+    """Return key figures of experiment hard-braking, with the set's dither; pressures in Pa."""
     experiment = hard_braking.EXPERIMENT
     following = {} if experiment.following is None else dict(experiment.following(par))
     options = experiment.defaults.replace({"p_from": p_from, "p_to": p_to, **following})
@@ -313,7 +321,7 @@ def _sine_run(par: Par, mean: float, swing: float, f: float) -> xr.Dataset:
 
 
 def _fitted(run: xr.Dataset, f: float) -> tuple[float, float]:
-    """Return mean and fundamental's amplitude of the pressure [Pa], by least squares."""
+    """Return the pressure's mean and fundamental amplitude [Pa] from a least-squares fit."""
     angle = 2.0 * np.pi * f * run["time"].values
     waves = [wave(n * angle) for n in range(1, _HARMONICS + 1) for wave in (np.sin, np.cos)]
     columns = np.column_stack([np.ones_like(angle), *waves])
@@ -334,17 +342,21 @@ def _recorded(case: Case) -> xr.Dataset:
 Count = Annotated[int, Unit("1", 41.0), Field(ge=3, le=401)]
 
 ASSUMPTIONS = (
-    "The gear ratio varies; motor, rotor inertia, battery, pistons, fluid and efficiency are "
+    "The gear ratio varies. Motor, rotor inertia, battery, pistons, fluid and efficiency are "
     "constant.",
-    "The seals' friction is a force at the piston, so at the shaft it grows with the gear ratio.",
-    "The pressure follows its demand exactly: flow through the pressure-volume curves of chamber, "
-    "pipeline and caliper gives the speed; pressure, friction, efficiency and inertia the torque.",
+    "The seal friction is a force at the piston, so its torque at the shaft increases with the "
+    "gear ratio.",
+    "The pressure follows its demand exactly. The speed follows from the flow through the "
+    "pressure-volume curves of chamber, pipeline and caliper. The torque follows from pressure, "
+    "friction, efficiency and inertia.",
     "Compliances are evaluated at the middle of the pressure range. The calculation neglects the "
     "winding's inductance.",
-    "The seals slide; the current that breaks them away at the peak pressure is also required.",
-    "The calculation neglects dither, but lists its current at the peak pressure.",
-    "Limits: the pressure controller's current limit, and the bridge's voltage at that current.",
-    "On the bench, the pressure controller's gains grow with the gear ratio without other tuning.",
+    "The seals slide. The motor must also supply the breakaway current at the peak pressure.",
+    "The calculation neglects dither, but lists the dither current at the peak pressure.",
+    "The limits are the pressure controller's current limit and the bridge voltage at that "
+    "current.",
+    "On the bench, the pressure controller gains increase with the gear ratio, with no other "
+    "tuning.",
 )
 
 
@@ -354,9 +366,9 @@ class Options(ParameterSet):
     bandwidth: Frequency
     """required bandwidth: frequency of the sine, or bandwidth of the step response"""
     p_peak: Pressure
-    """maximum pressure: crest of the sine, end of the step"""
+    """maximum pressure: crest of the sine or end of the step"""
     amplitude: Pressure
-    """amplitude of the sine"""
+    """sine amplitude"""
     p_from: Pressure
     """start of the step"""
     demand: Literal["sine", "step"]
@@ -394,17 +406,17 @@ SIZES = {
     "torque": ("N*m", "maximum torque"),
     "speed": ("rad/s", "maximum speed"),
     "current": ("A", "maximum current"),
-    "inertia_share": ("1", "inertia's torque over the total"),
-    "current_share": ("1", "current over its limit"),
-    "voltage_share": ("1", "voltage over the available voltage"),
+    "inertia_share": ("1", "inertia torque relative to the total"),
+    "current_share": ("1", "current relative to its limit"),
+    "voltage_share": ("1", "voltage relative to the available voltage"),
 }
 """unit and label of each size of a motion"""
 
 
 _ROWS = 13  # gear ratios of the table
-_AT_EDGE = 1e-3  # share of an end of the range that counts as on it
-_SLOWEST, _FASTEST = 1e-2, 1e3  # range of the search for the highest bandwidth [Hz]
-_EXACT = 1e-12  # tolerance of the logarithm of a ratio or bandwidth in the search
+_AT_EDGE = 1e-3  # relative distance from a limit of the range that counts as on the limit
+_SLOWEST, _FASTEST = 1e-2, 1e3  # search range for the highest bandwidth [Hz]
+_EXACT = 1e-12  # search tolerance for the logarithm of a ratio or bandwidth
 
 
 def course(par: Par, options: Options, f: float, demand: str = "") -> Course:
@@ -415,7 +427,7 @@ def course(par: Par, options: Options, f: float, demand: str = "") -> Course:
 
 
 def compute(par: Par, options: Options, progress: Progress) -> Findings:
-    """Return power over gear ratio and bandwidth, the best ratio, and its trial on the bench.
+    """Return power versus gear ratio and bandwidth, the best ratio, and its trial on the bench.
 
     Raises
     ------
@@ -428,7 +440,7 @@ def compute(par: Par, options: Options, progress: Progress) -> Findings:
             "p_peak",
             f"{options.p_peak / 1e5:g} bar",
             f"< {highest / 1e5:.4g} bar",
-            "where the piston meets its end stop. Reduce it, or move the stop "
+            "where the piston reaches its end stop. Reduce the pressure, or move the stop "
             "(master_cylinder.x_end)",
         )
     data = _mapped(
@@ -460,9 +472,9 @@ def compute(par: Par, options: Options, progress: Progress) -> Findings:
 
 
 def _at(par: Par, options: Options, f: float, demand: str = "") -> dict[str, float]:
-    """Return the largest values of the motion at a bandwidth [Hz], SI, by the names of `SIZES`.
+    """Return the motion's maximum values at a bandwidth [Hz], SI, keyed by the names in `SIZES`.
 
-    Torque, current and power include the breakaway of the piston at the peak pressure.
+    Torque, current and power include the piston's breakaway at the peak pressure.
     """
     done, static = (
         motion(par, course(par, options, f, demand)),
@@ -479,7 +491,7 @@ def _at(par: Par, options: Options, f: float, demand: str = "") -> dict[str, flo
         "current": current,
         "inertia_share": float(np.abs(done.inertia).max()) / torque,
         "current_share": current / par.ecu.pressure.i_max,
-        # If no voltage is available at this current, the share would change its sign.
+        # If no voltage is available at this current, the ratio would change its sign.
         "voltage_share": voltage if bool((done.available > 0).all()) else np.inf,
     }
 
@@ -495,14 +507,14 @@ def _best_ratio(par: Par, options: Options) -> float:
     def power(z: float) -> float:
         return _at(geared(par, math.exp(z)), options, options.bandwidth)["electrical"]
 
-    # The power has one minimum: inertia falls with the ratio, the load grows with it.
+    # The power has one minimum: inertia decreases with the ratio, and the load increases.
     ends = (math.log(options.k_g_min), math.log(options.k_g_max))
     least = minimize_scalar(power, bounds=ends, method="bounded", options={"xatol": _EXACT})
     return math.exp(least.x)
 
 
 def fastest(par: Par, options: Options, demand: str) -> float:
-    """Return the highest bandwidth [Hz] within current and voltage limit; NaN for none."""
+    """Return the highest bandwidth [Hz] within the current and voltage limits; NaN for none."""
     from scipy.optimize import bisect
 
     def excess(z: float) -> float:
@@ -512,7 +524,7 @@ def fastest(par: Par, options: Options, demand: str) -> float:
     low, high = math.log(_SLOWEST), math.log(_FASTEST)
     if excess(low) > 0.0:
         return math.nan
-    # Bisection, because the voltage share is infinite if no voltage is available.
+    # Bisection, because the voltage ratio is infinite if no voltage is available.
     return math.exp(bisect(excess, low, high, xtol=_EXACT))
 
 
@@ -520,12 +532,12 @@ def _figures(label: str, par: Par, options: Options) -> list[Kpi]:
     sizes = _at(par, options, options.bandwidth)
     texts = {
         "electrical": "Maximum electrical motor power, including copper loss.",
-        "mechanical": "Maximum mechanical power, which rates the motor.",
+        "mechanical": "Maximum mechanical power, which determines the motor rating.",
         "torque": "Maximum torque, including breakaway at the peak pressure.",
         "speed": "Maximum speed.",
         "current": "Maximum current, including breakaway at the peak pressure.",
-        "inertia_share": "Maximum torque of rotor and piston inertia over the largest torque.",
-        "voltage_share": "Maximum voltage over the bridge's voltage at that current.",
+        "inertia_share": "Maximum inertia torque (rotor, piston) relative to the maximum torque.",
+        "voltage_share": "Maximum ratio of motor voltage to bridge voltage at that current.",
     }
     current = motion(par, course(par, options, options.bandwidth)).current
     copper = par.motor.R_m * np.mean(current**2)
@@ -541,13 +553,13 @@ def _figures(label: str, par: Par, options: Options) -> list[Kpi]:
             f"{label}_copper",
             float(copper),
             "W",
-            "Mean copper loss over the demanded pressure's course.",
+            "Mean copper loss while the pressure follows its demand.",
         ),
         Kpi(
             f"{label}_dither_current",
             A_dit * par.ecu.dither.gain,
             "A",
-            "Amplitude of the dither's current at the peak pressure, eq. (20).",
+            "Dither current amplitude at the peak pressure, eq. (20).",
             note,
         ),
         *(
@@ -563,7 +575,7 @@ def _figures(label: str, par: Par, options: Options) -> list[Kpi]:
 
 
 def _mapped(par: Par, options: Options, count: int, frequencies: Array) -> xr.Dataset:
-    """Return the variables of `SIZES` over ``count`` gear ratios and the bandwidths [Hz]."""
+    """Return the variables in `SIZES` versus ``count`` gear ratios and the bandwidths [Hz]."""
     ratios = np.geomspace(options.k_g_min, options.k_g_max, count)
     brakes = [geared(par, float(k_g)) for k_g in ratios]
     rows = [[_at(brake, options, float(f)) for f in frequencies] for brake in brakes]
@@ -573,7 +585,7 @@ def _mapped(par: Par, options: Options, count: int, frequencies: Array) -> xr.Da
 
 
 def _cut(par: Par, options: Options) -> Cut:
-    """Return the sizes over the gear ratio at the required bandwidth."""
+    """Return the sizes versus gear ratio at the required bandwidth."""
     row = _mapped(par, options, _ROWS, np.array([options.bandwidth])).isel(frequency=0)
     names = (
         "electrical",
@@ -593,8 +605,8 @@ def _warnings(kpis: list[Kpi], k_best: float, options: Options) -> tuple[str, ..
     fast = value[f"optimum_fastest_{options.demand}"]
     if not fast >= options.bandwidth:
         warnings.append(
-            f"this motor cannot follow the {options.demand} at {options.bandwidth:g} Hz: at the "
-            f"best gear ratio its limits allow {fast:.3g} Hz"
+            f"this motor cannot follow the {options.demand} at {options.bandwidth:g} Hz. At the "
+            f"best gear ratio, its limits allow {fast:.3g} Hz"
         )
     ends = (options.k_g_min, options.k_g_max)
     return (*warnings, *edge_warnings("k_g", k_best, ends, "m/rad", _AT_EDGE))

@@ -46,16 +46,17 @@ Node = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Pressures = Annotated[tuple[Node, ...], Unit("Pa", 2e6), Field(min_length=1, max_length=20)]
 
 ASSUMPTIONS = (
-    "Each dither has a trial on the nonlinear brake with a closed pressure loop, which approaches "
+    "Each dither is tried on the nonlinear brake with a closed pressure loop, which approaches "
     "the set point from below and from above.",
     "The amplitude is the gain times the ECU's eqs. (18) and (19), so it follows the pressure.",
-    "Friction counts as overcome when the share of the time stuck and the remaining dead band "
-    "(mean current from above minus mean current from below, over the band in which the piston may "
-    "rest) stay within their limits, at this gain and at all higher ones.",
-    "The cost is the copper power in excess of the mean current's, averaged over the pressures. "
+    "Friction counts as overcome when the fraction of time stuck and the remaining dead band stay "
+    "within their limits, at this gain and at all higher gains. The remaining dead band is the "
+    "mean current from above minus that from below, relative to the band in which the piston may "
+    "rest.",
+    "The cost is the copper loss in excess of the mean current's, averaged over the pressures. "
     "Figures between two gains of the grid are interpolated.",
-    "Periods are even numbers of the ECU's sample times.",
-    "Wear, noise and heat of motor and seals are neglected.",
+    "Dither periods are even numbers of ECU sample times.",
+    "The study neglects wear, noise, and heat in motor and seals.",
 )
 
 
@@ -65,29 +66,29 @@ class Options(ParameterSet):
     pressures: Pressures
     """pressures at which dither must overcome friction"""
     gain_min: Factor
-    """minimum gain of the dither's law"""
+    """minimum dither gain"""
     gain_max: Factor
-    """maximum gain of the dither's law"""
+    """maximum dither gain"""
     gains: Count
     """number of gains, evenly spaced"""
     f_min: Frequency
-    """lowest frequency"""
+    """lowest dither frequency"""
     f_max: Frequency
-    """highest frequency"""
+    """highest dither frequency"""
     frequencies: Count
-    """number of frequencies, about logarithmically spaced"""
+    """number of frequencies, spaced about logarithmically"""
     stuck_max: Fraction
-    """maximum fraction of the time stuck"""
+    """maximum fraction of time stuck"""
     band_max: Fraction
     """maximum fraction of the dead band that may remain"""
     ripple_max: Pressure
-    """maximum ripple of the caliper's pressure, peak to peak"""
+    """maximum peak-to-peak ripple of the caliper pressure"""
     approach: Pressure
     """distance from which the pressure loop approaches each pressure"""
     settle: Duration
     """time for the pressure loop to settle"""
     compare: Literal["waveforms", "none"]
-    """whether to compare waveforms and places of the low-pass filter"""
+    """whether to compare waveforms and positions of the low-pass filter"""
 
     @model_validator(mode="after")
     def _ordered(self) -> Options:
@@ -125,7 +126,7 @@ DEFAULTS = Options(
 
 Par = MotorcycleParameters
 
-# Comparison of sine, square and triangle, filtered with the demand or bypassing the filter.
+# Comparison of sine, square and triangle, through the demand's filter or bypassing it.
 
 WAVEFORMS = ("sine", "square", "triangle")
 PLACES = ("after-dither", "before-dither")
@@ -135,10 +136,10 @@ _UNITS = {"distortion": "%", "copper": "W", "ripple_caliper": "Pa"}
 def compared(
     par: Par, grid: Grid, f: float, limits: Mapping[str, float], report: Callable[[float], None]
 ) -> Cut:
-    """Return the least gain of each waveform that overcomes the friction at one frequency [Hz].
+    """Return each waveform's lowest gain that overcomes the friction at one frequency [Hz].
 
-    Each has the least gain that is enough at every pressure. Copper power is the mean over the
-    pressures; ripple is the largest.
+    This gain is sufficient at every pressure. Copper loss is the mean of the pressures, ripple is
+    the maximum.
     """
     cases = [(shape, place) for place in PLACES for shape in WAVEFORMS]
     rows: list[dict[str, Any]] = []
@@ -157,16 +158,17 @@ def compared(
         coords={"case": ("case", index)},
     )
     return Cut(
-        f"waveforms at {f:.4g} Hz, filter after or before the dither is added",
+        f"waveforms at {f:.4g} Hz, with the filter after or before the dither is added",
         table,
         tuple(rows[0]),
     )
 
 
 def distortion(par: Par, f: float, p: float) -> float:
-    """Return the total harmonic distortion of the motor current at a stuck shaft, in %.
+    """Return the motor current's total harmonic distortion with a stuck shaft, in %.
 
-    Up to half the ECU's sampling rate; beyond it, the hold and the winding attenuate strongly.
+    The sum ends at half the ECU's sampling rate. Beyond it, the hold and the winding attenuate
+    strongly.
     """
     samples = waveform(par, f)
     orders = np.arange(1, (samples.size + 1) // 2)
@@ -191,7 +193,7 @@ def _row(par: Par, grid: Grid, f: float, limits: Mapping[str, float]) -> dict[st
 
 
 def compute(par: Par, options: Options, progress: Progress) -> Findings:
-    """Return figures over gain and frequency, the cheapest dither, and its comparison.
+    """Return figures versus gain and frequency, the cheapest dither, and its comparison.
 
     Raises
     ------
@@ -241,7 +243,7 @@ def grid_of(par: Par, options: Options) -> Grid:
 
 
 def limits_of(options: Options) -> dict[str, float]:
-    """Return the largest admissible value of every figure that has one."""
+    """Return the maximum admissible value of every figure that has one."""
     return {
         "stuck": options.stuck_max,
         "band": options.band_max,
@@ -258,8 +260,8 @@ def _require_reachable(par: Par, options: Options) -> None:
             "pressures",
             f"{largest / 1e5:g} bar",
             f"< {(highest - options.approach) / 1e5:.4g} bar",
-            f"since the piston meets its end stop at {highest / 1e5:.4g} bar and must be free "
-            f"when it approaches from {options.approach / 1e5:g} bar above",
+            f"because the piston reaches its end stop at {highest / 1e5:.4g} bar and must be "
+            f"free when it approaches from {options.approach / 1e5:g} bar above",
         )
 
 
@@ -272,7 +274,7 @@ def _kpis(
     for (label, (gain, f)), ratio in zip(designs.items(), ratios, strict=True):
         figures_of_design = [tried(par, p, (gain,), (f,), grid.trial) for p in grid.pressures]
         kpis += [
-            Kpi(f"{label}_gain", gain, "1", "Gain of the dither's law, eqs. (18) and (19)."),
+            Kpi(f"{label}_gain", gain, "1", "Dither gain, eqs. (18) and (19)."),
             Kpi(f"{label}_frequency", f, "Hz", "Frequency of the dither."),
         ]
         limits = limits_of(options)
@@ -288,7 +290,7 @@ def _kpis(
                     value,
                     unit,
                     f"{text.capitalize()}, {which}.",
-                    "beyond its limit" if over else "",
+                    "exceeds its limit" if over else "",
                 )
             )
         kpis.append(
@@ -296,7 +298,8 @@ def _kpis(
                 f"{label}_area_ratio",
                 ratio,
                 "1",
-                "Loop area on the ramp of eq. (17) over the area without dither, including delay.",
+                "Loop area on the ramp of eq. (17) relative to that without dither, including "
+                "delay.",
             )
         )
         kpis += _plant(par, label, gain, f, grid.pressures[len(grid.pressures) // 2])
@@ -304,7 +307,7 @@ def _kpis(
 
 
 def _plant(par: Par, label: str, gain: float, f: float, p: float) -> list[Kpi]:
-    """Return gain and slowest pole of the plant under dither."""
+    """Return gain and slowest pole of the plant with dither."""
     dithered = par.replace({"ecu.dither.gain": gain, "ecu.dither.f_dit": f})
     values, note = (math.nan, math.nan), ""
     try:
@@ -312,7 +315,7 @@ def _plant(par: Par, label: str, gain: float, f: float, p: float) -> list[Kpi]:
         values = (plant.gain, plant.slowest)
     except (InputError, RunError) as error:
         note = str(error).partition(":")[0]
-    where = f"under dither at {p / 1e5:g} bar, from current demand to pressure."
+    where = f"with dither at {p / 1e5:g} bar, from current demand to pressure."
     return [
         Kpi(f"{label}_plant_gain", values[0], "Pa/A", f"Gain of the plant {where}", note),
         Kpi(f"{label}_plant_pole", values[1], "Hz", f"Slowest pole of the plant {where}", note),
@@ -335,13 +338,13 @@ def _maps(
     where = f"worst of {len(options.pressures)} pressures from {low:g} to {high:g} bar"
     return {
         "copper": Map(
-            "worst_copper", "gain", "frequency", f"Dither's copper power, {where}.", marks, limits
+            "worst_copper", "gain", "frequency", f"Copper loss from dither, {where}.", marks, limits
         ),
         "stuck": Map(
             "worst_stuck",
             "gain",
             "frequency",
-            f"Fraction of the time in which the piston sticks, {where}.",
+            f"Fraction of time in which the piston sticks, {where}.",
             marks,
             limits,
         ),
@@ -349,7 +352,7 @@ def _maps(
             "worst_ripple_caliper",
             "gain",
             "frequency",
-            f"Pressure ripple at the caliper, peak to peak, {where}.",
+            f"Peak-to-peak pressure ripple at the caliper, {where}.",
             marks,
             limits,
         ),
@@ -363,7 +366,7 @@ def _limits(grid: Grid, each: list[Candidate], best: int | None) -> tuple[str, .
     chosen = each[best]
     texts = [
         f"the {NAMES[chosen.binding]} at {grid.pressures[chosen.decisive] / 1e5:g} bar requires "
-        f"the gain of {chosen.gain:.3g}"
+        f"a gain of {chosen.gain:.3g}"
     ]
     out = [
         f"{f:.4g} Hz ({e.verdict})"
@@ -384,9 +387,11 @@ def _warnings(
     texts = []
     f = grid.frequencies[best]
     if best in (0, len(each) - 1):
-        texts.append(f"the optimum is at the edge of the frequencies, {f:g} Hz. Widen the range")
+        texts.append(
+            f"the optimum is at the limit of the frequency range, {f:g} Hz. Widen the range"
+        )
     if math.isclose(each[best].gain, options.gain_min):
-        texts.append(f"the smallest gain, {options.gain_min:g}, is sufficient. Widen the range")
+        texts.append(f"the lowest gain, {options.gain_min:g}, is sufficient. Widen the range")
     return tuple(texts)
 
 

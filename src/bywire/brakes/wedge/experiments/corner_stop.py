@@ -1,4 +1,4 @@
-"""Stops of a quarter car: a stop with hold, and a panic stop beyond the road's adhesion."""
+"""Stops of a quarter car: a stop with hold, and a panic stop that exceeds the road's adhesion."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ class StopOptions(ParameterSet):
     """Start, demand and road of both stops."""
 
     v_0: RidingSpeed
-    """speed at the start"""
+    """initial speed"""
     M_brake: SomeMoment
     """demanded moment from time zero on"""
     surface: SurfaceName
-    """surface of the road"""
+    """road surface"""
     T_disc: Temperature
-    """temperature of the disc at the start, if corner.heat.law is on"""
+    """initial disc temperature, if corner.heat.law is on"""
 
 
 def _stop_case(
@@ -42,9 +42,9 @@ def _stop_case(
     levels: Mapping[float, float],
     duration: float,
 ) -> Case:
-    """Return a stop with moment demands [N m] from their times [s] on."""
-    given = {"command.mode": "moment", "flywheel.law": "coasting", **changes}
-    changed = par.replace(given | laid("corner.road", options.surface))
+    """Return a stop whose moment demands [N m] start at the times [s] in ``levels``."""
+    overrides = {"command.mode": "moment", "flywheel.law": "coasting", **changes}
+    changed = par.replace(overrides | laid("corner.road", options.surface))
     state, memory = at_speed(options.v_0, changed, options.T_disc)
     return Case(
         "run",
@@ -58,9 +58,9 @@ def _stop_case(
     )
 
 
-# --- Stop, hold and release: the tire rocks back, and so does the wheel as far as the pads allow
+# --- Stop, hold and release: the tire rocks back, and the wheel too as far as the pads allow
 
-_CALM = 1.0  # s after the stop, for tire and brake to come to rest
+_CALM = 1.0  # s after the stop, in which tire and brake come to rest
 
 STOP_FIGURES = Figures(
     undefined="the vehicle does not stop before the release",
@@ -72,10 +72,10 @@ STOP_FIGURES = Figures(
     wheel_reversal=("rad", "Angle by which the wheel turns backward after the stop."),
     force_held=("N", f"Mean normal force from {_CALM:g} s after the stop to the release."),
     force_change=("N", "Peak-to-peak normal force in that time."),
-    creep_speed=("m/s", "Maximum speed of the vehicle in that time."),
+    creep_speed=("m/s", "Maximum vehicle speed in that time."),
     energy_braked=("J", "Energy taken from the wheel until the stop."),
     disc_temperature=("K", "Disc temperature at the stop."),
-    contact_angle=("rad", "Estimated motor angle from parking to pad contact."),
+    contact_angle=("rad", "Estimated motor angle from the parking position to pad contact."),
 )
 
 
@@ -133,7 +133,7 @@ def _stop(
 CORNER_STOP = Experiment(
     name="corner-stop",
     assembly="wedge-corner",
-    summary="the wedge brake stops a quarter car from {v_0:km/h} with {M_brake}, and holds it",
+    summary="the wedge brake stops a quarter car from {v_0:km/h} with {M_brake} and holds it",
     options=CornerStopOptions,
     defaults=CornerStopOptions(
         v_0=50.0 / 3.6, M_brake=600.0, surface="dry-asphalt", T_disc=293.15, t_hold=5.5, t_end=0.5
@@ -151,19 +151,19 @@ PANIC_FIGURES = Figures(
     undefined="the vehicle does not stop within the recording. Increase options.duration",
     stopping_distance=("m", "Distance from the demand to the first standstill."),
     stopping_time=("s", "Time from the demand to the first standstill."),
-    braking_efficiency=("%", "Ideal stopping distance on this road over the actual distance."),
+    braking_efficiency=("%", "Ratio of the ideal stopping distance on this road to the actual."),
     first_bite=("s", "Time from the demand until the pads touch."),
     peak_slip=("1", f"Maximum slip at speeds above {SLOW:g} m/s."),
     locked_time=("s", f"Time with a locked wheel at speeds above {SLOW:g} m/s."),
     peak_moment=("N*m", "Maximum brake moment."),
     supply_energy=("J", "Energy drawn by the drives until the stop."),
     disc_energy=("J", "Energy taken from the wheel until the stop."),
-    disc_temperature=("K", "Highest disc temperature until the stop."),
+    disc_temperature=("K", "Maximum disc temperature until the stop."),
 )
 
 
 class CornerPanicOptions(StopOptions):
-    """The stop; slip control is a parameter, ``ecu.abs``."""
+    """The stop. The parameter ``ecu.abs`` selects the slip control."""
 
     duration: Duration
     """recording time"""
@@ -217,7 +217,7 @@ def _at_the_end(run: xr.Dataset, end: float, v_0: float) -> dict[str, float]:
 
 
 def _ideal(v_0: float, par: WedgeCornerParameters) -> float:
-    """Return the shortest stopping distance [m]: the tire at its peak from the demand on."""
+    """Return the shortest stopping distance [m], with the tire at its peak from the demand on."""
     corner = par.corner
     ground, slope = road.surface(0.0, corner.road), road.slope(0.0, corner.road)
     mu = adhesion.adhesion(adhesion.peak_slip(ground, corner.tyre), ground, corner.tyre)

@@ -1,4 +1,4 @@
-"""Current loop: current steps of a clamped motor over windings and controller gains."""
+"""Current loop: current steps of a clamped motor for several windings and controller gains."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ _UNITS = {name: units_of("step_response")[name] for name in _FIGURES} | LAG.unit
 
 
 class Options(ParameterSet):
-    """The step, and the windings and gains for which it is repeated.
+    """The step, and the windings and gains at which it is repeated.
 
-    A motor unit has two stators, used in parallel, one alone, or in series.
+    A motor unit has two stators. They work in parallel, in series, or one of them alone.
     """
 
     i_step: Current
@@ -77,14 +77,14 @@ def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Cas
 
 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
-    """Return the figures of all steps, each name followed by the label of its case."""
+    """Return the key figures of all steps. The label of the case follows each name."""
     kpis: list[Kpi] = []
     for label in _LABELS:
         setting = step_response.Setting("i_1", 0.0, 0.0, options.i_step)
         step = evaluate("step_response", recordings[label], setting)
         kpis += [replace(step[name], name=f"{name}_{label}") for name in _FIGURES]
         rise = step["rise_time"]
-        # A first-order lag of corner f rises from 10 to 90 % within ln(9) / (2 pi f).
+        # A first-order lag with corner frequency f rises from 10 to 90 % within ln(9) / (2 pi f).
         bandwidth = math.log(9.0) / (2.0 * math.pi * rise.value)
         kpis += LAG(f"_{label}", bandwidth=(bandwidth, rise.note))
     return tuple(kpis)
@@ -93,7 +93,7 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
 EXPERIMENT = Experiment(
     name="current-loop",
     assembly="wedge-brake",
-    summary="current steps of a clamped motor over windings and controller gains",
+    summary="current steps of a clamped motor for several windings and controller gains",
     options=Options,
     defaults=Options(
         i_step=5.0, windings=(1.0, 2.0, 4.0), gains=(0.5, 1.0, 2.0), duration=0.01, record=2e-5

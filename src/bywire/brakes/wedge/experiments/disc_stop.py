@@ -42,7 +42,10 @@ FIGURES = Figures(
         "rad",
         "Windup: travel of the common reference toward clamping while the disc is at rest.",
     ),
-    hold_power=("W", "Mean input power in that time, including standby."),
+    hold_power=(
+        "W",
+        f"Mean input power from {_CALM:g} s after the stop to the release, including standby.",
+    ),
 )
 _UNITS = {**FIGURES.units, "release_time": "s", "parking_time": "s"}
 
@@ -84,7 +87,7 @@ def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Cas
 
 
 def stop_figures(run: xr.Dataset, options: Options) -> dict[str, float] | str:
-    """Return key figures around the standstill of a run, or why it has none."""
+    """Return a run's key figures around standstill, or the reason for not having any."""
     braked = run.sel(time=slice(-1e-9, options.t_hold - 1e-9))
     turns = np.abs(braked["Omega"].values) > parameters_of(run).flywheel.Omega_still
     if not turns[:1].any():
@@ -117,7 +120,7 @@ def _last_tenth(turning: xr.Dataset, signal: str) -> float:
 
 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
-    """Return the figures of stop, hold and release for each reading."""
+    """Return the key figures of stop, hold and release for each reading."""
     kpis: list[Kpi] = []
     for reading in READINGS:
         run = recordings[reading]

@@ -25,7 +25,7 @@ _LABELS = tuple(f"{motion}_{pair}" for motion in _MOTIONS for pair in ("equal", 
 _PAIRS = tuple(f"_{pair}" for pair in ("equal", "unequal"))
 PEAK = Figures(peak_force=("N", "Maximum magnitude of the measured force."))
 HELD = Figures(
-    static_force=("N", "Magnitude of the mean force in the last tenth of the time after the step."),
+    static_force=("N", "Magnitude of the mean force in the last tenth of the recording."),
 )
 APART = Figures(peak_difference=("rad", "Maximum difference between the encoders."))
 
@@ -56,7 +56,7 @@ class Options(ParameterSet):
 
 
 def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Case, ...]:
-    """Return every motion with equal motors, and with a changed motor 2."""
+    """Return each motion with equal motors and with a different motor 2."""
     modes = {"rig.mode_1": "position", "rig.mode_2": "position"}
     motor = par.motor_2
     different = {
@@ -80,7 +80,7 @@ def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Cas
 
 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
-    """Return the largest forces with equal and with unequal motors."""
+    """Return the maximum forces with equal and unequal motors."""
     kpis: list[Kpi] = []
     for label in _LABELS:
         kpis += PEAK(f"_{label}", peak_force=peak(recordings[label], "y_F"))
@@ -94,7 +94,7 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
 
 
 def _reference(motion: str, options: Options) -> Any:
-    """Return the common reference of both motors, of one motion."""
+    """Return the common reference of both motors for one motion."""
     w = 2.0 * math.pi * options.f_sine
 
     def stimulus(t: Array) -> dict[str, Array]:

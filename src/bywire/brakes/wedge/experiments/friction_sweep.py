@@ -1,4 +1,4 @@
-"""Friction sweep: a moment step in closed loop for several friction coefficients of the pads.
+"""Friction sweep: a closed-loop moment step at several pad friction coefficients.
 
 Above tan(alpha) the wedge is unstable without control. The paper announces tests with extreme
 coefficients (Roberts et al. 2003, sections "Introduction" and "Programme status").
@@ -32,14 +32,15 @@ from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration
 
-_BAND = 0.05  # share of the step: half width of a stable loop's final band
-_LAST = 0.2  # share of the hold
+_BAND = 0.05  # half width of a stable loop's final band, relative to the step
+_LAST = 0.2  # evaluated last fraction of the hold
 _NO_ROW = "the recording has no row in this time. Record more often"
 
 EACH = Figures(
     stable=(
         "1",
-        "1 if the last fifth of the hold stays within 5 % of the step, without an end stop.",
+        "1 if the moment stays within 5 % of the step in the last fifth of the hold, without an "
+        "end stop.",
     ),
     hold_power=("W", "Mean input power in the last fifth of the hold, including standby."),
     undefined=_NO_ROW,
@@ -57,8 +58,8 @@ ALL = Figures(
 class Options(ParameterSet):
     """The step, and the variations.
 
-    ``slope``: with ``"known"``, the controller uses the correct slope of moment over angle for each
-    coefficient; with ``"fixed"``, it uses the parameter set's slope.
+    ``slope``: with ``"known"``, the controller uses the correct slope of moment versus angle for
+    each coefficient. With ``"fixed"``, it uses the slope from the parameter set.
     ``friction``: ``"none"`` removes the brake's dry friction, which helps to hold the moment.
     """
 
@@ -67,7 +68,7 @@ class Options(ParameterSet):
     t_hold: Duration
     """recording time after the step"""
     mu_B: Coefficients
-    """friction coefficients of the pads"""
+    """pad friction coefficients"""
     slope: Literal["known", "fixed"]
     """whether the controller uses the correct friction coefficient"""
     friction: Literal["kept", "none"]
@@ -77,7 +78,7 @@ class Options(ParameterSet):
 
 
 def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Case, ...]:
-    """Return one run for each friction coefficient, without runout, which would hide the rest."""
+    """Return one run per friction coefficient, without runout, which would mask other effects."""
     levels = {0.0: options.M_step}
     changes: dict[str, Any] = {"flywheel.runout": 0.0}
     if options.friction == "none":
@@ -97,18 +98,18 @@ def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Cas
 
 
 def _stable(run: xr.Dataset, options: Options) -> tuple[float, str]:
-    """Return 1 if a moment ends within 5 % of the step, without the help of an end stop."""
+    """Return 1 if the moment ends within 5 % of the step, without the help of an end stop."""
     last = run.sel(time=slice((1.0 - _LAST) * options.t_hold, None))
     if not last.sizes["time"]:
         return math.nan, _NO_ROW
     if not last["F_N"].values.any():
-        return math.nan, "the pads are not applied: the moment loop is open"
+        return math.nan, "the pads are not applied, so the moment loop is open"
     away = np.abs(np.abs(last["M_B"].values) - options.M_step).max()
     return float(away <= _BAND * options.M_step and not run["F_end"].values.any()), ""
 
 
 def _each(run: xr.Dataset, mu_B: float, options: Options) -> tuple[Kpi, ...]:
-    """Return the figures of a friction coefficient."""
+    """Return the key figures of one friction coefficient."""
     backward = float(run["Omega"].values[0]) < 0
     end = -options.M_step if backward else options.M_step
     step = evaluate("step_response", run, Setting("M_B", t_step=0.0, start=0.0, end=end))
@@ -122,7 +123,7 @@ def _each(run: xr.Dataset, mu_B: float, options: Options) -> tuple[Kpi, ...]:
 
 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
-    """Return the figures of every friction coefficient, and the worst of them."""
+    """Return the key figures of each friction coefficient, and the worst values."""
     each = {mu_B: _each(recordings[tag(mu_B)], mu_B, options) for mu_B in options.mu_B}
     stable, overshoot, settling, power = (
         [kpi.value for kpi in column] for column in zip(*each.values(), strict=True)
@@ -131,7 +132,7 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     slow = [f"{m:g}" for m, t in zip(options.mu_B, settling, strict=True) if math.isnan(t)]
     unjudged = sum(math.isnan(value) for value in stable)
     overall = ALL(
-        unstable=(math.nan, f"{unjudged} coefficients cannot be judged")
+        unstable=(math.nan, f"stability is undefined at {unjudged} coefficients")
         if unjudged
         else float(sum(value == 0 for value in stable)),
         overshoot_max=Undefined(f"open at mu_B = {', '.join(unknown)}", is_open=True)

@@ -1,7 +1,6 @@
 """Gap adjusting: several applications with excess clearance, which an adjuster removes.
 
-Roberts et al. (2003) plan an adjustment mechanism for their next prototype. We defined the
-maneuver.
+Roberts et al. (2003) plan an adjustment mechanism for their next prototype. The maneuver is ours.
 """
 
 from __future__ import annotations
@@ -24,14 +23,14 @@ Growth = Annotated[float, Unit("m", 2e-4), Field(ge=-1e-2, le=1e-2, allow_inf_na
 
 FIGURES = Figures(
     clicks=("1", "Teeth turned by the adjuster."),
-    teeth_counted=("1", "Teeth counted by the adjuster, its measure of wear."),
-    turned_after=("1", "Applications before the adjuster's first turn."),
+    teeth_counted=("1", "Teeth counted by the adjuster as a measure of wear."),
+    turned_after=("1", "Number of applications before the adjuster first turns."),
     clearance_start=("m", "Clearance at the start."),
     clearance_end=("m", "Clearance at the end."),
     gap_error=("m", "Clearance estimated by the adjuster at the end, minus the true clearance."),
     contact_first=("s", "Time to pad contact, first application."),
     contact_last=("s", "Time to pad contact, last application."),
-    adjuster_work=("J", "Work of the adjuster on the caliper: 0 if it turns within the gap."),
+    adjuster_work=("J", "Work of the adjuster on the caliper, 0 if it turns within the gap."),
     undefined="the pads do not touch the disc, or the adjuster does not turn",
 )
 
@@ -40,9 +39,9 @@ class Options(ParameterSet):
     """The maneuver."""
 
     M_brake: SomeMoment
-    """moment of every application"""
+    """moment of each application"""
     more: Growth
-    """excess clearance from wear; the brake has the correct contact angle"""
+    """excess clearance from wear; the contact angle in the brake's memory is correct"""
     applications: Count
     """number of applications"""
     t_hold: Duration
@@ -58,7 +57,7 @@ def _begins(options: Options) -> list[float]:
 
 
 def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Case, ...]:
-    """Return the single run, with a driven disc for equal conditions in all applications."""
+    """Return the single run. A driven disc makes conditions equal in all applications."""
     begins = _begins(options)
     levels = {begin: options.M_brake for begin in begins}
     levels |= {begin + options.t_hold: 0.0 for begin in begins}

@@ -1,6 +1,6 @@
 """End of braking: the demand falls to zero, or the power stages switch off under load.
 
-Roberts et al. (2003) show the end of a pulse in Fig. 9. We defined the release and its figures.
+Roberts et al. (2003) show the end of a pulse in Fig. 9. The release and its key figures are ours.
 Without power, dry friction holds the brake.
 """
 
@@ -36,27 +36,28 @@ def _braked_case(
     settle: float,
     duration: float,
 ) -> Case:
-    """Return a run whose braking begins with the settling time [s] and ends at time zero."""
+    """Return a run that brakes for the settling time [s] and ends braking at time zero."""
     return case_from_parked(par, stimulus, duration, settle=settle, keep=min(settle, 0.1))
 
 
 # --- Release: its speed, and the remaining clearance of the pads
 
-_LOW = 0.05  # of the moment at the release
+_LOW = 0.05  # fraction of the moment at the release
 
 FALL = Figures(
-    moment_start=("N*m", "Moment at the instant the demand falls."),
+    moment_start=("N*m", "Moment when the demand falls."),
     time_to_5=("s", "Time until the moment stays below 5 % of its initial value."),
 )
 FREEDOM = Figures(
-    drag_moment=("N*m", "Residual drag: largest moment after parking."),
+    drag_moment=("N*m", "Residual drag: maximum moment after parking."),
     travel_left=("m", "Distance of the wedge from the middle at the end."),
     clearance_regained=(
         "m",
-        "Clearance at the end, sum of both pads, without runout; negative if they are applied.",
+        "Total clearance of both pads at the end, without runout. Negative if the pads are "
+        "applied.",
     ),
-    clearance_nominal=("m", "The same clearance with the wedge centered."),
-    travel_beyond=("m", "Maximum travel of the wedge past the middle, toward the other side."),
+    clearance_nominal=("m", "Total clearance with the wedge centered."),
+    travel_beyond=("m", "Maximum wedge travel past the middle, toward the other side."),
     peak_current=("A", "Maximum motor current during the release."),
     energy_in=("J", "Energy at the drives' input until the brake is parked, including standby."),
 )
@@ -68,13 +69,13 @@ class ReleaseOptions(ParameterSet):
     M_hold: SomeMoment
     """moment from which the brake is released"""
     settle: Duration
-    """time of controlled braking before"""
+    """time of controlled braking before the release"""
     duration: Duration
     """recording time after the demand falls to zero"""
 
 
 def release(par: WedgeParameters, options: ReleaseOptions, _: object = None) -> tuple[Case, ...]:
-    """Return the single run: braking during the settling time, no demand after time zero."""
+    """Return the single run, which brakes during the settling time and releases at time zero."""
     levels = {-options.settle: options.M_hold, 0.0: 0.0}
     return (
         _braked_case(par, lambda t: {"M_set": steps(t, levels)}, options.settle, options.duration),
@@ -82,7 +83,7 @@ def release(par: WedgeParameters, options: ReleaseOptions, _: object = None) -> 
 
 
 def judge_release(recordings: Recordings, options: ReleaseOptions) -> tuple[Kpi, ...]:
-    """Return fall time of the moment, residual drag, and energy of the release."""
+    """Return the moment's fall time, the residual drag, and the energy of the release."""
     run = along_disc(recordings["run"]).sel(time=slice(-1e-9, None))
     par = parameters_of(run)
     home = parking_time(run, 0.0)
@@ -91,7 +92,8 @@ def judge_release(recordings: Recordings, options: ReleaseOptions) -> tuple[Kpi,
     end = float(run["x"].values[-1])
     until = run.sel(time=slice(None, home.value)) if parked is not None else run
     energy = float(until["W_supply"].values[-1] - until["W_supply"].values[0])
-    counted = "" if parked is not None else "not parked: energy until the end of the recording"
+    not_parked = "the brake is not parked, so the energy counts until the end of the recording"
+    counted = "" if parked is not None else not_parked
     return (
         *FALL(moment_start=run["M_B"].values[0], time_to_5=_fall(run)),
         release_time(run, 0.0),
@@ -114,12 +116,12 @@ def _clearance(x: float, par: WedgeParameters) -> float:
 
 
 def _toward(run: xr.Dataset) -> xr.DataArray:
-    """Return the wedge's travel, positive on its side at the release."""
+    """Return the wedge travel, positive on the side where the wedge is at the release."""
     return run["x"] * (-1.0 if float(run["x"].values[0]) < 0 else 1.0)
 
 
 def _fall(run: xr.Dataset) -> tuple[float, str]:
-    """Return the time until the moment has fallen permanently to a twentieth."""
+    """Return the time until the moment stays below a twentieth of its initial value."""
     t, M = run["time"].values, np.abs(run["M_B"].values)
     level = _LOW * M[0]
     above = np.flatnonzero(level < M)
@@ -147,13 +149,13 @@ MOMENT_RELEASE = Experiment(
 # --- Power off: dry friction holds the brake
 
 POWER_OFF_FIGURES = Figures(
-    time_to_rest=("s", "Time from power off until shafts and wedge stick permanently."),
-    drift=("m", "Maximum change of the wedge's travel after that instant."),
-    relaxation=("m", "Change of the wedge's travel before that instant."),
-    moment_start=("N*m", "Moment at power off."),
+    time_to_rest=("s", "Time from power-off until shafts and wedge stick permanently."),
+    drift=("m", "Maximum change in wedge travel after that time."),
+    relaxation=("m", "Change in wedge travel before that time."),
+    moment_start=("N*m", "Moment at power-off."),
     moment_end=("N*m", "Moment at the end, including runout."),
     preload_end=("N", "Wedge preload at the end."),
-    end_stop_force=("N", "Maximum force of an end stop."),
+    end_stop_force=("N", "Maximum force at an end stop."),
     undefined="the brake does not come to rest within the recording",
 )
 
@@ -162,15 +164,15 @@ class PowerOffOptions(ParameterSet):
     """The maneuver."""
 
     M_hold: SomeMoment
-    """moment at power off"""
+    """moment at power-off"""
     settle: Duration
-    """time of controlled braking before"""
+    """time of controlled braking before power-off"""
     duration: Duration
     """recording time without power"""
 
 
 def power_off(par: WedgeParameters, options: PowerOffOptions, _: object = None) -> tuple[Case, ...]:
-    """Return the single run: braking during the settling time, power off at zero."""
+    """Return the single run, which brakes during the settling time and loses power at time zero."""
     levels, off = {-options.settle: options.M_hold}, {0.0: 1.0}
     return (
         _braked_case(
@@ -183,7 +185,7 @@ def power_off(par: WedgeParameters, options: PowerOffOptions, _: object = None) 
 
 
 def judge_power_off(recordings: Recordings, options: PowerOffOptions) -> tuple[Kpi, ...]:
-    """Return relaxation, time to rest, and creep afterwards."""
+    """Return the relaxation, the time to rest, and the creep afterward."""
     after = along_disc(recordings["run"]).sel(time=slice(-1e-9, None))
     t, x, stuck = (after[name].values for name in ("time", "x", "stuck"))
     moving = np.flatnonzero(stuck == 0)
@@ -204,7 +206,7 @@ def judge_power_off(recordings: Recordings, options: PowerOffOptions) -> tuple[K
 POWER_OFF_HOLD = Experiment(
     name="power-off-hold",
     assembly="wedge-brake",
-    summary="power off at {M_hold}: moment held by dry friction, and how long",
+    summary="power-off at {M_hold}: moment that dry friction holds, and time to rest",
     options=PowerOffOptions,
     defaults=PowerOffOptions(M_hold=500.0, settle=0.6, duration=2.0),
     cases=power_off,

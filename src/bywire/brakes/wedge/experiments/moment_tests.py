@@ -1,6 +1,6 @@
 """Moment tests of Roberts et al. (2003): pulses (Fig. 7), a ramp (Fig. 8), a large pulse (Fig. 9).
 
-We chose the times of the maneuvers, since the figures' text does not contain any.
+The text on these figures does not state any times, so we chose them.
 """
 
 from __future__ import annotations
@@ -34,21 +34,21 @@ from bywire.core.typing import Array
 
 Count = Annotated[int, Unit("1", 3.0), Field(ge=1, le=100)]
 
-# --- Key figures that all maneuvers share
+# --- Key figures of all maneuvers
 
 BRAKING_FIGURES = Figures(
     contact_time=("s", "Time to pad contact."),
     time_to_90=("s", "Time until the measured moment first reaches 90 % of the demand."),
     peak_power=("W", "Maximum power at the drives' input."),
-    peak_power_filtered=("W", "Maximum power at the drives' input, with the rig's filter."),
+    peak_power_filtered=("W", "Maximum power at the drives' input after the rig's filter."),
     peak_normal_force=("N", "Maximum normal force."),
     caliper_energy=("J", "Maximum energy stored in the caliper before the demand changes."),
     disc_share=("%", "Fraction of that energy supplied by the disc (self-reinforcement)."),
-    rate_limited=("%", "Fraction of time at the software rate limit, until the demand changes."),
+    rate_limited=("%", "Fraction of time at the software rate limit until the demand changes."),
     peak_speed=("rad/s", "Maximum speed of motor 1."),
     energy_in=("J", "Energy at the drives' input, including standby."),
     energy_braked=("J", "Energy taken from the disc."),
-    energy_left=("J", "Maximum residual of the energy balance: the numerical error."),
+    energy_left=("J", "Maximum residual of the energy balance, which is the numerical error."),
     undefined="the signal does not reach the level in this time",
 )
 """key figures of braking"""
@@ -58,7 +58,7 @@ def _braking(run: xr.Dataset, target: float, end: float) -> tuple[Kpi, ...]:
     """Return the key figures of braking that begins at time zero.
 
     ``run``: recording, positive in the disc's direction; ``target``: demanded moment [N m];
-    ``end``: time of the first change of the demand [s].
+    ``end``: time of the first demand change [s].
     """
     after = run.sel(time=slice(-1e-9, None))
     held = run.sel(time=slice(-1e-9, end + 1e-9))
@@ -85,7 +85,7 @@ def _braking(run: xr.Dataset, target: float, end: float) -> tuple[Kpi, ...]:
 
 
 def _contact(held: xr.Dataset) -> float:
-    """Return the time [s] of the first contact; without clearance the pads touch from the start."""
+    """Return the time [s] of first contact. Without clearance the pads touch from the start."""
     return 0.0 if parameters_of(held).caliper.clearance == 0.0 else first(held, "F_N", 0.0)
 
 
@@ -94,13 +94,13 @@ def _gained(run: xr.Dataset, name: str) -> float:
 
 
 def _too_coarse(run: xr.Dataset, begin: float, end: float, rows: int = 1) -> str:
-    """Return the reason if rows are too far apart to judge a moment between two times [s], or "".
+    """Return why rows are too far apart to evaluate a moment between two times [s], or "".
 
     Parameters
     ----------
     rows
-        Smallest number of rows in that time. A revolution of the disc needs five rows; with fewer,
-        the runout's oscillation would alias.
+        Minimum number of rows in that time. A disc revolution needs five rows. With fewer rows the
+        oscillation due to runout would alias.
     """
     t = run["time"].values
     apart = float(np.diff(t).max()) if t.size > 1 else math.inf
@@ -111,8 +111,8 @@ def _too_coarse(run: xr.Dataset, begin: float, end: float, rows: int = 1) -> str
         return ""
     interval = min((end - begin) / rows, fifth)
     return (
-        f"rows {apart:.3g} s apart are too few between t = {begin:.4g} s and {end:.4g} s: "
-        f"record every {interval:.2g} s or more often"
+        f"the recording interval of {apart:.3g} s is too long between t = {begin:.4g} s and "
+        f"{end:.4g} s. Record every {interval:.2g} s or more often"
     )
 
 
@@ -123,9 +123,9 @@ PULSES_FIGURES = Figures(
     hold_moment=("N*m", f"Mean moment {_OVER}."),
     hold_error=(
         "%",
-        "Relative error of that moment; far below 0 if the demand exceeds the brake's capability.",
+        "Relative error of that moment. It is far below 0 if the brake cannot reach the demand.",
     ),
-    hold_ripple=("N*m", f"Peak-to-peak moment {_OVER}, due to the disc's runout."),
+    hold_ripple=("N*m", f"Peak-to-peak moment {_OVER}, due to disc runout."),
     hold_power=("W", f"Mean input power {_OVER}, including standby."),
     brake_power=("W", f"Mean braking power {_OVER}."),
     pulse_moment=(
@@ -140,7 +140,7 @@ class PulsesOptions(ParameterSet):
     """The braking maneuver."""
 
     M_high: SomeMoment
-    """moment demanded"""
+    """demanded moment"""
     low: Fraction
     """fraction of the moment to which the pulses fall"""
     t_hold: Duration
@@ -175,7 +175,7 @@ def pulses(par: WedgeParameters, options: PulsesOptions, _: object = None) -> tu
 
 
 def judge_pulses(recordings: Recordings, options: PulsesOptions) -> tuple[Kpi, ...]:
-    """Return the figures of the braking, of its hold and of its pulses."""
+    """Return the key figures of the braking, the hold and the pulses."""
     run = along_disc(recordings["run"])
     begin, end = _turn(run, 0.0, options.t_hold, 0.5)
     held = _too_coarse(run, begin, end)
@@ -195,8 +195,8 @@ def judge_pulses(recordings: Recordings, options: PulsesOptions) -> tuple[Kpi, .
 def _turn(run: xr.Dataset, begin: float, end: float, last: float) -> tuple[float, float]:
     """Return the evaluated part of an interval [s], without the rows at its ends.
 
-    It is the disc's last revolution, over which the runout averages out. If the interval is
-    shorter than a revolution, it is the ``last`` share of the interval.
+    The part is the disc's last revolution, over which the runout averages out. If the interval is
+    shorter than a revolution, the part is the last fraction ``last`` of the interval.
     """
     nearest = int(np.abs(run["time"].values - end).argmin())
     speed = abs(float(run["Omega"].values[nearest]))
@@ -229,13 +229,13 @@ MOMENT_PULSES = Experiment(
 
 # --- A step, a reduction, and a slow ramp back (Fig. 8)
 
-_ROWS = 10  # smallest number of rows on the ramp
+_ROWS = 10  # minimum number of rows on the ramp
 
 RAMP_FIGURES = Figures(
-    ramp_error_mean=("N*m", "Mean of demand minus moment on the ramp."),
+    ramp_error_mean=("N*m", "Mean difference between demand and moment on the ramp."),
     ramp_error_rms=(
         "N*m",
-        "Root mean square of demand minus moment on the ramp, including runout.",
+        "Root-mean-square difference between demand and moment on the ramp, including runout.",
     ),
     ramp_slope=("N*m/s", "Slope of a line through the moment on the ramp."),
 )
@@ -245,7 +245,7 @@ class RampOptions(ParameterSet):
     """The braking maneuver."""
 
     M_high: SomeMoment
-    """demanded moment at the start, and at the end of the ramp"""
+    """demanded moment at the start and at the end of the ramp"""
     M_low: SomeMoment
     """moment from which the ramp starts"""
     t_hold: Duration
@@ -255,7 +255,7 @@ class RampOptions(ParameterSet):
     t_ramp: Duration
     """length of the ramp"""
     t_end: Duration
-    """time recorded after the ramp"""
+    """recording time after the ramp"""
     settle: Duration
     """time parked before the step"""
 
@@ -291,7 +291,7 @@ def ramp(par: WedgeParameters, options: RampOptions, _: object = None) -> tuple[
 
 
 def judge_ramp(recordings: Recordings, options: RampOptions) -> tuple[Kpi, ...]:
-    """Return the figures of the braking, and the tracking errors on the ramp."""
+    """Return the key figures of the braking, and the tracking errors on the ramp."""
     run = along_disc(recordings["run"])
     begin = options.t_hold + options.t_low
     end = begin + options.t_ramp
@@ -340,11 +340,11 @@ class LargePulseOptions(ParameterSet):
     """The braking maneuver."""
 
     M_high: SomeMoment
-    """moment demanded"""
+    """demanded moment"""
     t_pulse: Duration
     """length of the pulse"""
     t_end: Duration
-    """time recorded after it"""
+    """recording time after the pulse"""
     omega_gap: SpeedLimit
     """maximum speed during gap crossing, lower than in Figs. 7 and 8"""
     settle: Duration
@@ -369,7 +369,7 @@ def large_pulse(
 
 
 def judge_large_pulse(recordings: Recordings, options: LargePulseOptions) -> tuple[Kpi, ...]:
-    """Return the figures of the braking and of the release."""
+    """Return the key figures of the braking and the release."""
     run = along_disc(recordings["run"])
     return (
         *_braking(run, options.M_high, options.t_pulse),

@@ -1,6 +1,6 @@
 """Position step: both motors of the assembled brake follow a step within the clearance.
 
-Roberts et al. (2003), section "Position control of wedge", state very little difference from the
+Roberts et al. (2003), section "Position control of wedge", report very little difference from
 motors with only their screws, due to the high gear ratio. The experiment runs both for comparison.
 """
 
@@ -40,13 +40,13 @@ _REST = "maximum value over time and amplitudes, in % of the step."
 OVERALL = Figures(
     difference_screws=(
         "%",
-        f"Difference of the mean angle from screws that preload each other without wedge; {_REST}",
+        f"Difference in mean angle from screws that preload each other without the wedge: {_REST}",
     ),
     difference_motors=(
         "%",
-        f"Difference of the mean angle from motors with free screws; {_REST}",
+        f"Difference in mean angle from motors with free screws: {_REST}",
     ),
-    normal_force=("N", "Maximum normal force: 0 while the steps stay within the clearance."),
+    normal_force=("N", "Maximum normal force, 0 if the steps stay within the clearance."),
 )
 
 
@@ -64,14 +64,14 @@ Amplitudes = Annotated[
 
 
 class Options(ParameterSet):
-    """The steps; from parking, toward clamping on the positive side."""
+    """Steps from the parking position toward clamping on the positive side."""
 
     amplitudes: Amplitudes
-    """angles of the steps; the pads touch at clearance / tan(alpha) of wedge travel"""
+    """step angles; the pads touch at a wedge travel of clearance / tan(alpha)"""
     f_low: Frequency
-    """natural frequency of the position loop of low bandwidth"""
+    """natural frequency of the low-bandwidth position loop"""
     f_high: Frequency
-    """natural frequency of the position loop of high bandwidth"""
+    """natural frequency of the high-bandwidth position loop"""
     delta: Position
     """offset of each screw, which preloads the wedge; default: the parameter set's value"""
     duration: Duration
@@ -81,14 +81,14 @@ class Options(ParameterSet):
 
 
 def following(par: WedgeParameters) -> Mapping[str, Any]:
-    """Return the preload of the parameters."""
+    """Return the preload offset of the parameter set."""
     return {"delta": par.control.offset.delta_preload}
 
 
 def _arrangements(par: WedgeParameters, delta: float) -> dict[str, dict[str, float]]:
-    """Return the changes that remove the wedge, and then also the other motor's screw.
+    """Return the changes that remove the wedge, and those that also remove the other screw.
 
-    Without the wedge, the screws push on each other, tip to tip, with the same force.
+    Without the wedge, the screws push on each other tip to tip with the same force.
     """
     heart = par.heart
     c = brake_heart.compliances(heart)
@@ -145,7 +145,7 @@ def finish(run: xr.Dataset, _: Options) -> xr.Dataset:
 
 
 def _each(run: xr.Dataset, amplitude: float, ending: str) -> tuple[Kpi, ...]:
-    """Return the figures of a step of the assembled brake."""
+    """Return the key figures of one step of the assembled brake."""
     setting = Setting("theta", t_step=0.0, start=0.0, end=amplitude)
     step = evaluate("step_response", run, setting)
     after, par = run.sel(time=slice(-1e-9, None)), parameters_of(run)
@@ -165,7 +165,7 @@ def _each(run: xr.Dataset, amplitude: float, ending: str) -> tuple[Kpi, ...]:
 
 
 def _over(recordings: Recordings, band: str, options: Options) -> tuple[Kpi, ...]:
-    """Return the largest differences from the arrangements without wedge, over all amplitudes."""
+    """Return the maximum differences from the setups without a wedge, over all amplitudes."""
     worst, touching = {SCREWS: 0.0, MOTORS: 0.0}, 0.0
     for amplitude in options.amplitudes:
         ending = f"-{band}-{_tag(amplitude)}"
@@ -174,7 +174,7 @@ def _over(recordings: Recordings, band: str, options: Options) -> tuple[Kpi, ...
         for kind in worst:
             apart = np.abs(brake["theta"].values - recordings[kind + ending]["theta"].values)
             worst[kind] = max(worst[kind], 100.0 * float(apart.max()) / amplitude)
-    note = "the pads touch the disc: the step leaves the clearance" if touching > 0 else ""
+    note = "the pads touch the disc, so the step leaves the clearance" if touching > 0 else ""
     return OVERALL(
         f"_{band}",
         difference_screws=(worst[SCREWS], note),
@@ -184,7 +184,7 @@ def _over(recordings: Recordings, band: str, options: Options) -> tuple[Kpi, ...
 
 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
-    """Return each step's figures, and the effect of the wedge."""
+    """Return the key figures of each step, and the effect of the wedge."""
     each = [
         kpi
         for band, amplitude in product(_BANDS, options.amplitudes)
@@ -213,7 +213,7 @@ _DEFAULTS = Options(
 EXPERIMENT = Experiment(
     name="position-step",
     assembly="wedge-brake",
-    summary="steps of both motors within the clearance, at two bandwidths, with and without wedge",
+    summary="steps of both motors within the clearance, two bandwidths, with and without the wedge",
     options=Options,
     defaults=_DEFAULTS,
     cases=cases,

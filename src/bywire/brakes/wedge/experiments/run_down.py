@@ -1,7 +1,7 @@
-"""Run-down: a motor coasts to rest alone, with an added known inertia, and with a known torque.
+"""Run-down: a motor coasts to rest alone, with a known added inertia, and with a known torque.
 
-A plain run-down determines only friction and damping per inertia. A known inertia on the shaft, or
-the torque of a known current, sets the scale.
+A plain run-down determines only the ratios of friction and damping to inertia. A known inertia on
+the shaft, or the torque of a known current, sets the scale.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ from bywire.core.quantities import Current, Duration, Inertia
 from bywire.core.typing import Array
 
 LABELS = ("free", "added", "braked")
-_HALF = 0.5  # share of the initial speed at which the range for decelerations ends
+_HALF = 0.5  # fraction of the initial speed at which the range for decelerations ends
 STOPPING = Figures(
-    stopping_time=("s", "Time from the end of the spin-up until the shaft rests."),
+    stopping_time=("s", "Time from the end of the spin-up until the shaft is at rest."),
     undefined="the shaft turns for too short a time, or does not come to rest",
 )
 FIGURES = Figures(
@@ -55,7 +55,7 @@ class Options(ParameterSet):
     J_added: Inertia
     """inertia added to the shaft in the second run"""
     i_brake: Current
-    """current against the motion in the third run; friction must hold its torque at rest"""
+    """braking current in the third run; at rest, friction must hold its torque"""
     duration: Duration
     """recording time after the end of the spin-up"""
     record: Duration
@@ -90,7 +90,7 @@ def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Cas
 
 
 def _spun(options: Options, i_after: float) -> Stimuli:
-    """Return the current of the spin-up and of the coasting."""
+    """Return the current during spin-up and coasting."""
 
     def stimulus(t: Array) -> dict[str, Array]:
         return {"i_1_set": np.where(t < -1e-9, options.i_spin, i_after)}
@@ -127,7 +127,7 @@ def _first(run: xr.Dataset) -> float:
 
 
 def _deceleration(recordings: Recordings, label: str) -> float:
-    """Return the mean deceleration [rad/s^2] between two speeds that all runs pass through."""
+    """Return the mean deceleration [rad/s^2] between two speeds that occur in all runs."""
     high = min(_first(recordings[each]) for each in LABELS)
     speed = _speed(recordings[label])
     t = recordings[label]["time"].sel(time=slice(-1e-9, None)).values

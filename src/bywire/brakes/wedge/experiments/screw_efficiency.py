@@ -1,8 +1,8 @@
-"""Roller screw efficiency: two motors against each other, with a force sensor between them.
+"""Roller screw efficiency: two motors work against each other, with a force sensor between them.
 
-Two such motors cannot back-drive each other at full current, since only 0.65 x 0.46 of a motor's
-torque reaches the other. So the motor in position control moves, and the motor in current control
-follows or is driven back.
+Two such motors cannot back-drive each other at full current, because only 0.65 x 0.46 of a motor's
+torque reaches the other. Therefore the motor in position control moves, and the motor in current
+control follows or is driven back.
 """
 
 from __future__ import annotations
@@ -35,29 +35,35 @@ from bywire.core.typing import Array
 
 SlowSpeed = Annotated[float, Unit("rad/s", 10.0), Field(gt=0, allow_inf_nan=False)]
 
-_SETTLED = 0.3  # share of the time in motion that means omit
+_SETTLED = 0.3  # initial fraction of the time in motion that means omit
 _LESS = 0.5  # ratio of currents in the motions under lower force
-_SPEED = 0.05  # largest relative error of mean speeds in steady motion
+_SPEED = 0.05  # maximum relative error of mean speeds in steady motion
 EFFICIENCY_FIGURES = Figures(
-    eta_f=("1", "Force torque over motor torque minus bearing torque, motor 1 driving."),
-    eta_f_no_load=("1", "The same, subtracting only the no-load bearing torque."),
-    eta_f_raw=("1", "Force torque over motor torque, motor 1 driving."),
-    eta_f_reverse=("1", "Like eta_f, motor 2 driving."),
+    eta_f=(
+        "1",
+        "Ratio of force torque to motor torque minus bearing torque, with motor 1 driving.",
+    ),
+    eta_f_no_load=("1", "Like eta_f, but subtracting only the no-load bearing torque."),
+    eta_f_raw=("1", "Ratio of force torque to motor torque, with motor 1 driving."),
+    eta_f_reverse=("1", "Like eta_f, with motor 2 driving."),
     eta_f_true=("1", "True value."),
-    eta_b=("1", "Holding torque plus bearing torque over force torque, motor 2 driven."),
-    eta_b_no_load=("1", "The same, adding only the no-load bearing torque."),
-    eta_b_raw=("1", "Holding torque over force torque, motor 2 driven."),
-    eta_b_reverse=("1", "Like eta_b, motor 1 driven."),
+    eta_b=(
+        "1",
+        "Ratio of holding torque plus bearing torque to force torque, with motor 2 driven back.",
+    ),
+    eta_b_no_load=("1", "Like eta_b, but adding only the no-load bearing torque."),
+    eta_b_raw=("1", "Ratio of holding torque to force torque, with motor 2 driven back."),
+    eta_b_reverse=("1", "Like eta_b, with motor 1 driven back."),
     eta_b_true=("1", "True value."),
     force=("N", "Mean force while motor 1 drives."),
     force_reverse=("N", "Mean force while motor 1 is driven back."),
     bearing_torque=("N*m", "No-load motor torque at the same speed."),
     bearing_growth=(
         "N*m/N**2",
-        "Growth of the bearing torque with the square of the force, motor 1 driving.",
+        "Growth of the bearing torque with force squared, with motor 1 driving.",
     ),
     bearing_growth_true=("N*m/N**2", "True value."),
-    undefined="no steady motion under compression: a motor cannot hold its speed or force",
+    undefined="the motion is not steady under compression. A motor cannot hold its speed or force",
 )
 
 
@@ -77,11 +83,11 @@ class EfficiencyOptions(ParameterSet):
 
 
 class Reading(NamedTuple):
-    """Mean readings of a run in motion, friction counted against the motion."""
+    """Mean readings while a run is in motion. Friction opposes the motion."""
 
     F: Annotated[float, Signal("N", "force", 1000.0)]
-    T_1: Annotated[float, Signal("N*m", "torque of motor 1 by its current", 1.0)]
-    T_2: Annotated[float, Signal("N*m", "torque of motor 2 by its current", 1.0)]
+    T_1: Annotated[float, Signal("N*m", "torque of motor 1 from its current", 1.0)]
+    T_2: Annotated[float, Signal("N*m", "torque of motor 2 from its current", 1.0)]
     steady: Annotated[float, Signal("1", "1 in steady motion under compression, else NaN")]
 
 
@@ -92,8 +98,8 @@ def efficiency(
 
     Notes
     -----
-    The bearings' friction grows with the square of the force. The no-load torque does not contain
-    that growth, so subtracting only the no-load torque gives an efficiency that is too low by
+    Bearing friction grows with the square of the force. The no-load torque does not contain this
+    growth, so subtracting only the no-load torque gives an efficiency that is too low by
     F C_2 / k, a percent or more. Each motion therefore runs under two forces. Torque per force,
     extrapolated to zero force, belongs only to the screw.
     """
@@ -125,7 +131,7 @@ def efficiency(
 
 
 def judge_efficiency(recordings: Recordings, options: EfficiencyOptions) -> tuple[Kpi, ...]:
-    """Return the efficiencies in both directions, with and without the bearings' friction."""
+    """Return the efficiencies in both directions, with and without bearing friction."""
     no_load = recordings["no_load"]
     par = parameters_of(no_load)
     k = slope_of(par)
@@ -179,7 +185,7 @@ def _read(run: xr.Dataset, speed: float, options: EfficiencyOptions) -> Reading:
 
 
 def _speed(run: xr.Dataset, name: str, options: EfficiencyOptions) -> float:
-    """Return the mean speed [rad/s] by an encoder."""
+    """Return the mean speed [rad/s] from an encoder."""
     window = run.sel(time=slice(_SETTLED * options.duration, None))
     t, q = window["time"].values, window[name].values
     return float((q[-1] - q[0]) / (t[-1] - t[0])) if t.size > 1 else math.nan
@@ -190,7 +196,7 @@ def _mean(run: xr.Dataset, name: str, options: EfficiencyOptions) -> float:
 
 
 def _without_force(full: tuple[Reading, float], less: tuple[Reading, float]) -> tuple[float, float]:
-    """Return a torque per force, extrapolated to zero force, and its growth; NaN if not steady."""
+    """Return torque per force, extrapolated to zero force, and its growth. NaN if not steady."""
     (there, T), (below, T_less) = full, less
     steady = there.steady * below.steady
     if not steady > 0 or there.F == below.F:
@@ -220,29 +226,29 @@ SCREW_EFFICIENCY = Experiment(
 
 Levels = Annotated[int, Unit("1", 3.0), Field(ge=1, le=100)]
 
-_TURN = 0.2  # share of a stroke's time at rest after it, while the current changes
-_RAMP = 0.2  # share of a stroke's time in which the speed rises, and in which it falls
-_SWEEP_SETTLED = 0.4  # share of a stroke that means omit
+_TURN = 0.2  # rest after a stroke while the current changes, relative to the stroke time
+_RAMP = 0.2  # fraction of the stroke time in which the speed rises, and in which it falls
+_SWEEP_SETTLED = 0.4  # initial fraction of a stroke that means omit
 LOAD_SWEEP_FIGURES = Figures(
     force_max=("N", "Maximum mean force of a stroke."),
     force_min=("N", "Minimum mean force of a stroke."),
-    eta_f_slope=("1", "Slope of force torque over motor torque, motor 1 driving."),
+    eta_f_slope=("1", "Slope of force torque versus motor torque, with motor 1 driving."),
     eta_f_true=("1", "True value."),
-    eta_b_slope=("1", "Inverse of that slope, motor 1 driven back."),
+    eta_b_slope=("1", "Inverse of that slope, with motor 1 driven back."),
     eta_b_true=("1", "True value."),
-    undefined="the force does not grow with the current. Set more levels",
+    undefined="the force does not increase with the current. Set more levels",
 )
 
 
 class LoadSweepOptions(ParameterSet):
-    """Strokes of motor 2 forward and back, at currents of motor 1 that grow from pair to pair."""
+    """Strokes of motor 2 forward and back. The current of motor 1 increases from pair to pair."""
 
     i_drive: Current
     """maximum current of motor 1 while it drives"""
     i_back: Current
     """maximum current while motor 2 pushes motor 1 back; must be small enough for motor 2"""
     levels: Levels
-    """number of currents, evenly spaced up to the largest"""
+    """number of currents, evenly spaced up to the maximum"""
     omega_slow: SlowSpeed
     """speed of the motion"""
     t_stroke: Duration
@@ -258,7 +264,7 @@ class Stroke(NamedTuple):
 
 
 def strokes(options: LoadSweepOptions) -> tuple[Stroke, ...]:
-    """Return the strokes: at every level, motor 1 drives once and is driven back once."""
+    """Return the strokes. At each level, motor 1 drives once and is driven back once."""
     period = (1.0 + _TURN) * options.t_stroke
     moves = []
     for k in range(options.levels):
@@ -271,7 +277,7 @@ def strokes(options: LoadSweepOptions) -> tuple[Stroke, ...]:
 def load_sweep(
     par: WedgeParameters, options: LoadSweepOptions, _: object = None
 ) -> tuple[Case, ...]:
-    """Return the single run; motor 1 in current, motor 2 in position control."""
+    """Return the single run, with motor 1 in current control and motor 2 in position control."""
     for name in ("i_drive", "i_back"):
         check_current(name, getattr(options, name), par)
     moves = strokes(options)
@@ -295,7 +301,7 @@ def load_sweep(
 
 
 def _moved(t: Array, T: float) -> Array:
-    """Return the travel of a stroke of speed one, which rises and falls gently."""
+    """Return the travel of a stroke at speed one, with ramps of the speed at both ends."""
     ramp = _RAMP * T
     rising, falling = np.clip(t, 0.0, ramp), np.clip(t - (T - ramp), 0.0, ramp)
     steady = np.clip(t - ramp, 0.0, T - 2.0 * ramp)
@@ -303,7 +309,7 @@ def _moved(t: Array, T: float) -> Array:
 
 
 def judge_load_sweep(recordings: Recordings, options: LoadSweepOptions) -> tuple[Kpi, ...]:
-    """Return both efficiencies from the slope of motor 1's torque over the force."""
+    """Return both efficiencies from the slope of motor 1's torque versus force."""
     run = recordings["run"]
     par = parameters_of(run)
     k, K = slope_of(par), torque_constant_of(par)
@@ -332,7 +338,7 @@ def _stroke_mean(run: xr.Dataset, stroke: Stroke, name: str, options: LoadSweepO
 
 
 def _line(rows: list[tuple[float, ...]]) -> float:
-    """Return current over force, the slope of a line."""
+    """Return the slope of a line of current versus force."""
     F, i = np.array(rows).T
     return float(np.polyfit(F, i, 1)[0]) if len(rows) > 1 and np.ptp(F) > 0 else math.nan
 
@@ -340,7 +346,7 @@ def _line(rows: list[tuple[float, ...]]) -> float:
 LOAD_SWEEP = Experiment(
     name="load-sweep",
     assembly="wedge-brake",
-    summary="screw driving and back-driven under rising forces: load-dependent and other friction",
+    summary="screw driving and back-driven at increasing force: friction with and without load",
     options=LoadSweepOptions,
     defaults=LoadSweepOptions(i_drive=12.0, i_back=3.0, levels=6, omega_slow=10.0, t_stroke=0.6),
     cases=load_sweep,

@@ -1,4 +1,4 @@
-"""Position steps of a single motor on its rig, two bandwidths, on a screw and on a dummy shaft."""
+"""Position steps of a single motor on its rig at two bandwidths, with screw or dummy shaft."""
 
 from __future__ import annotations
 
@@ -38,14 +38,14 @@ _UNITS = {
 
 
 class StepsOptions(ParameterSet):
-    """Steps of three amplitudes with a low and a high bandwidth."""
+    """Steps of three amplitudes at a low and a high bandwidth."""
 
     a_small: SomeAngle
-    """minimum step"""
+    """smallest step"""
     a_medium: SomeAngle
     """middle step"""
     a_large: SomeAngle
-    """maximum step"""
+    """largest step"""
     f_low: Frequency
     """natural frequency of the low-bandwidth controller"""
     f_high: Frequency
@@ -94,7 +94,7 @@ def _step_cases(
 
 
 def judge_steps(recordings: Recordings, options: StepsOptions) -> tuple[Kpi, ...]:
-    """Return the figures of all steps, each name followed by the label of its case."""
+    """Return the key figures of all steps. The label of the case follows each name."""
     kpis: list[Kpi] = []
     for label in _CASES:
         run, end = recordings[label], options.value(f"a_{label.partition('_')[2]}")
@@ -110,7 +110,7 @@ def judge_steps(recordings: Recordings, options: StepsOptions) -> tuple[Kpi, ...
 
 
 def _share_at(run: xr.Dataset, name: str, limit: float) -> float:
-    """Return the share of the time after zero in which a signal's magnitude is at a limit [%]."""
+    """Return the fraction of time after zero with a signal's magnitude at a limit [%]."""
     after = np.abs(run[name].sel(time=slice(-1e-9, None)).values)
     return 100.0 * float(np.mean(after >= limit * (1.0 - 1e-9)))
 
@@ -122,12 +122,12 @@ def _stepped(level: float) -> Stimuli:
 # --- Preloaded roller screw
 
 BAND = Figures(
-    dead_band=("rad", "Angle error that friction and cogging can hold at rest, by their laws."),
+    dead_band=("rad", "Maximum angle error that friction and cogging can hold at rest."),
 )
 
 
 def judge_screw_position(recordings: Recordings, options: StepsOptions) -> tuple[Kpi, ...]:
-    """Return the figures of all steps, and the angle error that friction can hold."""
+    """Return the key figures of all steps, and the angle error that friction can hold."""
     bands: list[Kpi] = []
     for loop in _LOOPS:
         par = parameters_of(recordings[f"{loop}_small"])

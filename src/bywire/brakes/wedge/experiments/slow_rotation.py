@@ -1,6 +1,7 @@
 """Slow rotation: a motor's current during one slow revolution forward and back.
 
-Cogging depends only on the angle, dry friction on the direction, so two directions separate them.
+Cogging depends only on the angle, and dry friction only on the direction. Motion in both
+directions therefore separates them.
 """
 
 from __future__ import annotations
@@ -18,19 +19,19 @@ from bywire.core.quantities import Duration
 from bywire.core.typing import Array
 from bywire.plant.axial_bearing import AngularSpeed
 
-_STARTED = 0.05  # share of a stroke after which the motion counts as steady
+_STARTED = 0.05  # fraction of a stroke after which the motion counts as steady
 FIGURES = Figures(
     torque_forward=("N*m", "Mean torque from the current, forward."),
     torque_backward=("N*m", "Mean torque from the current, backward."),
-    friction_torque=("N*m", "Half the difference between the two."),
-    ripple=("N*m", "Amplitude of a sine that fits the torque's deviation from its mean."),
+    friction_torque=("N*m", "Half the difference between torque_forward and torque_backward."),
+    ripple=("N*m", "Amplitude of a sine with the same RMS as the torque ripple."),
     cogging_true=("N*m", "True amplitude of the cogging torque."),
     undefined="the recording has no row during steady motion",
 )
 
 
 class Options(ParameterSet):
-    """One revolution each way; fast enough not to stick, slow compared with the position loop."""
+    """One revolution in each direction, too fast to stick and slow for the position loop."""
 
     omega_slow: AngularSpeed
     """speed of the motion"""
@@ -61,7 +62,7 @@ def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Cas
 
 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
-    """Return mean torques both ways, half their difference as friction, and the ripple."""
+    """Return mean torques in both directions, half their difference as friction, and the ripple."""
     run, T = recordings["run"], stroke(options)
     par = parameters_of(run)
     K = torque_constant_of(par)

@@ -1,8 +1,9 @@
-"""Static force: actuation force and brake factor over the pads' friction coefficient.
+"""Static force: actuation force and brake factor versus pad friction coefficient.
 
 Roberts et al. (2003), section "Introduction": C* = 2 mu_B / (tan(alpha) - mu_B), positive while
 the actuator pushes, negative while it pulls. The formula neglects friction. With friction, the
-force at rest has any value in a band. A slowly rising and a slowly falling moment show its limits.
+force at rest may have any value in a band. A slowly rising and a slowly falling moment show the
+limits of the band.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ from bywire.core.quantities import Duration
 from bywire.core.typing import Array
 
 FREE, DRY = "frictionless", "friction"
-_SHARE = 0.2  # half width of the ramps, as a share of the moment
+_SHARE = 0.2  # half width of the ramps, relative to the moment
 _NO_FORCE = 1.0  # actuation force [N] below which the brake factor is meaningless
 
 EACH = Figures(
@@ -41,38 +42,45 @@ EACH = Figures(
         "N",
         "With friction: mean force while the moment rises slowly, at the same normal force.",
     ),
-    F_M_falling=("N", "The same while it falls slowly; the force at rest is between the two."),
+    F_M_falling=(
+        "N",
+        "With friction: mean force while the moment falls slowly. The force at rest is between "
+        "F_M_rising and F_M_falling.",
+    ),
     C_star=("1", "Brake factor without friction, 2 mu_B F_N / F_M."),
     C_star_closed=("1", "Closed form of C_star, 2 mu_B / (tan(alpha) - mu_B)."),
     C_star_rising=("1", "With friction: brake factor while the moment rises."),
     C_star_falling=("1", "With friction: brake factor while the moment falls."),
 )
 ALL = Figures(
-    F_M_error=("N", "Maximum difference between force and closed form, without friction."),
+    F_M_error=(
+        "N",
+        "Maximum difference between actuation force and closed form, without friction.",
+    ),
     C_star_error=(
         "%",
         "Maximum difference between brake factor and closed form, without friction.",
     ),
-    neutral_mu=("1", "Coefficient with zero actuation force, without friction."),
+    neutral_mu=("1", "Pad friction coefficient at which F_M is zero."),
     neutral_mu_closed=("1", "Closed form of neutral_mu, tan(alpha)."),
-    neutral_mu_rising=("1", "Coefficient with zero force with friction, while the moment rises."),
-    neutral_mu_falling=("1", "Coefficient with zero force with friction, while the moment falls."),
+    neutral_mu_rising=("1", "Pad friction coefficient at which F_M_rising is zero."),
+    neutral_mu_falling=("1", "Pad friction coefficient at which F_M_falling is zero."),
 )
 
 
 class Options(ParameterSet):
-    """A moment, approached slowly from below and from above, then held."""
+    """A moment that the brake approaches slowly from below and from above, then holds."""
 
     M_hold: SomeMoment
     """moment at which the force is evaluated"""
     mu_B: Coefficients
-    """friction coefficients of the pads"""
+    """pad friction coefficients"""
     t_start: Duration
     """time from the first demand to the rising ramp"""
     t_ramp: Duration
-    """length of the rising and of the falling ramp; 20 % on either side of the moment"""
+    """length of each ramp, rising and falling, from 20 % below to 20 % above the moment"""
     t_hold: Duration
-    """time at the moment, at the end"""
+    """hold time at the end"""
 
 
 def demand(t: Array, options: Options) -> Array:
@@ -101,7 +109,7 @@ def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Cas
 
 
 def _sign(run: xr.Dataset) -> float:
-    """Return the side of the wedge; forces count positive toward clamping."""
+    """Return the side of the wedge. Forces are positive toward clamping."""
     return -1.0 if float(run["x"].values[-1]) < 0 else 1.0
 
 
@@ -111,21 +119,21 @@ def _held(run: xr.Dataset) -> tuple[float, float]:
 
 
 def _slope(run: xr.Dataset, begin: float, end: float) -> float:
-    """Return the mean actuation force over the mean normal force between two times [s]."""
+    """Return the ratio of mean actuation force to mean normal force between two times [s]."""
     part = run.sel(time=slice(begin, end))
     pressed = float(part["F_N"].mean())
     return _sign(run) * float(part["F_M"].mean()) / pressed if pressed > 0 else math.nan
 
 
 def _each(recordings: Recordings, mu_B: float, options: Options) -> tuple[Kpi, ...]:
-    """Return the figures of a friction coefficient."""
+    """Return the key figures of one friction coefficient."""
     free, dry = (recordings[f"{kind}-{tag(mu_B)}"] for kind in (FREE, DRY))
     F_M, F_N = _held(free)
     tan_alpha = wedge.slope(parameters_of(free).wedge)
     closed = (tan_alpha - mu_B) * F_N if F_N > 0 else math.nan
     T = options.t_ramp
     middle = options.t_start + 0.5 * T
-    # The middle half of each ramp: 10 % to either side of the moment.
+    # Use the middle half of each ramp, 10 % to either side of the moment.
     rising, falling = (
         F_N * _slope(dry, at - 0.25 * T, at + 0.25 * T) for at in (middle, middle + T)
     )
@@ -146,23 +154,23 @@ def _each(recordings: Recordings, mu_B: float, options: Options) -> tuple[Kpi, .
 
 
 def _factor(F_B: float, F_M: float, problem: str) -> tuple[float, str]:
-    """Return a brake factor: both pads' braking force over the actuation force."""
+    """Return a brake factor: ratio of both pads' braking force to the actuation force."""
     vague = f"the actuation force is below {_NO_FORCE:g} N, so the brake factor is unbounded"
     note = problem or ("" if abs(F_M) >= _NO_FORCE else vague)
     return math.nan if note else 2.0 * F_B / F_M, note
 
 
 def _neutral(options: Options, F_M: list[float]) -> tuple[float, str]:
-    """Return the friction coefficient at which a force changes its sign, by linear interpolation.
+    """Return the friction coefficient at which a force changes sign, by linear interpolation.
 
-    At equal moments, force times mu_B is proportional to force per normal force, a straight line
-    over mu_B.
+    At equal moments, force times mu_B is proportional to force per normal force, which is a
+    straight line in mu_B.
     """
     order = np.argsort(options.mu_B)
     mu, F = np.array(options.mu_B)[order], np.multiply(F_M, options.mu_B)[order]
     crossings = np.flatnonzero((F[:-1] > 0) & (F[1:] <= 0))
     if not crossings.size:
-        return math.nan, "the actuation force does not change its sign in this range"
+        return math.nan, "the actuation force does not change sign in this range"
     k = int(crossings[0])
     return float(mu[k] + (mu[k + 1] - mu[k]) * F[k] / (F[k] - F[k + 1])), ""
 
@@ -212,7 +220,7 @@ _DEFAULTS = Options(
 EXPERIMENT = Experiment(
     name="static-force",
     assembly="wedge-brake",
-    summary="actuation force and brake factor C* versus pad friction, with or without dry friction",
+    summary="actuation force and C* versus pad friction, with and without dry friction",
     options=Options,
     defaults=_DEFAULTS,
     cases=cases,

@@ -1,4 +1,4 @@
-"""Drive train stiffness, with a force sensor between the screws, and in the brake heart."""
+"""Drive train stiffness, with a force sensor between the screws and in the brake heart."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ from bywire.plant.axial_bearing import AngularSpeed
 
 
 def _heart_case(par: WedgeParameters, stimulus: Stimuli, duration: float, mode: str) -> Case:
-    """Return a run of both motors in the brake heart, without an offset and so without force.
+    """Return a run of both motors in the brake heart, without offset and therefore without force.
 
-    The command's ``mode`` is "current" or "position"; the wedge stays in its clearance.
+    The command's ``mode`` is "current" or "position". The wedge stays in its clearance.
     """
     changes = {"command.mode": mode, "control.offset.delta_preload": 0.0}
     return case_from_parked(par, stimulus, duration, changes, "heart")
@@ -43,50 +43,56 @@ def _squeezing_current(run: xr.Dataset) -> Array:
 
 # --- In current control: ramps of opposite currents
 
-_UPPER = 0.35  # share of the largest current; below it, bearings and free play bend the line
-_HOLD = 0.2  # share of the ramp's time, at the largest current and between the directions
+_UPPER = 0.35  # fraction of the maximum current below which bearings and free play bend the line
+_HOLD = 0.2  # fraction of the ramp time, at the maximum current and between the directions
 STIFFNESS_FIGURES = Figures(
-    K_line_compression=("N/m", "Force over travel with the sensor, compression."),
-    K_line_tension=("N/m", "Force over travel with the sensor, tension."),
-    force_per_current=("N/A", "Force over rising current, mean of compression and tension."),
+    K_line_compression=("N/m", "Force per travel with the sensor, in compression."),
+    K_line_tension=("N/m", "Force per travel with the sensor, in tension."),
+    force_per_current=(
+        "N/A",
+        "Force per current while the current rises, mean of compression and tension.",
+    ),
     K_S=("N/m", "Stiffness of one screw: line stiffness, corrected for the sensor."),
     K_S_true=("N/m", "True value."),
-    K_heart_compression=("N/m", "Force from current over travel, tip to tip."),
-    K_heart_tension=("N/m", "Force from current over travel, through the wedge."),
-    K_W=("N/m", "Stiffness of one interface to the wedge: tension, corrected for the screws."),
+    K_heart_compression=("N/m", "Force from the current per travel, tip to tip."),
+    K_heart_tension=("N/m", "Force from the current per travel, through the wedge."),
+    K_W=(
+        "N/m",
+        "Stiffness of one interface to the wedge: stiffness in tension, corrected for the screws.",
+    ),
     K_W_true=("N/m", "True value."),
-    free_play=("m", "Travel between the compression and tension lines at zero force."),
+    free_play=("m", "Travel between the zero crossings of the compression and tension lines."),
     free_play_true=("m", "True value."),
-    undefined="no travel under load. Set a larger current",
+    undefined="the screws do not travel under load. Set a larger current",
 )
 
 
 class StiffnessOptions(ParameterSet):
-    """Ramps of the current, up and down: first compression, then tension."""
+    """Current ramps up and down, first in compression, then in tension."""
 
     i_max: Current
     """maximum current, with opposite signs in both motors"""
     t_ramp: Duration
-    """time from zero to the largest current"""
+    """time from zero to the maximum current"""
 
 
 class Line(NamedTuple):
-    """A straight line through readings; NaN where there are too few."""
+    """A straight line through readings, NaN if there are too few."""
 
     slope: float
     start: float
-    """its zero crossing"""
+    """zero crossing of the line"""
 
 
 def stiffness(
     par: WedgeParameters, options: StiffnessOptions, _: object = None
 ) -> tuple[Case, ...]:
-    """Return both stages under the same currents; the wedge stays in its clearance.
+    """Return both stages with the same currents. The wedge stays in its clearance.
 
     Notes
     -----
     The evaluation excludes friction as on a real rig. Stage 1 measures force and travel at the
-    sensor, so friction has no effect. Stage 2 has no force sensor. There the force follows from the
+    sensor, so friction has no effect. Stage 2 has no force sensor. There the force comes from the
     current and a calibration from stage 1, which includes the friction at rising current. The
     evaluation assumes symmetry, like the paper. Unequal motors drag the wedge along, and its
     friction then counts as stiffness (K_W is 5 % too high if the torque constants differ by 10 %).
@@ -107,7 +113,7 @@ def stiffness(
 
 
 def judge_stiffness(recordings: Recordings, options: StiffnessOptions) -> tuple[Kpi, ...]:
-    """Return stiffnesses of screws and wedge and the free play, with their true values."""
+    """Return the stiffnesses of screws and wedge and the free play, with their true values."""
     sensor, heart = recordings["sensor"], recordings["heart"]
     par = parameters_of(sensor)
     lines, calibrations, loaded = [], [], []
@@ -180,7 +186,7 @@ def _line(x: Array, y: Array) -> Line:
 STIFFNESS = Experiment(
     name="stiffness",
     assembly="wedge-brake",
-    summary="stiffness of screws and wedge, and free play, with motors against each other",
+    summary="screw and wedge stiffness, and free play, with the motors working against each other",
     options=StiffnessOptions,
     defaults=StiffnessOptions(i_max=15.0, t_ramp=2.0),
     cases=stiffness,
@@ -196,11 +202,11 @@ LABELS = ("sensor", "heart")
 FORCE_CYCLE_FIGURES = Figures(
     force_compression=("N", "Maximum force on the sensor."),
     force_tension=("N", "Maximum tension on the sensor."),
-    stiffness=("N/m", "Slope of force over travel with the sensor."),
+    stiffness=("N/m", "Slope of force versus travel with the sensor."),
     peak_current_sensor=("A", "Maximum mean current of both motors, with the sensor."),
     peak_current_heart=("A", "Maximum mean current of both motors, in the brake heart."),
-    hysteresis=("N*m", "Friction torque: half the loop's width, mean over the cycle."),
-    undefined="no travel. Set larger options",
+    hysteresis=("N*m", "Friction torque: half the width of the loop, mean over the cycle."),
+    undefined="the screws do not travel. Increase options.c_sensor",
 )
 
 
@@ -208,11 +214,11 @@ class ForceCycleOptions(ParameterSet):
     """Travel of one nut toward the other: zero, compression, tension, zero."""
 
     c_sensor: Length
-    """closest, and farthest, with the force sensor between the screws"""
+    """maximum travel in each direction with the force sensor between the screws"""
     c_close: Length
-    """closest in the brake heart, tip to tip"""
+    """maximum travel toward each other in the brake heart, tip to tip"""
     c_apart: Length
-    """farthest in the brake heart, through the wedge"""
+    """maximum travel apart in the brake heart, through the wedge"""
     omega_slow: AngularSpeed
     """speed of both motors"""
 
@@ -220,10 +226,10 @@ class ForceCycleOptions(ParameterSet):
 def force_cycle(
     par: WedgeParameters, options: ForceCycleOptions, _: object = None
 ) -> tuple[Case, ...]:
-    """Return both stages; the wedge stays in its clearance.
+    """Return both stages. The wedge stays in its clearance.
 
-    Steadily turning motors do not stick. Force versus current shows the friction's hysteresis, and
-    force over travel shows the stiffness, in both directions and through the free play.
+    Steadily turning motors do not stick. Force versus current shows the friction hysteresis, and
+    force versus travel shows the stiffness, in both directions and through the free play.
     """
     modes = {"rig.mode_1": "position", "rig.mode_2": "position"}
     squeeze, t_sensor = _cycle(par, options.c_sensor, options.c_sensor, options)
@@ -250,7 +256,7 @@ def _cycle(
 
 
 def judge_force_cycle(recordings: Recordings, options: ForceCycleOptions) -> tuple[Kpi, ...]:
-    """Return the forces reached, the line's stiffness, and the hysteresis of a cycle."""
+    """Return the maximum forces, the line's stiffness, and the hysteresis of a cycle."""
     run = recordings["sensor"]
     par = parameters_of(run)
     F, i = run["y_F"].values, _squeezing_current(run)
@@ -269,7 +275,7 @@ def judge_force_cycle(recordings: Recordings, options: ForceCycleOptions) -> tup
 FORCE_CYCLE = Experiment(
     name="force-cycle",
     assembly="wedge-brake",
-    summary="two motors squeeze and pull by position: stiffness, free play, force versus current",
+    summary="two motors squeeze and pull in position control: stiffness, free play, calibration",
     options=ForceCycleOptions,
     defaults=ForceCycleOptions(c_sensor=1.5e-4, c_close=1.4e-4, c_apart=3e-4, omega_slow=0.3),
     cases=force_cycle,

@@ -36,20 +36,29 @@ from bywire.identification.unknown import Unknown
 from bywire.plant import axial_bearing, servo_motor
 from bywire.plant.axial_bearing import AngularSpeed
 
-_LEVEL = 1e-3  # significance level: share of false alarms
-_OTHER = 0.1  # largest share of the cogging that the friction's slope may explain
+_LEVEL = 1e-3  # significance level: fraction of false alarms
+_OTHER = 0.1  # maximum fraction of the cogging that the friction slope may explain
 _FRICTION = ("T_forward", "T_backward", "friction_slope")
-_FALSE = 1e-3  # chance of an order by noise alone
+_FALSE = 1e-3  # probability that noise alone produces an order
 _MOST = 8
 
 
 @dataclass(frozen=True)
 class Turning:
-    """A shaft that turns slowly, sample by sample, shapes (n,).
+    """Samples of a slowly turning shaft, shapes (n,).
 
-    ``angle``: [rad]; ``way``: 1 forward, -1 backward; ``speed``: magnitude [rad/s]; ``torque``: of
-    the motor, minus the torque that accelerates the inertia [N m]; ``waves``: ``waves(order) ->
-    (cosine, sine)`` of the angle, filtered like the torque.
+    Parameters
+    ----------
+    angle
+        Shaft angle [rad].
+    way
+        1 forward, -1 backward.
+    speed
+        Magnitude [rad/s].
+    torque
+        Motor torque minus the torque that accelerates the inertia [N m].
+    waves
+        ``waves(order) -> (cosine, sine)`` of the angle, with the same filter as the torque.
     """
 
     angle: Array
@@ -60,7 +69,7 @@ class Turning:
 
     @cached_property
     def leveled(self) -> Array:
-        """Torque minus its mean of each direction."""
+        """Torque minus its mean in each direction."""
         rest = self.torque.copy()
         for way in (1.0, -1.0):
             rest[self.way == way] -= rest[self.way == way].mean()
@@ -68,7 +77,7 @@ class Turning:
 
     @cached_property
     def friction_columns(self) -> Array:
-        """Forward, backward, and the speed's deviation from its mean of each direction."""
+        """Forward, backward, and the deviation of the speed from its mean in each direction."""
         ways = [self.way == way for way in (1.0, -1.0)]
         ripple = sum(way * (self.speed - self.speed[way].mean()) for way in ways)
         return np.column_stack((1.0 * ways[0], -1.0 * ways[1], self.way * ripple))
@@ -78,7 +87,14 @@ class Turning:
 class CoggingFit:
     """Fit of cogging and friction.
 
-    ``turning``: data; ``orders``: strongest first; ``estimate``: of ``cogging_problem``.
+    Parameters
+    ----------
+    turning
+        The data.
+    orders
+        Strongest first.
+    estimate
+        Solution of ``cogging_problem``.
     """
 
     turning: Turning
@@ -93,11 +109,11 @@ class CoggingFit:
 
 
 def cogging_problem(turning: Turning, orders: tuple[int, ...]) -> Problem:
-    """Return the fit as a problem of least squares.
+    """Return the fit as a least-squares problem.
 
-    Unknowns are the friction both ways, its slope over speed, and amplitude and phase of every
-    order; those of the first are ``motor_1.T_cog`` and ``phase``, else ``amplitude.N``,
-    ``phase.N``.
+    Unknowns are the friction in both directions, its slope versus speed, and the amplitude and
+    phase of every order. The first order has the names ``motor_1.T_cog`` and ``phase``, and the
+    others have ``amplitude.N`` and ``phase.N``.
     """
     waves = [turning.waves(order) for order in orders]
     columns = np.column_stack((turning.friction_columns, *(w for pair in waves for w in pair)))
@@ -131,11 +147,11 @@ def cogging_problem(turning: Turning, orders: tuple[int, ...]) -> Problem:
 
 
 def _same_both_ways(cogging: CoggingFit) -> Check:
-    r"""Return whether the main order changes with the direction, as cogging does not.
+    r"""Check that the main order is the same in both directions, as cogging is.
 
-    Two more columns, cosine and sine with the sign of the direction, are fitted to the residual.
-    With their coefficients c and covariance C, :math:`c^T C^{-1} c / 2` is about one where
-    friction does not depend on the angle.
+    The check fits two more columns to the residual: cosine and sine with the sign of the
+    direction. With their coefficients c and covariance C, :math:`c^T C^{-1} c / 2` is about one
+    if friction does not depend on the angle.
     """
     from scipy import stats
 
@@ -147,35 +163,41 @@ def _same_both_ways(cogging: CoggingFit) -> Check:
     sure = uncertainty(columns, e - columns @ c)
     value = 0.5 * float(c @ np.linalg.solve(sure.covariance, c))
     limit = float(stats.f.isf(_LEVEL, 2, max(sure.freedom, 1.0)))
-    note = "main order that changes its sign with the direction, over its noise: angular friction"
+    note = (
+        "part of the main order that changes sign with the direction, relative to its noise. "
+        "Friction that depends on the angle causes it"
+    )
     return Check("cogging_same_both_ways", value, limit=limit, note=note)
 
 
 def _slope_as_known(cogging: CoggingFit, known: float) -> Check:
-    """Return the share of the ripple that the fit explains by friction beyond its known slope.
+    """Check how much of the ripple the fit explains by a friction slope other than the known one.
 
-    Friction that depends on the angle looks like friction that falls with the speed while cogging
-    makes the speed ripple. The fitted slope in excess of the known one may be either.
+    Cogging makes the speed ripple. Friction that depends on the angle then looks like friction
+    that falls with speed, so an excess of the fitted slope over the known one may be either.
 
-    ``known``: slope of the friction over speed by its law [N m s/rad].
+    ``known``: slope of friction versus speed according to its law [N m s/rad].
     """
     fit = cogging.estimate
     slope = fit["friction_slope"] if "friction_slope" in fit.names else known
     ripple = float(np.sqrt(2.0) * np.std(cogging.turning.friction_columns[:, 2]))
     share = abs(slope - known) * ripple / max(fit["motor_1.T_cog"], 1e-300)
-    note = "ripple explained by friction beyond its law, over the cogging: angular friction"
+    note = (
+        "ripple that the fit explains by a friction slope beyond the friction law, relative to "
+        "the cogging. Friction that depends on the angle causes it"
+    )
     return Check("slope_beyond_law", share, limit=_OTHER, note=note)
 
 
 def _amplitudes(angle: Array, torque: Array, highest: int) -> Array:
-    """Return the amplitude of every order 1 .. highest, each fitted alone, shape (highest,).
+    """Return the amplitudes of the orders 1 to ``highest``, each fitted alone, shape (highest,).
 
     Parameters
     ----------
     angle
-        [rad], shape (n,); spread evenly over whole revolutions, or nearly so.
+        [rad], shape (n,), spread (almost) evenly over whole revolutions.
     torque
-        Without its mean, shape (n,).
+        Torque minus its mean, shape (n,).
     """
     sizes = np.empty(highest)
     turn = np.exp(-1j * angle)
@@ -187,12 +209,12 @@ def _amplitudes(angle: Array, torque: Array, highest: int) -> Array:
 
 
 def _standing_out(angle: Array, torque: Array, highest: int) -> tuple[int, ...]:
-    """Return the orders that stand out of the noise, strongest first.
+    """Return the orders that stand out from the noise, strongest first.
 
-    The power of noise at an order has an exponential distribution; its mean is the median over all
-    orders divided by log 2. An order counts if its power exceeds this mean beyond the significance
-    level for all orders together. Orders are subtracted one after the other, so that a strong one
-    does not leak into others.
+    The noise power at an order has an exponential distribution. Its mean is the median over all
+    orders divided by log 2. An order counts if its power is significantly larger than this mean,
+    at a level that covers all orders together. The function subtracts one order after another, so
+    a strong order does not leak into others.
     """
     residual, orders = torque - torque.mean(), list[int]()
     limit = math.log(highest / _FALSE) / math.log(2.0)
@@ -208,48 +230,51 @@ def _standing_out(angle: Array, torque: Array, highest: int) -> tuple[int, ...]:
     return tuple(orders)
 
 
-_ADVICE = "turn the shaft slowly by whole revolutions both ways, as 'bywire run slow-rotation' does"
+_ADVICE = (
+    "Turn the shaft slowly through whole revolutions in both directions, as "
+    "'bywire run slow-rotation' does"
+)
 _BINS = 36
-_THINNED = 0.8  # cutoff of the low-pass over half the new sample rate
+_THINNED = 0.8  # cutoff frequency of the low-pass filter relative to half the new sample rate
 
 
 class Options(ParameterSet):
     """Filters, orders, and the synthetic noise."""
 
     cutoff: Frequency
-    """low-pass filter for torque and angle; must pass the cogging"""
+    """cutoff frequency of the filter for torque and angle; must be above the cogging frequency"""
     slowest: AngularSpeed
     """speed below which the shaft counts as reversing"""
     margin: Duration
-    """time omitted at either end of a motion"""
+    """time to omit at the start and end of each motion"""
     highest: Annotated[int, Unit("1", 400.0), Field(ge=1, le=10000)]
-    """maximum order of a revolution in the search"""
+    """maximum order per revolution in the search"""
     sigma_i: Annotated[float, Unit("A", 0.02), Field(ge=0)]
-    """noise of the measured current in synthetic measurements"""
+    """current noise in synthetic measurements"""
 
 
 def identify(
     data: xr.Dataset, par: WedgeParameters, options: Options, effort: Effort
 ) -> Identified:
-    r"""Return amplitude and phase of the cogging torque's orders, and the friction both ways.
+    r"""Return amplitude and phase of the cogging orders, and the friction in both directions.
 
     .. math::
         K_T i - J \dot\omega = \sum_n T_n \sin(n \theta + \varphi_n)
         \pm T_{FRICT} + d\,(\omega \mp \bar\omega)
 
-    The last term is the change of friction with the ripple of the speed.
+    The last term is the change in friction due to the speed ripple.
 
     Parameters
     ----------
     data
-        ``i_1`` [A], ``q_1`` [rad]. Torque constant and inertia, the
-        dummy shaft's included, must be known.
+        ``i_1`` [A], ``q_1`` [rad]. The torque constant and the inertia, including the dummy
+        shaft, must be known.
 
     Raises
     ------
     ParameterError
-        When the shaft turns in one direction only or too little, no order exceeds the noise, or a
-        sign is wrong.
+        If the shaft turns in one direction only or not far enough, if no order exceeds the
+        noise, or if a sign is wrong.
 
     References
     ----------
@@ -260,8 +285,8 @@ def identify(
     orders = _standing_out(turning.angle, turning.leveled, options.highest)
     if not orders:
         raise ParameterError(
-            f"no order up to {options.highest} exceeds the noise. Turn slower or by more "
-            "revolutions, or raise options.highest",
+            f"no order up to {options.highest} exceeds the noise. Turn the shaft more slowly or "
+            "through more revolutions, or raise options.highest",
             name="options.highest",
             value=str(options.highest),
         )
@@ -289,7 +314,8 @@ def _require_braking(turning: Turning) -> None:
     forward, backward = (float(turning.torque[turning.way == w].mean()) for w in (1.0, -1.0))
     friction = 0.5 * (forward - backward)
     if friction < 0.0:
-        raise wrong_sign("i_1", "q_1", f"friction {friction:.3g} N*m: it would drive the shaft")
+        cause = f"friction of {friction:.3g} N*m would drive the shaft"
+        raise wrong_sign("i_1", "q_1", cause)
 
 
 def _slope(par: WedgeParameters, turning: Turning) -> float:
@@ -304,17 +330,17 @@ def _slope(par: WedgeParameters, turning: Turning) -> float:
 
 def _notes(best: Estimate, orders: tuple[int, ...]) -> tuple[str, ...]:
     turned_by = np.degrees(best["phase"]) / orders[0]
-    notes = [f"the cogging's zero is {-turned_by:.4g} degrees of shaft angle from the encoder's"]
+    notes = [f"the zero of the cogging is {-turned_by:.4g} degrees from the encoder's zero"]
     if len(orders) > 1:
         notes.append(
-            f"orders {', '.join(map(str, orders[1:]))} are present too; the model has only the "
-            f"strongest ({orders[0]})"
+            f"the data also contain the orders {', '.join(map(str, orders[1:]))}. The model has "
+            f"only the strongest order ({orders[0]})"
         )
     return tuple(notes)
 
 
 def _turning(data: xr.Dataset, par: WedgeParameters, options: Options) -> Turning:
-    """Return the shaft's torque while it turns, thinned to independent samples."""
+    """Return the torque of the turning shaft, thinned to independent samples."""
     interval = even_interval(data["time"].values)
     seen = xr.Dataset({"theta": data["q_1"], "i": data["i_1"]})
     moved = differentiated(seen, "theta", ("omega", "alpha"), options.cutoff)
@@ -326,7 +352,7 @@ def _turning(data: xr.Dataset, par: WedgeParameters, options: Options) -> Turnin
     strokes = windows(omega, interval, options.slowest, options.margin, every * interval)
     if not strokes:
         raise ParameterError(
-            f"from q_1, the shaft never turns faster than {options.slowest:g} rad/s: {_ADVICE}",
+            f"the shaft (q_1) never turns faster than {options.slowest:g} rad/s. {_ADVICE}",
             name="q_1",
             valid=f"{options.slowest:g} rad/s",
         )
@@ -334,8 +360,8 @@ def _turning(data: xr.Dataset, par: WedgeParameters, options: Options) -> Turnin
     ways = np.sign(omega[rows])
     if np.all(ways > 0) or np.all(ways < 0):
         raise ParameterError(
-            "from q_1, the shaft turns in one direction only, so dry friction and an offset of "
-            f"the current cannot be separated: {_ADVICE}",
+            "the shaft (q_1) turns in one direction only, so the data do not separate dry "
+            f"friction from a current offset. {_ADVICE}",
             name="q_1",
         )
     fastest = float(np.abs(omega[rows]).max())
@@ -343,7 +369,7 @@ def _turning(data: xr.Dataset, par: WedgeParameters, options: Options) -> Turnin
     if options.highest > passes:
         advice = (
             f"the highest order that a low-pass filter of {options.cutoff:g} Hz passes at "
-            f"{fastest:.3g} rad/s; turn slower, or raise options.cutoff"
+            f"{fastest:.3g} rad/s. Turn the shaft more slowly, or raise options.cutoff"
         )
         raise not_valid("options.highest", str(options.highest), f"<= {passes:.0f}", advice)
     angle = data["q_1"].values
@@ -361,7 +387,7 @@ def _turning(data: xr.Dataset, par: WedgeParameters, options: Options) -> Turnin
 
 
 def _folded(cogging: CoggingFit) -> Curve:
-    """Return torque without friction over one period of the main order, both directions."""
+    """Return torque without friction versus one period of the main order, both directions."""
     turning, order = cogging.turning, cogging.orders[0]
     x = np.mod(order * turning.angle, 2.0 * np.pi)
     middle = (np.arange(_BINS) + 0.5) * 2.0 * np.pi / _BINS
@@ -376,12 +402,13 @@ def _folded(cogging: CoggingFit) -> Curve:
     model = np.tile(amplitude * np.sin(middle + phase), (2, 1))
     return Curve(
         "cogging-period",
-        f"Torque over one period of order {order} without friction: measured both ways, modeled.",
+        f"Torque without friction over one period of order {order}, measured in both directions "
+        "and modeled.",
         over(
             ("x", middle, "rad", f"{order} times the shaft angle"),
             {"measured": table, "modeled": model},
             "N*m",
-            "torque against cogging",
+            "motor torque minus friction",
             ("direction", ("forward", "backward")),
         ),
         "x",
@@ -389,7 +416,7 @@ def _folded(cogging: CoggingFit) -> Curve:
 
 
 def synthetic(par: WedgeParameters, options: Options, seed: int) -> xr.Dataset:
-    """Return the simulated slow rotation with sensor noise, from a random angle."""
+    """Return the simulated slow rotation from a random angle, with sensor noise."""
     experiment = slow_rotation.EXPERIMENT
     case = experiment.cases(par, experiment.defaults, None)[0]
     random = np.random.default_rng(seed)
@@ -408,7 +435,7 @@ def truth(par: WedgeParameters, options: Options) -> dict[str, float]:
 METHOD = Method(
     name="cogging",
     assembly="wedge-brake",
-    summary="orders of the cogging torque, amplitude and phase, and the dry friction",
+    summary="cogging torque (orders, amplitudes, phases) and dry friction",
     experiment="slow-rotation",
     signals={"i_1": "A", "q_1": "rad"},
     options=Options,
@@ -419,10 +446,10 @@ METHOD = Method(
     unknowns=("motor_1.T_cog",),
     truth=truth,
     further={
-        "phase": ("rad", "of the main order at the encoder's zero"),
-        "amplitude.N": ("N*m", "of a weaker order N, with its phase.N"),
+        "phase": ("rad", "phase of the main order at the encoder's zero"),
+        "amplitude.N": ("N*m", "amplitude of a weaker order N, whose phase is phase.N"),
         "T_forward": ("N*m", "dry friction forward"),
         "T_backward": ("N*m", "dry friction backward"),
-        "friction_slope": ("N*m*s/rad", "friction versus speed, at the test speed"),
+        "friction_slope": ("N*m*s/rad", "slope of friction versus speed, at the test speed"),
     },
 )

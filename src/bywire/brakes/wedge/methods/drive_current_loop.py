@@ -1,4 +1,4 @@
-"""Gains of a drive's current loop from steps of a clamped motor (2003, "Motor current loop")."""
+"""Current-loop gains of a drive from steps of a clamped motor (2003, "Motor current loop")."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ class Options(LoopOptions):
     """Unknowns, and the synthetic experiment."""
 
     i_step: Current
-    """synthetic: largest demand"""
+    """synthetic: maximum demand"""
     interval: Duration
     """synthetic: sample time"""
     sigma_i: Annotated[float, Unit("A", 2e-2), Field(ge=0)]
-    """synthetic: noise of the measured current"""
+    """synthetic: current noise"""
 
 
 def held(par: WedgeParameters, _: Options) -> WedgeParameters:
@@ -47,7 +47,7 @@ LOOP = CurrentLoop(
 
 
 def synthetic(par: WedgeParameters, options: Options, seed: int) -> xr.Dataset:
-    """Return simulated steps of the demand on the rig of one motor, with sensor noise."""
+    """Return simulated demand steps on the rig with one motor, with sensor noise."""
     check_current("i_step", options.i_step, par)
     T = par.control.T_fast
     demand = levels(-options.i_step, options.i_step, options.duration, options.dwell, T, seed=1)
@@ -68,7 +68,7 @@ def synthetic(par: WedgeParameters, options: Options, seed: int) -> xr.Dataset:
 METHOD = LOOP.method(
     name="drive-current-loop",
     assembly="wedge-brake",
-    summary="gains of a drive's current loop from steps, motor clamped (2003, current loop)",
+    summary="current-loop gains of a drive from steps with the motor clamped (2003)",
     experiment="current-loop",
     options=Options,
     defaults=Options(

@@ -1,7 +1,7 @@
-"""Force over current of a screw drive: calibration line, friction to either side, offset.
+"""Force versus current of a screw drive: calibration line, friction band, offset.
 
-For a brake without a force sensor: the force that a current gives, and its uncertainty by friction.
-Two motors squeeze a force between their screws; one of them may be at rest.
+A brake without a force sensor needs the force at a given current, and its uncertainty due to
+friction. Two motors squeeze a force between their screws. One of the motors may be at rest.
 """
 
 from __future__ import annotations
@@ -39,28 +39,28 @@ SIGNALS: Mapping[str, str] = {"i_1": "A", "i_2": "A", "q_1": "rad", "q_2": "rad"
 """currents, angles, compressive force: name -> SI unit"""
 
 SIMULATED = ("sigma_i", "sigma_F")
-"""options that synthetic measurements alone use"""
+"""options that only synthetic measurements use"""
 
 
 class RigOptions(ParameterSet):
     """Part of the motion that counts, and the synthetic noise."""
 
     cutoff: Frequency
-    """low-pass filter for the speed"""
+    """cutoff frequency of the low-pass filter for the speed"""
     slowest: AngularSpeed
-    """speed of one motor toward the other that counts as motion"""
+    """minimum relative speed of the two motors that counts as motion"""
     margin: Duration
-    """time omitted at either end of a motion"""
+    """time to omit at the start and end of each motion"""
     window: Duration
-    """time over which signals are averaged"""
+    """averaging time of the signals"""
     sigma_i: Annotated[float, Unit("A", 0.02), Field(ge=0)]
-    """noise of the measured currents in synthetic measurements"""
+    """current noise in synthetic measurements"""
     sigma_F: Annotated[float, Unit("N", 5.0), Field(ge=0)]
-    """noise of the force sensor in synthetic measurements"""
+    """force sensor noise in synthetic measurements"""
 
 
 def drive_sensors(options: RigOptions) -> dict[str, Sensor]:
-    """Return the sensors of a synthetic measurement: currents, angles of the shafts, force."""
+    """Return the sensors of a synthetic measurement: currents, shaft angles, force."""
     sensors = {name: Sensor(name, options.sigma_i) for name in ("i_1", "i_2")}
     sensors |= {name: Sensor(name) for name in ("q_1", "q_2")}
     return sensors | {"y_F": Sensor("y_F", options.sigma_F)}
@@ -69,26 +69,27 @@ def drive_sensors(options: RigOptions) -> dict[str, Sensor]:
 # --- Cogging of two motors that squeeze a force between their screws
 
 _WAVES = {
-    "cos": "cogging of known order over the motors' angle against each other, cosine",
-    "sin": "the same, sine",
-    "cos_drift": "effect of a drift of both motors in the same direction, cosine",
-    "sin_drift": "the same, sine",
+    "cos": "cogging of known order versus the relative angle of the motors, cosine",
+    "sin": "cogging of known order versus the relative angle of the motors, sine",
+    "cos_drift": "effect of both motors drifting in the same direction, cosine",
+    "sin_drift": "effect of both motors drifting in the same direction, sine",
 }
 
 
 def cogging_waves(q_1: Array, q_2: Array, order: float) -> Array:
-    r"""Return the waves that cogging makes in the current that squeezes, shape (n, 4).
+    r"""Return the waves that cogging causes in the squeezing current, shape (n, 4).
 
     .. math::
         \{\cos\psi, \sin\psi\} \times \{\cos\delta, \sin\delta\}, \qquad
         \psi = N \frac{q_1 - q_2}{2}, \quad \delta = N \frac{q_1 + q_2}{2}
 
-    with :math:`\delta` minus its mean: every :math:`a \cos(N q_1 + \varphi_1) + b \cos(N q_2 +
-    \varphi_2)` is a sum of them. The motors turn against each other, and :math:`\delta` is only
-    the common motion that cogging causes; its waves vanish with it.
+    where :math:`\delta` has its mean subtracted. Every :math:`a \cos(N q_1 + \varphi_1) +
+    b \cos(N q_2 + \varphi_2)` is a sum of these waves. The motors turn in opposite directions, so
+    :math:`\delta` is only the common motion that cogging causes. Without this motion its waves
+    vanish.
 
-    Where one motor stands, its cogging is a part of the offset and not a wave: the result is then
-    the waves of the other, and zeros.
+    If one motor is at rest, its cogging is part of the offset and not a wave. The result is then
+    the waves of the other motor, and zeros.
 
     ``q_1``, ``q_2``: angles [rad], shape (n,); ``order``: periods per revolution, N.
     """
@@ -113,48 +114,48 @@ def cogging_unknowns(par: WedgeParameters, stage: str) -> tuple[Unknown, ...]:
 
 
 def cogging_meanings(stage: str) -> dict[str, tuple[str, str]]:
-    """Return SI unit and meaning of the unknowns of a stage, by name."""
+    """Return SI unit and meaning of each unknown of a stage, by name."""
     return {f"cogging.{stage}.{name}": ("A", text) for name, text in _WAVES.items()}
 
 
-# --- Current over force: a mean line, and friction to either side of it
+# --- Current versus force: a mean line, and friction to either side of it
 
 LAW_MEANINGS: Mapping[str, tuple[str, str]] = {
     "offset": ("A", "current at zero force, i_0"),
     "force_per_current": ("N/A", "slope of the line, c"),
-    "half_width": ("A", "friction to either side without force, w_0"),
-    "half_width_slope": ("A/N", "its growth with force, w_1"),
-    "half_width_curvature": ("A/N**2", "and with the square of force, w_2"),
+    "half_width": ("A", "half width of the friction band at zero force, w_0"),
+    "half_width_slope": ("A/N", "growth of the half width with force, w_1"),
+    "half_width_curvature": ("A/N**2", "growth of the half width with force squared, w_2"),
 }
 """unknowns of the law -> SI unit and meaning"""
 
 LAW_NAMES = tuple(LAW_MEANINGS)
-_AGAINST = -0.5  # correlation of current and force that is not by chance
+_AGAINST = -0.5  # a correlation of current and force below this is not by chance
 
 
 @dataclass(frozen=True)
 class Squeeze:
-    """Steady motion of two screws toward each other or apart, by window, shapes (n,).
+    """Steady motion of two screws toward each other or apart, one value per window, shapes (n,).
 
     Parameters
     ----------
     i
-        Current that squeezes, mean of both motors, at the reference speed [A].
+        Squeezing current, mean of both motors, at the reference speed [A].
     F
-        Force by the sensor, corrected for the lag of its amplifier, compression positive [N].
+        Force from the sensor, corrected for the amplifier lag, positive in compression [N].
     d
-        Approach of the nuts by the encoders [m].
+        Approach of the nuts from the encoders [m].
     way
         1 closing, -1 opening.
     waves
-        Of the cogging, shape (n, 4).
+        Waves of the cogging, shape (n, 4).
     reach
-        Travel one margin before a window begins, and at its end [m], shape (n, 2): events in
+        Travel one margin before a window begins, and at its end [m], shape (n, 2). Events in
         between affect the window.
     each
         Speed of one motor in each window [rad/s].
     speed
-        Reference speed of one motor, to which the current is corrected [rad/s].
+        Reference speed of one motor [rad/s]. The current is corrected to this speed.
     """
 
     i: Array
@@ -172,7 +173,7 @@ class Squeeze:
         return replace(self, **columns)
 
     def under(self, F: Array, par: WedgeParameters) -> Squeeze:
-        """Return the same with other forces, and the current corrected for them."""
+        """Return the same motion with other forces, and the current corrected for them."""
         before = _speed_effect(self.F, self.each, self.speed, par)
         after = _speed_effect(F, self.each, self.speed, par)
         return replace(self, i=self.i + self.way * (before - after), F=F)
@@ -185,47 +186,48 @@ def squeeze(
     where: str,
     reference_speed: float | None = None,
 ) -> Squeeze:
-    """Return the steady motions of a record.
+    """Return the steady motions in a record.
 
     Parameters
     ----------
     data
         ``i_1``, ``i_2`` [A], ``q_1``, ``q_2`` [rad], ``y_F`` [N].
     par
-        Lead of the screw, order of the cogging, corner of the force sensor, and how the friction
-        of bearings and motors changes with speed.
+        Screw lead, cogging order, corner frequency of the force sensor, and the change of bearing
+        and motor friction with speed.
     options
-        How the record is filtered and cut into windows.
+        Filter and windows.
     where
         Name of the record in messages.
     reference_speed
-        Speed of one motor [rad/s] to which the current is corrected; the record's mean by default.
+        Speed of one motor [rad/s] to which the current is corrected. Default: the record's mean.
 
     Raises
     ------
     ParameterError
-        When the motors do not move both ways, or their currents go against the force.
+        If the motors do not move in both directions, or if their currents oppose the force.
     """
     interval = even_interval(data["time"].values)
     q_1, q_2 = data["q_1"].values, data["q_2"].values
     speed = np.gradient(low_passed(q_1 - q_2, interval, options.cutoff), interval)
     steady = windows(speed, interval, options.slowest, options.margin, options.window)
     side = np.sign(low_passed(data["y_F"].values, interval, options.cutoff))
-    # Where the force changes its sign, friction has a kink, and a mean over it violates the law.
+    # Friction has a kink where the force changes sign, and a mean over the kink violates the law.
     steady = [w for w in steady if abs(float(side[w.rows].mean())) in (0.0, 1.0)]
     ways = np.array([np.sign(speed[w.rows].mean()) for w in steady])
     if not (np.any(ways > 0) and np.any(ways < 0)):
         raise ParameterError(
             f"{where}: the screws do not move both toward each other and apart at more than "
-            f"{options.slowest:g} rad/s, so friction and force cannot be separated. Squeeze "
-            "and release slowly, as 'bywire run force-cycle' does",
+            f"{options.slowest:g} rad/s, so the data do not separate friction from force. "
+            "Squeeze and release slowly, as 'bywire run force-cycle' does",
             name=where,
         )
 
     def means(values: Array) -> Array:
         return np.array([values[w.rows].mean(axis=0) for w in steady])
 
-    # The sensor's amplifier lags, one way while the force rises, the other while it falls.
+    # The sensor's amplifier lags: it reads too low while the force rises, and too high while it
+    # falls.
     lag = 1.0 / (2.0 * np.pi * par.rig.sensor.f_F)
     rate = np.gradient(low_passed(data["y_F"].values, interval, options.cutoff), interval)
     F = means(data["y_F"].values + lag * rate)
@@ -249,7 +251,7 @@ def squeeze(
 
 
 def _require_along(i: Array, F: Array, where: str) -> None:
-    """Require currents that squeeze where the sensor shows compression."""
+    """Require currents that squeeze while the sensor shows compression."""
     together = float(np.corrcoef(i, F)[0, 1]) if np.ptp(F) > 0.0 and np.ptp(i) > 0.0 else 0.0
     if together < _AGAINST:
         raise wrong_sign(
@@ -258,10 +260,10 @@ def _require_along(i: Array, F: Array, where: str) -> None:
 
 
 def _speed_effect(F: Array, speed: Array, stated: float, par: WedgeParameters) -> Array:
-    """Return the current by which friction at each speed exceeds that at the reference speed [A].
+    """Return the extra current that friction needs at each speed, relative to the reference [A].
 
-    A position loop yields under load, so that the screws close slower than they open. The friction
-    of bearings and motors changes with the speed, which would turn the line.
+    A position loop yields under load, so the screws close more slowly than they open. The friction
+    of bearings and motors changes with speed, which would tilt the line.
     """
     motor = par.motor_1
     bearing = np.array(
@@ -275,14 +277,14 @@ def _speed_effect(F: Array, speed: Array, stated: float, par: WedgeParameters) -
 
 
 def law_unknowns(par: WedgeParameters) -> tuple[Unknown, ...]:
-    r"""Return the unknowns of the law, with starting values of the parameter set.
+    r"""Return the unknowns of the law, with starting values from the parameter set.
 
     .. math::
         i = i_0 + F/c \pm (w_0 + w_1 |F| + w_2 F^2), \quad
         \frac{1}{c} = \frac{L}{2\pi} \frac{1/\eta_f + \eta_b}{2 K_T}, \quad
         w_1 = \frac{L}{2\pi} \frac{1/\eta_f - \eta_b}{2 K_T} + \frac{C_1}{K_T}
 
-    with :math:`w_0 = C_0 (1 + G_S) / K_T` and :math:`w_2 = C_2 / K_T` of the bearings' friction.
+    with :math:`w_0 = C_0 (1 + G_S) / K_T` and :math:`w_2 = C_2 / K_T` from the bearing friction.
     """
     K = 0.5 * sum(servo_motor.torque_constant(m) for m in (par.motor_1, par.motor_2))
     k, screw, bearing = roller_screw.slope(par.screw), par.screw, par.bearing
@@ -300,7 +302,7 @@ def law_unknowns(par: WedgeParameters) -> tuple[Unknown, ...]:
 
 
 def law(F: Array, way: Array, values: Array) -> tuple[Array, Array, Array]:
-    """Return the current, its derivatives by the unknowns (n, 5), and by the force (n,)."""
+    """Return the current and its derivatives, by the unknowns (n, 5) and by the force (n,)."""
     c = values[1]
     size = np.abs(F)
     columns = np.column_stack((np.ones_like(F), -F / c**2, way, way * size, way * size**2))
@@ -310,7 +312,7 @@ def law(F: Array, way: Array, values: Array) -> tuple[Array, Array, Array]:
 
 
 def branches(squeezed: Squeeze, power: int, x: Array) -> Array:
-    """Return separate polynomials over x for closing and opening, below, at and above zero."""
+    """Return separate polynomials of x for closing and opening, below, at and above zero."""
     scaled = x / max(float(np.abs(x).max()), 1e-300)
     groups = [
         (squeezed.way == way) & (np.sign(x) == side) for way in (1, -1) for side in (1, 0, -1)
@@ -332,18 +334,18 @@ def identify(
 
     .. math:: i = i_0 + F/c \pm (w_0 + w_1 |F| + w_2 F^2)
 
-    with the upper sign while the screws close. Cogging of known order is fitted at the same time.
+    The upper sign applies while the screws close. The same fit includes cogging of known order.
 
     Parameters
     ----------
     data
-        ``i_1``, ``i_2`` [A], ``q_1``, ``q_2`` [rad], ``y_F`` [N]: two motors that squeeze and
+        ``i_1``, ``i_2`` [A], ``q_1``, ``q_2`` [rad], ``y_F`` [N] of two motors that squeeze and
         release slowly. A motor that only holds may be at rest.
 
     Raises
     ------
     ParameterError
-        When the motors move in one direction only.
+        If the motors move in one direction only.
 
     References
     ----------
@@ -374,20 +376,20 @@ def identify(
                 np.ones(cycle.i.size),
                 np.hstack((branches(cycle, 3, cycle.F), cycle.waves)),
                 len(best.values),
-                "whether current over force deviates from the law",
+                "whether current versus force deviates from the law",
             ),
         ),
         curves=(_curve(cycle, values),),
         notes=(
-            "half widths are valid at the mean speed of the test; at rest the force may be "
+            "half widths are valid at the mean speed of the test. At rest the force may be "
             "anywhere within them",
-            "the change of the bearings' friction with speed is that of the parameter set",
+            "the change of bearing friction with speed comes from the parameter set",
         ),
     )
 
 
 def _scatter(cycle: Squeeze) -> float:
-    """Return a rough scatter of the current; it drops out of the result."""
+    """Return a rough scatter of the current. It has no influence on the result."""
     return max(float(np.median(np.abs(np.diff(cycle.i)))), 1e-9)
 
 
@@ -410,7 +412,7 @@ def _curve(cycle: Squeeze, values: Array) -> Curve:
     places, rows = [], []
     for sign in (1.0, -1.0):
         F, i = cycle.F[cycle.way == sign], measured[cycle.way == sign]
-        # A gap at zero force: no window lies at the kink there.
+        # Leave a gap at zero force, because no window lies at the kink there.
         places.append(np.append(F, 0.0))
         branch = np.array((i, law(F, np.full(F.size, sign), values)[0]))
         rows.append(np.append(branch, _GAP, axis=1))
@@ -420,7 +422,7 @@ def _curve(cycle: Squeeze, values: Array) -> Curve:
     F, table = at_own_places(places, rows)
     return Curve(
         "current-over-force",
-        "Current over force, closing and opening, with the calibration line in the middle.",
+        "Current versus force, closing and opening, with the calibration line in the middle.",
         over(
             ("F", F, "N", "force"),
             {"measured": table[0], "modeled": table[1]},
@@ -441,7 +443,7 @@ def synthetic(par: WedgeParameters, options: RigOptions, seed: int) -> xr.Datase
 
 
 def truth(par: WedgeParameters, options: RigOptions) -> dict[str, float]:
-    """Return the true line and growth of the friction by the laws of screw and bearing."""
+    """Return the true line and friction growth according to the laws of screw and bearing."""
     known = {u.label: u.start for u in law_unknowns(par)}
     return {name: known[name] for name in ("offset", "force_per_current", "half_width_slope")}
 
@@ -449,7 +451,7 @@ def truth(par: WedgeParameters, options: RigOptions) -> dict[str, float]:
 METHOD = Method(
     name="force-calibration",
     assembly="wedge-brake",
-    summary="force versus current of the screw drive: line, friction to either side, offset",
+    summary="force versus current of the screw drive: calibration line, friction band, offset",
     experiment="force-cycle",
     signals=SIGNALS,
     options=RigOptions,

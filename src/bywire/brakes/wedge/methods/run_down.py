@@ -1,7 +1,7 @@
-"""Inertia and friction from run-downs of a motor (Roberts 2003, sections "Motor", "Bearings").
+"""Inertia and friction from motor run-downs (Roberts 2003, sections "Motor", "Bearings").
 
-A run-down alone determines friction and damping per inertia only: with all of them twice as large
-the shaft stops in the same way. An added inertia, or the torque of a known current, sets the scale.
+A run-down alone determines only the ratios of friction and damping to inertia: if all of them are
+twice as large, the shaft stops in the same way. An added inertia or a known current sets the scale.
 """
 
 from __future__ import annotations
@@ -44,13 +44,13 @@ from bywire.plant.axial_bearing import AngularSpeed
 
 _INERTIA = "motor_1.J_M"
 _NAMES = (_INERTIA, "bearing.C_0", "bearing.T_nu", "motor_1.D_M")
-_ADVICE = "let a fast shaft coast, as 'bywire run run-down' does"
-_SCALE = 0.02  # least known torque that sets the scale, over the decelerating torque
+_ADVICE = "Let a fast shaft coast, as 'bywire run run-down' does"
+_SCALE = 0.02  # minimum known torque that sets the scale, relative to the decelerating torque
 
 
 @dataclass(frozen=True)
 class RunDown:
-    """One record: its motion, the load on the shaft, and the equation of motion."""
+    """Motion, shaft load and equation of motion of one record."""
 
     label: str
     par: WedgeParameters
@@ -65,17 +65,18 @@ class RunDown:
 
 
 def _read_run(label: str, data: xr.Dataset, par: WedgeParameters, options: Options) -> RunDown:
-    """Return a record's motion; an inertia added to the shaft counts as part of the dummy."""
+    """Return a record's motion. An inertia added to the shaft counts as part of the dummy."""
     seen = data.rename({"q_1": "theta", "i_1": "i"})
     moved = differentiated(seen[["theta", "i"]], "theta", ("omega", "alpha"), options.cutoff)
     moved["F"] = ("time", np.zeros(moved.sizes["time"]), {"units": "N"})
     motion = motions(moved, "omega", options.slowest, options.margin, options.window)
     if len(motion.windows) < len(_NAMES):
         raise ParameterError(
-            f"record {label} has too few windows of {1e3 * options.window:g} ms above "
-            f"{options.slowest:g} rad/s, {len(motion.windows)}: {_ADVICE}",
+            f"record {label} has {len(motion.windows)} windows of {1e3 * options.window:g} ms "
+            f"above {options.slowest:g} rad/s, but the fit needs >= {len(_NAMES)}. {_ADVICE}",
             name=f"record {label}",
             value=str(len(motion.windows)),
+            valid=f">= {len(_NAMES)}",
         )
     added = float(data["J_added"].values[0])
     run_par = par.replace(
@@ -88,7 +89,7 @@ def _read_run(label: str, data: xr.Dataset, par: WedgeParameters, options: Optio
 
 
 def _fitted(runs: Sequence[RunDown], names: Sequence[str]) -> Estimate:
-    """Fit the torque balances of all records for parameters of the motor and its bearings."""
+    """Fit motor and bearing parameters to the torque balances of all records."""
     unknowns = parameters_of(runs[0].par, names)
     return steady_dynamics([run.problem(unknowns) for run in runs], unknowns, _ADVICE)
 
@@ -101,7 +102,7 @@ def _has_scale(runs: Sequence[RunDown]) -> bool:
     """Return whether a known inertia or torque is large enough to set the scale.
 
     The current that the back-EMF drives through the loop is proportional to the deceleration. It
-    acts like inertia and does not set a useful scale.
+    acts like inertia and cannot set a useful scale.
     """
     J = [run.par.motor_1.J_M + run.par.rig.J_dummy for run in runs]
     if max(J) - min(J) > _SCALE * min(J):
@@ -111,7 +112,7 @@ def _has_scale(runs: Sequence[RunDown]) -> bool:
 
 
 def _by_source(runs: Sequence[RunDown]) -> dict[str, tuple[float, float]]:
-    """Return the inertia and its deviation, by the added inertia alone and by the current alone."""
+    """Return inertia and standard deviation from the added inertia and from the current alone."""
     quiet = min(abs(run.torque) for run in runs)
     J = min(run.par.motor_1.J_M + run.par.rig.J_dummy for run in runs)
     small = _SCALE * J * max(map(_deceleration, runs))
@@ -130,7 +131,7 @@ def _by_source(runs: Sequence[RunDown]) -> dict[str, tuple[float, float]]:
 
 
 def _residuals_of(runs: Sequence[RunDown], best: Estimate) -> list[Array]:
-    """Return the residual torques of every record [N m], by window."""
+    """Return the residual torques of each record [N m], one per window."""
     values = best.parameters()
     unknowns = [u for u in best.unknowns if u.name in values]
     at = np.array([values[u.name] for u in unknowns])
@@ -148,23 +149,23 @@ class Options(ParameterSet):
     """Part of a run-down that counts, filter, and the synthetic noise."""
 
     slowest: AngularSpeed
-    """lowest speed that counts; below it cogging and the Stribeck effect dominate"""
+    """minimum speed; below it cogging and the Stribeck effect dominate"""
     margin: Duration
-    """time omitted at either end of that part"""
+    """time to omit at the start and end of each coasting phase"""
     window: Duration
-    """time over which the torque balance is averaged"""
+    """averaging time of the torque balance"""
     cutoff: Frequency
-    """low-pass filter applied to the angle before differentiation"""
+    """cutoff frequency of the low-pass filter for the angle before differentiation"""
     sigma_i: Annotated[float, Unit("A", 0.02), Field(ge=0)]
-    """noise of the measured current in synthetic measurements"""
+    """current noise in synthetic measurements"""
     sigma_q: Annotated[float, Unit("rad", 1e-4), Field(ge=0)]
-    """noise of the angle in synthetic measurements, in addition to whole counts"""
+    """angle noise in synthetic measurements, in addition to the encoder's resolution"""
 
 
 def identify(
     data: xr.Dataset, par: WedgeParameters, options: Options, effort: Effort
 ) -> Identified:
-    r"""Return inertia and friction, or their ratios without a known scale.
+    r"""Return inertia and friction, or only their ratios if the scale is unknown.
 
     .. math::
         (J_M + J_{dummy} + J_{added}) \dot\omega
@@ -173,14 +174,14 @@ def identify(
     Parameters
     ----------
     data
-        One or several records: ``q_1`` [rad], ``i_1`` [A] as measured (with zero demand, the
-        falling back-EMF still drives a current), and ``J_added`` [kg m^2], the known inertia
-        on the shaft in addition to the dummy's.
+        One or several records of ``q_1`` [rad], ``i_1`` [A] as measured (even at zero demand, the
+        falling back-EMF drives a current), and ``J_added`` [kg m^2], the known inertia on the
+        shaft in addition to the dummy shaft.
 
     Raises
     ------
     ParameterError
-        When a record does not coast.
+        If a record does not coast.
 
     References
     ----------
@@ -208,10 +209,10 @@ def identify(
 
 def _no_scale(par: WedgeParameters) -> str:
     return (
-        "the data do not determine the inertia: a run-down alone determines friction and damping "
-        "per inertia only. Those ratios are valid; the torques assume motor_1.J_M = "
+        "the data do not determine the inertia. A run-down alone determines only the ratios of "
+        "friction and damping to inertia. These ratios are valid. The torques assume motor_1.J_M = "
         f"{shown(par.motor_1.J_M, 'kg*m**2')}. Add a record with a known inertia on the shaft "
-        "(J_added), or with a known current while it coasts"
+        "(J_added), or with a known current while the shaft coasts"
     )
 
 
@@ -219,13 +220,16 @@ def _agreement(sources: dict[str, tuple[float, float]]) -> tuple[Check, ...]:
     if len(sources) < 2:
         return ()
     (a, da), (b, db) = sources.values()
-    note = "inertia by the added one minus that by the current: is the torque constant right"
+    note = (
+        "inertia from the added inertia minus inertia from the current, relative to the standard "
+        "deviation. A wrong torque constant makes them differ"
+    )
     value = abs(a - b) / float(np.hypot(da, db))
     return (Check("inertias_agree", value, limit=_AGREE, note=note),)
 
 
 def _fits(runs: Sequence[RunDown], best: Estimate) -> Check:
-    """Return the check whether a separate cubic over speed for every record would fit better."""
+    """Check whether a separate cubic in speed for each record fits better."""
     residuals = _residuals_of(runs, best)
     rows, columns, weights = sum(map(len, residuals)), [], []
     begin = 0
@@ -242,12 +246,12 @@ def _fits(runs: Sequence[RunDown], best: Estimate) -> Check:
         np.concatenate(weights),
         np.hstack(columns),
         len(best.values),
-        "whether friction over speed deviates from the laws",
+        "whether friction versus speed deviates from the laws",
     )
 
 
 def _ratios(best: Estimate, par: WedgeParameters) -> dict[str, tuple[float, str]]:
-    """Return friction and damping per inertia of motor and dummy shaft."""
+    """Return friction and damping divided by the inertia of motor and dummy shaft."""
     values = best.parameters()
     J = values.get(_INERTIA, par.motor_1.J_M) + par.rig.J_dummy
     return {
@@ -258,7 +262,7 @@ def _ratios(best: Estimate, par: WedgeParameters) -> dict[str, tuple[float, str]
 
 
 def _curve(runs: Sequence[RunDown], best: Estimate) -> Curve:
-    """Return the decelerating torque over the speed, measured and modeled."""
+    """Return the decelerating torque versus speed, measured and modeled."""
     values = best.parameters()
     speeds, table = [], []
     for run, e in zip(runs, _residuals_of(runs, best), strict=True):
@@ -270,7 +274,7 @@ def _curve(runs: Sequence[RunDown], best: Estimate) -> Curve:
     x, filled = at_own_places(speeds, table)
     return Curve(
         "torque-over-speed",
-        "Inertia times deceleration over speed while coasting, with the estimated inertia.",
+        "Estimated inertia times deceleration versus speed while coasting.",
         over(
             ("omega", x, "rad/s", "motor speed"),
             {"measured": filled[0], "modeled": filled[1]},
@@ -283,7 +287,7 @@ def _curve(runs: Sequence[RunDown], best: Estimate) -> Curve:
 
 
 def synthetic(par: WedgeParameters, options: Options, seed: int) -> xr.Dataset:
-    """Return the three simulated run-downs with sensor noise, from random angles."""
+    """Return the three simulated run-downs from random angles, with sensor noise."""
     experiment = run_down.EXPERIMENT
     random = np.random.default_rng(seed)
     sensors = {"q_1": Sensor("q_1", options.sigma_q), "i_1": Sensor("i_1", options.sigma_i)}
@@ -300,7 +304,7 @@ def synthetic(par: WedgeParameters, options: Options, seed: int) -> xr.Dataset:
 METHOD = Method(
     name="run-down",
     assembly="wedge-brake",
-    summary="inertia, bearing friction and damping from coasting, scaled by an inertia or a torque",
+    summary="inertia, bearing friction and damping from coasting with a known inertia or current",
     experiment="run-down",
     signals={"i_1": "A", "q_1": "rad", "J_added": "kg*m**2"},
     options=Options,

@@ -1,8 +1,8 @@
-"""Roller-screw efficiency, driving and driven back, from a sweep of the load (Roberts 2003).
+"""Roller-screw efficiency, driving and back-driven, from a load sweep (Roberts 2003).
 
 Current and speed of both motors and the force between them give two torque balances. Friction
-proportional to the force belongs to the screw; friction without force, or with its square, belongs
-to the bearings.
+proportional to the force belongs to the screw. Friction at zero force, and friction proportional
+to the force squared, belong to the bearings.
 """
 
 from __future__ import annotations
@@ -46,11 +46,22 @@ from bywire.plant.axial_bearing import AngularSpeed
 
 @dataclass(frozen=True)
 class Stroke:
-    """Means of one motion.
+    """Means over one motion.
 
-    ``side``: motor, 1 or 2; ``omega``: speed [rad/s]; ``F``: magnitude of the force [N];
-    ``drives``: whether the screw drives the load, or is driven back by it; ``torque``: of the
-    motor, along the motion [N m]; ``error``: residual torque of the fit [N m].
+    Parameters
+    ----------
+    side
+        Motor, 1 or 2.
+    omega
+        Speed [rad/s].
+    F
+        Magnitude of the force [N].
+    drives
+        True if the screw drives the load, false if the load drives the screw back.
+    torque
+        Motor torque in the direction of motion [N m].
+    error
+        Residual torque of the fit [N m].
     """
 
     side: int
@@ -77,7 +88,7 @@ def _strokes(shaft: Motions, residuals: Array, par: WedgeParameters, side: int) 
 
 
 def _fits(strokes_read: list[Stroke], best: Estimate) -> Check:
-    """Return the check whether a separate curve for every shaft and direction would fit better."""
+    """Check whether a separate curve for each shaft and direction fits better."""
     F = np.array([s.F for s in strokes_read]) / max(s.F for s in strokes_read)
     kind = [(s.side, s.drives) for s in strokes_read]
     groups = [np.array([each == k for each in kind], dtype=float) for k in sorted(set(kind))]
@@ -91,17 +102,19 @@ def _fits(strokes_read: list[Stroke], best: Estimate) -> Check:
         np.array([1.0 / scatter[s.side] for s in strokes_read]),
         np.column_stack([g * F**power for g in groups for power in (0, 1, 2)]),
         len(best.values),
-        "whether torque over force deviates from the laws",
+        "whether torque versus force deviates from the laws",
     )
 
 
 _NAMES = ("screw.eta_f", "screw.eta_b", "bearing.C_0", "bearing.C_2")
-_SPREAD = 1.5  # least ratio of forces that separates friction with and without load
-_ADVICE = "turn the screw both ways, slowly, under several forces, as 'bywire run load-sweep' does"
+_SPREAD = 1.5  # minimum ratio of forces that separates friction with and without load
+_ADVICE = (
+    "Turn the screw slowly in both directions under several forces, as 'bywire run load-sweep' does"
+)
 
 
 class Options(RigOptions):
-    """Strokes that count, and the synthetic noise."""
+    """Strokes to use, and the synthetic noise."""
 
     slowest: AngularSpeed
     """minimum speed of a stroke"""
@@ -119,20 +132,19 @@ def identify(
     Parameters
     ----------
     data
-        ``i_1``, ``i_2`` [A], ``q_1``, ``q_2`` [rad], ``y_F`` [N], compression positive. Torque
-        constants, inertias, the lead, and the change of the bearings' friction with speed must be
-        known.
+        ``i_1``, ``i_2`` [A], ``q_1``, ``q_2`` [rad], ``y_F`` [N], positive in compression. Torque
+        constants, inertias, the lead, and the change of bearing friction with speed must be known.
 
     Raises
     ------
     ParameterError
-        When the screw does not move enough, the force does not change, or a sign is wrong.
+        If the screw does not move enough, if the force does not change, or if a sign is wrong.
 
     References
     ----------
     Roberts et al. (2003), sections "Rollerscrew and bearings", "Roller-screw efficiency".
     """
-    # Cogging is faster than the low-pass, and averages out over a window.
+    # Cogging is above the filter's cutoff frequency, and averages out over a window.
     rig_par = par.replace({"rig.load": "screw", "motor_1.T_cog": 0.0})
     unknowns = parameters_of(rig_par, _NAMES)
     equation = Equation(DrivenShaft(), "omega", "alpha", options.slowest)
@@ -140,8 +152,8 @@ def identify(
     for side, shaft in zip(("1", "2"), shafts, strict=True):
         if not shaft.windows:
             raise ParameterError(
-                f"from q_{side}, motor {side} never stays above {options.slowest:g} rad/s "
-                f"long enough: {_ADVICE}",
+                f"motor {side} (q_{side}) never stays above {options.slowest:g} rad/s "
+                f"long enough. {_ADVICE}",
                 name=f"q_{side}",
                 valid=f"above {options.slowest:g} rad/s",
             )
@@ -164,9 +176,9 @@ def identify(
         checks=(_fits(strokes_read, best),),
         curves=(_curve(strokes_read),),
         notes=(
-            "a part of the bearings' friction that is proportional to the force (C_1) looks like "
-            f"a loss of the screw: assumed {shown(par.bearing.C_1, 'N*m/N')}",
-            "the change of the bearings' friction with speed is that of the parameter set",
+            "bearing friction proportional to the force (C_1) looks like a screw loss. The fit "
+            f"assumes {shown(par.bearing.C_1, 'N*m/N')}",
+            "the change of bearing friction with speed comes from the parameter set",
         ),
     )
 
@@ -174,7 +186,7 @@ def identify(
 def _moved(data: xr.Dataset, par: WedgeParameters, side: str, options: Options) -> Motions:
     """Return one shaft's motions, in terms of motor 1.
 
-    Differences between the motors are added to the current, so that one equation holds for both.
+    The current includes the differences between the motors, so one equation applies to both.
     """
     motor = par.motor_1 if side == "1" else par.motor_2
     force = -data["y_F"] if side == "1" else data["y_F"]
@@ -188,7 +200,7 @@ def _moved(data: xr.Dataset, par: WedgeParameters, side: str, options: Options) 
 
 
 def _require_loads(shafts: list[Motions]) -> None:
-    """Require strokes under several forces, which separate the kinds of friction."""
+    """Require strokes under several forces. They separate the kinds of friction."""
     forces: dict[bool, list[float]] = {True: [], False: []}
     for shaft in shafts:
         F = shaft.means(shaft.data["F"].values)
@@ -200,15 +212,17 @@ def _require_loads(shafts: list[Motions]) -> None:
         if not seen or max(seen) < _SPREAD * min(seen):
             word = "driving" if kind else "driven back"
             never = f"the screw is never {word}"
-            cause = f"{word}, the force stays near {max(seen):.3g} N" if seen else never
+            near = f"while the screw is {word}, the force stays near {max(seen):.3g} N"
+            cause = near if seen else never
             raise ParameterError(
-                f"the data do not separate screw.{name} from bearing.C_0: {cause}; {_ADVICE}",
+                f"the data do not separate screw.{name} from bearing.C_0, because {cause}. "
+                f"{_ADVICE}",
                 name=f"screw.{name}",
             )
 
 
 def _require_losses(shafts: list[Motions], par: WedgeParameters) -> None:
-    """Require a screw that loses power, both when it drives and when it is driven."""
+    """Require that the screw loses power, both when it drives and when it is driven back."""
     k, K_T = roller_screw.slope(par.screw), servo_motor.torque_constant(par.motor_1)
     for side, shaft in zip(("1", "2"), shafts, strict=True):
         omega, F, i = (shaft.means(shaft.data[n].values) for n in ("omega", "F", "i"))
@@ -219,13 +233,13 @@ def _require_losses(shafts: list[Motions], par: WedgeParameters) -> None:
                 raise wrong_sign(
                     f"i_{side}",
                     "y_F",
-                    f"turning as q_{side} does, {word}, the screw would gain "
-                    f"{-least:.3g} N*m; or q_{side} is the wrong one",
+                    f"with the motion of q_{side}, the screw would gain {-least:.3g} N*m while "
+                    f"{word}; or q_{side} is from the wrong shaft",
                 )
 
 
 def _figures(par: WedgeParameters, strokes_read: list[Stroke]) -> dict[str, tuple[float, str]]:
-    """Return the whole drive's efficiency at the largest load, bearings included."""
+    """Return the efficiency of the whole drive, including bearings, at the maximum load."""
     k = roller_screw.slope(par.screw)
     top = max((s for s in strokes_read if s.drives), key=lambda s: s.F, default=None)
     speed = float(np.median([abs(s.omega) for s in strokes_read]))
@@ -238,7 +252,7 @@ def _figures(par: WedgeParameters, strokes_read: list[Stroke]) -> dict[str, tupl
 
 
 def _curve(strokes_read: list[Stroke]) -> Curve:
-    """Return motor torque over force, both ways."""
+    """Return motor torque versus force in both directions."""
     ways = [[s for s in strokes_read if s.drives is drives] for drives in (True, False)]
     F, table = at_own_places(
         [np.array([s.F for s in way]) for way in ways],
@@ -246,12 +260,12 @@ def _curve(strokes_read: list[Stroke]) -> Curve:
     )
     return Curve(
         "torque-over-force",
-        "Motor torque in steady motion over the force between the screws, by stroke.",
+        "Motor torque in steady motion versus the force between the screws, one point per stroke.",
         over(
             ("F", F, "N", "force"),
             {"measured": table[0], "modeled": table[1]},
             "N*m",
-            "motor torque along the motion",
+            "motor torque in the direction of motion",
             ("direction", ("driving", "driven back")),
             along="stroke",
         ),
@@ -270,7 +284,7 @@ def synthetic(par: WedgeParameters, options: Options, seed: int) -> xr.Dataset:
 METHOD = Method(
     name="screw-efficiency",
     assembly="wedge-brake",
-    summary="roller screw's efficiency driving and back-driven, without bearing friction",
+    summary="roller screw efficiency, driving and back-driven, without bearing friction",
     experiment="load-sweep",
     signals=SIGNALS,
     options=Options,

@@ -1,8 +1,8 @@
 """Stiffnesses and free play of the drive train from the two-stage test (Roberts 2003).
 
-First the screws squeeze and pull a force sensor, which gives their stiffness and the force per
-current. Then they work in the brake heart, where the current gives the force: tip to tip while they
-close, through the wedge while they open, and zero in between.
+First the screws squeeze and pull a force sensor. This stage gives the screw stiffness and the force
+per current. Then the screws work in the brake heart, where the current gives the force. They press
+tip to tip while they close, pull on the wedge while they open, and are free in between.
 """
 
 from __future__ import annotations
@@ -50,32 +50,32 @@ _SENSOR, _HEART, _LOOP = slice(11, 15), slice(15, 19), 19
 MEANINGS: Mapping[str, tuple[str, str]] = {
     "zero_of_travel": ("m", "travel without force on the sensor, d_0"),
     "tips_touch": ("m", "travel at which the tips touch, d_c"),
-    "free_play": ("m", "from there to the pull on the wedge, d_c - d_t"),
+    "free_play": ("m", "travel from there to the pull on the wedge, d_c - d_t"),
     **force_calibration.LAW_MEANINGS,
     **force_calibration.cogging_meanings("sensor"),
     **force_calibration.cogging_meanings("heart"),
-    "travel_loop": ("m", "lag of the encoders behind the motion, h"),
+    "travel_loop": ("m", "encoder lag behind the motion, h"),
 }
 """unknowns other than the stiffnesses -> SI unit and meaning"""
 
-_SHARE = 0.3  # share of the largest current above which a contact is surely closed
+_SHARE = 0.3  # fraction of the maximum current above which a contact is surely closed
 
 
 @dataclass(frozen=True)
 class Contacts:
-    """Approximate travels at which the tips touch, and the wedge [m]."""
+    """Approximate travels [m] at which the tips touch (``closed``) and the wedge is pulled."""
 
     closed: float
     apart: float
 
 
 def started(par: WedgeParameters, sensor: Squeeze, heart: Squeeze, advice: str) -> Contacts:
-    """Return the approximate contacts: zero crossings of lines through the loading.
+    """Return the approximate contacts: zero crossings of lines through the loading data.
 
     Raises
     ------
     ParameterError
-        When the record does not reach one of them.
+        If the record does not reach one of the contacts.
     """
     values = np.array([u.start for u in force_calibration.law_unknowns(par)])
     friction = values[2]
@@ -85,25 +85,26 @@ def started(par: WedgeParameters, sensor: Squeeze, heart: Squeeze, advice: str) 
         loading = (heart.way == way) & (level > _SHARE * np.abs(sensor.i).max())
         if int(loading.sum()) < 3 or not np.ptp(heart.d[loading]) > 0.0:
             raise ParameterError(
-                f"record heart: the screws do not load each other {what}. Travel further; {advice}",
+                f"record heart: the screws do not load each other {what}. Increase the travel. "
+                f"{advice}",
                 name="record heart",
             )
         slope, start = np.polyfit(heart.d[loading], level[loading], 1)
         unknowns.append(float((friction - start) / slope))
     if not unknowns[0] > unknowns[1]:
         raise ParameterError(
-            "record heart: closing and opening load the screws at the same travel: they have no "
-            "free play, or the currents' signs are wrong",
+            "record heart: closing and opening load the screws at the same travel. Either they "
+            "have no free play, or the signs of the currents are wrong",
             name="record heart",
         )
     return Contacts(*unknowns)
 
 
 def clear_of(contacts: Contacts, heart: Squeeze) -> NDArray[np.bool_]:
-    """Return the windows without a contact that opens or closes in them or just before.
+    """Return the windows in which, and just before which, no contact opens or closes.
 
-    At a contact, force over travel has a kink, which a mean over a window rounds off, and the
-    motors change their speed.
+    Force versus travel has a kink at a contact, and a mean over a window rounds it off. The motors
+    also change their speed there.
     """
     low, high = heart.reach.min(axis=1), heart.reach.max(axis=1)
     kinks = np.array([contacts.closed, contacts.apart])
@@ -115,8 +116,14 @@ def clear_of(contacts: Contacts, heart: Squeeze) -> NDArray[np.bool_]:
 class TwoStages:
     """Measurements of both stages, and the unknowns of the fit.
 
-    ``par``: known parameters, the sensor's stiffness included, and starting values; ``sensor``,
-    ``heart``: the stages; ``contacts``: start of the search.
+    Parameters
+    ----------
+    par
+        Known parameters, including the sensor stiffness, and starting values.
+    sensor, heart
+        The two stages.
+    contacts
+        Starting values of the contacts.
     """
 
     par: WedgeParameters
@@ -126,7 +133,7 @@ class TwoStages:
 
     @cached_property
     def unknowns(self) -> tuple[Unknown, ...]:
-        """Stiffnesses, zeros of travel, free play, law of the current, cogging, encoders' lag."""
+        """Stiffnesses, zeros of travel, free play, current law, cogging, encoder lag."""
         play = self.contacts.closed - self.contacts.apart
         return (
             *parameters_of(self.par, _STIFFNESS),
@@ -140,7 +147,7 @@ class TwoStages:
         )
 
     def parts(self) -> tuple[Problem, Problem, Problem]:
-        """Return the equations: force over travel, current over force, current over travel."""
+        """Return the equations: force by travel, current by force, current by travel."""
         return tuple(
             Problem(self.unknowns, evaluate)
             for evaluate in (self.sensor_force, self.sensor_current, self.heart_current)
@@ -151,7 +158,7 @@ class TwoStages:
         return Contacts(float(values[_CLOSED]), float(values[_CLOSED] - values[_PLAY]))
 
     def slopes(self, values: Array) -> tuple[float, float]:
-        """Return stiffnesses tip to tip and through the wedge [N/m]."""
+        """Return the stiffnesses tip to tip and through the wedge [N/m]."""
         c_S, c_W, c_C = 2.0 / values[_S], 2.0 / values[_W], 1.0 / values[_C]
         return float(1.0 / (c_S + c_C)), float(1.0 / (c_S + c_W))
 
@@ -173,7 +180,7 @@ class TwoStages:
         return i + stage.waves @ values[_SENSOR] - stage.i, J
 
     def heart_force(self, values: Array, stage: Squeeze) -> tuple[Array, Array]:
-        """Return the force in the heart by the travel, and its derivatives."""
+        """Return the force in the heart at the travel, and its derivatives."""
         d, J = stage.d + stage.way * values[_LOOP], np.zeros((stage.d.size, len(values)))
         K_c, K_t = self.slopes(values)
         close = np.maximum(d - values[_CLOSED], 0.0)
@@ -187,7 +194,7 @@ class TwoStages:
         return K_c * close - K_t * apart, J
 
     def heart_current(self, values: Array) -> tuple[Array, Array]:
-        """Return the law's current at that force minus the measured one."""
+        """Return the law's current at the heart's force minus the measured one."""
         stage = self.heart
         F, J_F = self.heart_force(values, stage)
         i, columns, slope = law(F, stage.way, values[_LAW])
@@ -197,13 +204,13 @@ class TwoStages:
         return i + stage.waves @ values[_HEART] - stage.i, J
 
     def force_by_current(self, values: Array) -> Array:
-        """Return the force by the heart's current, to first order around the fit."""
+        """Return the force from the heart's current, to first order around the fit."""
         F, _ = self.heart_force(values, self.heart)
         slope = law(F, self.heart.way, values[_LAW])[2]
         return np.asarray(F - self.heart_current(values)[0] / slope)
 
     def fits(self, values: Array, count: int) -> Check:
-        """Return whether separate curves for every branch of both stages would fit better.
+        """Check whether separate curves for each branch of both stages fit better.
 
         ``count``: number of estimated unknowns.
         """
@@ -227,13 +234,13 @@ class TwoStages:
             np.concatenate(weights),
             table,
             count,
-            "whether force over travel or current over force deviates from the laws",
+            "whether force versus travel or current versus force deviates from the laws",
         )
 
 
-_PASSES = 3  # fits: of the contacts, of the forces without kinks, and with both
-_WITHIN = 0.5  # share of the clearance in which the wedge starts the test
-_ADVICE = "squeeze and pull with and without the brake heart, as 'bywire run force-cycle' does"
+_PASSES = 3  # fits: of the contacts, of the forces without kinks, and of both
+_WITHIN = 0.5  # fraction of the clearance in which the wedge starts the test
+_ADVICE = "Squeeze and pull with and without the brake heart, as 'bywire run force-cycle' does"
 
 
 def identify(
@@ -246,22 +253,23 @@ def identify(
         F = \frac{\max(0, d - d_c)}{2/K_S + 1/K_C} - \frac{\max(0, d_t - d)}{2/K_S + 2/K_W}, \qquad
         d = d_q \pm h
 
-    on the sensor and in the heart, with the travel d of one nut toward the other; the free play is
-    :math:`d_c - d_t`. The encoders' :math:`d_q` lags behind the motion by h; the damping of screws
-    and sensor adds to h. In the heart F is the force by the current, by the law of
-    ``methods.force_calibration``, which is fitted to both stages at once. Windows in which a
-    contact opens or closes, or has just done so, are omitted.
+    on the sensor and in the heart, with the travel d of one nut toward the other. The free play is
+    :math:`d_c - d_t`. The encoders' :math:`d_q` lags behind the motion by h, and the damping of
+    screws and sensor adds to h. In the heart, F comes from the current through the law of
+    ``methods.force_calibration``, which is fitted to both stages at once. The fit omits windows in
+    which a contact opens or closes, or has just done so.
 
     Parameters
     ----------
     data
-        Two records, ``sensor`` and ``heart``: ``i_1``, ``i_2`` [A], ``q_1``, ``q_2`` [rad],
-        ``y_F`` [N], which the second does not use. The sensor's stiffness must be known.
+        Two records, ``sensor`` and ``heart``, with ``i_1``, ``i_2`` [A], ``q_1``, ``q_2`` [rad],
+        ``y_F`` [N]. The fit does not use ``y_F`` of the second record. The sensor stiffness must
+        be known.
 
     Raises
     ------
     ParameterError
-        When a record is missing, does not move both ways, or does not reach both contacts.
+        If a record is missing, does not move in both directions, or does not reach both contacts.
 
     References
     ----------
@@ -271,8 +279,8 @@ def identify(
     for label in LABELS:
         if label not in records:
             raise ParameterError(
-                f"the measurement has no record {label} (it has {_named(records)}): "
-                f"give one file each, sensor and heart; {_ADVICE}",
+                f"the measurement has no record {label} (it has {_named(records)}). "
+                f"Specify one file for each record, sensor and heart. {_ADVICE}",
                 name=f"record {label}",
                 value=_named(records),
             )
@@ -292,8 +300,8 @@ def identify(
         checks=(stages.fits(values, len(best.values)),),
         curves=(_curve(replace(stages, heart=heart), values),),
         notes=(
-            "the data determine the whole free play, g_1 + g_2 + g_12, but not its parts",
-            f"the sensor's stiffness is assumed as {par.rig.sensor.K_F / 1e6:g} N/um",
+            "the data determine the total free play, g_1 + g_2 + g_12, but not its parts",
+            f"the fit assumes a sensor stiffness of {par.rig.sensor.K_F / 1e6:g} N/um",
         ),
     )
 
@@ -303,7 +311,7 @@ def _fitted(
 ) -> tuple[TwoStages, Estimate, Array, Squeeze]:
     """Return stages, fit, its values, and all windows in the heart.
 
-    Each fit takes the contacts, and the force that slows the motors, from the one before.
+    Each fit uses the contacts, and the force that slows the motors, from the previous fit.
     """
     contacts = started(par, sensor, heart, _ADVICE)
     for _ in range(_PASSES):
@@ -323,7 +331,7 @@ def _named(records: dict[str, xr.Dataset]) -> str:
 
 
 def _curve(stages: TwoStages, values: Array) -> Curve:
-    """Return the brake heart's force over travel, by the current and by the straight lines."""
+    """Return force versus travel in the brake heart, from the current and from the lines."""
     d = stages.heart.d
     order = np.argsort(d)
     rows = {
@@ -333,14 +341,14 @@ def _curve(stages: TwoStages, values: Array) -> Curve:
     x = ("d", 1e3 * d[order], "mm", "travel toward each other")
     return Curve(
         "force-over-travel",
-        "Force by the current over travel in the brake heart, and the identified stiffnesses.",
+        "Force from the current versus travel in the brake heart, and the identified stiffnesses.",
         over(x, rows, "N", "force between the screws"),
         "d",
     )
 
 
 def synthetic(par: WedgeParameters, options: RigOptions, seed: int) -> xr.Dataset:
-    """Return both simulated stages with sensor noise; the heart has no force sensor."""
+    """Return both simulated stages with sensor noise. The heart has no force sensor."""
     on_sensor, in_heart = FORCE_CYCLE.cases(par, FORCE_CYCLE.defaults, None)
     random = np.random.default_rng(seed)
     sensors = drive_sensors(options)
@@ -370,7 +378,7 @@ def truth(par: WedgeParameters, options: RigOptions) -> dict[str, float]:
 METHOD = Method(
     name="stiffness",
     assembly="wedge-brake",
-    summary="stiffness of screws, interfaces, tips, and free play, on a sensor and in the heart",
+    summary="stiffnesses of screws, interfaces and tips, and free play, from a two-stage test",
     experiment="force-cycle",
     signals=SIGNALS,
     options=RigOptions,

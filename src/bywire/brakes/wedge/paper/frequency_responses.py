@@ -30,7 +30,7 @@ _LOW = "low"
 
 
 def fig5(runs: Runs) -> Part:
-    """Return the responses by amplitude, and the loss by friction."""
+    """Return the responses at each amplitude, and the loss due to friction."""
     runs.report("Fig. 5: sweep", 0.0)
     shares = [
         float(_responses_at(_screw_responses(), _LOW, size)["share_sat_current"].max())
@@ -43,7 +43,7 @@ def fig5(runs: Runs) -> Part:
             "fig5.limit",
             FACTS["no_limit"],
             100.0 * max(shares),
-            note="largest share over frequencies and amplitudes",
+            note="maximum fraction over frequencies and amplitudes",
         ),
         *_friction_loss(_LOW, "fig5"),
         *_low_frequency(),
@@ -53,31 +53,31 @@ def fig5(runs: Runs) -> Part:
             "fig5.wedge",
             FACTS["little"],
             _largest_distance(_LOW),
-            note="largest distance of both responses, amplitudes of 0.5 and 1 rad",
+            note="maximum distance between the two responses, at amplitudes of 0.5 and 1 rad",
         ),
         found(
             "fig5.wedge.preload",
             "N",
             preload,
-            "preload of the screw alone that comes closest "
-            f"to the wedge, of 25, 50, 75, 100 N; ours is {parameters().rig.F_0:g} N",
+            "preload of the screw alone at which it comes closest to the wedge. Tested: 25, 50, "
+            f"75, 100 N; ours is {parameters().rig.F_0:g} N",
         ),
-        found("fig5.wedge.nearest", "%", nearest, "largest distance with that preload"),
+        found("fig5.wedge.nearest", "%", nearest, "maximum distance with that preload"),
     ]
     text = (
-        "A controller of 12 Hz on the preloaded screw, at 0.5, 1 and 2 rad: all three, and the "
-        "bandwidth, are our choice. 0.25 rad sticks at all frequencies."
+        "A 12 Hz controller moves the preloaded screw with amplitudes of 0.5, 1 and 2 rad. We "
+        "chose the bandwidth and the amplitudes. At 0.25 rad the screw sticks at all frequencies."
     )
     exhibits = (
         Exhibit(
             "fig5",
             lambda: _bode(_LOW),
-            "Fig. 5: position frequency response, low bandwidth controller.",
+            "Fig. 5: position frequency response, low-bandwidth controller.",
         ),
         Exhibit(
             "fig5-wedge",
             lambda: _comparison(_LOW),
-            "The assembled wedge beside the screw, low bandwidth controller.",
+            "Assembled wedge compared with the screw, low-bandwidth controller.",
         ),
     )
     return Part(
@@ -90,7 +90,7 @@ def fig5(runs: Runs) -> Part:
 
 
 def _friction_loss(controller: str, figure: str) -> list[Item]:
-    """Return the loss by friction at the lowest frequency."""
+    """Return the loss due to friction at the lowest frequency."""
     items: list[Item] = []
     sweep = _screw_responses()
     f = sweep["frequency"].values
@@ -111,15 +111,15 @@ def _friction_loss(controller: str, figure: str) -> list[Item]:
                 f"{figure}.friction.{size:g}",
                 "dB",
                 float(lost[0]),
-                f"gain at 1 Hz minus that of the linear loop, amplitude {size:g} rad; "
-                f"phase {late[0]:.2g} degree",
+                f"gain at 1 Hz minus the gain of the linear loop, amplitude {size:g} rad; "
+                f"phase difference {late[0]:.2g} degree",
             )
         )
     return items
 
 
 def _low_frequency() -> list[Item]:
-    """Return the loss by friction at low frequency, and the frequency of the largest loss."""
+    """Return the loss due to friction at low frequency, and the frequency of the maximum loss."""
     sweep = _screw_responses()
     f = sweep["frequency"].values
     lost = np.array(
@@ -133,14 +133,14 @@ def _low_frequency() -> list[Item]:
             "fig5.friction.low_frequency",
             FACTS["friction_low"],
             float((lost[:, 0] / lost[:, -1]).min()),
-            note="smallest ratio of all amplitudes",
+            note="minimum ratio over all amplitudes",
         ),
         found(
             "fig5.friction.most",
             "Hz",
             float(f[lost[-1].argmax()]),
-            f"frequency of the largest loss of gain at 2 rad, {lost[-1].max():.3g} dB; "
-            f"{lost[-1][0]:.2g} dB at 1 Hz: around its bandwidth the loop is least stiff",
+            f"frequency of the maximum gain loss at 2 rad: {lost[-1].max():.3g} dB, compared "
+            f"with {lost[-1][0]:.2g} dB at 1 Hz. The loop is least stiff around its bandwidth",
         ),
     ]
 
@@ -148,17 +148,20 @@ def _low_frequency() -> list[Item]:
 # --- Fig. 6: the high-bandwidth controller
 
 _HIGH = "high"
-_SMALL = 0.1  # rad: below the current limit up to 60 Hz with a screw without loss
+_SMALL = 0.1  # rad: below the current limit up to 60 Hz with a lossless screw
 _SEEN = (1.0, 10.0, 60.0, 100.0)  # Hz
-_SHAKEN, _BELOW, _ABOVE = 1.0, 20.0, 30.0  # rad, Hz, Hz: where two responses answer one sine
+_SHAKEN, _BELOW, _ABOVE = 1.0, 20.0, 30.0  # rad, Hz, Hz: where one sine has two responses
 _T_FALL, _T_SEEN = 3.0, 1.0  # s
-_LAWS = {"load": "friction by the axial force", "drive": "loss by the motor's torque"}
+_LAWS = {
+    "load": "friction proportional to axial force",
+    "drive": "loss proportional to motor torque",
+}
 
 Complex = NDArray[np.complex128]
 
 
 def fig6(runs: Runs) -> Part:
-    """Return the responses by amplitude, the current limit and the screw's efficiency."""
+    """Return the responses at each amplitude, the current limit and the screw efficiency."""
     gain, phase = _without_friction(_HIGH)
     runs.report("Fig. 6: current limit, efficiency", 0.5)
     items = [
@@ -172,31 +175,31 @@ def fig6(runs: Runs) -> Part:
             "fig6.wedge",
             FACTS["little"],
             _largest_distance(_HIGH),
-            note="largest distance of both responses, amplitudes of 0.25, 0.5 and 1 rad",
+            note="maximum distance between the two responses, at amplitudes of 0.25, 0.5 and 1 rad",
         ),
         found(
             "fig6.wedge.below_limit",
             "%",
             _largest_distance(_HIGH, limited=False),
-            "the same where the screw does not reach the current limit",
+            "the same distance where the screw does not reach the current limit",
         ),
     ]
     text = (
-        "A controller of 60 Hz on the preloaded screw, at 0.25, 0.5 and 1 rad: all three, and the "
-        "bandwidth, are our choice. Every sine starts from rest: just below the frequency where "
-        "the limit begins, a sweep that comes from above gives another response. Theory and "
-        "practice cannot be compared: the measured curves are not available."
+        "A 60 Hz controller moves the preloaded screw with amplitudes of 0.25, 0.5 and 1 rad. We "
+        "chose the bandwidth and the amplitudes. Every sine starts from rest. Just below the "
+        "frequency where the limit begins, a downward sweep would give a different response. The "
+        "measured curves are not available, so theory and practice cannot be compared."
     )
     exhibits = (
         Exhibit(
             "fig6",
             lambda: _bode(_HIGH),
-            "Fig. 6: position frequency response, high bandwidth controller.",
+            "Fig. 6: position frequency response, high-bandwidth controller.",
         ),
         Exhibit(
             "fig6-wedge",
             lambda: _comparison(_HIGH),
-            "The assembled wedge beside the screw, high bandwidth controller.",
+            "Assembled wedge compared with the screw, high-bandwidth controller.",
         ),
     )
     return Part(
@@ -209,7 +212,7 @@ def fig6(runs: Runs) -> Part:
 
 
 def _current_limit() -> list[Item]:
-    """Return the frequencies where the current limit begins, and its effect on gain and phase."""
+    """Return the onset frequencies of the current limit, and its effect on gain and phase."""
     f = _screw_responses()["frequency"].values
     model = LOOPS.find("screw-position").closed(_parameters_with(_HIGH), 0.0)
     wide = bandwidth(lambda g: model.response(g)[:, 0, 0], (0.5, 500.0))
@@ -235,7 +238,7 @@ def _current_limit() -> list[Item]:
                 f"fig6.kink.{size:g}",
                 "degree",
                 float(drops[k]),
-                f"fall of the phase from {f[k]:.3g} to {f[k + 1]:.3g} Hz at {size:g} rad; "
+                f"phase drop from {f[k]:.3g} to {f[k + 1]:.3g} Hz at {size:g} rad; "
                 f"{falls[k]:.2g} degree in the linear loop",
             ),
             found(
@@ -250,10 +253,10 @@ def _current_limit() -> list[Item]:
             "fig6.limit",
             FACTS["limited"],
             max(onsets) / wide,
-            note="largest ratio of all amplitudes; the linear loop falls to -3 dB at "
+            note="maximum ratio over all amplitudes. The linear loop falls to -3 dB at "
             f"{wide:.3g} Hz",
         ),
-        compared("fig6.kink", FACTS["kink"], min(kinks), note="smallest ratio of all amplitudes"),
+        compared("fig6.kink", FACTS["kink"], min(kinks), note="minimum ratio over all amplitudes"),
         *each,
     ]
 
@@ -263,7 +266,7 @@ def _slope(f: Array, gain: Array) -> float:
 
 
 def _efficiency() -> list[Item]:
-    """Return the effect of the screw's loss on the wedge's response, by both readings."""
+    """Return the effect of the screw loss on the wedge's response, for both readings."""
     ideal, load = _wedge("load")
     _, drive = _wedge("drive")
     items: list[Item] = []
@@ -282,7 +285,7 @@ def _efficiency() -> list[Item]:
                     f"fig6.efficiency.{law}.{f:g}",
                     "dB",
                     float(-lost[k]),
-                    f"gain at {f:g} Hz minus that of a screw without loss; {note}",
+                    f"gain at {f:g} Hz minus the gain with a lossless screw; {note}",
                 )
                 for k, f in enumerate(_SEEN)
             ),
@@ -291,7 +294,7 @@ def _efficiency() -> list[Item]:
 
 
 def _wedge(law: str) -> tuple[Complex, Complex]:
-    """Return the assembled wedge's response with a screw without loss, and with its loss."""
+    """Return the assembled wedge's response with a lossless screw and with a lossy one."""
     loop, par = LOOPS.find("position"), _parameters_with(_HIGH).replace({"screw.law": law})
     leaves = par.leaves()
     sweep = Sweep(
@@ -314,14 +317,14 @@ def _jump() -> list[Item]:
             "fig6.jump.from_rest",
             "1",
             _gain(_BELOW),
-            f"gain at {_BELOW:g} Hz and {_SHAKEN:g} rad, from rest: below the limit",
+            f"gain at {_BELOW:g} Hz and {_SHAKEN:g} rad from rest. The loop stays below the limit",
         ),
         found(
             "fig6.jump.from_above",
             "1",
             _gain(_ABOVE),
-            "the same after the frequency fell from "
-            f"{_ABOVE:g} Hz within {_T_FALL:g} s: the loop stays on the limit",
+            "the same gain after the frequency fell from "
+            f"{_ABOVE:g} Hz within {_T_FALL:g} s. The loop stays on the limit",
         ),
     ]
 
@@ -349,17 +352,17 @@ def _gain(begin: float) -> float:
 _BANDWIDTHS = {"low": 12.0, "high": 60.0}
 """natural frequencies of the two position controllers [Hz]"""
 _AMPLITUDES = {"low": (0.5, 1.0, 2.0), "high": (0.25, 0.5, 1.0)}
-"""amplitudes shown of each controller [rad]"""
+"""amplitudes shown for each controller [rad]"""
 _FREQUENCIES = tuple(np.geomspace(1.0, 100.0, 40).tolist())
 _BOTH = tuple(sorted({size for sizes in _AMPLITUDES.values() for size in sizes}))
-_WEDGE = (0.25, 0.5, 1.0)  # larger ones would reach the disc
+_WEDGE = (0.25, 0.5, 1.0)  # larger amplitudes would reach the disc
 _PRELOADS = (25.0, 50.0, 75.0, 100.0)  # N
-_PATIENCE = 12  # most windows: with friction, encoder and cogging they may never repeat
+_PATIENCE = 12  # maximum windows: with friction, encoder and cogging they may never repeat
 
 
 @cache
 def _screw_responses() -> xr.Dataset:
-    """Return the preloaded screw's responses: both controllers, all amplitudes, in one sweep."""
+    """Return the preloaded screw's responses with both controllers at all amplitudes."""
     return _swept("screw-position", _FREQUENCIES, _BOTH, ("stuck", "sat_current"))
 
 
@@ -387,7 +390,7 @@ def _swept(
 
 
 def _responses_at(responses: xr.Dataset, controller: str, size: float) -> xr.Dataset:
-    """Return the figures of one controller and amplitude [rad], over frequency."""
+    """Return the response of one controller at one amplitude [rad], versus frequency."""
     return responses.isel(variant=list(_BANDWIDTHS).index(controller)).sel(amplitude=size)
 
 
@@ -403,7 +406,7 @@ def _parameters_with(controller: str) -> ParameterSet:
 
 
 def _linear_response(controller: str, frequencies: Array) -> Complex:
-    """Return the response of the screw's linear model, without friction and limit."""
+    """Return the response of the screw's linear model, without friction and current limit."""
     loop = LOOPS.find("screw-position")
     return loop.closed(_parameters_with(controller), 0.0).response(frequencies)[:, 0, 0]
 
@@ -414,7 +417,7 @@ def _decibels(response: Complex) -> Array:
 
 
 def _without_friction(controller: str) -> tuple[float, float]:
-    """Return the largest differences of the nonlinear and the linear response, dB and degree.
+    """Return the maximum differences of the nonlinear and linear responses, dB and degree.
 
     Friction, cogging and the encoder's resolution are off, and the amplitude is below the current
     limit.
@@ -431,9 +434,9 @@ def _without_friction(controller: str) -> tuple[float, float]:
 
 
 def _largest_distance(controller: str, *, limited: bool = True) -> float:
-    """Return the largest distance of the wedge's response from the screw's, % of the amplitude.
+    """Return the maximum distance of the wedge's response from the screw's, % of the amplitude.
 
-    ``limited``: whether frequencies count at which the screw reaches the current limit.
+    ``limited``: include frequencies at which the screw reaches the current limit.
     """
     ours = _screw_responses().sel(frequency=_wedge_responses()["frequency"])
     largest = 0.0
@@ -448,9 +451,9 @@ def _largest_distance(controller: str, *, limited: bool = True) -> float:
 
 
 def _nearest_preload() -> tuple[float, float]:
-    """Return the screw's preload [N] that comes closest to the wedge, and the distance [%].
+    """Return the screw preload [N] that comes closest to the wedge, and the distance [%].
 
-    Low-bandwidth controller, the same amplitudes and frequencies as `apart`.
+    Uses the low-bandwidth controller, and the amplitudes and frequencies of the wedge's responses.
     """
     sizes = tuple(size for size in _AMPLITUDES["low"] if size in _WEDGE)
     loop = LOOPS.find("screw-position")
@@ -472,7 +475,7 @@ def _nearest_preload() -> tuple[float, float]:
 
 
 def _bode(controller: str) -> Figure:
-    """Return the Bode plot: all amplitudes, and the linear model's."""
+    """Return the Bode plot of all amplitudes and the linear model."""
     f = _screw_responses()["frequency"].values
     lines = [Response("linear", f, _linear_response(controller, f))]
     lines += [
@@ -483,7 +486,7 @@ def _bode(controller: str) -> Figure:
 
 
 def _comparison(controller: str) -> Figure:
-    """Return the Bode plot of the assembled wedge's response as points on the screw's."""
+    """Return the Bode plot of the screw's responses, with the wedge's responses as points."""
     lines = []
     for size in (size for size in _AMPLITUDES[controller] if size in _WEDGE):
         for label, responses, points in (

@@ -1,4 +1,4 @@
-"""Holding: without power, on a standing disc, and with motors that work together."""
+"""Holding without power, on a stopped disc, and with motors that work together."""
 
 from __future__ import annotations
 
@@ -24,19 +24,19 @@ _LOADED = {"M_high": 500.0, "t_hold": 2.0}
 
 
 def part(runs: Runs) -> Part:
-    """Return the causes that hold the brake, and its power."""
+    """Return what holds the brake, and the power that it needs."""
     off = runs.bench("power-off-hold", MAIN)
     items = [*_power_off(runs), *_standing(runs), *_together(runs)]
     text = (
-        "Without power the brake near its neutral point keeps its moment: dry friction of "
+        "Near its neutral point the brake keeps its moment without power. Dry friction in "
         "bearings, screws and wedge holds the small actuation force, and nothing creeps. Far "
-        "below the neutral point the wedge pushes the motors back until friction holds it."
+        "below the neutral point the wedge pushes the motors back until friction holds the wedge."
     )
     run = off.recordings["run"]
     exhibit = Exhibit(
         "power-off-hold",
         lambda: stacked(run),
-        "Power off at 500 Nm: only the runout's ripple remains.",
+        "Power off at 500 Nm. Only the ripple due to runout remains.",
     )
     return Part("Holding", text, tuple(items), (exhibit,), {"power-off-hold": run})
 
@@ -48,34 +48,35 @@ def _power_off(runs: Runs) -> list[Item]:
     low = {**with_friction(parameters(), _AWAY, known=True), **WITHOUT_RUNOUT}
     far = kpis(runs.bench("power-off-hold", MAIN, low))
     still = Fact(
-        0.0, "m", "physical bound: a body that dry friction holds does not creep", "physical bound"
+        0.0, "m", "physical bound: a body held by dry friction does not creep", "physical bound"
     )
     return [
         compared(
             "hold.neutral",
             FACTS["remains"],
             _share(kept),
-            note="moment 2 s after power off in % of that before; runout off, friction on",
+            note="moment 2 s after power-off, in % of the moment before. Runout off, friction on",
         ),
         compared(
             "hold.drift",
             still,
             usual["drift"],
             "<=",
-            "change of the wedge's travel in 2 s after all stuck; runout on",
+            "change in wedge travel in the 2 s after all bodies stick, runout on",
         ),
         found(
             "hold.relaxation",
             "m",
             usual["relaxation"],
-            "change of the wedge's travel from power off until all stick",
+            "change in wedge travel from power-off until all bodies stick",
         ),
         found("hold.preload", "N", usual["preload_end"], "remaining preload"),
         found(
             "hold.far",
             "%",
             _share(far),
-            f"as hold.neutral at mu_B = {_AWAY:g}: back-driven until friction holds",
+            f"like hold.neutral at mu_B = {_AWAY:g}. The motors are back-driven until friction "
+            "holds them",
         ),
     ]
 
@@ -85,7 +86,7 @@ def _share(values: dict[str, float]) -> float:
 
 
 def _standing(runs: Runs) -> list[Item]:
-    """Return the force balance of the wedge on a standing disc, for both readings."""
+    """Return the wedge's force balance on a stopped disc, for both readings of the paper."""
     result = runs.bench("disc-stop", MAIN)
     values = kpis(result)
     shares = {name: _self_reinforcement(run) for name, run in result.recordings.items()}
@@ -94,27 +95,27 @@ def _standing(runs: Runs) -> list[Item]:
             "hold.standing",
             FACTS["only_turning"],
             shares["drop"],
-            note="(tan(alpha) F_N - F_M)/(tan(alpha) F_N) on a standing disc, pad term dropped as "
-            "in the paper",
+            note="(tan(alpha) F_N - F_M)/(tan(alpha) F_N) on a stopped disc, without the pad term, "
+            "as in the paper",
         ),
         found(
             "hold.standing.stick",
             "1",
             shares["stick"],
-            "the same where the standing pad sticks to the disc, our other reading",
+            "the same ratio if the pad sticks to the stopped disc (our other reading)",
         ),
         found(
             "hold.force_held",
             "N",
             values["force_held_drop"],
-            "normal force on the standing "
+            "normal force on the stopped "
             f"disc; {values['force_before_stop_drop']:.4g} N before the stop",
         ),
     ]
 
 
 def _self_reinforcement(run: xr.Dataset) -> float:
-    """Return the share of the wedge's reaction that the motors do not supply, disc at rest."""
+    """Return the fraction of the wedge reaction that the motors do not supply, disc at rest."""
     still = parameters_of(run).flywheel.Omega_still
     standing = run.where((abs(run["Omega"]) <= still) & (run["M_set"] > 0.0), drop=True)
     last = standing.isel(time=-1)
@@ -134,7 +135,7 @@ def _together(runs: Runs) -> list[Item]:
             "hold.together",
             FACTS["together"],
             above["scheduled"] / above["preload"],
-            note=f"500 Nm at mu_B = {_AWAY:g}: {above['scheduled']:.3g} W together, "
-            f"{above['preload']:.3g} W preloaded",
+            note=f"500 Nm at mu_B = {_AWAY:g}: {above['scheduled']:.3g} W working together, "
+            f"{above['preload']:.3g} W with preload",
         ),
     ]

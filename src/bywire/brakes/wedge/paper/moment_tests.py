@@ -25,9 +25,9 @@ from bywire.reproduction.item import Fact, Item, compared, found, reading
 from bywire.reproduction.reproduction import Exhibit, Part, Runs, kpis, peak
 
 _TURNS = 20
-"""revolutions of the analysis of the oscillation"""
+"""revolutions over which the oscillation is analyzed"""
 _LONG_HOLD = {"t_hold": 3.0}
-"""[s], longer than that many revolutions"""
+"""[s], longer than these revolutions"""
 _FROM = 0.5
 """time [s] after which the hold has settled"""
 
@@ -38,14 +38,15 @@ def fig7(runs: Runs) -> Part:
     items = [*_held_moments(result), *_oscillation(runs), *_hold_power(result), *_course(result)]
     text = (
         "The demand goes directly into the simulation, as in the paper. The paper does not print "
-        "its times, the controller and most parameters; they are ours. The figure is stacked like "
-        "the paper's and can include a measured recording. Shaded: shafts and wedge stick, so the "
-        "run-out acts fully on the moment until the controller has broken them away."
+        "the times, the controller or most parameters, so we chose them. The panels are stacked as "
+        "in the paper, and the figure can include a measured recording. In the shaded spans, "
+        "shafts and wedge stick. The runout then acts fully on the moment until the controller "
+        "breaks them away."
     )
     exhibit = Exhibit(
         "fig7",
         lambda: stacked(result.recordings["run"]),
-        "Fig. 7: 200 Nm step in moment, with pulses: demand and simulation.",
+        "Fig. 7: 200 Nm moment step with pulses, demand and simulation.",
     )
     return Part(
         "Figure 7: step and pulses",
@@ -57,7 +58,7 @@ def fig7(runs: Runs) -> Part:
 
 
 def _pulse_ends(result: Result) -> list[float]:
-    """Return when each pulse ends [s]."""
+    """Return the end time of each pulse [s]."""
     o = result.bench.chosen_options.flat()
     period = o["t_low"] + o["t_high"]
     return [o["t_hold"] + k * period + o["t_low"] for k in range(int(o["pulses"]))]
@@ -68,20 +69,20 @@ def _held_moments(result: Result) -> list[Item]:
     stated = FACTS["pulsed"].value
     low = [settled(run, "M_B", end) for end in _pulse_ends(result)]
     worst = max(low, key=lambda M: abs(M - stated))
-    judged = "mean over the last revolution of the disc before the demand changes"
+    judged = "mean over the disc's last revolution before the demand changes"
     return [
         compared("fig7.hold_moment", FACTS["held"], settled(run, "M_B", hold), note=judged),
         compared(
             "fig7.pulse_moment",
             FACTS["pulsed"],
             worst,
-            note=f"{judged}; the worst of {len(low)} pulses",
+            note=f"{judged}, in the worst of {len(low)} pulses",
         ),
     ]
 
 
 def _oscillation(runs: Runs) -> list[Item]:
-    """Return order and cause of the moment's oscillation."""
+    """Return order and cause of the moment oscillation."""
     run = runs.bench("moment-pulses", MAIN, None, _LONG_HOLD).recordings["run"]
     plain = runs.bench("moment-pulses", MAIN, WITHOUT_RUNOUT, _LONG_HOLD).recordings["run"]
     end = _LONG_HOLD["t_hold"]
@@ -94,40 +95,40 @@ def _oscillation(runs: Runs) -> list[Item]:
             "fig7.ripple_order",
             FACTS["once"],
             float(spectrum["order"][strongest]),
-            note="strongest wave over the disc's angle; the model's runout is one wave per "
-            "revolution, so that this only shows that no other oscillation is larger",
+            note="order of the strongest wave over the disc angle. The model's runout is one wave "
+            "per revolution, so this only shows that no other oscillation is larger",
         ),
         compared(
             "fig7.ripple_without_runout",
             FACTS["runout"],
             100.0 * swing(plain, "M_B", _FROM, end) / ripple,
-            note="peak to peak in % of that with runout: the loop does not hunt",
+            note="peak to peak, in % of the ripple with runout. The loop does not hunt",
         ),
         found(
             "fig7.ripple",
             "N*m",
             ripple,
-            "peak to peak of the moment during the hold, from "
-            f"{1e6 * parameters().flywheel.runout:g} um of runout, our choice",
+            "peak-to-peak moment during the hold, caused by "
+            f"{1e6 * parameters().flywheel.runout:g} um of runout (our choice)",
         ),
         found(
             "fig7.ripple_passive",
             "N*m",
             2.0 * parameters().flywheel.runout * _stiffness(),
-            "ripple by the runout with a fixed wedge: at this frequency, near its "
-            "crossover, the moment control adds to it",
+            "ripple due to runout with a fixed wedge. This frequency is near the moment control's "
+            "crossover, where the control adds to the ripple",
         ),
         found(
             "fig7.ripple_third",
             "N*m",
             third,
-            "amplitude of the third wave per revolution: stick and slip distort the sine",
+            "amplitude of the third order. Stick and slip distort the sine",
         ),
         found(
             "fig7.share_stuck",
             "%",
             100.0 * mean(run, "stuck", _FROM, end),
-            "share of the hold in which shafts and wedge stick",
+            "fraction of the hold in which shafts and wedge stick",
         ),
     ]
 
@@ -135,20 +136,20 @@ def _oscillation(runs: Runs) -> list[Item]:
 def order_spectrum(
     run: xr.Dataset, name: str, turns: int, begin: float
 ) -> Mapping[str, np.ndarray[tuple[int], np.dtype[np.float64]]]:
-    """Return the spectrum of a signal over the disc's angle.
+    """Return the spectrum of a signal versus the disc angle.
 
     Parameters
     ----------
     turns
-        Revolutions of the analysis: the spectrum resolves 1/turns.
+        Number of revolutions. The order resolution is 1/turns.
     begin
         Start of the analysis [s].
 
     Returns
     -------
     mapping
-        ``order`` [waves per revolution] and ``amplitude`` [the signal's unit], without the mean;
-        NaN where the disc turns too little.
+        ``order`` [waves per revolution] and ``amplitude`` [unit of the signal], without the mean.
+        NaN if the disc does not turn far enough.
     """
     seen = run.sel(time=slice(begin, None))
     phi = np.abs(seen["phi"].values)
@@ -161,7 +162,7 @@ def order_spectrum(
 
 
 def _stiffness() -> float:
-    """Return moment per approach of the pads [N]."""
+    """Return the moment per pad approach [N]."""
     par = parameters()
     return 2.0 * par.wedge.mu_B * par.caliper.r_B * par.caliper.K_cal
 
@@ -177,7 +178,7 @@ def _hold_power(result: Result) -> list[Item]:
             "fig7.power_peak_time",
             FACTS["peak_first"],
             t_peak / values["contact_time"],
-            note="time of the largest input power over that of the contact",
+            note="time of the maximum input power divided by the time of contact",
         ),
         compared(
             "fig7.hold_power",
@@ -189,19 +190,22 @@ def _hold_power(result: Result) -> list[Item]:
             "fig7.standby",
             FACTS["standby"],
             100.0 * standby() / holding,
-            note="standby tuned to Fig. 9's 60 W",
+            note="the standby power is tuned to the 60 W of Fig. 9",
             tuned="calibrated",
         ),
-        found("fig7.power_peak", "W", values["peak_power"], "at the drives' input, not filtered"),
+        found("fig7.power_peak", "W", values["peak_power"], "at the drives' input, unfiltered"),
         found(
             "fig7.power_peak_filtered",
             "W",
             values["peak_power_filtered"],
-            "at the drives' input through our filter",
+            "at the drives' input, after our filter",
         ),
         found("fig7.hold_power_watt", "W", above, "above standby, mean over a revolution"),
         found(
-            "fig7.brake_power", "W", values["brake_power"], "power taken from the disc in this time"
+            "fig7.brake_power",
+            "W",
+            values["brake_power"],
+            "braking power at the disc at the same time",
         ),
     ]
 
@@ -212,12 +216,17 @@ def _course(result: Result) -> list[Item]:
     bound = Fact(
         1e-6 * scale,
         "J",
-        "physical bound: energy in is energy out, to 1e-6 of the input",
+        "physical bound: energy in equals energy out, to within 1e-6 of the input",
         "physical bound",
     )
-    not_printed = "the controller's law and gains are ours"
+    not_printed = "control law and gains are ours"
     return [
-        found("fig7.contact_time", "s", values["contact_time"], f"pads on the disc; {not_printed}"),
+        found(
+            "fig7.contact_time",
+            "s",
+            values["contact_time"],
+            f"pads touch the disc; {not_printed}",
+        ),
         found(
             "fig7.time_to_90",
             "s",
@@ -228,14 +237,14 @@ def _course(result: Result) -> list[Item]:
             "fig7.peak_speed",
             "rad/s",
             values["peak_speed"],
-            f"of a motor, while crossing the gap; {not_printed}",
+            f"motor speed while crossing the gap; {not_printed}",
         ),
         compared(
             "fig7.energy_left",
             bound,
             values["energy_left"],
             "<=",
-            "largest residual of the energy balance",
+            "maximum residual of the energy balance",
         ),
     ]
 
@@ -253,17 +262,17 @@ def fig8(runs: Runs) -> Part:
             "fig8.ramp_error_rms.without_runout",
             "N*m",
             plain["ramp_error_rms"],
-            "the same without runout: tracking error of the controller itself",
+            "root mean square on the ramp without runout. This is the controller's tracking error",
         ),
     ]
     text = (
-        "Length and slope of the ramp are ours; we read 'slow' as 1 s. The comparison uses means "
-        "over a revolution of the disc, because the runout averages out over it."
+        "We chose the length and slope of the ramp, and read 'slow' as 1 s. The comparison uses "
+        "means over one revolution of the disc, because the runout averages out over a revolution."
     )
     exhibit = Exhibit(
         "fig8",
         lambda: stacked(result.recordings["run"]),
-        "Fig. 8: 200 Nm step in moment, with ramp: demand and simulation.",
+        "Fig. 8: 200 Nm moment step with a ramp, demand and simulation.",
     )
     return Part(
         "Figure 8: step and ramp",
@@ -282,7 +291,7 @@ def _items(result: Result) -> list[Item]:
     slope = reading(
         (o["M_high"] - o["M_low"]) / o["t_ramp"],
         "N*m/s",
-        f"{FACTS['ramped'].where}; read as: within {o['t_ramp']:g} s",
+        f"{FACTS['ramped'].where}, read as within {o['t_ramp']:g} s",
     )
     return [
         compared(
@@ -302,7 +311,7 @@ def _items(result: Result) -> list[Item]:
             slope,
             values["ramp_slope"],
             ALLOWANCES["followed"],
-            "of a line through the moment on the ramp",
+            "slope of a line through the moment on the ramp",
         ),
         compared(
             "fig8.ramp_error",
@@ -314,7 +323,7 @@ def _items(result: Result) -> list[Item]:
             "fig8.ramp_error_rms",
             "N*m",
             values["ramp_error_rms"],
-            "root mean square on the ramp; mostly runout",
+            "root mean square on the ramp, mostly due to runout",
         ),
     ]
 
@@ -322,11 +331,11 @@ def _items(result: Result) -> list[Item]:
 # --- Fig. 9: a pulse of 950 N m on the software rate limit
 
 _SHORT, _LONGER = 0.11, 1.0
-"""lengths [s] of a pulse that ends as soon as the moment is there, and of a longer braking"""
+"""lengths [s] of a pulse that ends as soon as the moment is reached, and of a longer braking"""
 _THRESHOLDS = (8.0, 20.0)
-"""moments [N m] below which the controller leaves the moment mode; our 12 N m lies between"""
+"""moments [N m] below which the controller leaves the moment mode; our 12 N m is in between"""
 _FIRST = 0.2
-"""time [s] in which the effect of friction is compared, the length of the pulse"""
+"""time [s] over which the effect of friction is compared: the length of the pulse"""
 
 
 def fig9(runs: Runs) -> Part:
@@ -339,13 +348,13 @@ def fig9(runs: Runs) -> Part:
         *_tail(runs),
     ]
     text = (
-        "The paper does not print the length of the pulse; ours is 0.2 s. Standby power, the "
-        "filter of the power and the rate limit were tuned to the paper's 60 W, so that number is "
-        "not evidence. The disc supplies nearly all of the energy that the caliper stores."
+        "The paper does not print the length of the pulse. We chose 0.2 s. Standby power, power "
+        "filter and rate limit were tuned to the paper's 60 W, so that number is not evidence. "
+        "The disc supplies nearly all of the energy that the caliper stores."
     )
     run = result.recordings["run"]
     exhibit = Exhibit(
-        "fig9", lambda: stacked(run), "Fig. 9: 950 Nm step pulse in moment: demand and simulation."
+        "fig9", lambda: stacked(run), "Fig. 9: 950 Nm moment pulse, demand and simulation."
     )
     return Part("Figure 9: large pulse", text, tuple(items), (exhibit,), {"fig9": run})
 
@@ -353,28 +362,31 @@ def fig9(runs: Runs) -> Part:
 def _pulse_moment(result: Result) -> list[Item]:
     values = kpis(result)
     return [
-        compared("fig9.peak_moment", FACTS["pulse"], values["peak_moment"], note="largest moment"),
+        compared("fig9.peak_moment", FACTS["pulse"], values["peak_moment"], note="maximum moment"),
         found("fig9.time_to_90", "s", values["time_to_90"], "the sensor shows 90 % of the demand"),
-        found("fig9.normal_force", "N", values["peak_normal_force"], "largest normal force"),
-        found("fig9.caliper_energy", "J", values["caliper_energy"], "largest energy stored"),
+        found("fig9.normal_force", "N", values["peak_normal_force"], "maximum normal force"),
+        found("fig9.caliper_energy", "J", values["caliper_energy"], "maximum stored energy"),
         found(
             "fig9.disc_share",
             "%",
             values["disc_share"],
-            "work of the disc on the wedge until then, over that energy: self-reinforcement",
+            "fraction of this energy that the disc supplies through the wedge (self-reinforcement)",
         ),
         found(
             "fig9.energy_in",
             "J",
             values["energy_in"],
-            "at the drives' input, standby included; "
-            f"the disc loses {values['energy_braked']:.4g} J",
+            "at the drives' input, including standby. "
+            f"The disc loses {values['energy_braked']:.4g} J",
         ),
     ]
 
 
 def _limited(result: Result, target: float) -> tuple[float, float]:
-    """Return the shares of the time to 90 % on the rate limit [%]: from contact, from the step."""
+    """Return the fractions [%] of the time to 90 % spent on the rate limit.
+
+    The first counts from contact, the second from the step.
+    """
     run, values = result.recordings["run"], kpis(result)
     end = run["time"].values[int(np.argmax(run["y_M"].values > 0.9 * target))]
     return (
@@ -384,7 +396,7 @@ def _limited(result: Result, target: float) -> tuple[float, float]:
 
 
 def _limits(runs: Runs, result: Result) -> list[Item]:
-    """Return the dominant effect at either amplitude: friction, or limits."""
+    """Return the dominant effect at each amplitude, friction or limits."""
     small = runs.bench("moment-pulses", MAIN)
     build_up, whole = _limited(result, FACTS["pulse"].value)
     _, whole_small = _limited(small, FACTS["held"].value)
@@ -401,29 +413,32 @@ def _limits(runs: Runs, result: Result) -> list[Item]:
             "fig9.rate_limited",
             FACTS["long"],
             build_up,
-            note="the limit of 60 rad/s is ours, tuned to the power",
+            note="we tuned the limit of 60 rad/s to the power",
         ),
         found(
-            "fig9.rate_limited_pulse", "%", kpis(result)["rate_limited"], "share of the whole pulse"
+            "fig9.rate_limited_pulse",
+            "%",
+            kpis(result)["rate_limited"],
+            "fraction of the whole pulse",
         ),
         compared(
             "fig9.limits_dominate",
             FACTS["large_limited"],
             whole - whole_small,
-            note=f"share at 950 Nm minus that at 200 Nm ({whole_small:.3g} %)",
+            note=f"fraction at 950 Nm minus the fraction at 200 Nm ({whole_small:.3g} %)",
         ),
         compared(
             "fig9.friction_dominates",
             FACTS["small_friction"],
             at_200 / at_950,
-            note=f"root mean square over {_FIRST:g} s of the effect of friction: "
+            note=f"effect of friction on the moment, root mean square over {_FIRST:g} s: "
             f"{100 * at_200:.3g} % of 200 Nm, {100 * at_950:.3g} % of 950 Nm",
         ),
     ]
 
 
 def _friction_effect(runs: Runs, experiment: str, M: float) -> float:
-    """Return the effect of friction on the moment, root mean square over the demand."""
+    """Return friction's effect on the moment as a root mean square, relative to the demand."""
     changed = [
         runs.bench(experiment, MAIN, overrides).recordings["run"]["M_B"].sel(time=slice(0, _FIRST))
         for overrides in ({**WITHOUT_RUNOUT, "encoder.law": "ideal"}, IDEAL)
@@ -449,26 +464,26 @@ def _pulse_power(runs: Runs, result: Result) -> list[Item]:
             "fig9.power",
             FACTS["power"],
             peak(run, "P_meas"),
-            note="largest filtered power; standby, filter and rate limit are tuned to it",
+            note="maximum filtered power. Standby, filter and rate limit are tuned to it",
             tuned="calibrated",
         ),
         compared(
             "fig9.no_initial_peak",
             FACTS["no_peak"],
             before / after,
-            note=f"{before:.3g} W before contact, {after:.3g} W after it; a hump remains",
+            note=f"{before:.3g} W before contact, {after:.3g} W after contact. A hump remains",
         ),
         compared(
             "fig9.lowest_power",
             FACTS["not_low"],
             _lowest(run, contact, end) / hold,
-            note=f"pulse of {end:g} s; Fig. 7's hold takes {hold:.3g} W above standby",
+            note=f"pulse of {end:g} s. The hold of Fig. 7 needs {hold:.3g} W above standby",
         ),
         found(
             "fig9.lowest_power.short",
             "1",
             _lowest(short, contact, _SHORT) / hold,
-            f"the same for a pulse of {_SHORT:g} s",
+            f"the same ratio for a pulse of {_SHORT:g} s",
         ),
         compared(
             "fig9.power_reduces",
@@ -485,28 +500,31 @@ def _largest(run: xr.Dataset, begin: float, end: float) -> float:
 
 
 def _lowest(run: xr.Dataset, begin: float, end: float) -> float:
-    """Return the lowest filtered power above standby [W] during braking."""
+    """Return the minimum filtered power above standby [W] during braking."""
     return float(run["P_meas"].sel(time=slice(begin, end)).min()) - standby()
 
 
 def _tail(runs: Runs) -> list[Item]:
-    """Return the effect of the gap mode's threshold on the end of the release."""
+    """Return how the threshold of the gap mode affects the end of the release."""
     low, high = (
         runs.bench("moment-pulse-950", MAIN, {"control.moment.M_contact": M}) for M in _THRESHOLDS
     )
     times = [_switches(result.recordings["run"]) for result in (low, high)]
     parking = [kpis(result)["parking_time"] for result in (low, high)]
     between = f"between thresholds of {_THRESHOLDS[0]:g} and {_THRESHOLDS[1]:g} Nm"
-    why = "the paper attributes its difference at the end of Fig. 9 to the time of this switch"
+    why = "the paper attributes its deviation at the end of Fig. 9 to the time of this switch"
     return [
         found(
             "fig9.switch_shift",
             "s",
             times[0] - times[1],
-            f"switch from moment to retracting, {between}; {why}",
+            f"shift of the switch from moment to retracting, {between}; {why}",
         ),
         found(
-            "fig9.tail_shift", "s", parking[0] - parking[1], f"time of parking, {between}; {why}"
+            "fig9.tail_shift",
+            "s",
+            parking[0] - parking[1],
+            f"shift of the parking time, {between}; {why}",
         ),
     ]
 

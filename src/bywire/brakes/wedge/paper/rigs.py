@@ -19,7 +19,7 @@ _MICRON = 1e6
 
 
 def current_loop(runs: Runs) -> Part:
-    """Return the bandwidth of the current loop, over windings and gains."""
+    """Return the current-loop bandwidth for several windings and gains."""
     result = runs.bench("current-loop", MAIN)
     values = kpis(result)
     bandwidths = [value for name, value in values.items() if name.startswith("bandwidth")]
@@ -29,20 +29,26 @@ def current_loop(runs: Runs) -> Part:
             "current_loop.bandwidth",
             FACTS["fast_current"],
             usual / position,
-            note=f"{usual:.0f} Hz against {position:g} Hz of the high-bandwidth position control; "
-            "both are ours",
+            note=f"{usual:.0f} Hz compared with {position:g} Hz of the high-bandwidth position "
+            "control; both are ours",
         ),
         found(
             "current_loop.slowest",
             "Hz",
             min(bandwidths),
-            "over stators in parallel, alone and in series, and half to twice the gains",
+            "minimum bandwidth for stators in parallel, single and in series, with half to twice "
+            "the gains",
         ),
-        found("current_loop.fastest", "Hz", max(bandwidths), "over the same"),
+        found(
+            "current_loop.fastest",
+            "Hz",
+            max(bandwidths),
+            "maximum bandwidth for the same windings and gains",
+        ),
     ]
     text = (
-        "As in the paper, steps with the shaft clamped for several windings and gains. The data "
-        "of the drive are the manufacturer's and not printed."
+        "As in the paper, the current steps with the shaft clamped, for several windings and "
+        "gains. The drive data come from the manufacturer and are not printed."
     )
     return Part("Motor current loop", text, tuple(items))
 
@@ -65,15 +71,15 @@ def efficiency(runs: Runs) -> Part:
             "efficiency.recovered",
             put_in,
             values["eta_f"],
-            note=f"with the bearings' torque, {bearing} without load and its growth with the "
-            "force, subtracted",
+            note=f"after subtracting the bearing torque: {bearing} without load, and its growth "
+            "with force",
         ),
         compared(
             "efficiency.no_load",
             put_in,
             values["eta_f_no_load"],
-            note="with only the torque without load subtracted: friction that grows with the "
-            "square of the force counts as loss of the screw",
+            note="after subtracting only the no-load bearing torque. Friction that grows with the "
+            "force squared then counts as screw loss",
         ),
         compared(
             "efficiency.raw", put_in, values["eta_f_raw"], note="motor torque and force alone"
@@ -82,8 +88,8 @@ def efficiency(runs: Runs) -> Part:
             "efficiency.back_driven",
             "%",
             values["eta_b"],
-            f"the same for a screw that is driven back; {values['eta_b_true']:.3g} % is true, "
-            f"{values['eta_b_no_load']:.3g} % with only the torque without load",
+            f"the same for a back-driven screw. The true value is {values['eta_b_true']:.3g} %, "
+            f"and {values['eta_b_no_load']:.3g} % results from the no-load torque alone",
         ),
         found(
             "efficiency.back_driven.raw", "%", values["eta_b_raw"], "motor torque and force alone"
@@ -92,17 +98,18 @@ def efficiency(runs: Runs) -> Part:
             "efficiency.both",
             "%",
             values["eta_f_true"] * values["eta_b_true"] / 100.0,
-            "of one motor's torque arrive at the other: at full current neither moves the other",
+            "fraction of one motor's torque that reaches the other motor. At full current neither "
+            "motor moves the other",
         ),
     ]
     text = (
-        "One motor in current control against the other in position control, a force sensor "
-        "between their screws, in slow motion."
+        "One motor in current control works slowly against the other in position control, with a "
+        "force sensor between their screws."
     )
     exhibit = Exhibit(
         "screw-efficiency",
         lambda: time_traces(result.recordings["driving"]),
-        "Screw efficiency: motor 1 drives with constant current while motor 2 gives way.",
+        "Screw efficiency: motor 1 drives at constant current while motor 2 gives way.",
     )
     return Part("Roller-screw efficiency", text, tuple(items), (exhibit,))
 
@@ -118,9 +125,10 @@ def stiffness(runs: Runs) -> Part:
         *_directions(values),
     ]
     text = (
-        "The motors are driven against each other: first with a force sensor between the screws, "
-        "which also gives the force per current, then in the brake heart, where tension flows "
-        "through the wedge. The results of the test are compared with the values of the model."
+        "The motors work against each other in two stages. The first stage has a force sensor "
+        "between the screws and also gives the force per current. The second stage uses the brake "
+        "heart, where tension acts through the wedge. The test results are compared with the "
+        "values in the model."
     )
     exhibits = tuple(
         Exhibit(f"stiffness-{label}", partial(time_traces, result.recordings[label]), caption)
@@ -149,19 +157,19 @@ def _directions(values: dict[str, float]) -> list[Item]:
             "stiffness.compression",
             same,
             compression / _MICRON,
-            note="tip to tip, the force by the motors' current",
+            note="tip to tip, with the force from the motor currents",
         ),
         compared(
             "stiffness.tension",
             FACTS["softer_tension"],
             values["K_heart_tension"] / compression,
-            note="tension over compression",
+            note="ratio of tension to compression",
         ),
         found(
             "stiffness.force_per_current",
             "N/A",
             values["force_per_current"],
-            "the calibration that the second stage needs, for rising current",
+            "calibration for the second stage, for rising current",
         ),
     ]
 
@@ -170,7 +178,7 @@ def _directions(values: dict[str, float]) -> list[Item]:
 
 _MOTIONS = ("step", "ramp", "sine")
 _WEAKER = 0.95
-"""torque constant of motor 2 over that of motor 1 where they differ"""
+"""ratio of the torque constant of motor 2 to that of motor 1 where they differ"""
 
 
 def position(runs: Runs) -> Part:
@@ -185,13 +193,14 @@ def position(runs: Runs) -> Part:
                 f"position.wedge.{controller}",
                 FACTS["little"],
                 values[f"difference_screws_{controller}"],
-                note=f"{controller} bandwidth: largest difference over time and amplitudes",
+                note=f"{controller} bandwidth: maximum difference over time and amplitudes",
             ),
             found(
                 f"position.motors.{controller}",
                 "%",
                 values[f"difference_motors_{controller}"],
-                f"{controller} bandwidth: the same against motors whose screws touch nothing",
+                f"{controller} bandwidth: maximum difference from motors whose screws touch "
+                "nothing",
             ),
             found(
                 f"position.dead_band.{controller}",
@@ -201,8 +210,8 @@ def position(runs: Runs) -> Part:
             ),
         ]
     text = (
-        "Steps of the position within the clearance, with the wedge and without it. The paper "
-        "compares frequency responses."
+        "Position steps within the clearance, with and without the wedge. The paper compares "
+        "frequency responses."
     )
     return Part("Position control of the wedge", text, tuple(items))
 
@@ -219,14 +228,14 @@ def force_fight(runs: Runs) -> Part:
             "force_fight.equal",
             FACTS["differences_fight"],
             equal,
-            note="equal motors: largest force of step, ramp and sine",
+            note="equal motors: maximum force in step, ramp and sine",
         ),
         *(
             found(
                 f"force_fight.{motion}",
                 "N",
                 values[f"peak_force_{motion}_unequal"],
-                f"largest force, motor 2 with {unequal}, our choice",
+                f"maximum force, motor 2 with {unequal} (our choice)",
             )
             for motion in _MOTIONS
         ),
@@ -234,19 +243,20 @@ def force_fight(runs: Runs) -> Part:
             "force_fight.static",
             "N",
             values["static_force_unequal"],
-            "remaining force after the step: friction holds the screws apart",
+            "remaining force after the step. Friction holds the screws apart",
         ),
         *_speed(runs),
     ]
     text = (
-        "Both motors follow one reference, a force sensor between their screws. The paper prints "
-        "no forces. It explains the rate limit by higher speeds, which widen the angle between the "
-        "motors: Fig. 9's pulse with a weaker second motor tests that."
+        "Both motors follow one reference, with a force sensor between their screws. The paper "
+        "prints no forces. It says that the rate limit is needed because higher speeds widen the "
+        "angle between the motors. The pulse of Fig. 9 with a weaker second motor tests this "
+        "statement."
     )
     exhibit = Exhibit(
         "force-fight",
         lambda: time_traces(result.recordings["step_unequal"]),
-        "Force fight: step of both motors, of which the second one differs.",
+        "Force fight: step of both motors, with a different second motor.",
     )
     return Part("Force fight", text, tuple(items), (exhibit,))
 
@@ -261,7 +271,7 @@ def _speed(runs: Runs) -> list[Item]:
         changed = {**weaker, "control.moment.rate_max": limit}
         result = runs.bench("moment-pulse-950", MAIN, changed, {"omega_gap": limit})
         swings.append(_swing(result.recordings["run"]))
-    # From nut to nut the screws and both interfaces to the wedge are in series.
+    # Both screws and both interfaces to the wedge are in series from nut to nut.
     stiffness = 0.5 / (1.0 / par.heart.K_S + 1.0 / par.heart.K_W)
     per_angle = stiffness * roller_screw.slope(par.screw)
     return [
@@ -270,17 +280,18 @@ def _speed(runs: Runs) -> list[Item]:
             FACTS["faster_fights"],
             swings[1] / swings[0],
             note=f"swings of {1e3 * swings[0]:.3g} mrad at {rate:g} rad/s, {1e3 * swings[1]:.3g} "
-            f"mrad at {2 * rate:g} rad/s; torque constant of motor 2 {_WEAKER:g} times",
+            f"mrad at {2 * rate:g} rad/s. The torque constant of motor 2 is {_WEAKER:g} times that "
+            "of motor 1",
         ),
         found(
             "force_fight.force_per_angle",
             "N/rad",
             per_angle,
-            "force through the wedge per angle between the motors: the drive train is stiff",
+            "force through the wedge per angle between the motors. The drive train is stiff",
         ),
     ]
 
 
 def _swing(run: xr.Dataset) -> float:
-    """Return the peak-to-peak angle between the motors [rad]; their offset does not count."""
+    """Return the peak-to-peak angle between the motors [rad], without their offset."""
     return float(np.ptp(run["theta_1"].values - run["theta_2"].values))

@@ -1,4 +1,4 @@
-"""Roberts, Schautt, Hartmann, Gombert (2003), reproduced: Figs. 5 to 9, rigs, statements."""
+"""Reproduction of Roberts, Schautt, Hartmann, Gombert (2003): Figs. 5 to 9, rigs, statements."""
 
 from __future__ import annotations
 
@@ -51,10 +51,10 @@ def causes(items: Iterable[Item]) -> tuple[RootCause, ...]:
 
 def _neutral_band(q: Quoted) -> RootCause:
     return RootCause(
-        "The paper's instability above mu_B = tan(alpha) neglects friction: without "
-        f"it the brake runs away from {q('stability.runaway')} on "
-        f"({q.stated('stability.runaway')} stated), but dry friction of bearings, "
-        "screws and wedge holds it without power below "
+        "The paper's instability above mu_B = tan(alpha) neglects friction. Without "
+        f"friction the brake runs away above {q('stability.runaway')} "
+        f"({q.stated('stability.runaway')} stated). Dry friction in bearings, "
+        "screws and wedge holds the brake without power below "
         f"{q('stability.runaway.friction')} at 500 Nm and "
         f"{q('stability.runaway.friction.950')} at 950 Nm.",
         ("stability.runaway.friction",),
@@ -63,61 +63,62 @@ def _neutral_band(q: Quoted) -> RootCause:
 
 def _pulse_length(q: Quoted) -> RootCause:
     return RootCause(
-        "The length of Fig. 9's pulse is not printed: within our 0.2 s the filtered "
-        f"power above standby already falls to {q('fig9.lowest_power')} times that of "
-        "Fig. 7's hold, which the paper does not report; in a pulse that ends at 90 % of "
-        f"the moment it is {q('fig9.lowest_power.short')} times.",
+        "The paper does not print the length of the pulse in Fig. 9. Within our 0.2 s the "
+        f"filtered power above standby falls to {q('fig9.lowest_power')} times the hold power of "
+        "Fig. 7, which the paper does not report. In a pulse that ends at 90 % of the moment, "
+        f"the power falls to {q('fig9.lowest_power.short')} times the hold power.",
         ("fig9.lowest_power",),
     )
 
 
 def _bearings(q: Quoted) -> RootCause:
     return RootCause(
-        "Motor torque and force alone do not measure the screw's efficiency: with the "
-        f"bearings' friction included, the rig reads {q('efficiency.raw')} of the true "
-        f"{q.stated('efficiency.raw')}; with their torque without load subtracted, "
-        f"{q('efficiency.recovered')}. The rest is the bearings' friction under load, "
-        "which no sensor of the rig can separate from the screw's.",
+        "Motor torque and force alone do not give the screw efficiency. Including bearing "
+        f"friction, the rig measures {q('efficiency.raw')} where "
+        f"{q.stated('efficiency.raw')} is true. After the no-load bearing torque is subtracted, "
+        f"the rig gives {q('efficiency.recovered')}. The remaining difference is bearing friction "
+        "under load, which no sensor of the rig can separate from screw friction.",
         ("efficiency.*",),
     )
 
 
 def _dead_band(q: Quoted) -> RootCause:
     return RootCause(
-        "Position steps end where friction holds the shaft: with the soft low-bandwidth "
-        f"controller a shaft can rest {q('position.dead_band.low')} from its "
-        "reference, and the preload that remains with the wedge decides where. Its "
-        f"response differs from that of the screws alone by {q('position.wedge.low')} "
-        f"of the step, but only by {q('position.wedge.high')} with the other "
-        f"controller, with which friction holds {q('position.dead_band.high')}.",
+        "Position steps end where friction holds the shaft. With the soft low-bandwidth "
+        f"controller a shaft can come to rest {q('position.dead_band.low')} from its "
+        "reference, and the preload that remains with the wedge determines where. The "
+        "wedge's response then differs from the screws' response by "
+        f"{q('position.wedge.low')} of the step. With the high-bandwidth controller the "
+        f"difference is only {q('position.wedge.high')}, because friction holds only "
+        f"{q('position.dead_band.high')}.",
         ("position.wedge.*",),
     )
 
 
 def _preload(q: Quoted) -> RootCause:
     return RootCause(
-        "The low-bandwidth controller is too soft to keep the wedge's preload: its "
-        f"response is that of a screw preloaded by {q('fig5.wedge.preload')} (to "
-        f"{q('fig5.wedge.nearest')}), and {q('fig5.wedge')} away from that with our "
-        "preload of the single screw, which the paper does not print. The gear ratio "
-        "hides the wedge's mass, not its friction.",
+        "The low-bandwidth controller is too soft to maintain the wedge's preload. The "
+        f"wedge responds like a screw with a preload of {q('fig5.wedge.preload')} (to "
+        f"within {q('fig5.wedge.nearest')}). Its response differs by {q('fig5.wedge')} from "
+        "the single screw with our preload, which the paper does not print. The gear ratio "
+        "hides the wedge's mass, but not its friction.",
         ("fig5.wedge",),
     )
 
 
 def _limit(q: Quoted) -> RootCause:
     return RootCause(
-        f"Wedge and screw differ by {q('fig6.wedge.below_limit')} as long as the "
-        f"current limit is not reached, and by {q('fig6.wedge')} where the limit begins: "
-        "there the response jumps, and a small change of friction moves the jump.",
+        f"Wedge and screw differ by {q('fig6.wedge.below_limit')} below the current limit, "
+        f"and by {q('fig6.wedge')} where the limit begins. The response jumps there, and a "
+        "small change in friction moves the jump.",
         ("fig6.wedge",),
     )
 
 
 def _stiff_loop(q: Quoted) -> RootCause:
     return RootCause(
-        "Friction affects the response of a stiff loop only where the amplitude is "
-        f"small: with 60 Hz it moves the response at 1 Hz by {q('fig6.friction')} of "
-        "0.25 rad, our choice, and by more of a smaller amplitude.",
+        "Friction affects the response of a stiff loop only at small amplitudes. With the "
+        f"60 Hz controller it changes the response at 1 Hz by {q('fig6.friction')} of "
+        "0.25 rad (our choice), and by a larger fraction of smaller amplitudes.",
         ("fig6.friction",),
     )

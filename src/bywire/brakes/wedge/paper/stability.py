@@ -28,22 +28,22 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _COEFFICIENTS = (0.2, 0.35, 0.6)
-"""below, near and above the neutral point: coefficients of the judged brake factors"""
+"""coefficients below, near and above the neutral point, at which brake factors are compared"""
 _TRIED = (0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.5, 0.55, 0.6)
 """coefficients at which the actuation force is computed"""
 _LOWEST, _HIGHEST = 0.32, 0.62
-"""bounds of the search for the lowest coefficient that runs away"""
+"""bounds of the search for the lowest coefficient at which the brake runs away"""
 _GROWN = 1.05
-"""moment relative to power-off beyond which the brake counts as run away"""
+"""ratio to the moment at power-off above which the brake counts as having run away"""
 _VARIANTS = (
     ("", "fixed", "kept"),
     (".frictionless", "fixed", "none"),
     (".known", "known", "kept"),
 )
-"""endings of ids, whether the controller knows mu_B, and the brake's friction"""
+"""suffixes of ids, whether the controller uses the true mu_B, and the brake's friction"""
 _FREE = {"control.offset.delta_preload": 0.0}
 _HOLD = (0.1, 0.5)
-"""times [s] between which changes of contact are counted"""
+"""start and end [s] of the interval in which contact changes are counted"""
 _BELOW, _ABOVE = 0.2, 0.5
 """friction coefficients on both sides of the neutral point"""
 _DEPTH = 5e-5
@@ -51,12 +51,12 @@ _DEPTH = 5e-5
 
 
 def part(runs: Runs) -> Part:
-    """Return the statements on brake factor, neutral point and instability."""
+    """Return the comparisons on brake factor, neutral point and instability."""
     items = [*_static(runs), *_poles(), *_runaway(runs), *_closed_loop(runs), *_free_play(runs)]
     text = (
         "The paper derives the brake factor and the neutral point without friction. Without "
-        "friction the model obeys both. With friction the neutral point is a band in which the "
-        "brake stays by itself. The band narrows with the load."
+        "friction the model agrees with both. With friction the neutral point widens to a band in "
+        "which the brake holds its position by itself. The band narrows with the load."
     )
 
     def pulses() -> Figure:
@@ -65,13 +65,13 @@ def part(runs: Runs) -> Part:
     exhibit = Exhibit(
         "unstable-region",
         pulses,
-        "Fig. 7's test in the unstable region, at mu_B = 0.6: the motors pull the wedge back.",
+        "The test of Fig. 7 in the unstable region, at mu_B = 0.6. The motors pull the wedge back.",
     )
     return Part("Neutral point and stability", text, tuple(items), (_figure(runs), exhibit))
 
 
 def _at(mu_B: float, changes: dict[str, Any]) -> dict[str, Any]:
-    """Return overrides that set the pads' friction, known to the controller."""
+    """Return overrides that set the pad friction in the brake and in the controller."""
     return {**with_friction(parameters(), mu_B, known=True), **changes}
 
 
@@ -93,11 +93,11 @@ def _static(runs: Runs) -> list[Item]:
                 ALLOWANCES["formula"],
                 f"mu_B = {mu_B:g}, simulated "
                 f"without friction, F_M = {values[f'F_M_{tag(mu_B)}']:.4g} N at 500 "
-                f"Nm; with friction {values[f'C_star_rising_{tag(mu_B)}']:.3g} "
+                f"Nm. With friction {values[f'C_star_rising_{tag(mu_B)}']:.3g} "
                 f"rising, {values[f'C_star_falling_{tag(mu_B)}']:.3g} falling",
             )
         )
-    neutral = "coefficient without actuation force, with friction, while the moment"
+    neutral = "coefficient at which the actuation force is zero, with friction, while the moment"
     return [
         *items,
         compared(
@@ -112,14 +112,14 @@ def _static(runs: Runs) -> list[Item]:
 
 
 def _sweep() -> dict[str, Any]:
-    """Return the coefficients of the static test, the neutral point among them."""
+    """Return the coefficients of the static test, including the neutral point."""
     return {"mu_B": tuple(sorted((*_TRIED, tan_alpha())))}
 
 
 def _figure(runs: Runs) -> Exhibit:
     values = kpis(runs.bench("static-force", MAIN, None, _sweep()))
     tried = _sweep()["mu_B"]
-    # Per normal force, which is M/(2 mu_B r_B) at the moment of the test.
+    # Divide by the normal force, which is M/(2 mu_B r_B) at the test moment.
     pressed = [500.0 / (2.0 * mu_B * parameters().caliper.r_B) for mu_B in tried]
     ratios = {
         name: [values[f"{name}_{tag(m)}"] / F for m, F in zip(tried, pressed, strict=True)]
@@ -129,7 +129,7 @@ def _figure(runs: Runs) -> Exhibit:
     return Exhibit(
         "brake-factor",
         lambda: brake_factor(forces, tan_alpha()),
-        "Actuation force and brake factor at 500 Nm over the pads' friction coefficient.",
+        "Actuation force and brake factor at 500 Nm versus pad friction coefficient.",
     )
 
 
@@ -137,7 +137,7 @@ def _runaway(runs: Runs) -> list[Item]:
     """Return the lowest friction coefficient that pulls the wedge in without power."""
     where = "section 'Introduction': unstable above the ideal point, mu_B = tan(alpha)"
     stated = Fact(tan_alpha(), "1", where)
-    note = "lowest mu_B tried at which the moment grows by itself when the power goes off at"
+    note = "lowest tested mu_B at which the moment grows by itself when the power goes off at"
     high = FACTS["pulse"].value
     return [
         compared(
@@ -145,20 +145,20 @@ def _runaway(runs: Runs) -> list[Item]:
             stated,
             _lowest(runs, IDEAL, 500.0),
             ALLOWANCES["grid"],
-            f"{note} 500 Nm; without friction",
+            f"{note} 500 Nm, without friction",
         ),
         compared(
             "stability.runaway.friction",
             stated,
             _lowest(runs, {"flywheel.runout": 0.0}, 500.0),
             ALLOWANCES["grid"],
-            f"{note} 500 Nm; with friction",
+            f"{note} 500 Nm, with friction",
         ),
         found(
             "stability.runaway.friction.950",
             "1",
             _lowest(runs, {"flywheel.runout": 0.0}, high),
-            f"{note} {high:g} Nm; with friction",
+            f"{note} {high:g} Nm, with friction",
         ),
     ]
 
@@ -166,7 +166,7 @@ def _runaway(runs: Runs) -> list[Item]:
 def _lowest(runs: Runs, changes: dict[str, Any], M_hold: float) -> float:
     """Return the lowest coefficient of a grid at which the moment grows, from a bisection.
 
-    NaN if it grows already at the lowest, or not even at the highest.
+    NaN if the moment grows at the lowest coefficient, or does not grow at the highest.
     """
 
     def grows(k: int) -> bool:
@@ -185,39 +185,39 @@ def _lowest(runs: Runs, changes: dict[str, Any], M_hold: float) -> float:
 
 
 def _closed_loop(runs: Runs) -> list[Item]:
-    """Return stability and overshoot of the closed loop at all coefficients."""
+    """Return stability and overshoot of the closed loop over all coefficients."""
     items: list[Item] = []
     for suffix, slope, friction in _VARIANTS:
         values = kpis(
             runs.bench("friction-sweep", MAIN, None, {"slope": slope, "friction": friction})
         )
         belief = "knows" if slope == "known" else "does not know"
-        note = f"200 Nm, friction {friction}; the controller {belief} mu_B"
+        note = f"200 Nm, friction {friction}. The controller {belief} mu_B"
         items += [
             compared(
                 f"stability.unstable{suffix}",
                 FACTS["stable"],
                 values["unstable"],
-                note=f"coefficients without a settled hold; {note}",
+                note=f"coefficients at which the hold does not settle; {note}",
             ),
             found(
                 f"stability.overshoot{suffix}",
                 "%",
                 values["overshoot_max"],
-                f"largest over all coefficients; {note}",
+                f"maximum over all coefficients; {note}",
             ),
             found(
                 f"stability.hold_power{suffix}",
                 "W",
                 values["hold_power_max"],
-                f"largest over all coefficients, standby included; {note}",
+                f"maximum over all coefficients, including standby; {note}",
             ),
         ]
     return items
 
 
 def _free_play(runs: Runs) -> list[Item]:
-    """Return the changes of contact at the neutral point, with preload and with free play."""
+    """Return the contact changes at the neutral point, with preload and with free play."""
     shaking = {"flywheel.runout": parameters().flywheel.runout}
     held = {}
     for name, preload in (("preload", {}), ("free_play", _FREE)):
@@ -227,13 +227,13 @@ def _free_play(runs: Runs) -> list[Item]:
         name: int(np.count_nonzero(np.diff(run["contacts"].sel(time=slice(*_HOLD)).values)))
         for name, run in held.items()
     }
-    note = "changes of contact between the rows of 0.4 s of a hold at tan(alpha), without friction"
+    note = "contact changes from sample to sample in 0.4 s of a hold at tan(alpha), no friction"
     return [
         compared(
             "stability.contact_changes",
             FACTS["no_play"],
             float(changes["preload"]),
-            note=f"{note}, preload of the parameter set",
+            note=f"{note}, preload from the parameter set",
         ),
         found(
             "stability.contact_changes.free_play",
@@ -246,7 +246,7 @@ def _free_play(runs: Runs) -> list[Item]:
                 f"stability.ripple.{name}",
                 "N*m",
                 swing(run, "M_B", *_HOLD),
-                "peak to peak of the moment meanwhile",
+                "peak-to-peak moment during the same hold",
             )
             for name, run in held.items()
         ),
@@ -262,32 +262,37 @@ def _poles() -> list[Item]:
             "stability.pole.neutral",
             FACTS["neutral_pole"],
             neutral.real,
-            note=f"largest growth rate, {note} tan(alpha)",
+            note=f"maximum growth rate, {note} tan(alpha)",
         ),
         compared(
             "stability.pole.above",
             FACTS["unstable_pole"],
             above.real,
-            note=f"largest growth rate, {note} {_ABOVE:g}",
+            note=f"maximum growth rate, {note} {_ABOVE:g}",
         ),
         compared(
             "stability.pole.below",
             FACTS["stable_pole"],
             below.real,
-            note=f"largest growth rate, {note} {_BELOW:g}",
+            note=f"maximum growth rate, {note} {_BELOW:g}",
         ),
-        found("stability.swing.below", "rad/s", below.imag, f"of the slow pair, {note} {_BELOW:g}"),
+        found(
+            "stability.swing.below",
+            "rad/s",
+            below.imag,
+            f"frequency of the slow pole pair, {note} {_BELOW:g}",
+        ),
     ]
 
 
 def _slow_pole(mu_B: float) -> complex:
-    """Return the slow pole that grows fastest [1/s], the one with positive frequency of a pair."""
+    """Return the slow pole with the highest growth rate [1/s], of a pair the upper one."""
     par = parameters().replace({**IDEAL, "command.mode": "current", "wedge.mu_B": mu_B})
     state = state_at(travel_for(0.0, par) + _DEPTH, par)
     model = linearize(
         WedgeBrake(), par, state, memory_at(state.x, par), inputs=("i_1_ref",), outputs=("x",)
     )
-    # Held: the current loops, and the disc with its sensors, which do not feed back.
+    # Hold the current loops, and the disc with its sensors, because they do not feed back.
     every = model.reduced(MECHANICAL_STATES, held=True).poles()
     slow = every[np.argsort(np.abs(every))][:2]
     return complex(max(slow, key=lambda s: (round(s.real, 6), s.imag)))

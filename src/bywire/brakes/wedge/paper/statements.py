@@ -24,7 +24,7 @@ FILE = SourceFile(Path(__file__).with_name("roberts2003.toml"))
 FACTS, ALLOWANCES = FILE.facts, FILE.allowances
 
 
-# --- Common parts of the figures: parameter set, changes, means over a turn
+# --- Common parts of the figures: parameter set, overrides, means over a revolution
 
 MAIN = "roberts2003"
 
@@ -35,32 +35,32 @@ IDEAL = {
     "motor_1.T_cog": 0.0,
     "motor_2.T_cog": 0.0,
 }
-"""overrides that leave the equations of section "Wedge and brake calliper", without friction"""
+"""overrides that reduce the model to section "Wedge and brake calliper", without friction"""
 STACK = tuple(panel for panel in BRAKING.panels if panel.quantity != "force")
 """moment, speed, current, power and mode, one above the other as in Figs. 7 to 9"""
 
 
 def parameters() -> WedgeParameters:
-    """Return the parameter set of the catalog."""
+    """Return the parameter set from the catalog."""
     return cast(WedgeParameters, PARAMETER_SETS.find(MAIN).parameters())
 
 
 def tan_alpha() -> float:
-    """Return the tangent of the wedge's angle: the neutral point's friction coefficient."""
+    """Return the tangent of the wedge angle: the friction coefficient at the neutral point."""
     return wedge.slope(parameters().wedge)
 
 
 def stacked(run: xr.Dataset, measured: xr.Dataset | None = None) -> Figure:
-    """Return a run stacked as in Figs. 7 to 9: demand, simulation, and a measurement if given.
+    """Draw demand, simulation and an optional measurement, stacked as in Figs. 7 to 9.
 
     Parameters
     ----------
     run
         Recording of the wedge brake.
     measured
-        Recording of a rig with the same names and units; its variables may be fewer.
+        Recording from a rig with the same names and units. It may have fewer variables.
     """
-    from bywire.report.time_traces import time_traces  # with Matplotlib, which runs do without
+    from bywire.report.time_traces import time_traces  # loads Matplotlib, which runs do not need
 
     return time_traces(run, panels=STACK, measured=measured)
 

@@ -1,1 +1,1 @@
-"""The exported ECU on other processors: compiled for them, run by an emulator, measured."""
+"""Tests of an exported ECU on other processors: compilation, emulation and measurement."""

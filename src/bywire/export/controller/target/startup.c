@@ -1,4 +1,5 @@
-/* Start of a Cortex-M without an operating system, and its words to the emulator (semihosting). */
+/* Startup code of a Cortex-M without an operating system, and its output to the emulator
+ * (semihosting). */
 #include "target.h"
 
 int main(void);
@@ -27,7 +28,7 @@ void say_number(uint32_t value)
 
 void leave(int status)
 {
-    const uint32_t block[2] = {0x20026u, (uint32_t)status}; /* the application exits */
+    const uint32_t block[2] = {0x20026u, (uint32_t)status}; /* ADP_Stopped_ApplicationExit */
     (void)semihosting(0x20, block);
     for (;;) {}
 }
@@ -41,12 +42,12 @@ static void fault(void)
 void reset(void)
 {
 #if defined(__ARM_FP)
-    *(volatile uint32_t *)0xE000ED88u |= 0xFu << 20; /* CPACR: the floating-point unit */
+    *(volatile uint32_t *)0xE000ED88u |= 0xFu << 20; /* CPACR: enable the floating-point unit */
     __asm__ volatile("dsb\n\tisb");
 #endif
     SYST_RVR = CLOCK_TOP;
     SYST_CVR = 0u;
-    SYST_CSR = 5u; /* on, by the processor's clock */
+    SYST_CSR = 5u; /* enabled, driven by the processor's clock */
     leave(main());
 }
 

@@ -1,4 +1,4 @@
-/* Services for a harness on a Cortex-M: text by semihosting, a clock, and the depth of the stack. */
+/* Services for a harness on a Cortex-M: semihosting output, a clock, and the stack depth. */
 #ifndef BYWIRE_TARGET_H
 #define BYWIRE_TARGET_H
 
@@ -7,7 +7,7 @@
 #define STACK_PAINT 0xA5A5A5A5u
 #define CLOCK_TOP 0xFFFFFFu
 #define INSIDE static inline __attribute__((always_inline))
-/* The compiler must not move memory across this point. */
+/* The compiler must not move memory accesses across this point. */
 #define IN_ORDER() __asm__ volatile("" ::: "memory")
 
 extern uint32_t stack_low[], stack_top[];
@@ -16,8 +16,8 @@ void say(const char *text);
 void say_number(uint32_t value);
 void leave(int status) __attribute__((noreturn));
 
-/* SysTick counts down 24 bits, here once in 40 instructions: QEMU runs one in a nanosecond of its
- * own time (-icount shift=0), and the clock of these boards has 25 MHz. */
+/* SysTick is a 24-bit counter that counts down, here once every 40 instructions. QEMU runs one
+ * instruction per nanosecond of its own time (-icount shift=0), and these boards have a 25 MHz clock. */
 #define INSTRUCTIONS_PER_COUNT 40u
 #define SYST_CSR (*(volatile uint32_t *)0xE000E010u)
 #define SYST_RVR (*(volatile uint32_t *)0xE000E014u)
@@ -38,7 +38,7 @@ INSIDE void paint_stack(void)
     for (volatile uint32_t *at = stack_low; at < end; ++at) *at = STACK_PAINT;
 }
 
-/* Return how far below the caller the stack was written since it was painted, in bytes. */
+/* Return the number of bytes below the caller's stack that were used since the stack was painted. */
 INSIDE uint32_t stack_used(void)
 {
     const volatile uint32_t *const end = stack_pointer();

@@ -1,4 +1,4 @@
-"""Trials of an exported ECU on a processor: compiled, run on its vectors, and measured."""
+"""Trials of an exported ECU on a processor: compilation, a run of its vectors, measurement."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ EMULATOR = "qemu-system-arm"
 INSTALL = "apt-get install gcc-arm-none-eabi libnewlib-arm-none-eabi qemu-system-arm"
 HERE = Path(__file__).parent
 RUNTIME = ("startup.c", "target.h", "target.ld")
-"""files of this folder for a harness on a Cortex-M"""
+"""files in this folder for a harness on a Cortex-M"""
 
 
 @dataclass(frozen=True)
@@ -34,9 +34,9 @@ class Target:
     name
         Name for users.
     flags
-        Flags of the compiler.
+        Compiler flags.
     machine
-        Board of the emulator.
+        Board that the emulator emulates.
     """
 
     name: str
@@ -60,24 +60,25 @@ TARGETS = (
 
 
 def missing_tools() -> str:
-    """Return the missing tools of targets, and how to install them; empty if none is missing."""
+    """Return the missing tools with an install command; empty if no tool is missing."""
     absent = [name for name in (CROSS, EMULATOR) if find_program(name) is None]
     if not absent:
         return ""
-    return f"{' and '.join(absent)} not installed ({INSTALL})"
+    verb = "is" if len(absent) == 1 else "are"
+    return f"{' and '.join(absent)} {verb} not installed (run {INSTALL})"
 
 
 # --- A harness for a Cortex-M
 
 SAMPLES = 100
-"""largest number of vectors of a task whose instructions are counted"""
+"""maximum number of a task's vectors whose instructions are counted"""
 _REPEATS = 40
 
 
 def target_harness(program: Program, every: Sequence[Vectors]) -> str:
-    """Return a program that prints the number of different values, then figures for every task."""
+    """Return a program that prints the number of different values, then each task's figures."""
     name = program.name
-    what = f"Tries the compiled ECU of {program.model.name} on a Cortex-M."
+    what = f"Tests the compiled ECU of {program.model.name} on a Cortex-M."
     tasks = [c_name(each.step.task.name) for each in every]
     calls = " + ".join(f"differing_{task}()" for task in tasks)
     breaches = " + ".join(f"breaches_{task}()" for task in tasks)
@@ -144,7 +145,7 @@ _TIMEOUT = 300.0
 
 @dataclass(frozen=True)
 class TaskFigures:
-    """Cost of a task: largest and average number of instructions, stack in bytes."""
+    """Cost of a task: maximum and mean number of instructions, and stack in bytes."""
 
     instructions: int
     average: int
@@ -153,7 +154,7 @@ class TaskFigures:
 
 @dataclass(frozen=True)
 class Trial:
-    """Result of an ECU for all its vectors.
+    """Result of an ECU for all its test vectors.
 
     Parameters
     ----------
@@ -162,12 +163,12 @@ class Trial:
     differing
         Number of values that differ from Python's.
     bits
-        A hash of all results, equal if they are equal in every bit.
+        Hash of all results, which is equal if the results are bit-identical.
     breaches
-        Failed trials of the contract of a step: invalid inputs, and memory of arbitrary bits.
+        Number of violations of a step's contract with invalid inputs and memory of arbitrary bits.
     rom, ram
-        Bytes: code, constants and parameters including the compiler's library; memory of the ECU.
-        None on the host.
+        Size in bytes of code, constants and parameters including the compiler's library, and of the
+        ECU's memory. None on the host.
     """
 
     target: str
@@ -186,7 +187,7 @@ def host_trial(program: Program, folder: Path, compiler: Compiler, scratch: Path
     Raises
     ------
     CompilerError
-        If it cannot be compiled or run.
+        If the ECU cannot be compiled or run.
     """
     made = scratch / "host"
     _call(
@@ -215,7 +216,7 @@ def target_trial(
     Raises
     ------
     CompilerError
-        If it cannot be compiled or run.
+        If the ECU cannot be compiled or run.
     """
     objects = []
     for source in _sources(program, folder):
@@ -255,7 +256,7 @@ def target_trial(
 def _sizes(
     program: Program, objects: Sequence[str], target: Target, scratch: Path
 ) -> tuple[int, int]:
-    """Return read-only and other memory of the ECU, including its compiler's library."""
+    """Return the size of the ECU's read-only and other memory, with the compiler's library."""
     parts = scratch / "parts.elf"
     steps = [f"-Wl,-u,{step.name}" for step in program.steps]
     _call(
@@ -285,7 +286,7 @@ def _image(
     folder: Path,
     scratch: Path,
 ) -> Path:
-    """Return a program for the emulator: the ECU, its vectors, and our start of the processor."""
+    """Return a program for the emulator: the ECU, its vectors, and the startup code."""
     for name in RUNTIME:
         shutil.copyfile(HERE / name, scratch / name)
     harness, image = scratch / "target_harness.c", scratch / "target.elf"
@@ -320,9 +321,11 @@ def _call(command: list[str], may_fail: bool = False) -> str:
     try:
         done = run_program([find_program(command[0]) or command[0], *command[1:]], _TIMEOUT)
     except subprocess.TimeoutExpired:
-        raise CompilerError(f"{name} took longer than {_TIMEOUT:g} s for an exported ECU") from None
+        raise CompilerError(
+            f"{name} exceeded its limit of {_TIMEOUT:g} s for an exported ECU"
+        ) from None
     except OSError as error:
-        raise CompilerError(f"{name} did not run: {error.strerror or error}") from None
+        raise CompilerError(f"{name} did not start ({error.strerror or error})") from None
     if done.returncode != 0 and not may_fail:
         said = "\n".join((done.stderr or done.stdout).splitlines()[:6]) or "nothing"
         raise CompilerError(f"{name} failed on an exported ECU:\n{said}")

@@ -5,7 +5,7 @@ import pytest
 
 import bywire
 from bywire.brakes.two_wheeler.model import TwoWheelerByWire
-from bywire.vehicle.slip_remarks import far_from_peak
+from bywire.vehicle.slip_control import far_from_peak
 from bywire.vehicle.surfaces import laid
 
 PLACE = np.linspace(0.0, 40.0, 81)

@@ -1,4 +1,4 @@
-"""Slip control of a quarter car, which lowers the moment demand of any brake.
+"""Slip control around any brake: of a quarter car, and remarks on a fixed set point.
 
 The laws use pressures. For a brake that follows a moment, the demand is converted to a pressure
 with ``slip.k_hat``, and the lowered pressure is converted back.
@@ -6,7 +6,7 @@ with ``slip.k_hat``, and the lowered pressure is converted back.
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple, cast
 
 from pydantic import Field
 
@@ -15,7 +15,9 @@ from bywire.core import ops
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, TimeConstant, Unit
 from bywire.core.signals import Signal, zeros
-from bywire.plant import wheel_encoder
+from bywire.core.typing import Array
+from bywire.plant import adhesion, road, wheel_encoder
+from bywire.vehicle.surfaces import surface_name
 
 SomeMoment = Annotated[float, Unit("N*m", 10.0), Field(ge=0, allow_inf_nan=False)]
 MomentRate = Annotated[float, Unit("N*m/s", 1e4), Field(gt=0, allow_inf_nan=False)]
@@ -24,9 +26,9 @@ MomentRate = Annotated[float, Unit("N*m/s", 1e4), Field(gt=0, allow_inf_nan=Fals
 class Parameters(ParameterSet):
     """Sensors and laws of one wheel.
 
-    ``abs``: ``"pi"`` controls the slip; ``"rules"`` build, dump and hold by thresholds; ``"off"``
-    does not change the demand. ``sees``: speed and slip are ``"estimated"`` from pulses and an
-    accelerometer, or ``"known"``, for comparison.
+    ``abs``: ``"pi"`` controls the slip; ``"rules"`` build, dump and hold the pressure by
+    thresholds; ``"off"`` does not change the demand. ``sees``: speed and slip are ``"estimated"``
+    from pulses and an accelerometer, or ``"known"``, for comparison.
     """
 
     T_s: Duration
@@ -36,9 +38,9 @@ class Parameters(ParameterSet):
     sees: Literal["estimated", "known"]
     """whether speed and slip are estimated"""
     M_rate: MomentRate
-    """fastest build-up of a demand"""
+    """maximum build-up rate of the demand"""
     M_least: SomeMoment
-    """lowest moment under slip control, which keeps the pads on the disc"""
+    """minimum moment under slip control, which keeps the pads on the disc"""
     encoder: wheel_encoder.Parameters
     tau_a: TimeConstant
     """time constant of the accelerometer's filter"""
@@ -73,7 +75,7 @@ class Memory(NamedTuple):
 
 
 class Readings(NamedTuple):
-    """Readings at a tick, of vehicle, wheel, slope and brake."""
+    """Readings of vehicle, wheel, slope and brake at a tick."""
 
     v: Annotated[float, Signal("m/s", "vehicle speed", 20.0)]
     v_wheel: Annotated[float, Signal("m/s", "speed of the tread", 20.0)]
@@ -126,7 +128,7 @@ def tick(r: Readings, m: Any, M_set: float, par: Parameters) -> Any:
         m = m._replace(**{f"{name}_x": value for name, value in rules._asdict().items()})
     left = ops.fmax(k * out.p, ops.fmin(par.M_least, m.M_most))
     # Near standstill, the car rocks on its tire, and the motors would follow this slip although the
-    # disc is at rest. The lowered moment therefore stays, unless the demand is lower.
+    # disc is at rest. The lowered moment is therefore kept, unless the demand is lower.
     holds = ops.where(m.v_hat < par.vehicle_speed.v_still, before.abs, 0.0)
     kept = ops.fmin(before.M_left, m.M_most)
     left = ops.where(holds > 0.5, kept, left)
@@ -158,3 +160,57 @@ def _measured(r: Readings, m: Any, par: Parameters) -> Any:
         age=wheel.age,
         v_last=r.v,
     )
+
+
+# --- Remarks on the road's surfaces
+
+FAR = 2.0
+"""minimum ratio of the slip at maximum adhesion to the slip set point that causes a remark"""
+
+
+def far_from_peak(
+    place: Array,
+    acts: Array,
+    slip_set: float,
+    parameter: str,
+    curve: adhesion.Parameters,
+    ways: road.Parameters,
+) -> list[str]:
+    """Return remarks on surfaces whose maximum adhesion needs far more slip than the set point.
+
+    Parameters
+    ----------
+    place
+        Position of the wheel along the road [m], row by row.
+    acts
+        Whether slip control acts, above 0.5.
+    slip_set
+        Slip set point.
+    parameter
+        Name of its parameter, for example ``"ecu.slip.slip_set"``.
+    curve, ways
+        Parameters of tire and road.
+
+    Returns
+    -------
+    list of str
+        A remark for each surface on which slip control acted and whose peak is beyond `FAR` times
+        the slip set point.
+    """
+    places = place[acts > 0.5]
+    is_further = cast("Array", road.share(cast("Any", places), ways)) > 0.5
+    texts: dict[str, None] = {}
+    for x in (*places[~is_further][:1], *places[is_further][:1]):
+        ground = road.surface(float(x), ways)
+        peak = float(adhesion.peak_slip(ground, curve))
+        if not peak > FAR * slip_set:
+            continue
+        most, held = (float(adhesion.adhesion(slip, ground, curve)) for slip in (peak, slip_set))
+        name = surface_name(float(x), ways)
+        surface = "the road" if name == "own" else name
+        texts[
+            f"slip control uses a slip set point of {slip_set:.3g} ({parameter}), but {surface} "
+            f"has its maximum adhesion at {peak:.3g}. The wheel uses {100.0 * held / most:.0f} % "
+            "of it. A larger set point, or rules (abs=rules), would brake harder there"
+        ] = None
+    return list(texts)
