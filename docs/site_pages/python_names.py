@@ -101,8 +101,8 @@ def errors_page() -> str:
             "======",
             "",
             "If a command fails, it prints one line and exits with the status below. Status 1 "
-            "means that a requirement or check is not met. Status 130 means that you interrupted the "
-            "command. For messages with causes and remedies, see :doc:`../troubleshooting`.",
+            "means that a requirement or check is not met. Status 130 means that you interrupted "
+            "the command. For messages with causes and remedies, see :doc:`../troubleshooting`.",
             "",
             ".. automodule:: bywire.core.errors",
             "   :members:",
