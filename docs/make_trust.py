@@ -14,7 +14,7 @@ from typing import Any
 from bywire.core.scratch import require_finished
 
 DOCS = Path(__file__).parent
-HEAD = """# Trust in identification: known parameters recovered
+HEAD = """# Validation of the identification methods
 
 In each study, bywire simulates experiments with sensor noise, each with its own seed. It then
 identifies the parameters from starting points that are up to 30 % off. The mean of the estimates

@@ -191,7 +191,7 @@ def _motors() -> list[Row]:
         *(
             Row(
                 "power.stuck 1",
-                f"remaining moment of 500 N m at mu_B {mu_B:g}",
+                f"remaining moment (initially 500 N m) at mu_B {mu_B:g}",
                 kept,
                 "N m",
                 figure("moment_end", hold, (("wedge.mu_B", mu_B),)),
@@ -236,7 +236,7 @@ def _motors() -> list[Row]:
         *(
             Row(
                 f"drive_{k}.stuck 0",
-                "moment achieved of 950 N m at mu_B 0.2",
+                "achieved moment (demand 950 N m) at mu_B 0.2",
                 None,
                 "N m",
                 held("M_B", "moment-ramp", friction(0.2), f"drive_{k}.stuck", 0.0, options=HIGH),
@@ -254,7 +254,7 @@ def _motors() -> list[Row]:
         ),
         Row(
             "motor_1.shorted",
-            "moment achieved of 200 N m",
+            "achieved moment (demand 200 N m)",
             None,
             "N m",
             held("M_B", "moment-ramp", (), "motor_1.shorted", options=LOW),
@@ -331,7 +331,7 @@ def _mechanics() -> list[Row]:
         ),
         Row(
             "wedge_friction.worn 5",
-            "remaining moment of 500 N m without power",
+            "remaining moment (initially 500 N m) without power",
             None,
             "N m",
             figure("moment_end", "power-off-hold", (), "wedge_friction.worn", onset=FROM_START),
