@@ -154,7 +154,7 @@ def test_an_experiment_runs_by_its_name(bywire):
 def test_a_file_comes_before_an_experiment_of_its_name(bywire, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "hard-braking").write_text("nothing = 1")
-    refused(bywire("run", "hard-braking"), "unknown key of a bench file 'nothing'")
+    refused(bywire("run", "hard-braking"), "experiment is missing")
     # A folder is no bench file: that of the last results does not stand in the way.
     (tmp_path / "seal-stribeck").mkdir()
     assert bywire("run", "seal-stribeck").status == 0

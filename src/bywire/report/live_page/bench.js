@@ -98,7 +98,8 @@ function judge() {
       : element("td", {}, reason);
     const { text, where } = figure.stated ?? { text: "", where: "" };
     const stated = isStated ? [element("td", { title: where }, text)] : [];
-    return element("tr", {}, element("th", { scope: "row", title: figure.definition }, figure.name), value, ...beside, verdict, ...stated);
+    const name = figure.name.split(/(?<=_)/).flatMap((part) => [part, element("wbr", {})]); // leaves room for kept runs
+    return element("tr", {}, element("th", { scope: "row", title: figure.definition }, ...name), value, ...beside, verdict, ...stated);
   }));
 }
 
