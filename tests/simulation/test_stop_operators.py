@@ -190,7 +190,7 @@ class _Rubbing(MaxwellSlip):
     ("model", "message"),
     [
         (_Wrong(), "the rate of z_2 depends on a stop operator"),
-        (_OneWidth(), r"widths returns 1 values: expected 4 \(one width per stop operator\)"),
+        (_OneWidth(), r"widths returns 1 values, but must return 4 \(one width per stop operator\)"),
         (_Rubbing(), "stops lists 'z_2', which is also one of frictions"),
     ],
 )
