@@ -211,11 +211,12 @@ def solve_small(M: Any, b: Any) -> Any:
 # --- Stop operators
 # A stop operator's state z follows a motion, and slips at its width. Its force counts with its mean
 # over the motion. The stored energy and the loss, width times slip, are then exact, even in a
-# substep in which slip begins. This mean has a continuous slope, so Newton's method converges fast.
+# substep in which slip begins. This mean is a smooth function of the motion, so Newton's method
+# converges fast. The fast pass avoids it: an operator holds or slips for the whole substep.
 
 
-TINY = 1e-300  # where a stop operator does not move
-EVEN = 1e-12  # share of width and motion below which the assumed and the resulting mean are equal
+TINY = 1e-300  # positive where a stop operator does not move
+EVEN = 1e-12  # share of width and motion below which two states of a stop operator are equal
 
 
 @dataclass(frozen=True)
@@ -234,6 +235,40 @@ class Stop:
     first: Any
     last: Any
 
+    def held_or_slipping(self, half: Any, assumed: Any) -> tuple[Stopped, Any]:
+        """Return the result of a motion, if the operator holds or slips for the whole substep.
+
+        Parameters
+        ----------
+        half
+            Half the motion.
+        assumed
+            The same for the motion that determines whether it slips, and where.
+
+        Returns
+        -------
+        tuple
+            The result, and a value that is positive if the operator does neither.
+        """
+        ahead, free = self.start + 2.0 * assumed, self.start + 2.0 * half
+        slips, is_up = ca.fabs(ahead) > self.last, ahead > 0
+        edge = ca.if_else(is_up, self.last, -self.last)
+        slip = free - edge
+        room = self.first - ca.if_else(is_up, self.start, -self.start)
+        # A predicted width is not exactly the width at the next start.
+        room = room - (EVEN * self.last + ca.fabs(self.last - self.first))
+        inward = ca.fmin(ca.if_else(is_up, -slip, slip), self.last)  # 0 without a width
+        doubt = ca.if_else(slips, ca.fmax(room, inward), ca.fabs(free) - self.last)
+        origin = ca.if_else(slips, 0.5 * (self.start + edge), self.start)
+        result = Stopped(
+            end=ca.if_else(slips, edge, free),
+            slip=ca.if_else(slips, slip, 0),
+            mean=ca.if_else(slips, origin, self.start + half),
+            slope=ca.if_else(slips, 0, 1),
+            origin=origin,
+        )
+        return result, doubt
+
     def after(self, half: Any) -> Stopped:
         """Return the result of a motion, given by its half."""
         free = self.start + 2.0 * half
@@ -245,34 +280,27 @@ class Stop:
         room = ca.if_else(slip > 0, first - self.start, first + self.start)
         share = ca.fabs(slip) / ca.fmax(ca.fabs(slip) + room, TINY)
         mean = self.start + (half - 0.5 * slip * share)
-        return Stopped(end, slip, mean, (1.0 - share) * (1.0 - share))
+        slope = (1.0 - share) * (1.0 - share)
+        return Stopped(end, slip, mean, slope, mean - slope * half)
 
-    def misfit(self, half: Any, assumed: Any, at: Stopped, result: Stopped) -> Any:
-        """Return a positive value if a motion's mean is not that of the tangent at another one.
-
-        Parameters
-        ----------
-        half, result
-            Half the motion, and its result.
-        assumed, at
-            Half the motion at which the tangent was taken, and its result.
-        """
-        tangent = at.mean + at.slope * (half - assumed)
+    def misfit(self, half: Any, assumed: Stopped, result: Stopped) -> Any:
+        """Return a positive value if a motion's mean is not on the assumed tangent."""
         scale = self.first + ca.fabs(self.start) + ca.fabs(half)
-        return ca.fabs(result.mean - tangent) - EVEN * scale
+        return ca.fabs(result.mean - (assumed.origin + assumed.slope * half)) - EVEN * scale
 
 
 @dataclass(frozen=True)
 class Stopped:
     """State of a stop operator after a motion, its slip, and the mean of the state.
 
-    ``slope``: derivative of the mean with respect to half the motion.
+    ``origin`` and ``slope``: tangent of the mean as a function of half the motion.
     """
 
     end: Any
     slip: Any
     mean: Any
     slope: Any
+    origin: Any
 
 
 # --- Linear forms
@@ -584,7 +612,10 @@ def build_pass(model: Model, par: ParameterSet, s: Symbols, exact: bool) -> Pass
     at_y = K @ closed
     stops = _stops(model, par, s, gaps)
     moved = _moved(model, par, s, y, at_y, stops)
-    assumed = {k: stop.after(moved[k]) for k, stop in stops.items()}
+    assumed = {
+        k: stop.after(moved[k]) if exact else stop.held_or_slipping(moved[k], moved[k])[0]
+        for k, stop in stops.items()
+    }
     y = _replaced(y, {k: each.mean for k, each in assumed.items()})
     linear = _linearize(model, par, s, y, K, gaps, moved, assumed)
     bounds = _bounds(model, par, s, y, at_y)
@@ -602,8 +633,13 @@ def build_pass(model: Model, par: ParameterSet, s: Symbols, exact: bool) -> Pass
     x = column(
         [projection.w[kept.index(k)] if k in kept else middle[k] + d[k] for k in range(d.shape[0])]
     )
-    stopped = {k: stop.after(d[k]) for k, stop in stops.items()}
-    misfits = [stop.misfit(d[k], moved[k], assumed[k], stopped[k]) for k, stop in stops.items()]
+    if exact:
+        stopped = {k: stop.after(d[k]) for k, stop in stops.items()}
+        misfits = [stop.misfit(d[k], assumed[k], stopped[k]) for k, stop in stops.items()]
+    else:
+        both = {k: stop.held_or_slipping(d[k], moved[k]) for k, stop in stops.items()}
+        stopped = {k: result for k, (result, _) in both.items()}
+        misfits = [misfit for _, misfit in both.values()]
     x = _replaced(x, {k: each.end for k, each in stopped.items()})
     middle = _replaced(middle, {k: each.mean for k, each in stopped.items()})
     d = _replaced(d, {k: 0.5 * (each.end - s.x[k]) for k, each in stopped.items()})
@@ -722,7 +758,7 @@ def _linearize(
     # tangent continues to ``start``.
     d = _replaced(s.d, moved)
     slope = {k: each.slope for k, each in assumed.items()}
-    start = _replaced(s.x, {k: y[k] - slope[k] * moved[k] for k in moved})
+    start = _replaced(s.x, {k: each.origin for k, each in assumed.items()})
     x, xe = SX.sym("x_", n), SX.sym("xe_", n)
     force = SX.sym("contact_", K.shape[0])
     state, fixed = symbol_tuple(model.State, x), symbol_tuple(model.State, xe)
