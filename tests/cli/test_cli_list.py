@@ -148,7 +148,7 @@ def test_a_parameter_a_group_a_signal_and_a_key_figure(bywire: Bywire) -> None:
     assert figure["unit"] == "%"
     assert "hard-braking" in figure["experiments"].split(", ")
     distance = only(bywire("list", "stopping_distance", "--json"), "KPI")
-    assert distance["unit"] == "um, mm or m"  # as reports write it, by its size
+    assert distance["unit"] == "um, mm or m"  # in the unit that reports choose by size
     refused(bywire("list", "motor.R_n"), "unknown name 'motor.R_n'", "'motor.R_m'")
 
 

@@ -1,4 +1,4 @@
-"""The wedge brake's experiments on the command line: one line of error, or figures with reasons."""
+"""Experiments of the wedge brake on the command line: one error line, or key figures."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Columns of a measurement before any question: units to choose from, and a first plot."""
+"""Columns of a measurement, with units to choose from and a first plot."""
 
 from __future__ import annotations
 
