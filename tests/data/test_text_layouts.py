@@ -286,7 +286,7 @@ def test_a_remark_in_cp1252_far_below_the_head_is_read_with_the_note(tmp_path):
 def test_bytes_that_are_not_text_in_any_table_are_refused(tmp_path, byte):
     path = tmp_path / "a.csv"
     path.write_bytes(b"t [s],p [bar]\n0,1\n1,2\xb5" + bytes([byte]))
-    with pytest.raises(FileError, match=r"line 3 is not UTF-8 text, nor cp1252.*encoding = '"):
+    with pytest.raises(FileError, match=r"line 3 is neither UTF-8 nor cp1252.*encoding = '"):
         read_measurement(path)
 
 

@@ -74,7 +74,7 @@ def test_without_names_every_column_comes_in_si(tmp_path):
             "a column 'time",
         ),
         ("time [s], pedal [mm], Pedal [mm]\n0,1,1\n1,2,1\n", "two columns named 'pedal'"),
-        (b"time [s], pedal [mm]\n0,1\n1,2\x81\n", "not UTF-8 text, nor cp1252 .* Save it as UTF-8"),
+        (b"time [s], pedal [mm]\n0,1\n1,2\x81\n", "neither UTF-8 nor cp1252 .* Save it as UTF-8"),
     ],
 )
 def test_refused_files(tmp_path, content, text):

@@ -21,7 +21,7 @@ from bywire.report.panels import Panel, Role, Trace
 from bywire.report.response_figures import Response, bode
 from bywire.report.step_response import StepFacts, StepLimits, step_response, tracking
 from bywire.report.time_traces import overlaid_traces, time_traces
-from tests.raising import raises
+from raising import raises
 
 step_figure = partial(step_response, variable="p_mc", set_point="p_ref")
 LOOP = ("p_mc", "i", "i_star")  # response, drive, demand

@@ -24,7 +24,7 @@ from bywire.reproduction.reproduction import (
     tallies,
     verdicts,
 )
-from tests.raising import raises
+from raising import raises
 
 KEYS = ["id", "unit", "stated", "computed", "tolerance", "agrees", "note"]
 

@@ -43,7 +43,7 @@ from bywire.report.document import (
     recording_file,
 )
 from bywire.report.stated_levels import stated_figure
-from bywire.report.subject import bench_changes
+from bywire.report.subject import bench_changes, origins_text
 from bywire.report.tables import KpiRow, kpi_table
 from bywire.report.wording import amount, beside_limit, error_text, measured_amount
 
@@ -235,6 +235,7 @@ class BenchResult(Result, Answer):
                 *([Listing(said)] if said else []),
                 *([table] if self.kpis else []),
                 *self._undefined(),
+                Paragraph(f"{origins_text(bench.parameters)}."),
                 Details("", self._scatter()),
             ],
             data={**self._data(), "remarks": said},

@@ -19,7 +19,7 @@ from bywire.core.units import difference_unit
 from bywire.report.document import Block, Details, Listing, Paragraph, Section, TableBlock
 from bywire.report.schematic import schematic_blocks
 from bywire.report.stated_levels import stated_level
-from bywire.report.subject import Subject, bench_changes, parameter_rows
+from bywire.report.subject import Subject, bench_changes, parameter_rows, source_block
 from bywire.report.tables import (
     Cell,
     KpiRow,
@@ -190,7 +190,7 @@ def how_it_was_made(
     return Section(
         "Settings",
         [
-            Paragraph(f"Source of the parameters: {cited.source}."),
+            source_block(bench.parameters),
             Paragraph(f"{kept}."),
             *_signal_errors(errors),
             _options_in_use(bench),

@@ -183,7 +183,7 @@ def head_of_table(path: Path, options: ReadOptions) -> Head:
     Raises
     ------
     FileError
-        When they are not text in the given encoding, in UTF-8 or as Windows writes it.
+        When they are not text in the specified encoding, in UTF-8 or in Windows encoding.
     """
     return Head(path, *head_text(path, options.encoding, HEAD), options)
 

@@ -1,4 +1,4 @@
-"""Compressed air: an ideal gas with the reference state of pneumatic components."""
+"""Compressed air as an ideal gas with the reference state of pneumatic components."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ Kelvin = Annotated[float, Signal("K", "temperature", 300.0, low=1.0)]
 class Parameters(ParameterSet):
     """Ideal gas with constant heat capacities.
 
-    Its gas constant follows from the reference state, so that mass flows and volume flows of
-    components that are specified at this state always agree.
+    The reference state determines the gas constant, so mass and volume flows of components that are
+    specified at this state always agree.
     """
 
     p_ref: Pressure
@@ -30,9 +30,9 @@ class Parameters(ParameterSet):
     T_0: Temperature
     """temperature of the reference state (293.15 K in ISO 8778), and of the surroundings"""
     gamma: Exponent
-    """ratio of the heat capacities"""
+    """heat capacity ratio"""
     p_atm: Pressure
-    """ambient pressure, absolute"""
+    """absolute ambient pressure"""
 
 
 def gas_constant(
@@ -47,7 +47,7 @@ def exergy(p: AbsolutePressure, par: Parameters) -> Annotated[float, Signal("J/k
 
     .. math:: e = R T_0 \ln(p / p_{atm})
 
-    It is the largest work that the air can do while it expands isothermally to ambient pressure.
+    This is the maximum work that the air can do while it expands isothermally to ambient pressure.
     """
     return gas_constant(par) * par.T_0 * ops.log(p / par.p_atm)
 

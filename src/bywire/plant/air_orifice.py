@@ -1,4 +1,4 @@
-"""Air orifice after ISO 6358: choked flow, subsonic flow, and laminar flow near zero."""
+"""Air orifice according to ISO 6358: choked flow, subsonic flow, and laminar flow near zero."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ Loss = Annotated[float, Signal("W", "throttling loss", role=Role("sink", "thrott
 
 
 class Parameters(ParameterSet):
-    """Restriction without inertia of the air. Conductances of orifices in series do not add."""
+    """Restriction without air inertia. Conductances of orifices in series do not add."""
 
     C: SonicConductance
     """sonic conductance"""
     b: CriticalRatio
-    """critical ratio of the absolute pressures, below which the flow is choked"""
+    """critical ratio of absolute pressures, below which the flow is choked"""
     r_lam: LaminarRatio
-    """ratio of the absolute pressures above which the flow is laminar, 0.995 to 0.999"""
+    """ratio of absolute pressures above which the flow is laminar, typically 0.995 to 0.999"""
 
     @model_validator(mode="after")
     def _laminar_flow_is_subsonic(self) -> Parameters:
@@ -66,17 +66,18 @@ def output(u: Input, par: Parameters, gas: air.Parameters) -> Output:
         \sqrt{1 - \left(\frac{r - b}{1 - b}\right)^2} & b < r \le r_{lam} \\
         \psi(r_{lam}) \frac{1 - r}{1 - r_{lam}} & r > r_{lam} \end{cases}
 
-    with the index 1 upstream, and the enthalpy flow :math:`\dot m c_p T_1`.
+    with index 1 upstream, and the enthalpy flow :math:`\dot m c_p T_1`.
 
     Notes
     -----
-    Without the linear part, the slope at equal pressures is infinite, and a volume fills in finite
-    time. The slope has kinks at ``r_lam``, and at equal pressures if the temperatures differ.
+    Without the linear part, the slope at equal pressures would be infinite, and a volume would fill
+    in finite time. The slope has kinks at ``r_lam``, and at equal pressures if the temperatures
+    differ.
 
     References
     ----------
-    ISO 6358-1:2013, eqs. for the mass flow rate; the linear part after The MathWorks, Simscape
-    Fluids, Orifice (G), "laminar flow pressure ratio".
+    ISO 6358-1:2013, equations for the mass flow rate. The linear part follows The MathWorks,
+    Simscape Fluids, Orifice (G), "laminar flow pressure ratio".
     """
     forward = u.p_a > u.p_b
     p_1, p_2 = ops.fmax(u.p_a, u.p_b), ops.fmin(u.p_a, u.p_b)
@@ -92,6 +93,6 @@ def output(u: Input, par: Parameters, gas: air.Parameters) -> Output:
 
 
 def power_loss(u: Input, par: Parameters, gas: air.Parameters) -> Loss:
-    """Return the exergy lost by throttling at ambient temperature, >= 0."""
+    """Return the exergy loss due to throttling at ambient temperature, >= 0."""
     drop = air.exergy(u.p_a, gas) - air.exergy(u.p_b, gas)
     return output(u, par, gas).mdot * drop

@@ -1,4 +1,4 @@
-"""Volume of air: mass and temperature, isothermal or with heat exchange to its walls."""
+"""Air volume with mass and temperature, isothermal or with heat exchange to its walls."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from bywire.plant import air
 class Parameters(ParameterSet):
     """Well-mixed ideal gas.
 
-    ``law``: ``"isothermal"`` keeps the air at the ambient temperature, and its energy is an exergy:
-    the work that it can do. ``"heat"`` computes the temperature, and its energy is the internal
-    energy. ``G_w = 0`` is then adiabatic.
+    ``law``: ``"isothermal"`` keeps the air at ambient temperature. Its energy is then exergy, the
+    work that it can do. ``"heat"`` computes the temperature, and the energy is the internal energy.
+    ``G_w = 0`` is then adiabatic.
     """
 
     law: Literal["isothermal", "heat"]
-    """whether the temperature of the air is constant"""
+    """whether the air temperature is constant"""
     G_w: HeatConductance
     """heat conductance between air and walls (law "heat")"""
 
@@ -47,22 +47,22 @@ class Balance(NamedTuple):
 
 
 class Input(NamedTuple):
-    """Sum of the flows into the volume; the volume, and its derivative."""
+    """Sum of the flows into the volume, the volume, and its derivative."""
 
     mdot: Annotated[float, Signal("kg/s", "mass flow in", 1e-2)]
     H: Annotated[float, Signal("W", "enthalpy flow in", 1e3)]
     V: Annotated[float, Signal("m**3", "volume", 1e-3, low=1e-7)]
-    V_rate: Annotated[float, Signal("m**3/s", "growth of the volume", 1e-3)]
+    V_rate: Annotated[float, Signal("m**3/s", "rate of the volume", 1e-3)]
 
 
 class InputRate(NamedTuple):
     """Derivative of the input that affects the stored energy."""
 
-    V: Annotated[float, Signal("m**3/s", "growth of the volume", 1e-3)]
+    V: Annotated[float, Signal("m**3/s", "rate of the volume", 1e-3)]
 
 
 def temperature(x: State, par: Parameters, gas: air.Parameters) -> air.Kelvin:
-    """Return the temperature of the air: a state, or ambient temperature (law "isothermal")."""
+    """Return the air temperature, which is a state, or ambient (law "isothermal")."""
     return x.T if par.law == "heat" else gas.T_0
 
 
@@ -83,7 +83,7 @@ def balance(x: State, u: Input, par: Parameters, gas: air.Parameters) -> Balance
         \frac{dm}{dt} = \sum \dot m, \quad
         m c_v \frac{dT}{dt} = \sum \dot H - c_v T \frac{dm}{dt} - p \frac{dV}{dt} + G_w (T_0 - T)
 
-    (law "heat"); the temperature of law "isothermal" is constant.
+    for law "heat". With law "isothermal", the temperature is constant.
     """
     if par.law == "isothermal":
         return Balance(m=u.mdot, T=0.0 * u.H)
@@ -95,7 +95,7 @@ def balance(x: State, u: Input, par: Parameters, gas: air.Parameters) -> Balance
 def energy(x: State, u: Input, par: Parameters, gas: air.Parameters) -> Energy:
     r"""Return the exergy :math:`V (p \ln(p/p_{atm}) - (p - p_{atm}))`, or :math:`m c_v T`.
 
-    The exergy is that of law "isothermal", the internal energy :math:`m c_v T` that of law "heat".
+    Law "isothermal" has the exergy, and law "heat" the internal energy :math:`m c_v T`.
     """
     if par.law == "heat":
         return x.m * air.heat_capacity(gas) * x.T
@@ -104,12 +104,12 @@ def energy(x: State, u: Input, par: Parameters, gas: air.Parameters) -> Energy:
 
 
 def input_rate(u: Input) -> InputRate:
-    """Return the growth of the volume, through which it does work."""
+    """Return the rate of the volume, through which the air does work."""
     return InputRate(V=u.V_rate)
 
 
 def power_in(x: State, u: Input, par: Parameters, gas: air.Parameters) -> Power:
-    """Return the power of the inflow minus the work of the growing volume, and wall heat."""
+    """Return the inflow power minus the work of the growing volume, plus wall heat."""
     p = pressure(x, u, par, gas)
     if par.law == "heat":
         return u.H - p * u.V_rate + par.G_w * (gas.T_0 - x.T)

@@ -1,4 +1,4 @@
-"""Angle sensor of a rotor: offset, harmonics of its eccentricity, and quantization."""
+"""Rotor angle sensor with offset, harmonics due to eccentricity, and quantization."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ Phase = Annotated[float, Unit("rad", 1.0), Field(ge=-7, le=7, allow_inf_nan=Fals
 
 
 class Parameters(ParameterSet):
-    """Sensor of the mechanical angle, without delay of its own.
+    """Sensor of the mechanical angle, without delay.
 
-    ``law``: with ``"real"``, the reading has the errors below and is rounded to whole counts.
+    ``law``: with ``"real"``, the reading has the errors below, and is rounded to whole counts.
     """
 
     law: Literal["ideal", "real"]
@@ -29,13 +29,13 @@ class Parameters(ParameterSet):
     eps_0: AngleError
     """offset"""
     eps_1: AngleError
-    """amplitude of the error once per revolution"""
+    """amplitude of the first-order error (once per revolution)"""
     phi_1: Phase
-    """its phase"""
+    """phase of the first-order error"""
     eps_2: AngleError
-    """amplitude of the error twice per revolution"""
+    """amplitude of the second-order error (twice per revolution)"""
     phi_2: Phase
-    """its phase"""
+    """phase of the second-order error"""
     counts: Annotated[float, Unit("1", 4096.0), Field(gt=0, allow_inf_nan=False)]
     """counts per revolution"""
 
@@ -57,7 +57,7 @@ def reading(theta: Angle, par: Parameters) -> Angle:
     .. math:: \theta + \epsilon_0 + \epsilon_1 \sin(\theta + \varphi_1)
         + \epsilon_2 \sin(2 \theta + \varphi_2)
 
-    rounded to the nearest count.
+    The reading is rounded to the nearest count.
     """
     if par.law == "ideal":
         return theta

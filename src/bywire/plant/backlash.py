@@ -1,4 +1,4 @@
-"""Backlash between two shafts: a play whose two flanks push and never pull."""
+"""Backlash between two shafts: free play with two flanks that push but never pull."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ MeshStiffness = Annotated[float, Unit("N*m/rad", 400.0), Field(gt=0, allow_inf_n
 Compliance = Annotated[float, Signal("rad/(N*m)", "compliance of the mesh", 2e-3)]
 Work = Annotated[float, Signal("W", "work on the mesh")]
 Loss = Annotated[
-    float, Signal("W", "loss in the mesh, minus its energy at start", role=Role("sink", "mesh"))
+    float, Signal("W", "loss in the mesh, minus its initial energy", role=Role("sink", "mesh"))
 ]
 
 
 class Parameters(ParameterSet):
-    """Massless mesh of a gear; each flank is a spring with damping in proportion."""
+    """Massless gear mesh. Each flank is a spring with damping proportional to stiffness."""
 
     i: Factor
-    """gear ratio: speed of shaft 1 per speed of shaft 2"""
+    """gear ratio, which is the speed of shaft 1 divided by the speed of shaft 2"""
     b: Play
-    """play, as an angle of shaft 1"""
+    """free play, as an angle of shaft 1"""
     k: MeshStiffness
-    """stiffness of the mesh, on shaft 1"""
+    """mesh stiffness at shaft 1"""
     tau: TimeConstant
     """ratio of damping to stiffness"""
 
 
-FAULTS = (ParameterFault("worn", "larger play", ("b",), 3.0),)
+FAULTS = (ParameterFault("worn", "increased free play", ("b",), 3.0),)
 
 
 class Input(NamedTuple):
@@ -61,7 +61,7 @@ class Forces(NamedTuple):
 
 
 class Overlaps(NamedTuple):
-    """Overlaps with damping; a torque acts where they are positive."""
+    """Overlaps with damping. A torque acts where they are positive."""
 
     front: Annotated[float, Signal("rad", "overlap of the front flank", 1e-3)]
     back: Annotated[float, Signal("rad", "overlap of the back flank", 1e-3)]
@@ -98,13 +98,13 @@ def compliance(par: Parameters) -> Compliance:
 
 
 def forces(u: Input, par: Parameters) -> Forces:
-    """Return the contact torques of shafts that no other contact holds."""
+    """Return the contact torques on shafts without other contacts."""
     d = overlaps(u, par)
     return Forces(front=par.k * ops.fmax(d.front, 0.0), back=par.k * ops.fmax(d.back, 0.0))
 
 
 def torque(f: Forces) -> Annotated[float, Signal("N*m", "torque of the mesh", 0.5)]:
-    """Return the torque of the mesh against shaft 1; shaft 2 receives i times this torque."""
+    """Return the mesh torque against shaft 1. Shaft 2 receives i times this torque."""
     return f.front - f.back
 
 

@@ -1,4 +1,4 @@
-"""Ball ramp: balls between inclined tracks turn a rotation into travel."""
+"""Ball ramp, in which balls between inclined tracks convert rotation to travel."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ RampAngle = Annotated[float, Unit("rad", 0.05), Field(gt=0, lt=1.5, allow_inf_na
 
 
 class Parameters(ParameterSet):
-    """Massless ramp of constant slope; all balls share the load equally."""
+    """Massless ramp with constant slope. All balls share the load equally."""
 
     r: Length
-    """radius of the tracks"""
+    """track radius"""
     alpha: RampAngle
-    """angle of the ramp"""
+    """ramp angle"""
     mu: Weight
     """friction coefficient of the rolling balls"""
 
@@ -55,5 +55,5 @@ def friction(u: Input, par: Parameters) -> Torque:
 
 
 def power_loss(u: Input, par: Parameters) -> Power:
-    """Return the heat of the friction, >= 0."""
+    """Return the friction heat, >= 0."""
     return friction(u, par) * ops.fabs(u.omega)

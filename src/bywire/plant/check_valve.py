@@ -1,4 +1,4 @@
-"""Check valve: an orifice that opens in one direction, above its cracking pressure."""
+"""Check valve, an orifice that opens in one direction above its cracking pressure."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ CrackingPressure = Annotated[float, Unit("Pa", 2e4), Field(ge=0, allow_inf_nan=F
 
 
 class Parameters(ParameterSet):
-    """Massless ball on a seat: its spring takes the cracking pressure from the pressure drop."""
+    """Massless ball on a seat. Its spring uses up the cracking pressure of the pressure drop."""
 
     seat: orifice.Parameters
     """orifice of the open valve"""
@@ -29,7 +29,7 @@ FAULTS = (ParameterFault("clogged", "narrower seat", ("seat.d",), 0.5),)
 
 
 class Input(NamedTuple):
-    """Pressures at the inlet and at the outlet."""
+    """Pressures at inlet and outlet."""
 
     p_a: Pressure
     p_b: Pressure
@@ -43,13 +43,13 @@ def flow(u: Input, par: Parameters, fluid: brake_fluid.Parameters) -> orifice.Fl
     Notes
     -----
     The flow has a kink where the pressure drop equals the cracking pressure. A linear model at this
-    point has the slope of one side. The closed valve is tight.
+    point uses the slope on one side. The closed valve is tight.
     """
     drop = ops.fmax(u.p_a - u.p_b - par.p_crack, 0.0)
     return orifice.flow(orifice.Input(p_a=drop, p_b=0.0 * drop, opening=1.0), par.seat, fluid)
 
 
 def power_loss(u: Input, par: Parameters, fluid: brake_fluid.Parameters) -> orifice.Loss:
-    """Return the heat of the flow through seat and spring, >= 0."""
+    """Return the heat from the flow through seat and spring, >= 0."""
     h = brake_fluid.flow_energy
     return flow(u, par, fluid) * (h(u.p_a, fluid) - h(u.p_b, fluid))

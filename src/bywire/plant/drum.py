@@ -1,4 +1,4 @@
-"""Drum brake with internal shoes: leading, trailing, and shoes in series."""
+"""Drum brake with internal shoes: leading shoes, trailing shoes, and shoes in series."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from bywire.core.signals import Power, Signal
 Angle = Annotated[float, Unit("rad", 1.0), Field(ge=0, le=math.pi, allow_inf_nan=False)]
 LiningFriction = Annotated[float, Unit("1", 0.3), Field(gt=0, lt=1, allow_inf_nan=False)]
 LOCKING = 0.9
-"""highest friction coefficient, relative to that at which a shoe locks"""
+"""maximum friction coefficient, relative to the coefficient at which a shoe locks"""
 
 Coefficient = Annotated[float, Signal("1", "coefficient of the shoe factors", 0.5)]
 ShoeFactor = Annotated[float, Signal("1", "shoe factor", 1.0)]
@@ -25,27 +25,27 @@ ShoeFactor = Annotated[float, Signal("1", "shoe factor", 1.0)]
 class Parameters(ParameterSet):
     """Two rigid shoes, each on a pivot, with a cosine pressure along the lining.
 
-    ``law``: with ``"simplex"``, one shoe is leading and one is trailing in either direction of
-    rotation. With ``"duplex"``, both are leading forward and trailing in reverse. With ``"servo"``,
-    the first shoe pushes the second one at its free end, in either direction.
+    ``law``: with ``"simplex"``, one shoe is leading and the other is trailing in either direction
+    of rotation. With ``"duplex"``, both are leading forward and trailing in reverse. With
+    ``"servo"``, the first shoe pushes the second one at its free end, in either direction.
     """
 
     law: Literal["simplex", "duplex", "servo"]
     """arrangement of the shoes"""
     r: Length
-    """radius of the drum"""
+    """drum radius"""
     b: Length
-    """width of the lining"""
+    """lining width"""
     a: Length
     """distance of the pivots from the center"""
     c: Length
     """distance of the actuating force from the pivots"""
     theta_1: Angle
-    """angle from the pivot to the beginning of the lining"""
+    """angle from the pivot to the start of the lining"""
     theta_2: Angle
     """angle from the pivot to the end of the lining"""
     mu: LiningFriction
-    """friction coefficient of the lining"""
+    """lining friction coefficient"""
 
     @model_validator(mode="after")
     def _shoes_release(self) -> Parameters:
@@ -55,11 +55,11 @@ class Parameters(ParameterSet):
                 "theta_2", f"{math.degrees(self.theta_2):.4g} deg", f"> theta_1 = {low:.4g} deg"
             )
         if not self.c > self.a:
-            raise RuleError("c", f"{self.c:g} m", f"> the distance of the pivots a = {self.a:g} m")
+            raise RuleError("c", f"{self.c:g} m", f"> the pivot distance a = {self.a:g} m")
         k_0, k_1 = coefficients(self)
         if not (k_1 <= 0.0 or self.mu <= LOCKING * k_0 / k_1):
             limit = LOCKING * k_0 / k_1
-            reason = f"the leading shoe locks at {k_0 / k_1:.3g}"
+            reason = f"because the leading shoe locks at mu = {k_0 / k_1:.3g}"
             raise RuleError("mu", f"{self.mu:g}", f"<= {limit:.3g}", reason)
         return self
 
@@ -71,21 +71,21 @@ FAULTS = (
 
 
 class Input(NamedTuple):
-    """Actuating force on each shoe, >= 0, and the drum's speed."""
+    """Actuating force on each shoe, >= 0, and drum speed."""
 
     force: Annotated[float, Signal("N", "actuating force on a shoe", 2e3, low=0.0)]
     omega: Annotated[float, Signal("rad/s", "speed of the drum", 50.0)]
 
 
 class Output(NamedTuple):
-    """Bounds of the brake torque; at standstill it takes any value between them."""
+    """Bounds of the brake torque. At standstill the torque can have any value between them."""
 
     T_p: Annotated[float, Signal("N*m", "brake torque, forward", 500.0)]
     T_n: Annotated[float, Signal("N*m", "brake torque, in reverse", 500.0)]
 
 
 class Moments(NamedTuple):
-    """Moments about the pivot, per largest pressure."""
+    """Moments about the pivot, per maximum pressure."""
 
     normal: Annotated[float, Signal("m**3", "moment of the normal force per pressure", 1e-3)]
     friction: Annotated[float, Signal("m**3", "friction moment per pressure and mu", 1e-3)]
@@ -101,7 +101,7 @@ def moments(par: Parameters) -> Moments:
         d\theta, \quad
         \frac{T}{\mu p_a} = \frac{b r^2}{\sin\theta_a} \int \sin\theta\, d\theta
 
-    The largest pressure is at :math:`\theta_a`: 90 degrees, or the end of a shorter lining.
+    The maximum pressure is at :math:`\theta_a`, which is 90 degrees or the end of a shorter lining.
 
     References
     ----------
@@ -135,7 +135,7 @@ def coefficients(par: Parameters) -> tuple[Coefficient, Coefficient]:
 
 
 def shoe_factors(par: Parameters) -> tuple[ShoeFactor, ShoeFactor]:
-    """Return the factors of a leading and of a trailing shoe, see `coefficients`."""
+    """Return the factors of a leading and of a trailing shoe (see `coefficients`)."""
     k_0, k_1 = coefficients(par)
     return par.mu / (k_0 - par.mu * k_1), par.mu / (k_0 + par.mu * k_1)
 
@@ -145,9 +145,9 @@ def brake_factors(par: Parameters) -> tuple[ShoeFactor, ShoeFactor]:
 
     Notes
     -----
-    With law ``"servo"``, the first shoe floats. It leads, and pushes the second shoe with the force
-    :math:`F (c - a + C^*_1 r)/a` at the distance ``2 a`` from the second shoe's pivot. The second
-    shoe leads, too.
+    With law ``"servo"``, the first shoe floats. It is a leading shoe, and pushes the second shoe
+    with the force :math:`F (c - a + C^*_1 r)/a` at the distance ``2 a`` from the second shoe's
+    pivot. The second shoe is also a leading shoe.
     """
     leading, trailing = shoe_factors(par)
     if par.law == "duplex":
@@ -155,7 +155,7 @@ def brake_factors(par: Parameters) -> tuple[ShoeFactor, ShoeFactor]:
     if par.law == "simplex":
         return leading + trailing, leading + trailing
     pushed = (par.c - par.a + leading * par.r) / par.a
-    # A shoe's factor is proportional to the lever of its actuating force.
+    # A shoe's factor is proportional to the lever arm of its actuating force.
     total = leading + pushed * leading * 2.0 * par.a / par.c
     return total, total
 
@@ -167,6 +167,6 @@ def output(u: Input, par: Parameters) -> Output:
 
 
 def power_loss(u: Input, par: Parameters) -> Power:
-    """Return the heat of the linings, >= 0."""
+    """Return the lining heat, >= 0."""
     T = output(u, par)
     return ops.where(u.omega > 0, T.T_p, T.T_n) * ops.fabs(u.omega)

@@ -1,4 +1,4 @@
-"""Three-phase inverter, averaged over the carrier: dead time, voltage drops, held voltages."""
+"""Three-phase inverter averaged over the carrier, with dead time, voltage drops, held voltages."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ Loss = Annotated[float, Signal("W", "inverter loss", role=Role("sink", "inverter
 
 
 class Parameters(ParameterSet):
-    """Voltages that stand still between two ticks, while the rotor turns on.
+    """Inverter that holds its voltages between two ticks, while the rotor continues to turn.
 
-    ``law``: with ``"dead time"``, the voltage of each phase is smaller by the dead time and the
-    forward voltage, and the difference reverses with the phase's current.
+    ``law``: with ``"dead time"``, dead time and forward voltage reduce the voltage of each phase.
+    The reduction reverses with the phase current.
     """
 
     law: Literal["ideal", "dead time"]
@@ -37,7 +37,7 @@ class Parameters(ParameterSet):
     V_f: ForwardVoltage
     """forward voltage of switch and diode (law "dead time")"""
     i_th: Current
-    """current at which the distortion has its full value; smaller currents recharge the switches'
+    """current at which the distortion reaches its full value; smaller currents recharge the switch
     capacitances, :math:`2 C_{oss} V_{dc} / t_d` (law "dead time")"""
 
 
@@ -53,7 +53,7 @@ FAULTS = (
 
 
 class Input(NamedTuple):
-    """Demanded voltages in stator coordinates, currents in rotor coordinates, angle, bus."""
+    """Voltage demands in stator coordinates, currents in rotor coordinates, angle, bus voltage."""
 
     v_alpha: Volts
     v_beta: Volts
@@ -72,28 +72,28 @@ class Output(NamedTuple):
 
 
 def largest_voltage(V_dc: BusVoltage) -> Volts:
-    r"""Return the largest amplitude of space-vector modulation, :math:`V_{dc} / \sqrt 3`."""
+    r"""Return the maximum amplitude of space-vector modulation, :math:`V_{dc} / \sqrt 3`."""
     return V_dc / math.sqrt(3.0)
 
 
 def rotated(
     first: Volts, second: Volts, theta: Annotated[float, Signal("rad", "electrical angle", 3.0)]
 ) -> tuple[Volts, Volts]:
-    """Return a vector in coordinates that are ahead by an angle."""
+    """Return a vector in coordinates that are rotated forward by an angle."""
     c, s = ops.cos(theta), ops.sin(theta)
     return c * first + s * second, c * second - s * first
 
 
 def distortion(u: Input, par: Parameters) -> tuple[Volts, Volts, Loss]:
-    r"""Return the distortion of the voltages in stator coordinates, and its loss.
+    r"""Return the voltage distortion in stator coordinates, and its loss.
 
     .. math:: \Delta v = -(V_{dc} t_d f_s + V_f)\, \mathrm{sat}(i / i_{th})
 
-    phase by phase.
+    in each phase.
 
     Notes
     -----
-    The capacitances of the switches give the characteristic a finite slope around zero. It is
+    The switch capacitances give the characteristic a finite slope around zero. The distortion is
     therefore a function of the current, with kinks at :math:`\pm i_{th}`, and not set-valued.
     """
     if par.law == "ideal":
@@ -114,12 +114,12 @@ def output(u: Input, par: Parameters) -> Output:
 
     .. math:: i_{dc} = \tfrac{3}{2} (v_\alpha i_\alpha + v_\beta i_\beta) / V_{dc}
 
-    with the demanded voltages, so that the distortion's loss comes from the bus.
+    with the demanded voltages. Therefore the bus supplies the distortion loss.
 
     Notes
     -----
-    Held voltages turn back in rotor coordinates while the rotor turns on. A model that holds
-    ``v_d`` and ``v_q`` instead would hide this angle, which grows with speed and sample time.
+    Held voltages rotate backward in rotor coordinates while the rotor turns. A model that holds
+    ``v_d`` and ``v_q`` instead would omit this angle, which increases with speed and sample time.
     """
     more_alpha, more_beta, _ = distortion(u, par)
     v_d, v_q = rotated(u.v_alpha + more_alpha, u.v_beta + more_beta, u.theta_e)
@@ -129,5 +129,5 @@ def output(u: Input, par: Parameters) -> Output:
 
 
 def power_loss(u: Input, par: Parameters) -> Loss:
-    """Return the power that dead time and voltage drops take from the bus, >= 0."""
+    """Return the power loss due to dead time and voltage drops, >= 0."""
     return distortion(u, par)[2]

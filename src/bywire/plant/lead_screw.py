@@ -1,4 +1,4 @@
-"""Lead screw: a sliding thread whose friction follows from its geometry, also self-locking."""
+"""Lead screw: a sliding thread whose geometry determines its friction. It may be self-locking."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ Friction = Annotated[float, Unit("1", 0.1), Field(ge=0, lt=1, allow_inf_nan=Fals
 
 
 class Parameters(ParameterSet):
-    """Massless screw with constant friction on its flanks, proportional to the load."""
+    """Massless screw with a constant friction coefficient on its flanks."""
 
     lead: Length
     """travel per revolution"""
     d_m: Length
-    """mean diameter of the thread"""
+    """mean thread diameter"""
     mu: Friction
-    """friction coefficient of the flanks"""
+    """flank friction coefficient"""
     beta: FlankAngle
-    """flank angle: half the angle of the thread"""
+    """flank angle, half the thread angle"""
 
     @model_validator(mode="after")
     def _turns_under_load(self) -> Parameters:
@@ -43,7 +43,7 @@ FAULTS = (ParameterFault("dry", "thread without grease", ("mu",), 2.0),)
 
 
 class Input(NamedTuple):
-    """Axial force on the screw, positive toward clamping, and the shaft's speed."""
+    """Axial force on the screw, positive toward clamping, and shaft speed."""
 
     force: Annotated[float, Signal("N", "axial force on the screw", 1e4)]
     omega: Annotated[float, Signal("rad/s", "speed of the screw", 20.0)]
@@ -88,7 +88,7 @@ def efficiencies(par: Parameters) -> Efficiencies:
         \eta_f = \frac{\tan\lambda}{\tan(\lambda + \rho)}, \quad
         \eta_b = \frac{\tan(\lambda - \rho)}{\tan\lambda}
 
-    A screw with :math:`\eta_b \le 0` locks itself: only a torque on the shaft releases its load.
+    A screw with :math:`\eta_b \le 0` is self-locking. Only a torque on the shaft releases its load.
 
     References
     ----------
@@ -110,8 +110,8 @@ def friction(u: Input, par: Parameters) -> Output:
         T = (1/\eta_f - 1) |F| L/2\pi \text{ (load opposes)}, \quad
         T = (1 - \eta_b) |F| L/2\pi \text{ (load aids)}
 
-    At rest, the friction takes any value between these bounds. A self-locking screw therefore holds
-    its load exactly, for any time.
+    At rest, the friction can have any value between these bounds. A self-locking screw therefore
+    holds its load exactly and indefinitely.
     """
     load, eta = load_torque(u, par), efficiencies(par)
     opposing = (1.0 / eta.eta_f - 1.0) * ops.fabs(load)
@@ -123,6 +123,6 @@ def friction(u: Input, par: Parameters) -> Output:
 
 
 def power_loss(u: Input, par: Parameters) -> Power:
-    """Return the heat of the sliding thread, >= 0."""
+    """Return the heat from the sliding thread, >= 0."""
     T = friction(u, par)
     return ops.where(u.omega > 0, T.T_p, T.T_n) * ops.fabs(u.omega)

@@ -1,4 +1,4 @@
-"""Orifice: turbulent flow of brake fluid through a sharp edge, laminar near zero."""
+"""Sharp-edged orifice for brake fluid, with turbulent flow that is laminar near zero."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ Loss = Annotated[float, Signal("W", "throttling loss", role=Role("sink", "thrott
 
 
 class Parameters(ParameterSet):
-    """Sharp-edged orifice without inertia of the fluid and without cavitation."""
+    """Sharp-edged orifice without fluid inertia and without cavitation."""
 
     d: Length
     """diameter"""
     C_d: DischargeCoefficient
     """discharge coefficient of turbulent flow"""
     Re_cr: CriticalReynolds
-    """Reynolds number of the transition from laminar to turbulent flow"""
+    """Reynolds number at the transition from laminar to turbulent flow"""
 
 
 FAULTS = (ParameterFault("clogged", "narrower orifice", ("d",), 0.5),)
@@ -51,14 +51,14 @@ def area(par: Parameters) -> Annotated[float, Signal("m**2", "area", 2e-7)]:
 def coefficient(
     par: Parameters, fluid: brake_fluid.Parameters
 ) -> Annotated[float, Signal("m**3/(s*Pa**0.5)", "flow coefficient", 5e-9)]:
-    r"""Return the coefficient of the turbulent flow, :math:`K = C_d A \sqrt{2/\rho}`."""
+    r"""Return the turbulent flow coefficient, :math:`K = C_d A \sqrt{2/\rho}`."""
     return par.C_d * area(par) * ops.sqrt(2.0 / fluid.rho)
 
 
 def critical_pressure(
     par: Parameters, fluid: brake_fluid.Parameters
-) -> Annotated[float, Signal("Pa", "pressure drop of the transition", 1e4)]:
-    r"""Return the pressure drop of the transition from laminar to turbulent flow.
+) -> Annotated[float, Signal("Pa", "pressure drop at the transition", 1e4)]:
+    r"""Return the pressure drop at the transition from laminar to turbulent flow.
 
     .. math:: p_{cr} = \frac{\rho}{2} \left(\frac{Re_{cr} \nu}{C_d d}\right)^2
     """
@@ -73,10 +73,10 @@ def flow(u: Input, par: Parameters, fluid: brake_fluid.Parameters) -> Flow:
 
     Notes
     -----
-    The square root alone has an infinite slope at zero pressure drop. The form above has the slope
-    :math:`K/\sqrt{p_{cr}}` there, and deviates from the square root by
-    :math:`p_{cr}^2 / (4 \Delta p^2)` far from zero. Linear models at a small pressure drop have
-    this finite slope. The transition uses the diameter of the open orifice for all openings.
+    The square root alone has an infinite slope at zero pressure drop. The formula above has the
+    slope :math:`K/\sqrt{p_{cr}}` there. Far from zero, its relative deviation from the square root
+    is :math:`p_{cr}^2 / (4 \Delta p^2)`. Linear models at a small pressure drop have this finite
+    slope. The transition uses the diameter of the open orifice for all openings.
 
     References
     ----------
@@ -88,6 +88,6 @@ def flow(u: Input, par: Parameters, fluid: brake_fluid.Parameters) -> Flow:
 
 
 def power_loss(u: Input, par: Parameters, fluid: brake_fluid.Parameters) -> Loss:
-    """Return the heat of the flow, including released compression energy, >= 0."""
+    """Return the heat from the flow, including released compression energy, >= 0."""
     h = brake_fluid.flow_energy
     return flow(u, par, fluid) * (h(u.p_a, fluid) - h(u.p_b, fluid))

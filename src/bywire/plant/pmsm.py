@@ -21,29 +21,29 @@ IronLoss = Annotated[float, Signal("W", "iron loss", role=Role("sink", "iron"))]
 
 
 class Parameters(ParameterSet):
-    """Constant inductances and sinusoidal flux; amplitudes are those of phase quantities.
+    """Constant inductances and sinusoidal flux. Amplitudes refer to phase quantities.
 
-    The d axis lies along the magnets, and the q axis is 90 degrees (electrical) ahead. Magnets on
-    the surface have ``L_d = L_q``, interior magnets ``L_d < L_q``. ``iron``: with ``"drag"``, the
-    iron loss is a torque against the rotation, and not a current.
+    The d axis is along the magnets, and the q axis is 90 degrees (electrical) ahead. Surface
+    magnets have ``L_d = L_q``, interior magnets ``L_d < L_q``. ``iron``: with ``"drag"``, the iron
+    loss is a torque against the rotation, and not a current.
     """
 
     p: PolePairs
     """number of pole pairs"""
     R: Resistance
-    """resistance of a phase"""
+    """phase resistance"""
     L_d: Inductance
-    """inductance along the magnets"""
+    """d-axis inductance"""
     L_q: Inductance
-    """inductance across the magnets"""
+    """q-axis inductance"""
     psi: FluxLinkage
-    """amplitude of the magnets' flux linkage"""
+    """amplitude of the magnet flux linkage"""
     iron: Literal["off", "drag"]
     """whether the iron has losses"""
     c_h: Hysteresis
-    """coefficient of the hysteresis loss (iron "drag")"""
+    """hysteresis loss coefficient (iron "drag")"""
     c_e: Eddy
-    """coefficient of the eddy-current loss (iron "drag")"""
+    """eddy-current loss coefficient (iron "drag")"""
 
 
 FAULTS = (
@@ -55,8 +55,8 @@ FAULTS = (
 class State(NamedTuple):
     """Currents in rotor coordinates."""
 
-    i_d: Annotated[float, Signal("A", "current along the magnets", 5.0)]
-    i_q: Annotated[float, Signal("A", "current across the magnets", 5.0)]
+    i_d: Annotated[float, Signal("A", "d-axis current", 5.0)]
+    i_q: Annotated[float, Signal("A", "q-axis current", 5.0)]
 
 
 class Factors(NamedTuple):
@@ -74,22 +74,22 @@ class Balance(NamedTuple):
 
 
 class Input(NamedTuple):
-    """Voltages in rotor coordinates, and the speed of the rotor."""
+    """Voltages in rotor coordinates, and rotor speed."""
 
-    v_d: Annotated[float, Signal("V", "voltage along the magnets", 5.0)]
-    v_q: Annotated[float, Signal("V", "voltage across the magnets", 5.0)]
+    v_d: Annotated[float, Signal("V", "d-axis voltage", 5.0)]
+    v_q: Annotated[float, Signal("V", "q-axis voltage", 5.0)]
     omega: MotorSpeed
 
 
 class Flux(NamedTuple):
     """Flux linkages in rotor coordinates."""
 
-    psi_d: Annotated[float, Signal("V*s", "flux linkage along the magnets", 6e-3)]
-    psi_q: Annotated[float, Signal("V*s", "flux linkage across the magnets", 1e-3)]
+    psi_d: Annotated[float, Signal("V*s", "d-axis flux linkage", 6e-3)]
+    psi_q: Annotated[float, Signal("V*s", "q-axis flux linkage", 1e-3)]
 
 
 class Output(NamedTuple):
-    """Torque of the motor, and the friction of its iron."""
+    """Motor torque, and the dry friction due to iron hysteresis."""
 
     torque: Annotated[float, Signal("N*m", "motor torque, with eddy-current drag", 0.3)]
     T_h: Annotated[float, Signal("N*m", "hysteresis torque, a dry friction", 1e-3)]
@@ -101,7 +101,7 @@ def flux(x: State, par: Parameters) -> Flux:
 
 
 def mass(x: State, par: Parameters) -> Factors:
-    """Return the factors of the currents' derivatives, the inductances."""
+    """Return the factors of the currents' derivatives, which are the inductances."""
     return Factors(i_d=par.L_d, i_q=par.L_q)
 
 
@@ -115,8 +115,8 @@ def balance(x: State, u: Input, par: Parameters) -> Balance:
 
     References
     ----------
-    R. H. Park, "Two-Reaction Theory of Synchronous Machines", Trans. AIEE 48, 1929; in this form
-    in the documentation of MathWorks' "MTPA Control Reference".
+    R. H. Park, "Two-Reaction Theory of Synchronous Machines", Trans. AIEE 48, 1929. The
+    documentation of MathWorks' "MTPA Control Reference" has this form.
     """
     omega_e, f = par.p * u.omega, flux(x, par)
     return Balance(
@@ -128,7 +128,7 @@ def balance(x: State, u: Input, par: Parameters) -> Balance:
 def airgap_torque(
     x: State, par: Parameters
 ) -> Annotated[float, Signal("N*m", "air-gap torque", 0.3)]:
-    r"""Return the torque of the currents.
+    r"""Return the torque due to the currents.
 
     .. math:: T = \tfrac{3}{2} p (\psi + (L_d - L_q) i_d) i_q
     """
@@ -137,7 +137,7 @@ def airgap_torque(
 
 
 def output(x: State, omega: MotorSpeed, par: Parameters) -> Output:
-    r"""Return the torque on the rotor, and the bound of the iron's dry friction.
+    r"""Return the torque on the rotor, and the bound of the hysteresis friction.
 
     .. math::
         T_e = c_e p^2 \omega \psi_s^2, \quad T_h = c_h p \psi_s^2, \quad
@@ -145,9 +145,10 @@ def output(x: State, omega: MotorSpeed, par: Parameters) -> Output:
 
     Notes
     -----
-    A drag torque leaves two states. The usual resistor across the windings would need two more, and
-    gives the same loss at constant speed. The hysteresis torque does not depend on the magnitude of
-    the speed. It is a set-valued friction on the rotor, which holds it at rest.
+    With a drag torque, the model has two states. The usual resistor across the windings would need
+    two more states, and gives the same loss at constant speed. The hysteresis torque does not
+    depend on the magnitude of the speed. It is a set-valued friction, which holds the rotor at
+    rest.
     """
     T = airgap_torque(x, par)
     if par.iron == "off":
@@ -187,5 +188,5 @@ def power_loss(x: State, par: Parameters) -> Loss:
 
 
 def iron_loss(x: State, omega: MotorSpeed, par: Parameters) -> IronLoss:
-    """Return the eddy-current loss, >= 0; the model's dry friction contains the hysteresis."""
+    """Return the eddy-current loss, >= 0. The model's dry friction contains the hysteresis."""
     return 0.0 * omega if par.iron == "off" else _eddy_slope(x, par) * omega * omega

@@ -66,5 +66,5 @@ def power_loss(
     force: Annotated[float, Signal("N", "friction force on the wedge", 50.0)],
     v: Annotated[float, Signal("m/s", "velocity of the wedge", 0.02)],
 ) -> Power:
-    """Return the friction heat, minus force times velocity."""
+    """Return the friction heat (signed: minus force times velocity)."""
     return -force * v
