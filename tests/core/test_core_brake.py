@@ -81,7 +81,7 @@ def test_a_package_keeps_each_kind_in_its_own_module(write: Write) -> None:
             "raises.py",
             f"{HEAD}x = 3\ny = x / 0\n",
             ModelError,
-            ["raises.py, line 3: ZeroDivisionError: division by zero", "fix it and load it again"],
+            ["raises.py, line 3: ZeroDivisionError: division by zero"],
         ),
         (
             "deep.py",
@@ -117,7 +117,7 @@ def test_a_package_keeps_each_kind_in_its_own_module(write: Write) -> None:
             "taken.py",
             declared("motorcycle"),
             ModelError,
-            ["taken.py declares a brake 'motorcycle', and so does", "rename one of them"],
+            ["taken.py", "a brake 'motorcycle'", "Rename one of them"],
         ),
         (
             "json.py",
@@ -292,7 +292,7 @@ def installed(
     [
         ("broken_at_import", "x = 1\nx.no\n", r"broken_at_import.py, line 2: AttributeError"),
         ("without_declaration", "x = 1\n", "declares no BRAKE"),
-        ("with_our_name", declared("wedge"), "declares a brake 'wedge', and so does"),
+        ("with_our_name", declared("wedge"), "declare a brake 'wedge'"),
     ],
 )
 def test_a_broken_entry_point_is_reported_once_and_left_out(
@@ -316,7 +316,7 @@ def test_what_an_installed_brake_breaks_is_left_out_and_the_others_stay(
         "from bywire.core.parameters import ParameterSet\n"
         'SETS = (CitedSet("roberts2003", "a", "", "", ParameterSet, {}),)\n',
     )
-    with pytest.warns(BrakeWarning, match=r"'clashing' is skipped: .*'roberts2003'"):
+    with pytest.warns(BrakeWarning, match="'clashing': .*'roberts2003'"):
         known = PARAMETER_SETS.all()
     assert known["roberts2003"].assembly == "wedge-brake"
     assert set(brakes()) == OURS | {"clashing"}

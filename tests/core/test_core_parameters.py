@@ -209,7 +209,7 @@ def test_nothing_can_be_assigned_or_added():
         ({"inner.law": 3}, "inner.law must be 'paper' or 'directional', got 3"),
         ({"on": "maybe"}, "on: it must be true or false, got 'maybe'"),
         ({"on": [1]}, "on: it must be true or false, got [1]"),
-        ({"note": 3}, "note: it must be a text, got 3"),
+        ({"note": 3}, "note: it must be a string, got 3"),
         ({"short": 2.0}, "Outer: short must be shorter than long"),
     ],
 )

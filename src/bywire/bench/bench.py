@@ -114,7 +114,7 @@ class Bench:
     def __post_init__(self) -> None:
         for key in ("experiment", "parameters", "name", "assembly"):
             if not isinstance(getattr(self, key), str):
-                raise not_valid(key, quoted(getattr(self, key)), "a text")
+                raise not_valid(key, quoted(getattr(self, key)), "a string")
         for key in ("overrides", "options", "stimulus", "requirements"):
             object.__setattr__(self, key, dict(getattr(self, key)))  # a copy
         object.__setattr__(self, "faults", tuple(checked_sections(self.faults)))

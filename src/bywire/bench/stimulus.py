@@ -210,7 +210,7 @@ def with_nodes(values: Mapping[str, Any], level_unit: str) -> dict[str, Any]:
         )
     path = values["file"]
     if not isinstance(path, str):
-        raise not_valid("stimulus.file", quoted(path), "a text")
+        raise not_valid("stimulus.file", quoted(path), "a string")
     whole = {key: values[key] for key in _FILE if key in values}
     clock = {inner: values[key] for key, inner in _CLOCK.items() if key in values}
     whole |= {"time": clock} if clock else {}
