@@ -1,4 +1,4 @@
-"""Arguments of public functions: another kind than the signature says is one clear error."""
+"""Arguments of public functions: a type that the signature does not allow is one clear error."""
 
 from __future__ import annotations
 

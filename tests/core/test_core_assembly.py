@@ -1,4 +1,4 @@
-"""Assemblies: what follows from parts, and mistakes of wiring said with place and next step."""
+"""Assemblies: derived equations, and errors of wiring with place and next step."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Held(NamedTuple):
 
 
 class Screw(Assembly[Parameters, Held]):
-    """What the other ones here do wrong, done right."""
+    """The correct version of the faulty assemblies in this file."""
 
     name = "screw"
     Memory = Stimulus = Held

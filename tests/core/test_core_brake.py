@@ -1,4 +1,4 @@
-"""Brakes of users: loaded from files and packages, found by entry points; what is wrong is said."""
+"""Users' brakes from files, packages and entry points, and their errors."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ Write = Callable[[str, str], Path]
 
 @pytest.fixture(autouse=True)
 def _forgotten() -> Iterator[None]:
-    """Forget what a test loads."""
+    """Remove the modules that a test loads."""
     with forgotten():
         yield
 
@@ -272,7 +272,7 @@ def test_what_a_brake_does_not_declare_is_said_with_how_it_is_declared() -> None
 def installed(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> Iterator[Callable[[str, str], None]]:
-    """Return a function that installs a brake of one file beside ours."""
+    """Return a function that installs a single-file brake next to ours."""
     real = brakes_module.entry_points(group=brakes_module.GROUP)
     added: list[EntryPoint] = []
     monkeypatch.syspath_prepend(tmp_path)

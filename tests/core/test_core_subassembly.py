@@ -1,4 +1,4 @@
-"""Assemblies in assemblies: what is held under a prefix is what it is alone, number by number."""
+"""Subassemblies: with a prefix, an assembly gives the same numbers as alone."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Texts with units: what is read, what is refused, and how quickly."""
+"""Strings with units: valid and invalid strings, and the time to read them."""
 
 from __future__ import annotations
 

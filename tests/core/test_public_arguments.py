@@ -1,4 +1,4 @@
-"""Every public function and declaration refuses arguments of another kind, in one sentence."""
+"""Every public function and declaration rejects arguments of the wrong type in one sentence."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Sections of files: what they read, and one sentence for each thing that does not fit."""
+"""Sections of files: their values, and one sentence for each invalid value."""
 
 from __future__ import annotations
 

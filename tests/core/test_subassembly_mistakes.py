@@ -1,4 +1,4 @@
-"""Assemblies in assemblies: every mistake has one error, with its place."""
+"""Subassemblies: each mistake gives one error with its place."""
 
 from __future__ import annotations
 

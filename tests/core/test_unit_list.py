@@ -1,4 +1,4 @@
-"""Every unit of the list, and all products and quotients of two, against factors by hand."""
+"""All units of the list, and all products and quotients of two, versus handwritten factors."""
 
 from __future__ import annotations
 
