@@ -59,7 +59,7 @@ def test_a_response_that_is_too_fast_is_said(bywire):
         (("drive-train", "--parameters", "dardanelli2010"), ("wedge-brake", "motorcycle-brake")),
         (("drive-train", "--set", "lead=3mm"), ("lead_min",)),
         (("drive-train", "--set", "lead_min=9mm"), ("lead_min", "lead_max", "below")),
-        (("drive-train", "--set", "t_90=0.1"), ("t_90", "for example, write")),
+        (("drive-train", "--set", "t_90=0.1"), ("t_90", "For example, write")),
         (("drive-train", "--set", "slopes=2"), ("slopes", ">= 3")),
         (("drive-train", "--set", "power=peak"), ("'filtered' or 'instantaneous'",)),
         (("drive-train", "--set", "wedge.mu_b=0.4"), ("wedge.mu_B",)),
