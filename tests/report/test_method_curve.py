@@ -105,7 +105,7 @@ def test_a_band_is_named() -> None:
     ("half", "said"),
     [
         (0.1, "95 % band (± 0.1 N at most)"),
-        (1e-3, "95 % band (± 0.001 N at most, within the line)"),
+        (1e-3, "95 % band (± 0.001 N at most, hidden by the line)"),
     ],
 )
 def test_a_band_that_the_line_hides_is_told(half: float, said: str) -> None:

@@ -11,14 +11,14 @@ from typing import Annotated, Any
 
 from bywire.bench.bench import Bench
 from bywire.bench.changes import is_relative, settled
-from bywire.bench.experiment import EXPERIMENTS
+from bywire.bench.experiment import EXPERIMENTS, Experiment
 from bywire.bench.faults.fault_section import Course, numbers_as_text
 from bywire.bench.faults.injected import checked_sections
 from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS, experiment_of, usual_set
 from bywire.bench.stimulus import STIMULI, stimulus_sections
 from bywire.core.arguments import checked
 from bywire.core.callers import option
-from bywire.core.catalog import PARAMETER_SETS, sets_of_loaded
+from bywire.core.catalog import PARAMETER_SETS, CitedSet, sets_of_loaded
 from bywire.core.errors import InputError, ParameterError, UnknownNameError, quoted, unknown_name
 from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.section import Hint, Section, Table, table_of
@@ -26,7 +26,7 @@ from bywire.core.values import parsed, require_unit, require_units
 from bywire.data.toml_file import BENCH, first_there, near_files, read_toml, require_kind
 
 PATHS = ("trace", "trace_map", "file")
-"""keys of options and stimuli that name files: bench files contain them as absolute paths"""
+"""keys of options and stimuli that specify files: bench files contain them as absolute paths"""
 
 
 def bench_text(bench: Bench, comment: str = "") -> str:
@@ -35,7 +35,7 @@ def bench_text(bench: Bench, comment: str = "") -> str:
     Parameters
     ----------
     bench
-        Bench to write; numbers get their SI units, texts stay as typed.
+        Bench to write; numbers get their SI units, and texts remain as typed.
     comment
         Text of the first lines, as a comment.
 
@@ -114,13 +114,12 @@ def _text(name: str, value: Any, symbol: str) -> str:
         return str(value).lower()
     if isinstance(value, Sequence):
         return f"[{', '.join(_text(name, node, symbol) for node in value)}]"
-    number = value if isinstance(value, int) else float(value)  # all digits, for the same run
+    number = value if isinstance(value, int) else float(value)  # all digits, to reproduce the run
     return json.dumps(f"{number} {symbol}") if symbol != "1" else f"{number}"
 
 
 # --- Reading
 
-_LIST = "(see 'bywire list')"
 _Quoted = Annotated[str, Hint("write it in quotation marks")]
 
 
@@ -144,11 +143,8 @@ class SimulationSection(Section):
 class BenchFile(Section):
     """Keys and sections of a bench file."""
 
-    experiment: Annotated[str, Hint(f'write experiment = "..." in quotation marks {_LIST}')]
-    parameters: Annotated[
-        str,
-        Hint(f'write parameters = "..." in quotation marks, with a parameter set\'s name {_LIST}'),
-    ]
+    experiment: _Quoted
+    parameters: _Quoted
     assembly: _Quoted = ""
     name: _Quoted = ""
     options: Table
@@ -192,13 +188,13 @@ def load(path: str | Path) -> Bench:
 
 
 def read(path: str | Path, changes: Mapping[str, str]) -> Bench:
-    """Read a bench file and change it as ``--set key=value`` does.
+    """Read a bench file and change it like ``--set key=value``.
 
     Parameters
     ----------
     path
-        Bench file; or the bare name of an experiment, for its defaults and the main parameter set
-        of its brake.
+        Bench file, or the bare name of an experiment for its defaults and the main parameter set of
+        its brake.
     changes
         ``options.NAME``, ``stimulus.NAME``, ``simulation.NAME``, ``requirements.NAME``,
         ``experiment``, ``parameters``, or the dotted name of a parameter, which may be a pattern.
@@ -223,10 +219,12 @@ def read(path: str | Path, changes: Mapping[str, str]) -> Bench:
 
 
 def from_mapping(content: Mapping[str, Any], folder: Path, name: str) -> Bench:
-    """Return the bench of a bench file's content; relative paths start at ``folder``."""
+    """Return the bench for a bench file's content; relative paths start at ``folder``."""
     sets = sets_of_loaded()
     only = {"parameters": sets[0]} if len(sets) == 1 else {}
-    file = BenchFile.read({"name": name, **only, **content}, "a bench file")
+    content = {"name": name, **only, **content}
+    _require_names(content)
+    file = BenchFile.read(content, "a bench file")
     options, overrides = flattened(file.options), flattened(file.set)
     _require_units(file, options, overrides)
     stimulus = {
@@ -244,6 +242,37 @@ def from_mapping(content: Mapping[str, Any], folder: Path, name: str) -> Bench:
         assembly=file.assembly,
         faults=[numbers_as_text(each) for each in checked_sections(file.faults)],
         **file.simulation.given,
+    )
+
+
+def _require_names(content: Mapping[str, Any]) -> None:
+    """Reject a bench without an experiment or a parameter set, with the names that fit."""
+    experiment, cited = content.get("experiment"), content.get("parameters")
+    if experiment is None:
+        known = PARAMETER_SETS.get(str(cited))
+        if known is None:
+            example, valid = next(iter(EXPERIMENTS.all())), "those of 'bywire list experiments'"
+        else:
+            names = _of_assembly(EXPERIMENTS.all(), known.assembly)
+            example = names[0]
+            valid = ", ".join((*names, *GENERIC_EXPERIMENTS.all()))
+        raise _missing("experiment", example, valid)
+    if cited is None and isinstance(experiment, str):
+        example = usual_set(experiment)
+        assembly = PARAMETER_SETS.find(example).assembly
+        valid = ", ".join(_of_assembly(PARAMETER_SETS.all(), assembly))
+        raise _missing("parameters", example, valid)
+
+
+def _of_assembly(known: Mapping[str, CitedSet] | Mapping[str, Experiment], name: str) -> list[str]:
+    return [each.name for each in known.values() if each.assembly == name]
+
+
+def _missing(key: str, example: str, valid: str) -> ParameterError:
+    return ParameterError(
+        f'{key} is missing. Add a line such as {key} = "{example}". Valid names are {valid}',
+        name=key,
+        valid=valid,
     )
 
 
@@ -348,7 +377,7 @@ _NAME = re.compile(r"[a-z][a-z0-9-]*")
 
 
 _FOLDER = "benches"  # usual folder of bench files
-_NEAR, _NEAR_EXPERIMENT = 0.5, 0.7  # least similarity of a suggested name
+_NEAR, _NEAR_EXPERIMENT = 0.5, 0.7  # minimum similarity of a suggested name
 
 
 def names_experiment(source: str | Path) -> bool:
@@ -360,7 +389,7 @@ def names_experiment(source: str | Path) -> bool:
 
 
 def content_of_experiment(file: Path, changes: Mapping[str, str]) -> dict[str, str]:
-    """Return the shortest bench file of an experiment; nothing if the name is that of a file.
+    """Return an experiment's shortest bench file; empty if the name belongs to a file.
 
     Raises
     ------
@@ -400,7 +429,7 @@ def _near(file: Path) -> Iterator[tuple[float, str]]:
     kinds = ("", BENCH)
     files = near_files(file, kinds, [file.parent], _NEAR, with_ending=True)
     yield from ((likeness, str(path)) for likeness, path in files)
-    written = file.name.replace("_", "-")  # a file's name for an experiment's
+    written = file.name.replace("_", "-")  # a file name instead of an experiment's name
     if _NAME.fullmatch(written):
         for name in {**EXPERIMENTS.all(), **GENERIC_EXPERIMENTS.all()}:
             likeness = SequenceMatcher(None, name, written).ratio()

@@ -20,7 +20,7 @@ from pydantic import Field
 from bywire.core.callers import option
 from bywire.core.errors import FileError, ParameterError, UnknownNameError, not_valid, quoted
 from bywire.core.parameters import ParameterSet, leaf_fields
-from bywire.core.quantities import Unit
+from bywire.core.quantities import Unit, display_unit
 from bywire.core.registry import Kind
 from bywire.core.values import nodes, number
 
@@ -31,9 +31,9 @@ TOLERANCE = 1e-9  # s: far above the rounding errors of ticks at k * T
 
 
 def reached(t: NDArray[np.float64], instant: float) -> NDArray[np.bool_]:
-    """Return whether each time has reached an instant, within the rounding errors of a tick.
+    """Return whether each time has reached another time, within the rounding errors of a tick.
 
-    ``t``: times [s], any shape; ``instant``: instant [s].
+    ``t``: times [s], any shape; ``instant``: the time to reach [s].
     """
     return t >= instant - TOLERANCE
 
@@ -154,7 +154,7 @@ def required_stimulus(stimulus: Stimulus | None, experiment: str) -> Stimulus:
     Raises
     ------
     ParameterError
-        When the bench has none.
+        When the bench has no stimulus.
     """
     if stimulus is None:
         raise ParameterError(
@@ -185,8 +185,8 @@ def with_nodes(values: Mapping[str, Any], level_unit: str) -> dict[str, Any]:
         required if there is more than one in addition to time. ``unit``, ``scale``, ``sign``,
         ``offset``, ``delay``, ``rate``, ``start``, ``format``, ``decimal`` and ``skip_lines`` are
         the same as in a mapping, as are ``time`` and ``time_unit`` for the time column.
-        ``max_gap``: longest gap that is bridged. Time starts at the first row; ``between`` is
-        ``"linear"`` by default.
+        ``max_gap``: maximum gap that is interpolated. Time starts at the first row. Default of
+        ``between``: ``"linear"``.
     level_unit
         SI unit of the driven signal.
 
@@ -210,7 +210,7 @@ def with_nodes(values: Mapping[str, Any], level_unit: str) -> dict[str, Any]:
         )
     path = values["file"]
     if not isinstance(path, str):
-        raise not_valid("stimulus.file", quoted(path), "a text")
+        raise not_valid("stimulus.file", quoted(path), "a string")
     whole = {key: values[key] for key in _FILE if key in values}
     clock = {inner: values[key] for key, inner in _CLOCK.items() if key in values}
     whole |= {"time": clock} if clock else {}
@@ -267,8 +267,30 @@ def stimulus_of(section: Mapping[str, Any], unit: str, name: str) -> Stimulus:
     """
     values = dict(section)
     kind = values.pop("kind", None)
+    title = f"stimulus.{name}" if name else "stimulus"
     if not isinstance(kind, str):
-        title = f"stimulus.{name}" if name else "stimulus"
         kinds = ", ".join(sorted(STIMULI.all()))
         raise ParameterError(f"[{title}] needs a kind: {kinds}", name=f"{title}.kind", valid=kinds)
-    return create(kind, with_nodes(values, unit) if kind == "table" else values, unit)
+    values = with_nodes(values, unit) if kind == "table" else values
+    _require_values(title, kind, values, unit)
+    return create(kind, values, unit)
+
+
+def _require_values(title: str, kind: str, values: Mapping[str, Any], level: str) -> None:
+    """Reject a section that lacks values, with all of them as a user types them."""
+    cls = STIMULI.find(kind).parameter_class
+    fields = cls.model_fields
+    lacking = [name for name in fields if fields[name].is_required() and name not in values]
+    if lacking:
+        leaves = leaf_fields(cls)
+        typed = {}
+        for name in lacking:
+            symbol = leaves[name].unit.symbol.replace("level", level) if name in leaves else "1"
+            unit = display_unit(symbol)
+            typed[f"{title}.{name}"] = "VALUE" if unit == "1" else f"VALUE {unit}"
+        verb = "is" if len(lacking) == 1 else "are"
+        raise ParameterError(
+            f"stimulus {kind!r}: {', '.join(lacking)} {verb} missing. Add to [{title}], or type "
+            f"{option('overrides', typed)}",
+            name=", ".join(typed),
+        )

@@ -1,7 +1,8 @@
-"""Variables of a recording, ready to draw: label, display unit, values, fewer points."""
+"""Variables of a recording, ready to draw: label, display unit and thinned values."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -9,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bywire.core.errors import ParameterError, unknown_name
-from bywire.core.quantities import display_unit
+from bywire.core.quantities import display_unit, readable_unit
 from bywire.core.typing import Array
 from bywire.core.units import convert
 from bywire.report.wording import clean
@@ -31,7 +32,7 @@ class Channel:
     symbol
         Its SI unit.
     unit
-        Display unit of ``values``.
+        Unit of ``values``.
     time
         Time axis [s], shape ``(n,)``.
     values
@@ -46,8 +47,8 @@ class Channel:
     values: Array
 
 
-def channel(recording: xr.Dataset, name: str) -> Channel:
-    """Return a variable of a recording in its display unit.
+def channel(recording: xr.Dataset, name: str, unit: str = "") -> Channel:
+    """Return a variable of a recording in a unit; by default its display unit.
 
     Raises
     ------
@@ -61,8 +62,8 @@ def channel(recording: xr.Dataset, name: str) -> Channel:
     array = recording[name]
     if array.dims != ("time",):
         raise ParameterError(
-            f"{name} has the dimensions {', '.join(map(str, array.dims)) or 'none'}: a figure "
-            "needs time only; select one case first, for example recording.isel(case=0)",
+            f"{name} has the dimensions {', '.join(map(str, array.dims)) or 'none'}. A figure "
+            "needs only time. Select one case first, for example recording.isel(case=0)",
             name=name,
             value=", ".join(map(str, array.dims)),
             valid="time",
@@ -70,7 +71,7 @@ def channel(recording: xr.Dataset, name: str) -> Channel:
     if array.size == 0:
         raise ParameterError(f"{name} has no samples to draw", name=name)
     symbol = str(array.attrs.get("units", "1"))
-    unit = display_unit(symbol)
+    unit = unit or display_unit(symbol)
     return Channel(
         name=name,
         label=clean(array.attrs.get("long_name", name)),
@@ -79,6 +80,29 @@ def channel(recording: xr.Dataset, name: str) -> Channel:
         time=np.asarray(recording["time"].values, dtype=np.float64),
         values=convert(np.asarray(array.values, dtype=np.float64), symbol, unit),
     )
+
+
+def size_of(values: Array) -> float:
+    """Return the largest magnitude of values; 0 without finite ones.
+
+    Examples
+    --------
+    >>> size_of(np.array([1.0, -3.0, np.nan])), size_of(np.array([]))
+    (3.0, 0.0)
+    """
+    return float(np.max(np.abs(values[np.isfinite(values)]), initial=0.0))
+
+
+def axis_unit(recordings: Iterable[xr.Dataset], *names: str) -> str:
+    """Return the most readable unit for the axis of some variables; see `readable_unit`.
+
+    Variables that a recording does not have are left out.
+    """
+    drawn = [each[name] for each in recordings for name in names if name in each.data_vars]
+    size = max(
+        (size_of(np.asarray(array.values, dtype=np.float64)) for array in drawn), default=0.0
+    )
+    return readable_unit(size, str(drawn[0].attrs.get("units", "1"))) if drawn else ""
 
 
 # --- Fewer points for long lines, with every peak kept
@@ -92,8 +116,8 @@ COLUMNS = 700
 def kept_samples(x: Array, y: Array, columns: int = COLUMNS) -> IntArray:
     """Return the positions of at most five samples per pixel column that draw the same line.
 
-    In every column the first, the lowest, the highest and the last sample stay, so that a line
-    through them covers the same pixels; a gap (NaN) stays a gap.
+    Every column keeps its first, lowest, highest and last sample, so a line through them covers the
+    same pixels. A gap (NaN) remains a gap.
 
     ``x``: abscissa, not decreasing, shape ``(n,)``; ``y``: ordinate, shape ``(n,)``; ``columns``:
     pixel columns.
@@ -101,7 +125,7 @@ def kept_samples(x: Array, y: Array, columns: int = COLUMNS) -> IntArray:
     Returns
     -------
     ndarray
-        Positions of the remaining samples, ascending. Short lines keep all samples.
+        Positions of the remaining samples, in ascending order. Short lines keep all samples.
 
     References
     ----------
@@ -145,7 +169,7 @@ def phases(
     Returns
     -------
     list
-        Start and end of every span [s], ascending and disjoint.
+        Start and end of every span [s], in ascending order and disjoint.
     """
     spans = _spans(time, active)
     if len(spans) <= columns // 2:
@@ -163,7 +187,8 @@ def phases(
 class Phase:
     """A time span in which a mode is active, or active repeatedly.
 
-    ``start``, ``end``: times [s]; ``share``: share of the time in which it is active, 1 if always.
+    ``start``, ``end``: times [s]; ``share``: fraction of the time in which the mode is active, 1
+    if always.
     """
 
     start: float
@@ -174,7 +199,7 @@ class Phase:
 def lasting_phases(
     time: Array, active: NDArray[np.bool_], columns: int = COLUMNS, near: int = 16
 ) -> list[Phase]:
-    """Return the time spans in which a mode is active, with close ones merged.
+    """Return the time spans in which a mode is active, with nearby spans merged.
 
     Parameters
     ----------

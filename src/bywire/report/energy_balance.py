@@ -1,4 +1,4 @@
-"""Figure: energy balance, by sources and sinks."""
+"""Figure: energy balance of sources and sinks."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 
 from bywire.bench.energy_ledger import Ledger, actuator_ledger, ledger
 from bywire.core.errors import ParameterError
+from bywire.core.quantities import readable_unit
+from bywire.core.units import convert
 from bywire.report import style
 from bywire.report.channel import channel
 from bywire.report.wording import amount, part_text
@@ -34,18 +36,18 @@ COLORS = {
     "E_caliper": style.YELLOW,
     "E_stored": style.BLUE,
 }
-"""fixed colors of energies in every figure; others use the remaining colors"""
+"""fixed colors of energies in every figure; other energies use the remaining colors"""
 SOURCE_COLORS = ("#4A4A4A", "#9A9A9A", "#C4C4C4")
 SMALL = 1e-3
 """fraction of the total energy below which entries are merged into the rest"""
 NEGLIGIBLE = 1e-9
-"""share below which the rest is not drawn"""
+"""fraction below which the rest is not drawn"""
 REST_COLOR = "#E4E4E4"
 
 
 @dataclass(frozen=True)
 class Entry:
-    """A piece of a bar: label, energy [J, not negative] and color."""
+    """A segment of a bar: label, energy [J, not negative] and color."""
 
     label: str
     energy: float
@@ -60,19 +62,19 @@ def energy_balance(
 ) -> Figure:
     """Draw two stacked bars of equal length: sources and sinks of the energy.
 
-    Every entry is signed, and its sign decides the side: a source that takes energy back is among
-    the sinks; a gear loss below zero and an emptied store are among the sources. The residual of
-    the energy balance is drawn as a hatched piece.
+    Every entry is signed, and its sign decides the side. A source that receives energy is among the
+    sinks. A negative gear loss and an emptied store are among the sources. A hatched segment shows
+    the residual of the energy balance.
 
     Parameters
     ----------
     recording
         Recording with energies [J]; the difference between end and start counts.
     source
-        Variable with the energy from the source; or label by variable of several sources; by
-        default those of the recording's brake.
+        Variable with the energy from the source, or labels of several sources by variable. Default:
+        the sources of the recording's brake.
     sinks
-        Label by variable of every sink; by default those of the recording's brake. Variables that
+        Labels of the sinks by variable. Default: the sinks of the recording's brake. Variables that
         are missing in the recording are left out.
 
     Raises
@@ -117,7 +119,9 @@ def ledger_bars(books: Ledger) -> Figure:
     axes.tick_params(axis="y", length=0)
     axes.grid(False, axis="y")
     axes.spines["left"].set_visible(False)
-    axes.set_xlabel(style.axis_label("energy", "J"))
+    unit = readable_unit(total, "J")
+    axes.xaxis.set_major_formatter(lambda energy, _: f"{convert(energy, 'J', unit):g}")
+    axes.set_xlabel(style.unit_label("energy", unit))
     style.legend_above(axes)
     return figure
 
@@ -150,7 +154,7 @@ def _gathered(entries: list[Entry], total: float) -> list[Entry]:
 
 
 def _colors(sinks: Sequence[str]) -> dict[str, str]:
-    """Return a color for every variable, different ones as long as the palette lasts."""
+    """Return a color for every variable; colors differ as long as the palette suffices."""
     known = {COLORS[name] for name in sinks if name in COLORS}
     left = cycle([c for c in dict.fromkeys(COLORS.values()) if c not in known] or [style.BLACK])
     colors: dict[str, str] = {}

@@ -15,7 +15,7 @@ from bywire.bench.requirements import Verdict
 from bywire.core.errors import ParameterError
 from bywire.core.units import convert
 from bywire.report import style
-from bywire.report.channel import Channel, channel, decimate
+from bywire.report.channel import Channel, axis_unit, channel, decimate
 from bywire.report.panels import Role
 from bywire.report.stated_levels import draw_stated
 from bywire.report.wording import amount
@@ -39,9 +39,9 @@ class StepLimits:
     before, after
         Set point before and after it.
     band
-        Half width of the tolerance band, as a share of the step.
+        Half width of the tolerance band, relative to the step.
     overshoot
-        Largest overshoot as a share of the step; ``None`` for no limit.
+        Maximum overshoot relative to the step; ``None`` for no limit.
     """
 
     start: float
@@ -53,19 +53,19 @@ class StepLimits:
     def __post_init__(self) -> None:
         if self.before == self.after:
             raise ParameterError(
-                f"StepLimits: before and after are both {self.after:g}: they must differ",
+                f"StepLimits: before and after are both {self.after:g}. They must differ",
                 name="after",
                 value=f"{self.after:g}",
             )
 
     def level(self, share: float) -> float:
-        """Return the level at a share of the step: 0 before it, 1 after it."""
+        """Return the level at a fraction of the step: 0 before it, 1 after it."""
         return self.before + share * (self.after - self.before)
 
 
 @dataclass(frozen=True)
 class StepFacts:
-    """Computed figures of a step response; ``None`` for those that were not computed.
+    """Computed figures of a step response; ``None`` for figures that were not computed.
 
     Parameters
     ----------
@@ -74,9 +74,9 @@ class StepFacts:
     settling_time
         From the step until the response stays in the band [s].
     overshoot
-        As a share of the step.
+        Relative to the step.
     rise_from, rise_to
-        Shares of the step between which the rise is measured.
+        Fractions of the step between which the rise is measured.
     """
 
     rise_time: float | None = None
@@ -96,7 +96,7 @@ def step_limits(
     definition, options
         The experiment and its options.
     verdicts
-        Requirements; one on the overshoot is drawn.
+        Requirements. The figure shows a requirement on the overshoot.
     """
     setting = None if definition.step is None else definition.step(options)
     if setting is None or setting.start is None or setting.end is None:
@@ -175,15 +175,17 @@ def step_response(
     measured
         Recording to compare with.
     smoothing
-        Averaging time [s] of the judged curve, which is then drawn thin, with the raw one pale
-        behind it and the marks on it. 0 if the raw curve was judged.
+        Averaging time [s] of the judged curve. The judged curve is then thin, with the marks on it
+        and the pale raw curve behind it. 0 if the raw curve was judged.
     stated
         Levels and ranges stated by a source; those of the variable are drawn.
     """
-    shown = channel(recording, variable)
+    others = () if measured is None else (measured,)
+    unit = axis_unit((recording, *others), variable, *filter(None, (set_point,)))
+    shown = channel(recording, variable, unit)
     figure, (axes,) = style.new_figure(3.3)
-    if measured is not None:
-        style.draw_channel(axes, channel(measured, variable), Role.MEASURED, ", measured")
+    for other in others:
+        style.draw_channel(axes, channel(other, variable, unit), Role.MEASURED, ", measured")
     compared = measured is not None
     role, suffix = (Role.SIMULATED, ", simulated") if compared else (Role.MAIN, "")
     opacity = style.PALE_OPACITY if smoothing > 0 else 1.0
@@ -200,7 +202,7 @@ def step_response(
             label=f"averaged over {amount(smoothing, 's', 3)}",
         )
     if set_point is not None:
-        style.draw_channel(axes, channel(recording, set_point), Role.SET_POINT)
+        style.draw_channel(axes, channel(recording, set_point, unit), Role.SET_POINT)
     if limits is not None:
         draw_limits(axes, limits, shown)
     if limits is not None and facts is not None:
@@ -259,7 +261,7 @@ def _after_step(shown: Channel, limits: StepLimits) -> int:
 
 
 def _first_crossing(shown: Channel, limits: StepLimits, level: float) -> float:
-    """Return when the response first reaches a level; NaN where it never does."""
+    """Return when the response first reaches a level; NaN if it never does."""
     begin = _after_step(shown, limits)
     rising = limits.after > limits.before
     values = shown.values[begin:]
@@ -284,7 +286,7 @@ def _peak(shown: Channel, limits: StepLimits) -> tuple[float, float]:
     return float(shown.time[k]), float(shown.values[k])
 
 
-# --- How well a variable follows its moving set point
+# --- A variable that tracks a moving set point
 
 
 def tracking(recording: xr.Dataset, variable: str, set_point: str) -> Figure:
@@ -306,6 +308,8 @@ def tracking(recording: xr.Dataset, variable: str, set_point: str) -> Figure:
             value=wanted.unit,
             valid=shown.unit,
         )
+    unit = axis_unit([recording], variable, set_point)
+    shown, wanted = (channel(recording, name, unit) for name in (variable, set_point))
     error = replace(shown, label="set point minus value", values=wanted.values - shown.values)
     figure, (upper, lower) = style.new_figure(4.6, (2.0, 1.0))
     style.draw_channel(upper, shown, Role.MAIN)
@@ -314,7 +318,7 @@ def tracking(recording: xr.Dataset, variable: str, set_point: str) -> Figure:
     lower.axhline(0.0, color=style.GRAY, linewidth=0.6, zorder=1)
     upper.margins(x=0.0)
     upper.set_ylabel(style.channel_label(shown))
-    lower.set_ylabel(style.axis_label("error", shown.symbol))
+    lower.set_ylabel(style.unit_label("error", unit))
     lower.set_xlabel(f"time [{style.time_scale(shown.time)[1]}]")
     style.legend_above(upper)
     style.legend_above(lower)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 
@@ -104,11 +105,11 @@ def value_changes(
     before
         Original values, by name.
     of
-        Owner of the original values, see `Change`.
+        Owner of the original values (see `Change`).
     prefix
         Prefix of the names.
     origins
-        Sources of the original values, by name; empty by default.
+        Sources of the original values, by name. Default: empty.
     """
     leaves, values = leaf_fields(type(now)), now.flat()
     units = {name: leaves[name].unit.symbol if name in leaves else "1" for name in values}
@@ -128,6 +129,36 @@ def value_changes(
 def defaults_of(name: str) -> str:
     """Return the name of an experiment's, or a study's, default values."""
     return f"the defaults of {name}"
+
+
+_ORIGINS = {
+    "paper": "printed in a source",
+    "derived": "derived from printed ones",
+    "calibrated": "calibrated to match a source",
+    "chosen": "chosen without a source",
+}
+
+
+def origins_text(parameters: str) -> str:
+    """Return how many values of a parameter set have which origin, as grounds to trust a result.
+
+    Raises
+    ------
+    UnknownNameError
+        When the parameter set is unknown.
+    """
+    values = PARAMETER_SETS.find(parameters).values.values()
+    counts = Counter(value.kind for value in values)
+    parts = [f"{counts[kind]} {text}" for kind, text in _ORIGINS.items() if counts[kind]]
+    return f"values of {parameters}: {', '.join(parts)} ('bywire list {parameters}' shows each)"
+
+
+def source_block(parameters: str) -> Paragraph:
+    """Return the source of a parameter set, and the origins of its values."""
+    source = PARAMETER_SETS.find(parameters).source
+    text = f"Source of the parameters: {source}. " if source else ""
+    origins = origins_text(parameters)
+    return Paragraph(f"{text}{origins[0].upper()}{origins[1:]}.")
 
 
 def changes_block(
@@ -160,7 +191,7 @@ def changes_block(
         )
     )
     if varied:
-        return Paragraph(f"Only {', '.join(varied)} varied; apart from that, {unchanged}.")
+        return Paragraph(f"Only {', '.join(varied)} varied. Otherwise, {unchanged}.")
     return Paragraph(f"Nothing was changed: {unchanged}.")
 
 
@@ -185,7 +216,7 @@ def _option_changes(bench: Bench) -> Iterator[Change]:
 
 
 def _unset(bench: Bench, option: str) -> str:
-    """Return the default of an option that names a signal, given all other options."""
+    """Return the default of an option that specifies a signal, with all other options set."""
     others = {name: value for name, value in bench.options.items() if name != option}
     try:
         unset = experiment_of(bench.experiment, bench.parameters, bench.assembly, others)
@@ -254,7 +285,7 @@ class Subject:
         varied: Collection[str] = (),
         further: tuple[Change, ...] = (),
     ) -> Subject:
-        """Return a bench as a subject, with its own name and summary by default.
+        """Return a bench as a subject. Default: the bench's name and summary.
 
         ``varied``: quantities with several values; ``further``: other changes.
         """
@@ -290,7 +321,7 @@ class Subject:
     def provenance(self, *notes: str, has_changes: bool = True) -> Section:
         """Return the section on the origin of a report: notes, changes, source, all parameters.
 
-        ``has_changes``: whether it contains the changes, instead of an earlier section.
+        ``has_changes``: whether it contains the changes, rather than an earlier section.
 
         Raises
         ------
@@ -304,7 +335,7 @@ class Subject:
             [
                 *map(Paragraph, filter(None, notes)),
                 *([self.changes_block] if has_changes else []),
-                Paragraph(f"Source of the parameters: {cited.source}."),
+                source_block(self.parameters),
                 Details("All parameters", [TableBlock(parameter_table(rows))]),
             ],
         )

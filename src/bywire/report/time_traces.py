@@ -13,7 +13,7 @@ import xarray as xr
 from bywire.core.errors import ParameterError
 from bywire.core.units import convert, difference_unit
 from bywire.report import style
-from bywire.report.channel import Channel, channel, decimate, lasting_phases, phases
+from bywire.report.channel import Channel, axis_unit, channel, decimate, lasting_phases, phases
 from bywire.report.panels import Panel, Role, Trace, declared_panels, panels_by_unit
 from bywire.report.stated_levels import draw_stated
 from bywire.report.step_response import StepLimits, draw_limits
@@ -31,8 +31,8 @@ if TYPE_CHECKING:
     from bywire.report.style import Color
 
 FAULTS = "faults"
-"""variable that counts the present faults: a bar along the lower edge shows them"""
-_HEIGHT = 0.04  # height of a bar, as a share of the panel
+"""variable that counts the active faults: a bar along the lower edge shows them"""
+_HEIGHT = 0.04  # height of a bar, relative to the panel
 
 
 def _mark_saturation(axes: Axes, panel: Panel, recording: xr.Dataset) -> None:
@@ -60,7 +60,7 @@ def _mark_faults(axes: Axes, recording: xr.Dataset, *, named: bool) -> None:
 def _mark_faults_of(
     axes: Axes, recordings: Sequence[xr.Dataset], colors: Sequence[str | Color], factor: float
 ) -> list[Artist]:
-    """Draw the fault bars of several recordings: a common one if their times are equal.
+    """Draw the fault bars of several recordings: a common bar if their times are equal.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def _mark_faults_of(
     Returns
     -------
     list
-        The entry of a legend; empty without a fault.
+        Entry of the legend; empty without a fault.
     """
     from matplotlib.patches import Patch
 
@@ -128,7 +128,7 @@ def _spans(recording: xr.Dataset, variable: str) -> list[tuple[float, float]]:
 
 _NEAR = 0.5
 """fraction of a limit above which its lines are drawn"""
-_LASTING = 0.9  # share of a phase above which short breaks are ignored
+_LASTING = 0.9  # fraction of a phase above which short breaks are ignored
 
 
 def time_traces(
@@ -142,24 +142,24 @@ def time_traces(
 ) -> Figure:
     """Draw panels of variables over a shared time axis.
 
-    Phases in which all friction elements are stuck are shaded; those with repeated sticking, as
-    under dither, more faintly. Saturation is a bar along the upper edge.
+    Phases in which all friction elements are stuck are shaded. Phases with repeated sticking, as
+    with dither, are shaded lightly. Saturation is a bar along the upper edge.
 
     Parameters
     ----------
     recording
         Recording to draw.
     panels
-        Panels to draw; by default those that the recording's brake or rig declares (of several, the
-        ones with most variables of the recording), else its signals by their units. Panels without
-        any variable are left out, and those that stay at zero unless all do.
+        Panels to draw. Default: the panels that the recording's brake or rig declares (of several,
+        those with the most variables of the recording), else its signals by unit. Panels without
+        any variable are left out, as are panels that stay at zero, unless all do.
     limits
         Step that judges the first trace of the first panel: its band and limit are drawn.
     measured
         Recording for comparison, for example of a test rig, with the names and units of
-        ``recording``; it may lack variables, and have other sample times. It is solid blue, with
-        ``recording`` dashed red on top. Then only the first trace and the set points of every panel
-        are drawn.
+        ``recording``; it may lack variables, and have other sample times. It is solid blue,
+        with ``recording`` in dashed red on top. Then only the first trace and the set points of
+        every panel are drawn.
     stuck
         Variable that is 1 while shafts and pistons stick.
     stated
@@ -176,8 +176,8 @@ def time_traces(
         raise ParameterError(
             f"the recording has none of the variables {wanted}"
             if wanted
-            else "the recording has none of the variables that time traces show: energies and "
-            "modes alone have no panel"
+            else "the recording has none of the variables that time traces show. Energies and "
+            "modes have no panel"
         )
     left = list(stated)
     heights = [panel.height for panel, _ in present]
@@ -247,27 +247,36 @@ def _draw_traces(
     measured: xr.Dataset | None,
 ) -> Channel:
     """Draw the lines of a panel and label its ordinate; return the first channel."""
-    channels = [channel(recording, trace.variable) for trace in traces]
+    names = [trace.variable for trace in traces]
+    unit = axis_unit([recording] if measured is None else [recording, measured], *names)
+    _require_one_unit(panel, recording, names)
+    channels = [channel(recording, name, unit) for name in names]
     first = channels[0]
     for trace, shown in zip(traces, channels, strict=True):
-        if shown.unit != first.unit:
-            raise ParameterError(
-                f"panel {panel.quantity!r}: {shown.name} is in {shown.unit}, {first.name} in "
-                f"{first.unit}; put them into two panels",
-                name=shown.name,
-                value=shown.unit,
-                valid=first.unit,
-            )
         if measured is None or trace.role is Role.SET_POINT:
             style.draw_channel(axes, shown, trace.role)
         elif shown is first:
             if trace.variable in measured.data_vars:
                 style.draw_channel(
-                    axes, channel(measured, trace.variable), Role.MEASURED, ", measured"
+                    axes, channel(measured, trace.variable, unit), Role.MEASURED, ", measured"
                 )
             style.draw_channel(axes, shown, Role.SIMULATED, ", simulated")
-    axes.set_ylabel(style.axis_label(panel.quantity, first.symbol, "\n"))
+    axes.set_ylabel(style.unit_label(panel.quantity, unit, "\n"))
     return first
+
+
+def _require_one_unit(panel: Panel, recording: xr.Dataset, names: Sequence[str]) -> None:
+    """Reject a panel whose variables differ in their unit."""
+    first, *others = [channel(recording, name) for name in names]
+    for other in others:
+        if other.unit != first.unit:
+            raise ParameterError(
+                f"panel {panel.quantity!r}: {other.name} is in {other.unit}, {first.name} in "
+                f"{first.unit}; put them into two panels",
+                name=other.name,
+                value=other.unit,
+                valid=first.unit,
+            )
 
 
 def _shade_stuck(axes: Axes, recording: xr.Dataset, variable: str, *, named: bool) -> None:
@@ -301,7 +310,7 @@ def _shade_stuck(axes: Axes, recording: xr.Dataset, variable: str, *, named: boo
 
 
 def _mark_limit(axes: Axes, panel: Panel, recording: xr.Dataset, first: Channel) -> None:
-    """Draw the limits of a panel's first trace where it comes near; distant ones are left out."""
+    """Draw the limits of a panel's first trace if it comes near; distant limits are left out."""
     level = _limit_of(recording, panel)
     if level is None:
         return
@@ -343,8 +352,8 @@ def _set_ticks(axes: Axes, panel: Panel, first: Channel) -> None:
 
 _DOTS: style.Dash = (0, (1.2, 1.2))
 """style of the second line of a panel"""
-_APART = 0.03  # of the lines' range: a closer set point of the same color is hidden
-_BRIEF = 0.01  # share of the time axis: shorter differences are not visible
+_APART = 0.03  # fraction of the lines' range: a closer set point of the same color is hidden
+_BRIEF = 0.01  # fraction of the time axis: shorter differences are not visible
 
 
 @dataclass(frozen=True)
@@ -378,19 +387,20 @@ def _draw_target(
     recordings: Sequence[xr.Dataset],
     looks: Sequence[Look],
     factor: float,
+    unit: str,
 ) -> list[Line2D]:
     """Draw a set point: once, in black, if it is equal in all recordings.
 
     Different set points are drawn in their recordings' colors, without those hidden by their lines.
-    ``lines``: names of the lines, the following one first.
+    ``lines``: names of the lines, starting with the line that follows the set point.
     """
     stroke = style.STROKES[Role.SET_POINT]
-    shown = [channel(recording, name) for recording in recordings]
+    shown = [channel(recording, name, unit) for recording in recordings]
     same = all(
         np.array_equal(each.time, shown[0].time) and np.array_equal(each.values, shown[0].values)
         for each in shown[1:]
     )
-    followed = [channel(recording, lines[0]) for recording in recordings]
+    followed = [channel(recording, lines[0], unit) for recording in recordings]
     if not (same or _are_seen(shown, followed)):
         return []
     colors = [stroke.color] if same else [look.color for look in looks]
@@ -409,7 +419,7 @@ def _draw_target(
 
 
 def _are_seen(targets: Sequence[Channel], followed: Sequence[Channel]) -> bool:
-    """Return whether a set point of any recording is visible beside the line that follows it."""
+    """Return whether a set point of any recording is visible next to the line that follows it."""
     ends = [each for line in followed for each in (np.nanmin(line.values), np.nanmax(line.values))]
     close = _APART * (max(ends) - min(ends))
     brief = _BRIEF * max(float(line.time[-1] - line.time[0]) for line in followed)
@@ -426,7 +436,7 @@ def _draw_limits_of(
     looks: Sequence[Look],
     first: Channel,
 ) -> list[Line2D]:
-    """Draw the limits of a panel's first trace where it comes near; each once."""
+    """Draw the limits of a panel's first trace if it comes near; each limit once."""
     stroke = style.STROKES[Role.LIMIT]
     levels = [_limit_of(recording, panel) for recording in recordings]
     is_one = len(set(levels)) == 1
@@ -434,7 +444,7 @@ def _draw_limits_of(
     for recording, look, level in zip(recordings, looks, levels, strict=True):
         if level is None:
             continue
-        values = channel(recording, first.name).values
+        values = channel(recording, first.name, first.unit).values
         level = convert(level, first.symbol, first.unit)
         for side in (1.0, -1.0):
             at = side * level
@@ -515,8 +525,8 @@ def overlaid_panels(
     present = _chosen(data)
     if not present:
         raise ParameterError(
-            f"the {len(recordings)} recordings share no signal over time that moves, so "
-            "they cannot be overlaid"
+            f"the {len(recordings)} recordings have no common time signal that changes, so "
+            "bywire cannot overlay them"
         )
     looks = _looks(list(recordings), scale, skipped)
     heights = [panel.height for panel, _ in present]
@@ -525,7 +535,8 @@ def overlaid_panels(
     for axes, (panel, traces) in zip(rows, present, strict=True):
         entries: list[Artist] = [*_draw_panel(axes, panel, traces, data, looks, factor)]
         if step is not None and traces[0].variable == step[0]:
-            draw_limits(axes, step[1], channel(_longest(data), step[0]))
+            unit_there = axis_unit(data, *(trace.variable for trace in traces))
+            draw_limits(axes, step[1], channel(_longest(data), step[0], unit_there))
             entries += axes.get_legend_handles_labels()[0]
         heads = (
             []
@@ -605,13 +616,14 @@ def _draw_panel(
     factor: float,
 ) -> list[Line2D]:
     """Draw a panel and label its ordinate; return the entries of its legend."""
-    first = channel(recordings[0], traces[0].variable)
+    unit = axis_unit(recordings, *(trace.variable for trace in traces))
+    first = channel(recordings[0], traces[0].variable, unit)
     targets = [trace for trace in traces if trace.role is Role.SET_POINT]
     lines = [trace for trace in traces if trace not in targets] or targets[:1]
     entries: list[Line2D] = []
     for k, trace in enumerate(lines[: 2 if len(recordings) <= _FEW else 1]):
         averages = [
-            _draw_line(axes, channel(recording, trace.variable), look, factor, second=k > 0)
+            _draw_line(axes, channel(recording, trace.variable, unit), look, factor, second=k > 0)
             for recording, look in zip(recordings, looks, strict=True)
         ]
         width = max(averages)
@@ -622,10 +634,10 @@ def _draw_panel(
             entries.append(entry(label, style.GRAY, dash))
     for target in [t for t in targets if t not in lines]:
         entries += _draw_target(
-            axes, target.variable, [t.variable for t in lines], recordings, looks, factor
+            axes, target.variable, [t.variable for t in lines], recordings, looks, factor, unit
         )
     entries += _draw_limits_of(axes, panel, recordings, looks, first)
-    axes.set_ylabel(style.axis_label(panel.quantity, first.symbol, "\n"))
+    axes.set_ylabel(style.unit_label(panel.quantity, unit, "\n"))
     _set_ticks(axes, panel, first)
     return entries
 
@@ -640,14 +652,14 @@ def _factor(recordings: Sequence[xr.Dataset]) -> tuple[float, str]:
     return style.time_scale(np.asarray(_longest(recordings)["time"].values, dtype=np.float64))
 
 
-# --- Differences: each minus the first, at the first one's times
+# --- Differences: each recording minus the first, at the first recording's times
 
 _LEAST = 1e-9
-"""fraction of a signal's largest magnitude below which a difference counts as rounding"""
+"""fraction of a signal's maximum magnitude below which a difference counts as rounding"""
 
 
 def difference_figure(recordings: Mapping[str, xr.Dataset]) -> Figure | None:
-    """Draw the differences of each recording from the first; None where there are none.
+    """Draw the differences of each recording from the first; None without differences.
 
     ``recordings``: by their label in the legend.
     """
@@ -660,8 +672,8 @@ def difference_figure(recordings: Mapping[str, xr.Dataset]) -> Figure | None:
 def differences_from_first(recordings: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
     """Return the common signals of all recordings, minus those of the first.
 
-    Signals are interpolated linearly between samples; there is no difference beyond the end of a
-    run, nor of modes, which are whole numbers.
+    Signals are interpolated linearly between samples. Differences end with the shorter run. Modes,
+    which are whole numbers, have no difference.
 
     Parameters
     ----------
@@ -713,7 +725,7 @@ def _less(other: xr.Dataset, base: xr.Dataset, names: list[str]) -> xr.Dataset:
     return xr.Dataset(signals, coords={"time": base["time"]}, attrs=kept)
 
 
-# --- The same variables of several recordings, one color each
+# --- The same variables from several recordings, one color each
 
 _ROOM = "  "  # extra space for short labels of wide letters
 _DASHES_OF_A_VARIABLE: tuple[style.Dash, ...] = ("-", (0, (4, 2)), (0, (1.5, 1.5)))
@@ -744,7 +756,7 @@ def overlaid_traces(recordings: Mapping[str, xr.Dataset], variables: Mapping[str
     figure, rows = style.new_figure(0.5 + 1.7 * len(shown), [1.0] * len(shown))
     for axes, name in zip(rows, shown, strict=True):
         unit = _draw(axes, recordings, name)
-        axes.set_ylabel(style.axis_label(variables[name], unit, "\n"))
+        axes.set_ylabel(style.unit_label(variables[name], unit, "\n"))
         style.few_ticks(axes, 6)
         axes.margins(x=0.0)
     style.legend_above(rows[0])
@@ -759,13 +771,13 @@ def _moves_in_any(recording: xr.Dataset, name: str) -> bool:
 
 
 def _draw(axes: Axes, recordings: Mapping[str, xr.Dataset], name: str) -> str:
-    """Draw one variable of all recordings that have it; return its SI unit."""
+    """Draw one variable of all recordings that have it; return its unit."""
     scale, _ = style.time_scale(next(iter(recordings.values()))["time"].values)
-    unit = "1"
+    unit = axis_unit(recordings.values(), name)
     for k, (label, recording) in enumerate(recordings.items()):
         if name not in recording.data_vars:
             continue
-        line, turn = channel(recording, name), k // len(style.SEQUENCE)
+        line, turn = channel(recording, name, unit), k // len(style.SEQUENCE)
         axes.plot(
             *decimate(scale * line.time, line.values),
             linewidth=1.1,
@@ -773,5 +785,4 @@ def _draw(axes: Axes, recordings: Mapping[str, xr.Dataset], name: str) -> str:
             linestyle=_DASHES_OF_A_VARIABLE[turn % len(_DASHES_OF_A_VARIABLE)],
             label=style.plain(label) + _ROOM,
         )
-        unit = line.symbol
     return unit

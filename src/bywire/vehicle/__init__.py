@@ -5,6 +5,8 @@ from bywire.vehicle.corner import (
     CornerParameters,
     HotCorner,
     HotCornerParameters,
+    WheelSpeed,
+    rolling_states,
     warm_disc,
 )
 from bywire.vehicle.two_wheeler import (
@@ -23,7 +25,9 @@ __all__ = [
     "HotCornerParameters",
     "TwoWheeler",
     "VehicleParameters",
+    "WheelSpeed",
     "cold_start",
     "rolling_start",
+    "rolling_states",
     "warm_disc",
 ]

@@ -57,10 +57,10 @@ class TwoWheeler(Assembly[ParT, MemoryT]):
         work="W_ground",
         loss="E_ground",
     )
-    front = Part(road_wheel, par="vehicle.front_wheel", outside=True, suffix="_f")
-    rear = Part(road_wheel, par="vehicle.rear_wheel", outside=True, suffix="_r")
-    front_tyre = Part(tyre, par="vehicle.front_tyre", suffix="_f")
-    rear_tyre = Part(tyre, par="vehicle.rear_tyre", suffix="_r")
+    front = Part(road_wheel, par="vehicle.front_wheel", outside=True, suffix="_f", which="front")
+    rear = Part(road_wheel, par="vehicle.rear_wheel", outside=True, suffix="_r", which="rear")
+    front_tyre = Part(tyre, par="vehicle.front_tyre", suffix="_f", which="front")
+    rear_tyre = Part(tyre, par="vehicle.rear_tyre", suffix="_r", which="rear")
     road = Part(road, par="vehicle.road")
     E_brake_f = Integral("J", "heat of the front brake", role=_sink("front brake"))
     E_brake_r = Integral("J", "heat of the rear brake", role=_sink("rear brake"))
@@ -240,10 +240,22 @@ class HotBrakes(TwoWheeler[ParT, MemoryT]):
     """
 
     front_heat = Part(
-        disc_heat, par="front.heat", suffix="_f", fixed=_SLOW, outside=True, loss="E_air"
+        disc_heat,
+        par="front.heat",
+        suffix="_f",
+        which="front",
+        fixed=_SLOW,
+        outside=True,
+        loss="E_air",
     )
     rear_heat = Part(
-        disc_heat, par="rear.heat", suffix="_r", fixed=_SLOW, outside=True, loss="E_air"
+        disc_heat,
+        par="rear.heat",
+        suffix="_r",
+        which="rear",
+        fixed=_SLOW,
+        outside=True,
+        loss="E_air",
     )
 
     E_friction = Shown(
