@@ -1,6 +1,8 @@
-"""The report of a run: verdict and changes first, figures before tables."""
+"""Report of a run, with verdict and changes first, and figures before tables."""
 
 from __future__ import annotations
+
+from pathlib import Path
 
 import bywire
 from bywire.core.errors import UnknownNameError
@@ -63,3 +65,13 @@ def test_a_run_without_requirements_counts_the_undefined_key_figures():
     changes = {"motor.R_m": "+50 %", "ecu.dither.waveform": "off"}
     banner = bywire.run("hard-braking", changes).document().banner
     assert banner.text == "done, no requirements; 3 of 14 key figures not defined"
+
+
+def test_report_and_terminal_state_the_origins_of_the_parameters(tmp_path: Path) -> None:
+    result = bywire.run("hard-braking", estimate_error=False)
+    text = (
+        "38 printed in a source, 3 derived from printed ones, 6 calibrated to match a source, 88 "
+    )
+    assert f"values of dardanelli2010: {text}" in str(result)
+    result.write(tmp_path)
+    assert f"Values of dardanelli2010: {text}" in (tmp_path / "report.html").read_text()

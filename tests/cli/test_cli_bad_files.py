@@ -1,4 +1,4 @@
-"""Files that are no bench files: missing, folders, binary, empty, hostile."""
+"""Files that are not bench files: missing, folders, binary, empty, hostile."""
 
 from __future__ import annotations
 
@@ -47,7 +47,48 @@ def test_ten_megabytes(bywire, bench):
 
 @pytest.mark.parametrize("text", [b"", b"\n\n", b"# only a comment\n"])
 def test_empty_file(bywire, bench, text):
-    refused(bywire("run", bench(text)), "experiment is missing", "bywire list")
+    refused(bywire("run", bench(text)), "experiment is missing", "'bywire list experiments'")
+
+
+@pytest.mark.parametrize(
+    ("text", "texts"),
+    [
+        (
+            'experiment = "hard-braking"',
+            ['a line such as parameters = "dardanelli2010"', "names are dardanelli2010, dard"],
+        ),
+        ('experiment = "step"', ["parameters=NAME", "sport600", "roberts2003"]),
+        ('experiment = "hard-breaking"', ["unknown experiment", "'hard-braking'"]),
+        (
+            'parameters = "roberts2003"',
+            ['a line such as experiment = "current-loop"', "moment-ramp", "sine-sweep"],
+        ),
+        (
+            'experiment = "hard-braking"\nparameters = "roberts2003"',
+            ["is for a wedge-brake. Its parameter sets are dardanelli2010, dard"],
+        ),
+    ],
+)
+def test_missing_name_comes_with_the_names_that_fit(bywire, bench, text, texts):
+    refused(bywire("run", bench(text)), *texts)
+
+
+@pytest.mark.parametrize(
+    ("change", "texts"),
+    [
+        ("experiment=step", ["options.input is missing", "--set options.input=p_set", "v_set"]),
+        ("experiment=motor-open-loop", ["--set stimulus.kind=step"]),
+        ("experiment=duty", ["--set options.input=p_set. Valid names are p_set, pedal_force"]),
+    ],
+)
+def test_missing_option_comes_with_what_to_type(bywire, bench, change, texts):
+    refused(bywire("run", bench('parameters = "dardanelli2010"'), "--set", change), *texts)
+
+
+def test_missing_values_of_a_stimulus_come_with_what_to_type(bywire):
+    changes = ["--set", "stimulus.kind=step", "--set", "stimulus.start=0 A"]
+    typed = '--set "stimulus.end=VALUE A" --set "stimulus.t_step=VALUE s"'
+    refused(bywire("run", "motor-open-loop", *changes), "end, t_step are missing", typed)
 
 
 @pytest.mark.parametrize("text", [NOT_TEXT, BRAKING.encode("utf-16")])

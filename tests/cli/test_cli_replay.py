@@ -17,7 +17,7 @@ Bywire = Callable[..., Outcome]
 
 @pytest.fixture(scope="module")
 def stop(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return the file of a braking whose brake has less friction than the parameter set's."""
+    """Return the file of a braking with less friction than in the parameter set."""
     bench = package.Bench(
         "moment-pulses",
         "roberts2003",
@@ -103,9 +103,61 @@ def test_a_refusal_lists_what_resembles_the_input_first_and_not_all(
     head = ",".join(["time [s]", *(f"{name} [1]" for name in names)])
     path.write_text("\n".join([head, *rows]) + "\n")
     (line,) = bywire("replay", path, "--bench", "hard-braking").lines
-    listed = line.partition("the signal one of ")[2]
-    assert set(listed.split(", ")[:2]) == {"pressure_set", "i_setpoint"}
+    listed = line.partition("The measured signals are ")[2].partition(". All inputs")[0]
+    assert set(listed.split(", ")[:2]) == {"pressure_set [1]", "i_setpoint [1]"}
     assert listed.endswith(" and 20 more")
+
+
+def pedal_record(folder: Path) -> Path:
+    """Return a record as a German rig writes it: decimal commas, cp1252, pedal and pressure."""
+    rows = [
+        f"{1e-3 * k:.3f};{6 + 0.01 * k:.2f};{20 + 0.04 * k:.2f};{2 + 0.01 * k:.2f}"
+        for k in range(400)
+    ]
+    titles = "Zeit [s];Pedalweg [mm];Fußkraft [N];Druck [bar]"
+    path = folder / "ride.csv"
+    path.write_bytes("\r\n".join([titles, *rows, ""]).replace(".", ",").encode("cp1252"))
+    return path
+
+
+def test_a_pedal_record_is_replayed_by_what_each_message_says_to_type(
+    bywire: Bywire, tmp_path: Path
+) -> None:
+    command = ["replay", pedal_record(tmp_path), "--bench", "pedal-tracking", "--no-error-estimate"]
+    typed = "--input pedal_force=Fußkraft"
+    refused(bywire(*command), "drives pedal_force [N]", typed, "Pedalweg [mm]", "Druck [bar]")
+    command += typed.split()
+    typed = "--output p_mc=Druck"
+    refused(bywire(*command), typed, "Druck may also be p_pd, p_ref, p_meas", "'bywire list motor")
+    outcome = bywire(*command, *typed.split(), "--json")
+    assert outcome.status == 0, outcome.err
+    assert [note for note in outcome.object["notes"] if "cp1252" in note]
+
+
+def test_an_unknown_output_names_those_of_its_unit_first_and_the_whole_list(
+    bywire: Bywire, tmp_path: Path
+) -> None:
+    command = ("replay", pedal_record(tmp_path), "--bench", "pedal-tracking", "--output", "z=Druck")
+    (line,) = bywire(*command, "--input", "pedal_force=Fußkraft").lines
+    assert "valid names are p_mc, p_meas, p_pd, p_ref, " in line
+    assert line.endswith("('bywire list motorcycle-brake' shows all)")
+
+
+def test_a_replay_notes_the_inputs_that_the_experiment_still_drives(
+    bywire: Bywire, tmp_path: Path
+) -> None:
+    columns = ("--input", "p_set=Druck", "--output", "p_mc=Druck", "--no-error-estimate")
+    outcome = bywire("replay", pedal_record(tmp_path), "--bench", "pedal-tracking", *columns)
+    assert "no measured signal replaces the experiment's pedal_force" in outcome.err
+
+
+def test_a_record_without_the_driven_quantity_hints_at_a_mapping(
+    bywire: Bywire, tmp_path: Path
+) -> None:
+    path = tmp_path / "travel.csv"
+    path.write_text("time [s],travel [mm]\n0,6\n0.001,7\n0.002,8\n")
+    text = "drives pedal_force [N], but no measured signal has its unit"
+    refused(bywire("replay", path, "--bench", "pedal-tracking"), text, "--map")
 
 
 def test_refusals(bywire: Bywire, stop: Path) -> None:
@@ -118,5 +170,9 @@ def test_refusals(bywire: Bywire, stop: Path) -> None:
     refused(bywire(*moment, "--tolerance", "nmrse <= 5 %"), "nrmse")
     refused(bywire(*moment, "--track", "alpha"), "wedge.mu_B")
     refused(bywire(*base, "motor-open-loop"), "no measured signal drives the model")
-    refused(bywire(*base, "hard-braking"), "i_set, v_set and the signal one of M_set, ")
+    refused(
+        bywire(*base, "hard-braking"),
+        "drives p_set [bar], but",
+        "All inputs of the model are p_set, ",
+    )
     refused(bywire("replay", "none.csv", "--bench", "moment-pulses"), "none.csv")

@@ -1,4 +1,4 @@
-"""Changes of a bench from the command line."""
+"""Changes to a bench from the command line."""
 
 from __future__ import annotations
 
@@ -15,7 +15,19 @@ import bywire as package
         ("=3", ["--set =3", "KEY=VALUE"]),
         ("options.p_to=", ["--set options.p_to=", "KEY=VALUE"]),
         ("", ["KEY=VALUE"]),
-        ("p_to=30bar", ["unknown parameter 'p_to'", "'options.p_to'"]),
+        ("p_to=30bar", ["'p_to': it is an option of hard-braking. Type --set options.p_to=30bar"]),
+        ("p_to=+50%", ["Type --set options.p_to=VALUE"]),
+        ("overshoot=3", ["it is a key figure", '--set "requirements.overshoot=<= 15 %"']),
+        ("overshoot=<= 3 %", ['--set "requirements.overshoot=<= 3 %"']),
+        ("seed=4", ["it is a setting of the simulation. Type --set simulation.seed=4"]),
+        ("sport600=1", ["it is a parameter set. Type --set parameters=sport600"]),
+        ("friction-ramp=1", ["it is an experiment. Type --set experiment=friction-ramp"]),
+        ("p_set=4 bar", ["it is a signal of motorcycle-brake. 'bywire list hard-braking'"]),
+        ("p_mc=4 bar", ["it is a signal of motorcycle-brake"]),
+        ("options.motor.R_m=1 ohm", ['it is a parameter. Type --set "motor.R_m=1 ohm"']),
+        ("options.overshoot=3 %", ["unknown option 'overshoot': it is a key figure"]),
+        ("requirements.p_to=<= 3 bar", ["it is an option of hard-braking. Type --set"]),
+        ("xyz=4", ["valid names are", "and 123 more ('bywire list dardanelli2010' shows all)"]),
         ("options.p_too=30bar", ["unknown option of hard-braking 'p_too'", "'p_to'"]),
         ("option.p_to=30bar", ["unknown section 'option'", "'options'"]),
         ("options=3", ["options is a section", "options.NAME=VALUE"]),
@@ -57,7 +69,7 @@ def test_number_without_a_unit_gets_the_same_answer_in_file_and_change(bywire, b
     changed = bywire("run", bench(), "--set", f"motor.R_m={number}")
     written = bywire("run", bench(f"{BRAKING}[set]\nmotor.R_m = {value}\n"))
     refused(changed, f"motor.R_m = '{number}' {said}", "'0.5 ohm'")
-    assert changed.err.replace(f"'{number}'", number) == written.err  # quoted as it stands there
+    assert changed.err.replace(f"'{number}'", number) == written.err  # quoted as in the file
 
 
 def test_zero_and_pure_numbers_need_no_unit(bywire, bench):
@@ -119,12 +131,12 @@ def test_shares_and_patterns_change_what_is_there(bench):
     path = str(bench(f'{BRAKING}{QUICK}\n[set]\nseal.c = "2 s/rad"\n"motor.*" = "+10%"\n'))
     changed = package.run(path, {"seal.T_pr": "+50%", "seal.c": " - 5 %"}).bench.par.leaves()
     assert changed["seal.T_pr"] == pytest.approx(1.5 * cited["seal.T_pr"], rel=1e-12)
-    assert changed["seal.c"] == pytest.approx(0.95 * 2.0, rel=1e-12)  # of what the file gives
+    assert changed["seal.c"] == pytest.approx(0.95 * 2.0, rel=1e-12)  # relative to the file's value
     for name in ("motor.R_m", "motor.K_e"):
         assert changed[name] == pytest.approx(1.1 * cited[name], rel=1e-12)
     assert changed["gear.eta_g"] == cited["gear.eta_g"]
     plain = package.Bench("hard-braking", "dardanelli2010", {"seal.*": "+50%", "seal.c": "2 s/rad"})
-    assert plain.par.seal.c == 2.0  # what is written out goes before a pattern
+    assert plain.par.seal.c == 2.0  # a full name takes precedence over a pattern
     twice = plain.with_overrides({"seal.c": "+50%"})
     assert twice.par.seal.c == pytest.approx(3.0)
     margins = package.margins("pressure", overrides={"seal.*": "-10%"})

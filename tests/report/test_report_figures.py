@@ -17,10 +17,10 @@ from bywire.core.errors import ParameterError, UnknownNameError
 from bywire.report.drawing import figure_bytes
 from bywire.report.energy_balance import energy_balance
 from bywire.report.friction_figures import hysteresis_loop, stribeck_curve
-from bywire.report.panels import Panel, Trace
+from bywire.report.panels import Panel, Role, Trace
 from bywire.report.response_figures import Response, bode
 from bywire.report.step_response import StepFacts, StepLimits, step_response, tracking
-from bywire.report.time_traces import time_traces
+from bywire.report.time_traces import overlaid_traces, time_traces
 from raising import raises
 
 step_figure = partial(step_response, variable="p_mc", set_point="p_ref")
@@ -95,6 +95,26 @@ def test_pressure_is_drawn_in_bar(recording: xr.Dataset) -> None:
     axes = step_figure(recording).axes[0]
     assert axes.get_ylabel() == "master-cylinder pressure [bar]"
     assert heights(axes)[0].max() == pytest.approx(recording["p_mc"].max().item() / 1e5)
+
+
+@pytest.mark.parametrize(("size", "unit"), [(12e3, "kN"), (800.0, "N")])
+def test_every_axis_of_a_force_takes_the_unit_of_tables(size: float, unit: str) -> None:
+    t = np.linspace(0.0, 1.0, 51)
+    force = ("time", size * t, {"units": "N", "long_name": "clamp force"})
+    data = xr.Dataset({"F": force, "F_ref": force}, {"time": t})
+    panel = Panel("clamp force", (Trace("F"), Trace("F_ref", Role.SET_POINT)))
+    figures = [
+        time_traces(data, panels=(panel,)),
+        step_response(data, "F", "F_ref"),
+        tracking(data, "F", "F_ref"),
+        overlaid_traces({"a": data, "b": data}, {"F": "clamp force"}),
+        hysteresis_loop({"a": data}, "F", "F_ref"),
+    ]
+    for figure in figures:
+        axes = figure.axes[0]
+        assert axes.get_ylabel().endswith(f"[{unit}]")
+        top = max(float(np.max(line.get_ydata(), initial=0.0)) for line in axes.lines)
+        assert top == pytest.approx(size / (1e3 if unit == "kN" else 1.0))
 
 
 def test_short_recordings_are_drawn_in_milliseconds(recording: xr.Dataset) -> None:

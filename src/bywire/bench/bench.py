@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from bywire.bench.changes import OPTION, settled, split_options
+from bywire.bench.changes import settled, split_options
 from bywire.bench.experiment import (
     Case,
     Cases,
@@ -25,6 +25,7 @@ from bywire.bench.experiment import (
 from bywire.bench.faults.fault_section import Injection, injections
 from bywire.bench.faults.injected import checked_sections, with_faults
 from bywire.bench.generic_experiment import experiment_of, usual_set
+from bywire.bench.misplaced import refuse_misplaced
 from bywire.bench.requirements import Limit, read_limits
 from bywire.bench.stimulus import Stimulus, stimulus_of, stimulus_sections
 from bywire.core.catalog import PARAMETER_SETS, outdated_values
@@ -134,15 +135,16 @@ class Bench:
         if chosen.assembly != self.system:
             by_name = f"assembly = {self.assembly!r}"
             by_set = f"parameter set {known.name!r} is for a {known.assembly}"
+            fit = [n for n, s in PARAMETER_SETS.all().items() if s.assembly == chosen.assembly]
             raise ParameterError(
                 f"experiment {chosen.name!r} tests a {chosen.assembly}, but "
-                f"{by_name if self.assembly else by_set}",
+                f"{by_name if self.assembly else by_set}. Its parameter sets are {', '.join(fit)}",
                 name="assembly" if self.assembly else "parameters",
                 value=self.assembly or known.name,
                 valid=chosen.assembly,
             )
+        refuse_misplaced(chosen, self.parameters, self.overrides, self.options, self.requirements)
         self._check_stimulus(chosen)
-        self._check_names()
         _ = self.limits  # rejects requirements that cannot be judged
         if chosen.preview is None:
             self._require_effects(written, self.cases(), chosen.cases)
@@ -210,14 +212,6 @@ class Bench:
         if switches and not self._is_used(name, moved, cases, make):
             refuse_without_effect(name, value, switches, self.par)
 
-    def _check_names(self) -> None:
-        """Reject options among the parameters, which are the most likely mistake."""
-        options = self.definition.defaults.flat().keys()
-        parameters = PARAMETER_SETS.find(self.parameters).values.keys()
-        for name in self.overrides:
-            if name in options and name not in parameters:
-                raise unknown_name("parameter", name, [f"{OPTION}{name}"])
-
     @cached_property
     def limits(self) -> Mapping[str, Limit]:
         """Limits from the requirements, by KPI name."""
@@ -237,7 +231,8 @@ class Bench:
     def par(self) -> ParameterSet:
         """Validated parameters, including the overrides."""
         base = PARAMETER_SETS.find(self.parameters).parameters()
-        return base.replace(parsed(type(base), self.overrides, "parameter"))
+        listed = f"bywire list {self.parameters}"
+        return base.replace(parsed(type(base), self.overrides, "parameter", listed))
 
     @cached_property
     def outdated(self) -> list[str]:

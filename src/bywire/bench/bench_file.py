@@ -11,14 +11,14 @@ from typing import Annotated, Any
 
 from bywire.bench.bench import Bench
 from bywire.bench.changes import is_relative, settled
-from bywire.bench.experiment import EXPERIMENTS
+from bywire.bench.experiment import EXPERIMENTS, Experiment
 from bywire.bench.faults.fault_section import Course, numbers_as_text
 from bywire.bench.faults.injected import checked_sections
 from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS, experiment_of, usual_set
 from bywire.bench.stimulus import STIMULI, stimulus_sections
 from bywire.core.arguments import checked
 from bywire.core.callers import option
-from bywire.core.catalog import PARAMETER_SETS, sets_of_loaded
+from bywire.core.catalog import PARAMETER_SETS, CitedSet, sets_of_loaded
 from bywire.core.errors import InputError, ParameterError, UnknownNameError, quoted, unknown_name
 from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.section import Hint, Section, Table, table_of
@@ -120,7 +120,6 @@ def _text(name: str, value: Any, symbol: str) -> str:
 
 # --- Reading
 
-_LIST = "(see 'bywire list')"
 _Quoted = Annotated[str, Hint("write it in quotation marks")]
 
 
@@ -144,11 +143,8 @@ class SimulationSection(Section):
 class BenchFile(Section):
     """Keys and sections of a bench file."""
 
-    experiment: Annotated[str, Hint(f'write experiment = "..." in quotation marks {_LIST}')]
-    parameters: Annotated[
-        str,
-        Hint(f'write parameters = "..." in quotation marks, with a parameter set\'s name {_LIST}'),
-    ]
+    experiment: _Quoted
+    parameters: _Quoted
     assembly: _Quoted = ""
     name: _Quoted = ""
     options: Table
@@ -226,7 +222,9 @@ def from_mapping(content: Mapping[str, Any], folder: Path, name: str) -> Bench:
     """Return the bench for a bench file's content; relative paths start at ``folder``."""
     sets = sets_of_loaded()
     only = {"parameters": sets[0]} if len(sets) == 1 else {}
-    file = BenchFile.read({"name": name, **only, **content}, "a bench file")
+    content = {"name": name, **only, **content}
+    _require_names(content)
+    file = BenchFile.read(content, "a bench file")
     options, overrides = flattened(file.options), flattened(file.set)
     _require_units(file, options, overrides)
     stimulus = {
@@ -244,6 +242,37 @@ def from_mapping(content: Mapping[str, Any], folder: Path, name: str) -> Bench:
         assembly=file.assembly,
         faults=[numbers_as_text(each) for each in checked_sections(file.faults)],
         **file.simulation.given,
+    )
+
+
+def _require_names(content: Mapping[str, Any]) -> None:
+    """Reject a bench without an experiment or a parameter set, with the names that fit."""
+    experiment, cited = content.get("experiment"), content.get("parameters")
+    if experiment is None:
+        known = PARAMETER_SETS.get(str(cited))
+        if known is None:
+            example, valid = next(iter(EXPERIMENTS.all())), "those of 'bywire list experiments'"
+        else:
+            names = _of_assembly(EXPERIMENTS.all(), known.assembly)
+            example = names[0]
+            valid = ", ".join((*names, *GENERIC_EXPERIMENTS.all()))
+        raise _missing("experiment", example, valid)
+    if cited is None and isinstance(experiment, str):
+        example = usual_set(experiment)
+        assembly = PARAMETER_SETS.find(example).assembly
+        valid = ", ".join(_of_assembly(PARAMETER_SETS.all(), assembly))
+        raise _missing("parameters", example, valid)
+
+
+def _of_assembly(known: Mapping[str, CitedSet] | Mapping[str, Experiment], name: str) -> list[str]:
+    return [each.name for each in known.values() if each.assembly == name]
+
+
+def _missing(key: str, example: str, valid: str) -> ParameterError:
+    return ParameterError(
+        f'{key} is missing. Add a line such as {key} = "{example}". Valid names are {valid}',
+        name=key,
+        valid=valid,
     )
 
 

@@ -277,7 +277,7 @@ def _placed(note: Any, places: Sequence[tuple[str, str, float]]) -> Any:
 def _signal(
     model: Model,
     experiment: str,
-    option: str,
+    key: str,
     place: str,
     wanted: Any,
     chosen: Mapping[str, tuple[str, Signal]],
@@ -285,17 +285,17 @@ def _signal(
     """Return the signal in an option, or the default signal."""
     known = _known(model, place)
     if wanted is not None and not isinstance(wanted, str):
-        raise not_valid(f"options.{option}", quoted(wanted), f"a {place} of {model.name}")
+        raise not_valid(f"options.{key}", quoted(wanted), f"a {place} of {model.name}")
     if wanted:
         if wanted not in known:
-            raise unknown_name(f"{place} of {model.name} in options.{option}", wanted, known)
+            raise unknown_name(f"{place} of {model.name} in options.{key}", wanted, known)
         return wanted, known[wanted]
     if place in ("state", "input or recording"):
         return next(iter(chosen.values()))
     if not known:
         raise ParameterError(
             f"experiment {experiment!r} needs a {place}, but {model.name} has none",
-            name=f"options.{option}",
+            name=f"options.{key}",
         )
     if place == "recording":
         driven, signal = chosen["input"]
@@ -304,11 +304,13 @@ def _signal(
     elif len(known) == 1 or place == "friction":
         name = next(iter(known))
     else:
+        valid = ", ".join(known)
+        typed = option("overrides", {f"options.{key}": next(iter(known))})
         raise ParameterError(
-            f"options.{option} is missing. Specify the {place} of {model.name} that experiment "
-            f"{experiment!r} drives: {', '.join(known)}",
-            name=f"options.{option}",
-            valid=", ".join(known),
+            f"options.{key} is missing: the {place} of {model.name} that experiment "
+            f"{experiment!r} drives. Type for example {typed}. Valid names are {valid}",
+            name=f"options.{key}",
+            valid=valid,
         )
     return name, known[name]
 

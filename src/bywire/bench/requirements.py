@@ -188,6 +188,11 @@ def read_limits(
     }
 
 
+def limit_like(unit: str) -> str:
+    """Return a limit of a figure in some unit, as an example."""
+    return "<= 15 %" if unit == "%" else f"<= {units.example(unit)}"
+
+
 def read_limit(
     figure: str, text: Any, unit: str, what: str = "requirement", *, has_probability: bool = False
 ) -> Limit:
@@ -215,7 +220,7 @@ def read_limit(
                 valid=quoted(split[1]),
             )
         probability, text = _probability(figure, text, split[2]), split[1]
-    example = "<= 15 %" if unit == "%" else f"<= {units.example(unit)}"
+    example = limit_like(unit)
     before, compare, bound = parted(text) if isinstance(text, str) else ("", None, "")
     if compare is None or before:
         raise not_valid(subject, quoted(text), f"a limit such as {example!r}")

@@ -20,7 +20,7 @@ from pydantic import Field
 from bywire.core.callers import option
 from bywire.core.errors import FileError, ParameterError, UnknownNameError, not_valid, quoted
 from bywire.core.parameters import ParameterSet, leaf_fields
-from bywire.core.quantities import Unit
+from bywire.core.quantities import Unit, display_unit
 from bywire.core.registry import Kind
 from bywire.core.values import nodes, number
 
@@ -267,8 +267,30 @@ def stimulus_of(section: Mapping[str, Any], unit: str, name: str) -> Stimulus:
     """
     values = dict(section)
     kind = values.pop("kind", None)
+    title = f"stimulus.{name}" if name else "stimulus"
     if not isinstance(kind, str):
-        title = f"stimulus.{name}" if name else "stimulus"
         kinds = ", ".join(sorted(STIMULI.all()))
         raise ParameterError(f"[{title}] needs a kind: {kinds}", name=f"{title}.kind", valid=kinds)
-    return create(kind, with_nodes(values, unit) if kind == "table" else values, unit)
+    values = with_nodes(values, unit) if kind == "table" else values
+    _require_values(title, kind, values, unit)
+    return create(kind, values, unit)
+
+
+def _require_values(title: str, kind: str, values: Mapping[str, Any], level: str) -> None:
+    """Reject a section that lacks values, with all of them as a user types them."""
+    cls = STIMULI.find(kind).parameter_class
+    fields = cls.model_fields
+    lacking = [name for name in fields if fields[name].is_required() and name not in values]
+    if lacking:
+        leaves = leaf_fields(cls)
+        typed = {}
+        for name in lacking:
+            symbol = leaves[name].unit.symbol.replace("level", level) if name in leaves else "1"
+            unit = display_unit(symbol)
+            typed[f"{title}.{name}"] = "VALUE" if unit == "1" else f"VALUE {unit}"
+        verb = "is" if len(lacking) == 1 else "are"
+        raise ParameterError(
+            f"stimulus {kind!r}: {', '.join(lacking)} {verb} missing. Add to [{title}], or type "
+            f"{option('overrides', typed)}",
+            name=", ".join(typed),
+        )

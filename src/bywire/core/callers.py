@@ -7,11 +7,13 @@ A message refers to an argument with `option`. The use case declares the corresp
 from __future__ import annotations
 
 import json
+import re
 import sys
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+_PLAIN = re.compile(r"[\w.=@:,+%/-]*")
 _commands: list[None] = []
 _flags: dict[str, str] = {}
 
@@ -73,16 +75,23 @@ def option(argument: str, value: str | bool | dict[str, str] | None = None) -> s
     >>> option("overrides"), option("overrides", {"parameters": "NAME"}), option("force", True)
     ('overrides', 'overrides={"parameters": "NAME"}', 'force=True')
     >>> with command_line():
-    ...     option("overrides", {"parameters": "NAME"}), option("force", True)
-    ('--set parameters=NAME', '--force')
+    ...     option("overrides", {"options.p_to": "30 bar"}), option("force", True)
+    ('--set "options.p_to=30 bar"', '--force')
     """
     if is_command_line():
         flag = _flags.get(argument, f"--{argument.replace('_', '-')}")
-        words = [f"{key}={each}" for key, each in value.items()] if isinstance(value, dict) else []
-        return " ".join([flag, *words, *([value] if isinstance(value, str) else [])])
+        pairs = value.items() if isinstance(value, dict) else ()
+        if pairs:
+            return " ".join(f"{flag} {_as_word(f'{key}={each}')}" for key, each in pairs)
+        return f"{flag} {value}" if isinstance(value, str) else flag
     if value is None:
         return argument
     return f"{argument}={value if value is True else json.dumps(value)}"
+
+
+def _as_word(text: str) -> str:
+    """Return one word of a command line, in quotation marks that every usual shell accepts."""
+    return text if '"' in text or _PLAIN.fullmatch(text) else f'"{text}"'
 
 
 # --- Warnings, which a command, a job or a study's process shows in its own way

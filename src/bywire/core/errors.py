@@ -20,7 +20,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from copy import copy
 from datetime import date, time
 from difflib import SequenceMatcher, get_close_matches
@@ -31,6 +31,7 @@ from bywire.core.clean_text import shortened
 E = TypeVar("E", bound="BywireError")
 
 _SHOWN = 60  # characters of a value in a message
+_MOST = 12  # names in a list
 _NEAR = 0.7  # lowest similarity of a suggestion in an error that lists all names
 _BARE_KEY = re.compile(r"[\w-]+", re.ASCII)
 
@@ -181,7 +182,7 @@ def not_valid(
 
 
 def unknown_name(
-    kind: str, name: str, known: Iterable[str], first: Iterable[str] = ()
+    kind: str, name: str, known: Iterable[str], first: Iterable[str] = (), listed: str = ""
 ) -> UnknownNameError:
     """Build the error for an unknown name, with the nearest known ones.
 
@@ -195,11 +196,16 @@ def unknown_name(
         Every valid name.
     first
         Names that come first in the list.
+    listed
+        Command that lists all of them, for a list that is too long for the error.
     """
     every, leading = {*known}, sorted(first)
-    candidates = [*leading, *sorted(every.difference(leading))]
+    others = sorted(every.difference(leading))
+    candidates = [*leading, *(by_likeness(others, [name]) if len(every) > _MOST else others)]
     close = get_close_matches(name, candidates, n=3, cutoff=0.5)
     hint = f"did you mean {', '.join(map(repr, close))}?" if close else _listing(candidates)
+    if listed and not close and len(candidates) > _MOST:
+        hint = f"{hint} ({listed!r} shows all)"
     text = f"unknown {kind} {quoted(name)}: {hint}"
     return UnknownNameError(text, name=kind, value=name, valid=", ".join(close or candidates))
 
@@ -223,20 +229,30 @@ def unknown_of_few(kind: str, name: str, known: Iterable[str]) -> UnknownNameErr
     return UnknownNameError(text, name=kind, value=name, valid=", ".join(every))
 
 
-def nearest_first(names: Iterable[str], requested: Iterable[str]) -> str:
+def nearest_first(
+    names: Iterable[str], requested: Iterable[str], units: Mapping[str, str] | None = None
+) -> str:
     """Return a short list of names for an error, those most similar to the requested ones first.
+
+    ``units``: unit of each name, to write it beside the name.
 
     Examples
     --------
     >>> nearest_first(["time", "p_caliper", "i_set"], ["p_set", "i_set"])
     'i_set, p_caliper, time'
     """
-    aims = list(requested)
+    ordered = by_likeness(names, list(requested))
+    return _shown(ordered if units is None else [f"{name} [{units[name]}]" for name in ordered])
+
+
+def by_likeness(names: Iterable[str], aims: list[str]) -> list[str]:
+    """Return names in the order of their likeness to one of some others, ignoring case."""
 
     def distance(name: str) -> float:
-        return -max((SequenceMatcher(None, name, aim).ratio() for aim in aims), default=0.0)
+        near = (SequenceMatcher(None, name.casefold(), aim.casefold()).ratio() for aim in aims)
+        return -max(near, default=0.0)
 
-    return _shown(sorted(names, key=distance))
+    return sorted(names, key=distance)
 
 
 def quoted(value: object) -> str:
@@ -281,4 +297,5 @@ def _listing(candidates: list[str]) -> str:
 
 
 def _shown(names: list[str]) -> str:
-    return ", ".join(names[:12]) + (f" and {len(names) - 12} more" if len(names) > 12 else "")
+    more = f" and {len(names) - _MOST} more" if len(names) > _MOST else ""
+    return ", ".join(names[:_MOST]) + more

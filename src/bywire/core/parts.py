@@ -68,6 +68,8 @@ class PartOptions(TypedDict, total=False):
         Place of its parameters among the assembly's. Default: the part's name.
     suffix
         Suffix of its states' names, for a second part of the same kind: ``"_2"``.
+    which
+        Words for this part in labels, ``"front"``. Default: the suffix.
     state
         Names of its states in the assembly, if they differ from the element's.
     labels
@@ -90,6 +92,7 @@ class PartOptions(TypedDict, total=False):
 
     par: str
     suffix: str
+    which: str
     state: Mapping[str, str]
     labels: Mapping[str, str]
     fixed: Iterable[str]
@@ -158,6 +161,8 @@ class Part(Generic[X, U, F, P]):
     def __init__(self, element: Any, **options: Unpack[PartOptions]) -> None:
         self.element = element
         self.path, self.suffix = options.get("par", ""), options.get("suffix", "")
+        which = options.get("which", "")
+        self.ending = f", {which}" if which else self.suffix.replace("_", " ")
         self.renamed, self.labels = options.get("state", {}), options.get("labels", {})
         self.fixed, output = tuple(options.get("fixed", ())), options.get("output", ())
         self.output = dict(output) if isinstance(output, Mapping) else {k: k for k in output}
@@ -221,9 +226,8 @@ class Part(Generic[X, U, F, P]):
         for name in (*self.renamed, *self.labels, *self.fixed):
             if name not in signals:
                 raise unknown_name("state", name, signals).at(self.where, ModelError)
-        number = self.suffix.replace("_", " ")
         return {
-            self.state_name(name): replace(s, label=self.labels.get(name, s.label) + number)
+            self.state_name(name): replace(s, label=self.labels.get(name, s.label) + self.ending)
             for name, s in signals.items()
         }
 
@@ -240,9 +244,8 @@ class Part(Generic[X, U, F, P]):
         for name in self.output:
             if name not in known:
                 raise unknown_name("output", name, known).at(self.where, ModelError)
-        number = self.suffix.replace("_", " ")
         return {
-            there: replace(known[name], label=known[name].label + number)
+            there: replace(known[name], label=known[name].label + self.ending)
             for name, there in self.output.items()
         }
 

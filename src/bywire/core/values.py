@@ -14,11 +14,14 @@ from bywire.core.parameters import ParameterSet, choice_fields, leaf_fields
 _ZERO = re.compile(r"\s*[+-]?(?:0+\.?0*|\.0+)\s*")
 
 
-def parsed(cls: type[ParameterSet], values: Mapping[str, Any], kind: str) -> dict[str, Any]:
+def parsed(
+    cls: type[ParameterSet], values: Mapping[str, Any], kind: str, listed: str = ""
+) -> dict[str, Any]:
     """Return values by dotted name, numbers in SI.
 
     ``cls``: the parameter class. ``values``: numbers (SI), texts with units, sequences of these for
-    tables, or choices. ``kind``: the kind of the names in errors.
+    tables, or choices. ``kind``: the kind of the names in errors. ``listed``: command that
+    lists them.
 
     Raises
     ------
@@ -39,7 +42,7 @@ def parsed(cls: type[ParameterSet], values: Mapping[str, Any], kind: str) -> dic
         elif name in choices:
             accepted[name] = value
         else:
-            raise unknown_name(kind, name, (*leaves, *choices))
+            raise unknown_name(kind, name, (*leaves, *choices), listed=listed)
     return accepted
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -19,11 +19,13 @@ from bywire.core.errors import (
     ParameterError,
     StepError,
     UnitError,
+    by_likeness,
     nearest_first,
     unknown_name,
     unknown_of_few,
 )
 from bywire.core.parameters import leaf_fields
+from bywire.core.quantities import display_unit
 from bywire.core.signals import Signal, signals_of, without_noise
 from bywire.core.typing import Array
 from bywire.data.column_units import measures, unit_of_symbol
@@ -31,6 +33,11 @@ from bywire.identification.measured import RECORD, as_even, require_signals
 from bywire.identification.output_error import Between, even_interval
 from bywire.simulation.run import Run, Trajectory, simulate
 
+_UNLIKE = (
+    ", but no measured signal has its unit. If a column measures it in another unit, such as a "
+    "sensor's voltage, set its scale and unit with {}. "
+)
+_SHOWN = 3  # other signals of the same quantity in an error
 _ACCUMULATED = ("J", "s")  # accumulated quantities, whose errors do not show the quality of fit
 
 
@@ -62,18 +69,56 @@ def _compared_outputs(
         if passed:
             notes = (f"not compared (flags, sums or constants): {', '.join(passed)}",)
     if not wanted:
+        free = [name for name in there if name not in driven.values()]
+        pairs = _pairs(data, free, signals)
         raise ParameterError(
-            "no measured signal is an output of the model. Use the model's signal names "
-            f"({option('mapping')}), for example {', '.join(list(signals)[:6])}. The measured "
-            f"signals are {nearest_first(there, signals)}",
-            name="mapping",
+            "no measured signal has the name of an output of the model. "
+            f"{_advice('outputs', pairs)}"
+            f"The measured signals are {_measured_first(data, signals)}. "
+            f"'bywire list {case.model.name}' lists all outputs",
+            name="outputs",
             valid=", ".join(signals),
         )
     for name in wanted:
         if name not in signals:
-            raise unknown_name("output", name, signals)
+            alike = [model for model, _ in _pairs(data, [name], signals)] if name in data else []
+            raise unknown_name("output", name, signals, alike, f"bywire list {case.model.name}")
         _require_measured(data, name, signals[name])
     return list(wanted), notes
+
+
+def _pairs(
+    data: xr.Dataset, measured: Sequence[str], signals: Mapping[str, Signal]
+) -> list[tuple[str, str]]:
+    """Return signals of the model with measured ones of the same quantity, the likeliest first."""
+    pairs = []
+    for name in measured:
+        unit = unit_of_symbol(str(data[name].attrs.get("units", "1")))
+        alike = [model for model, signal in signals.items() if measures(unit, signal.unit)]
+        pairs += [(model, name) for model in by_likeness(alike, [name])]
+    return pairs
+
+
+def _advice(argument: str, pairs: Sequence[tuple[str, str]]) -> str:
+    """Return what to type to assign measured signals; empty if none fits."""
+    fitting: dict[str, list[str]] = {}
+    for model, column in pairs:
+        fitting.setdefault(column, []).append(model)
+    if not fitting:
+        return ""
+    typed = {models[0]: column for column, models in fitting.items()}
+    several = {column: models for column, models in fitting.items() if len(models) > 1}
+    others = "".join(
+        f". {column} may also be {', '.join(models[1:][:_SHOWN])}"
+        for column, models in list(several.items())[:1]
+    )
+    return f"Type for example {option(argument, dict(list(typed.items())[:_SHOWN]))}{others}. "
+
+
+def _measured_first(data: xr.Dataset, signals: Iterable[str]) -> str:
+    """Return the measured signals with their units, those with similar names first."""
+    units = {str(n): display_unit(str(a.attrs.get("units", "1"))) for n, a in data.items()}
+    return nearest_first(units, signals, units)
 
 
 def _tells(values: Array, unit: str) -> bool:
@@ -127,7 +172,7 @@ class MeasuredRun:
     case
         Its run, aligned to the record.
     data
-        Measured signals over ``time`` [s], on the instants at which the model is recorded.
+        Measured signals over ``time`` [s], at the times at which the model is recorded.
     driven
         Stimulus -> measured signal.
     compared
@@ -135,7 +180,7 @@ class MeasuredRun:
     run
         Run to compute; its first ``settled`` rows are before the record.
     settled
-        Rows of the settling time.
+        Number of rows in the settling time.
     begun_at
         Option of the experiment -> signal whose first sample sets it.
     notes
@@ -171,7 +216,7 @@ def measured_run(
         Its experiment defines model, start, and unmeasured stimuli.
     data
         Measured signals over ``time`` [s], SI; resampled if the model's steps require it. The
-        run starts with the record; a negative start time is that of the experiment.
+        run starts with the record; if its time is negative, it includes part of the settling.
     inputs
         Stimulus of the model -> measured signal; default: all of the same name.
     outputs
@@ -182,24 +227,26 @@ def measured_run(
     settle
         Whether the run settles before the record, as in the experiment.
     between
-        Inputs between samples: demands of a controller are held. Smooth inputs that are read
-        faster than they were measured are better interpolated linearly.
+        Inputs between samples: a controller's demands are held. Interpolate smooth inputs linearly
+        if the model reads them faster than they were measured.
 
     Raises
     ------
     UnknownNameError
-        When a signal is not measured, or the model has none of that name.
+        When a signal is not measured, or the model has no signal of that name.
     ParameterError
         When no signal drives the model, none is compared, or an input has gaps.
     """
     chosen = case_of(bench, case)
     driven = _inputs(chosen, data, inputs)
+    left = [name for name in driven_at(chosen, np.zeros(1)) if name not in driven]
+    kept = [f"no measured signal replaces the experiment's {name}" for name in left]
     compared, passed = _compared_outputs(chosen, data, outputs, driven)
     bench, begun_at, notes = _started(bench, data, compared)
     chosen = case_of(bench, case)
     if not settle and chosen.settle > 0.0:
         chosen = replace(chosen, settle=0.0)
-        notes = (*notes, "starts with the record, without the experiment's settling")
+        notes = (*notes, "the run starts with the record, without the experiment's settling time")
     data, chosen, said = _on_grid(bench, data, chosen)
     for signal in driven.values():
         missing = np.flatnonzero(np.isnan(data[signal].values))
@@ -221,7 +268,7 @@ def measured_run(
         run,
         round(chosen.settle / run.record),
         begun_at,
-        (*notes, *said, *passed),
+        (*kept, *notes, *said, *passed),
     )
 
 
@@ -253,10 +300,15 @@ def _inputs(case: Case, data: xr.Dataset, wanted: Mapping[str, str] | None) -> d
         wanted = {name: name for name in there if name in stimuli}
     driven = without_noise(stimuli)
     if not wanted:
+        its_own = [name for name in driven_at(case, np.zeros(1)) if name in driven]
+        pairs = _pairs(data, there, {name: stimuli[name] for name in its_own or driven})
+        units = {name: display_unit(stimuli[name].unit) for name in driven}
+        drives = ", ".join(f"{name} [{units[name]}]" for name in its_own or driven)
         raise ParameterError(
-            "no measured signal drives the model. Add "
-            f"{option('inputs', {'STIMULUS': 'SIGNAL'})}, where the stimulus is one of "
-            f"{', '.join(driven)} and the signal one of {nearest_first(there, driven)}",
+            f"no measured signal drives the model. The experiment drives {drives}"
+            f"{'. ' if pairs else _UNLIKE.format(option('mapping'))}"
+            f"{_advice('inputs', pairs)}The measured signals are {_measured_first(data, driven)}. "
+            f"All inputs of the model are {', '.join(driven)}",
             name="inputs",
             valid=", ".join(driven),
         )
@@ -278,17 +330,17 @@ def _started(
             leaf = leaf_fields(bench.definition.options)[name]
             start = max(float(first[0]), leaf.low) if first.size else leaf.low
             started = replace(bench, options={**bench.options, name: start})
-            said = f"starts at the measured {signal}, {start:.5g} {leaf.unit.symbol}"
-            return started, {name: signal}, (said,)
+            note = f"the run starts at the measured {signal}, {start:.5g} {leaf.unit.symbol}"
+            return started, {name: signal}, (note,)
     return bench, {}, ()
 
 
 def _on_grid(
     bench: Bench, data: xr.Dataset, case: Case
 ) -> tuple[xr.Dataset, Case, tuple[str, ...]]:
-    """Return data at instants of the model's recording, and the case aligned to them."""
+    """Return data at the model's recording times, and the case aligned to them."""
     interval = even_interval(data["time"].values)
-    # A clock that starts below zero is the experiment's: part of its settling was recorded.
+    # A clock that starts below zero belongs to the experiment: part of its settling was recorded.
     case = replace(case, settle=max(case.settle + min(float(data["time"].values[0]), 0.0), 0.0))
     try:
         return data, case.aligned(bench.step, interval), ()
@@ -302,9 +354,9 @@ def _on_grid(
         even, said = as_even(data, aligned.record)
         return even, aligned, tuple(said)
     raise StepError(
-        f"the step of {bench.step:g} s divides neither the measurement's {interval:g} s nor the "
-        f"recording interval of {case.record:g} s. Resample the measurement (bywire convert "
-        "--rate)",
+        f"the step of {bench.step:g} s divides neither the measurement's interval of {interval:g} "
+        f"s nor the recording interval of {case.record:g} s. Resample the measurement "
+        "('bywire convert --rate')",
         name="step",
         value=f"{bench.step:g} s",
     )
@@ -319,7 +371,7 @@ def _run(
     begin = min(float(data["time"].values[0]), 0.0)
 
     def stimulus(t: Array) -> Array:
-        """Measured values, from one sample to the next; the first one while it settles."""
+        """Return measured values between samples; the first one during settling."""
         rows = np.zeros((t.size, len(fields)))
         given = driven_at(case, t - case.settle + begin)
         at = (t - case.settle) / interval
@@ -387,14 +439,14 @@ def replay(
     Parameters
     ----------
     bench, data, inputs, outputs, case
-        See ``bywire.identification.bench_replay``.
+        See `measured_run`.
     estimate_error
         Whether the model also runs at other steps; see `bywire.bench.running.run`.
 
     Raises
     ------
     UnknownNameError
-        When a signal is not measured, or the model has none of that name.
+        When a signal is not measured, or the model has no signal of that name.
     ParameterError
         When no signal drives the model, none is compared, or an input has gaps.
     """
@@ -462,7 +514,7 @@ def beside(data: xr.Dataset, name: str, modeled: Array) -> xr.Dataset:
     name
         The signal.
     modeled
-        Modeled values at the same instants, shape (n,).
+        Modeled values at the same times, shape (n,).
     """
     attrs = {
         "units": data[name].attrs.get("units", "1"),

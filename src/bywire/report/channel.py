@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -9,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bywire.core.errors import ParameterError, unknown_name
-from bywire.core.quantities import display_unit
+from bywire.core.quantities import display_unit, readable_unit
 from bywire.core.typing import Array
 from bywire.core.units import convert
 from bywire.report.wording import clean
@@ -31,7 +32,7 @@ class Channel:
     symbol
         Its SI unit.
     unit
-        Display unit of ``values``.
+        Unit of ``values``.
     time
         Time axis [s], shape ``(n,)``.
     values
@@ -46,8 +47,8 @@ class Channel:
     values: Array
 
 
-def channel(recording: xr.Dataset, name: str) -> Channel:
-    """Return a variable of a recording in its display unit.
+def channel(recording: xr.Dataset, name: str, unit: str = "") -> Channel:
+    """Return a variable of a recording in a unit; by default its display unit.
 
     Raises
     ------
@@ -70,7 +71,7 @@ def channel(recording: xr.Dataset, name: str) -> Channel:
     if array.size == 0:
         raise ParameterError(f"{name} has no samples to draw", name=name)
     symbol = str(array.attrs.get("units", "1"))
-    unit = display_unit(symbol)
+    unit = unit or display_unit(symbol)
     return Channel(
         name=name,
         label=clean(array.attrs.get("long_name", name)),
@@ -81,7 +82,30 @@ def channel(recording: xr.Dataset, name: str) -> Channel:
     )
 
 
-# --- Fewer points for long lines, with every peak preserved
+def size_of(values: Array) -> float:
+    """Return the largest magnitude of values; 0 without finite ones.
+
+    Examples
+    --------
+    >>> size_of(np.array([1.0, -3.0, np.nan])), size_of(np.array([]))
+    (3.0, 0.0)
+    """
+    return float(np.max(np.abs(values[np.isfinite(values)]), initial=0.0))
+
+
+def axis_unit(recordings: Iterable[xr.Dataset], *names: str) -> str:
+    """Return the most readable unit for the axis of some variables; see `readable_unit`.
+
+    Variables that a recording does not have are left out.
+    """
+    drawn = [each[name] for each in recordings for name in names if name in each.data_vars]
+    size = max(
+        (size_of(np.asarray(array.values, dtype=np.float64)) for array in drawn), default=0.0
+    )
+    return readable_unit(size, str(drawn[0].attrs.get("units", "1"))) if drawn else ""
+
+
+# --- Fewer points for long lines, with every peak kept
 
 IntArray = NDArray[np.intp]
 

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 
 from bywire.bench.energy_ledger import Ledger, actuator_ledger, ledger
 from bywire.core.errors import ParameterError
+from bywire.core.quantities import readable_unit
+from bywire.core.units import convert
 from bywire.report import style
 from bywire.report.channel import channel
 from bywire.report.wording import amount, part_text
@@ -117,7 +119,9 @@ def ledger_bars(books: Ledger) -> Figure:
     axes.tick_params(axis="y", length=0)
     axes.grid(False, axis="y")
     axes.spines["left"].set_visible(False)
-    axes.set_xlabel(style.axis_label("energy", "J"))
+    unit = readable_unit(total, "J")
+    axes.xaxis.set_major_formatter(lambda energy, _: f"{convert(energy, 'J', unit):g}")
+    axes.set_xlabel(style.unit_label("energy", unit))
     style.legend_above(axes)
     return figure
 

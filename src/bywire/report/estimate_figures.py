@@ -11,14 +11,14 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from bywire.core.typing import Array
-from bywire.core.units import difference_unit, display_factor
+from bywire.core.units import convert, difference_unit, display_factor
 from bywire.identification.confidence import autocorrelation
 from bywire.identification.estimate import Estimate
 from bywire.identification.method import Curve
 from bywire.identification.replay_fit import SegmentFit
 from bywire.identification.tracking import Track
 from bywire.report import style
-from bywire.report.channel import channel, decimate, kept_samples
+from bywire.report.channel import axis_unit, channel, decimate, kept_samples
 from bywire.report.panels import Role
 from bywire.report.wording import amount, in_display_unit
 
@@ -383,8 +383,9 @@ def replay_figure(
     """
     figure, (top, middle, bottom) = style.new_figure(5.6, (0.8, 2.2, 1.0))
     scale, unit = style.time_scale(pair["time"].values)
+    demand = axis_unit([inputs], *map(str, inputs.data_vars))
     for k, stimulus in enumerate(map(str, inputs.data_vars)):
-        shown = channel(inputs, stimulus)
+        shown = channel(inputs, stimulus, demand)
         color = style.SEQUENCE[k % len(style.SEQUENCE)] if len(inputs.data_vars) > 1 else None
         look = style.STROKES[Role.SET_POINT]
         top.plot(
@@ -393,27 +394,29 @@ def replay_figure(
             linewidth=look.linewidth,
             label=style.plain(shown.label),
         )
-        top.set_ylabel(style.axis_label("demand", shown.symbol, "\n"))
+        top.set_ylabel(style.unit_label("demand", demand, "\n"))
     symbol = str(pair["measured"].attrs.get("units", "1"))
+    readable = axis_unit([pair], "measured", "modeled")
     for values, role, word in (
         (pair["measured"].values, Role.MEASURED, "measured"),
         (pair["modeled"].values, Role.SIMULATED, "simulated"),
     ):
         look = style.STROKES[role]
         middle.plot(
-            *decimate(scale * pair["time"].values, in_display_unit(values, symbol)[0]),
+            *decimate(scale * pair["time"].values, convert(values, symbol, readable)),
             color=look.color,
             linestyle=look.linestyle,
             linewidth=look.linewidth,
             zorder=look.zorder,
             label=word,
         )
-    error = display_factor(symbol) * (pair["modeled"].values - pair["measured"].values)
+    factor = convert(1.0, symbol, readable) - convert(0.0, symbol, readable)
+    error = factor * (pair["modeled"].values - pair["measured"].values)
     bottom.plot(*decimate(scale * pair["time"].values, error), color=style.PURPLE, linewidth=0.9)
     bottom.axhline(0.0, color=style.GRAY, linewidth=0.6)
     label = str(pair["measured"].attrs.get("long_name", name))
-    middle.set_ylabel(style.axis_label(label, symbol))
-    bottom.set_ylabel(style.axis_label("difference", symbol, "\n"))
+    middle.set_ylabel(style.unit_label(label, readable))
+    bottom.set_ylabel(style.unit_label("difference", readable, "\n"))
     bottom.set_xlabel(f"time [{unit}]")
     _segments((middle, bottom), fits, scale)
     for axes in (top, middle, bottom):

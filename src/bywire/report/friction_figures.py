@@ -12,7 +12,7 @@ from bywire.bench.kpis.samples import smoothed
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.typing import Array
 from bywire.report import style
-from bywire.report.channel import Channel, channel, kept_samples
+from bywire.report.channel import Channel, axis_unit, channel, kept_samples
 from bywire.report.wording import amount
 
 if TYPE_CHECKING:
@@ -56,9 +56,10 @@ def hysteresis_loop(
     if not recordings:
         raise ParameterError("hysteresis_loop: no recording was passed. Pass at least one")
     figure, (axes,) = style.new_figure(4.2)
+    units = {name: axis_unit(recordings.values(), name) for name in (drive, response)}
     for k, (label, recording) in enumerate(recordings.items()):
         color = style.SEQUENCE[k % len(style.SEQUENCE)]
-        x, y = channel(recording, drive), channel(recording, response)
+        x, y = (channel(recording, name, unit) for name, unit in units.items())
         by = channel(recording, demand) if demand in recording.data_vars else x
         turn = _turn(by.values)
         if average > 0:

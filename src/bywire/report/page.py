@@ -204,13 +204,20 @@ def _block(block: Block, numbered: _Numbered) -> str:
     return f"<figure>\n{caption}{table}\n</figure>"
 
 
+_VERDICTS = ("verdict", "agrees", "result")
+_DETAILS = ("numerical error", "tolerance", "kind")
+
+
 def _verdicts_first(table: Table) -> Table:
-    """Return a table with errors after limits and verdicts, which are then visible on a phone."""
+    """Return a table whose limits and verdicts are visible on a phone: details come after them."""
     headings = [column.heading for column in table.columns]
-    if not {"numerical error", "verdict"} <= set(headings):
+    verdict = next((k for k, heading in enumerate(headings) if heading in _VERDICTS), None)
+    if verdict is None:
         return table
-    order = list(range(len(headings)))
-    order.insert(headings.index("verdict"), order.pop(headings.index("numerical error")))
+    first = [k for k in range(verdict) if headings[k] not in _DETAILS]
+    if headings[verdict] == "result":  # of many cases, described by many columns
+        first = first[:1]
+    order = [*first, verdict, *(k for k in range(len(headings)) if k not in {*first, verdict})]
     return Table(
         tuple(table.columns[k] for k in order),
         tuple(tuple(row[k] for k in order) for row in table.rows),
@@ -230,8 +237,8 @@ def table_html(table: Table, *, is_sortable: bool = False) -> str:
     body = "\n".join(
         "<tr>"
         + "".join(
-            _table_cell(cell, column, is_sortable)
-            for cell, column in zip(row, table.columns, strict=True)
+            _table_cell(cell, column, is_sortable, is_first=k == 0)
+            for k, (cell, column) in enumerate(zip(row, table.columns, strict=True))
         )
         + "</tr>"
         for row in table.rows
@@ -243,10 +250,12 @@ def table_html(table: Table, *, is_sortable: bool = False) -> str:
     )
 
 
-def _table_cell(cell: Cell, column: Column, is_sortable: bool) -> str:
+def _table_cell(cell: Cell, column: Column, is_sortable: bool, *, is_first: bool) -> str:
     number = cell.value if is_sortable else None
     data = "" if number is None else f' data-value="{number}"'
     text = escape(_MARKS[cell.verdict] + cell.text).replace("\n", "<br>")
+    if is_first:  # on a phone, a long name must leave room for the verdict
+        text = text.replace("_", "_<wbr>")
     if cell.verdict != "none":
         return f'<td class="{cell.verdict}{" number" * column.numeric}"{data}>{text}</td>'
     return f"<td{_number_class(column)}{data}>{text}</td>"

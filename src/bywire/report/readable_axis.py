@@ -16,23 +16,13 @@ from bywire.core.quantities import readable_unit
 from bywire.core.typing import Array
 from bywire.core.units import convert, difference_unit
 from bywire.report import style
+from bywire.report.channel import size_of
 from bywire.report.wording import amount, unit_text
 
 CHARACTER = 0.62 * style.TEXT_SIZE / 72.0
 """width of a digit [inch], rounded"""
 _GAP = 2  # minimum number of characters between two labels
 _PLAIN = (1e-2, 1e5)  # range of maximum magnitudes that are written without a power of ten
-
-
-def size_of(values: Array) -> float:
-    """Return the maximum magnitude of values; 0 if none is finite.
-
-    Examples
-    --------
-    >>> size_of(np.array([1.0, -3.0, np.nan])), size_of(np.array([]))
-    (3.0, 0.0)
-    """
-    return float(np.max(np.abs(values[np.isfinite(values)]), initial=0.0))
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from bywire.bench.requirements import Verdict
 from bywire.core.errors import ParameterError
 from bywire.core.units import convert
 from bywire.report import style
-from bywire.report.channel import Channel, channel, decimate
+from bywire.report.channel import Channel, axis_unit, channel, decimate
 from bywire.report.panels import Role
 from bywire.report.stated_levels import draw_stated
 from bywire.report.wording import amount
@@ -180,10 +180,12 @@ def step_response(
     stated
         Levels and ranges stated by a source; those of the variable are drawn.
     """
-    shown = channel(recording, variable)
+    others = () if measured is None else (measured,)
+    unit = axis_unit((recording, *others), variable, *filter(None, (set_point,)))
+    shown = channel(recording, variable, unit)
     figure, (axes,) = style.new_figure(3.3)
-    if measured is not None:
-        style.draw_channel(axes, channel(measured, variable), Role.MEASURED, ", measured")
+    for other in others:
+        style.draw_channel(axes, channel(other, variable, unit), Role.MEASURED, ", measured")
     compared = measured is not None
     role, suffix = (Role.SIMULATED, ", simulated") if compared else (Role.MAIN, "")
     opacity = style.PALE_OPACITY if smoothing > 0 else 1.0
@@ -200,7 +202,7 @@ def step_response(
             label=f"averaged over {amount(smoothing, 's', 3)}",
         )
     if set_point is not None:
-        style.draw_channel(axes, channel(recording, set_point), Role.SET_POINT)
+        style.draw_channel(axes, channel(recording, set_point, unit), Role.SET_POINT)
     if limits is not None:
         draw_limits(axes, limits, shown)
     if limits is not None and facts is not None:
@@ -306,6 +308,8 @@ def tracking(recording: xr.Dataset, variable: str, set_point: str) -> Figure:
             value=wanted.unit,
             valid=shown.unit,
         )
+    unit = axis_unit([recording], variable, set_point)
+    shown, wanted = (channel(recording, name, unit) for name in (variable, set_point))
     error = replace(shown, label="set point minus value", values=wanted.values - shown.values)
     figure, (upper, lower) = style.new_figure(4.6, (2.0, 1.0))
     style.draw_channel(upper, shown, Role.MAIN)
@@ -314,7 +318,7 @@ def tracking(recording: xr.Dataset, variable: str, set_point: str) -> Figure:
     lower.axhline(0.0, color=style.GRAY, linewidth=0.6, zorder=1)
     upper.margins(x=0.0)
     upper.set_ylabel(style.channel_label(shown))
-    lower.set_ylabel(style.axis_label("error", shown.symbol))
+    lower.set_ylabel(style.unit_label("error", unit))
     lower.set_xlabel(f"time [{style.time_scale(shown.time)[1]}]")
     style.legend_above(upper)
     style.legend_above(lower)

@@ -203,12 +203,17 @@ def axis_label(label: str, symbol: str, gap: str = " ") -> str:
     >>> axis_label("caliper pressure", "Pa"), axis_label("duty cycle", "1")
     ('caliper pressure [bar]', 'duty cycle [-]')
     """
-    return f"{plain(label, 40)}{gap}[{plain(unit_text(display_unit(symbol)), 20) or '-'}]"
+    return unit_label(label, display_unit(symbol), gap)
+
+
+def unit_label(label: str, unit: str, gap: str = " ") -> str:
+    """Return the label of an axis in some unit; ``gap``: see `axis_label`."""
+    return f"{plain(label, 40)}{gap}[{plain(unit_text(unit), 20) or '-'}]"
 
 
 def channel_label(shown: Channel) -> str:
     """Return the label of an axis that shows one channel."""
-    return axis_label(shown.label, shown.symbol)
+    return unit_label(shown.label, shown.unit)
 
 
 def time_scale(time: Array) -> tuple[float, str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 
@@ -128,6 +129,36 @@ def value_changes(
 def defaults_of(name: str) -> str:
     """Return the name of an experiment's, or a study's, default values."""
     return f"the defaults of {name}"
+
+
+_ORIGINS = {
+    "paper": "printed in a source",
+    "derived": "derived from printed ones",
+    "calibrated": "calibrated to match a source",
+    "chosen": "chosen without a source",
+}
+
+
+def origins_text(parameters: str) -> str:
+    """Return how many values of a parameter set have which origin, as grounds to trust a result.
+
+    Raises
+    ------
+    UnknownNameError
+        When the parameter set is unknown.
+    """
+    values = PARAMETER_SETS.find(parameters).values.values()
+    counts = Counter(value.kind for value in values)
+    parts = [f"{counts[kind]} {text}" for kind, text in _ORIGINS.items() if counts[kind]]
+    return f"values of {parameters}: {', '.join(parts)} ('bywire list {parameters}' shows each)"
+
+
+def source_block(parameters: str) -> Paragraph:
+    """Return the source of a parameter set, and the origins of its values."""
+    source = PARAMETER_SETS.find(parameters).source
+    text = f"Source of the parameters: {source}. " if source else ""
+    origins = origins_text(parameters)
+    return Paragraph(f"{text}{origins[0].upper()}{origins[1:]}.")
 
 
 def changes_block(
@@ -304,7 +335,7 @@ class Subject:
             [
                 *map(Paragraph, filter(None, notes)),
                 *([self.changes_block] if has_changes else []),
-                Paragraph(f"Source of the parameters: {cited.source}."),
+                source_block(self.parameters),
                 Details("All parameters", [TableBlock(parameter_table(rows))]),
             ],
         )

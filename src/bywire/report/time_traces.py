@@ -13,7 +13,7 @@ import xarray as xr
 from bywire.core.errors import ParameterError
 from bywire.core.units import convert, difference_unit
 from bywire.report import style
-from bywire.report.channel import Channel, channel, decimate, lasting_phases, phases
+from bywire.report.channel import Channel, axis_unit, channel, decimate, lasting_phases, phases
 from bywire.report.panels import Panel, Role, Trace, declared_panels, panels_by_unit
 from bywire.report.stated_levels import draw_stated
 from bywire.report.step_response import StepLimits, draw_limits
@@ -247,27 +247,36 @@ def _draw_traces(
     measured: xr.Dataset | None,
 ) -> Channel:
     """Draw the lines of a panel and label its ordinate; return the first channel."""
-    channels = [channel(recording, trace.variable) for trace in traces]
+    names = [trace.variable for trace in traces]
+    unit = axis_unit([recording] if measured is None else [recording, measured], *names)
+    _require_one_unit(panel, recording, names)
+    channels = [channel(recording, name, unit) for name in names]
     first = channels[0]
     for trace, shown in zip(traces, channels, strict=True):
-        if shown.unit != first.unit:
-            raise ParameterError(
-                f"panel {panel.quantity!r}: {shown.name} is in {shown.unit}, {first.name} in "
-                f"{first.unit}. Use two panels",
-                name=shown.name,
-                value=shown.unit,
-                valid=first.unit,
-            )
         if measured is None or trace.role is Role.SET_POINT:
             style.draw_channel(axes, shown, trace.role)
         elif shown is first:
             if trace.variable in measured.data_vars:
                 style.draw_channel(
-                    axes, channel(measured, trace.variable), Role.MEASURED, ", measured"
+                    axes, channel(measured, trace.variable, unit), Role.MEASURED, ", measured"
                 )
             style.draw_channel(axes, shown, Role.SIMULATED, ", simulated")
-    axes.set_ylabel(style.axis_label(panel.quantity, first.symbol, "\n"))
+    axes.set_ylabel(style.unit_label(panel.quantity, unit, "\n"))
     return first
+
+
+def _require_one_unit(panel: Panel, recording: xr.Dataset, names: Sequence[str]) -> None:
+    """Reject a panel whose variables differ in their unit."""
+    first, *others = [channel(recording, name) for name in names]
+    for other in others:
+        if other.unit != first.unit:
+            raise ParameterError(
+                f"panel {panel.quantity!r}: {other.name} is in {other.unit}, {first.name} in "
+                f"{first.unit}; put them into two panels",
+                name=other.name,
+                value=other.unit,
+                valid=first.unit,
+            )
 
 
 def _shade_stuck(axes: Axes, recording: xr.Dataset, variable: str, *, named: bool) -> None:
@@ -378,6 +387,7 @@ def _draw_target(
     recordings: Sequence[xr.Dataset],
     looks: Sequence[Look],
     factor: float,
+    unit: str,
 ) -> list[Line2D]:
     """Draw a set point: once, in black, if it is equal in all recordings.
 
@@ -385,12 +395,12 @@ def _draw_target(
     ``lines``: names of the lines, starting with the line that follows the set point.
     """
     stroke = style.STROKES[Role.SET_POINT]
-    shown = [channel(recording, name) for recording in recordings]
+    shown = [channel(recording, name, unit) for recording in recordings]
     same = all(
         np.array_equal(each.time, shown[0].time) and np.array_equal(each.values, shown[0].values)
         for each in shown[1:]
     )
-    followed = [channel(recording, lines[0]) for recording in recordings]
+    followed = [channel(recording, lines[0], unit) for recording in recordings]
     if not (same or _are_seen(shown, followed)):
         return []
     colors = [stroke.color] if same else [look.color for look in looks]
@@ -434,7 +444,7 @@ def _draw_limits_of(
     for recording, look, level in zip(recordings, looks, levels, strict=True):
         if level is None:
             continue
-        values = channel(recording, first.name).values
+        values = channel(recording, first.name, first.unit).values
         level = convert(level, first.symbol, first.unit)
         for side in (1.0, -1.0):
             at = side * level
@@ -525,7 +535,8 @@ def overlaid_panels(
     for axes, (panel, traces) in zip(rows, present, strict=True):
         entries: list[Artist] = [*_draw_panel(axes, panel, traces, data, looks, factor)]
         if step is not None and traces[0].variable == step[0]:
-            draw_limits(axes, step[1], channel(_longest(data), step[0]))
+            unit_there = axis_unit(data, *(trace.variable for trace in traces))
+            draw_limits(axes, step[1], channel(_longest(data), step[0], unit_there))
             entries += axes.get_legend_handles_labels()[0]
         heads = (
             []
@@ -605,13 +616,14 @@ def _draw_panel(
     factor: float,
 ) -> list[Line2D]:
     """Draw a panel and label its ordinate; return the entries of its legend."""
-    first = channel(recordings[0], traces[0].variable)
+    unit = axis_unit(recordings, *(trace.variable for trace in traces))
+    first = channel(recordings[0], traces[0].variable, unit)
     targets = [trace for trace in traces if trace.role is Role.SET_POINT]
     lines = [trace for trace in traces if trace not in targets] or targets[:1]
     entries: list[Line2D] = []
     for k, trace in enumerate(lines[: 2 if len(recordings) <= _FEW else 1]):
         averages = [
-            _draw_line(axes, channel(recording, trace.variable), look, factor, second=k > 0)
+            _draw_line(axes, channel(recording, trace.variable, unit), look, factor, second=k > 0)
             for recording, look in zip(recordings, looks, strict=True)
         ]
         width = max(averages)
@@ -622,10 +634,10 @@ def _draw_panel(
             entries.append(entry(label, style.GRAY, dash))
     for target in [t for t in targets if t not in lines]:
         entries += _draw_target(
-            axes, target.variable, [t.variable for t in lines], recordings, looks, factor
+            axes, target.variable, [t.variable for t in lines], recordings, looks, factor, unit
         )
     entries += _draw_limits_of(axes, panel, recordings, looks, first)
-    axes.set_ylabel(style.axis_label(panel.quantity, first.symbol, "\n"))
+    axes.set_ylabel(style.unit_label(panel.quantity, unit, "\n"))
     _set_ticks(axes, panel, first)
     return entries
 
@@ -744,7 +756,7 @@ def overlaid_traces(recordings: Mapping[str, xr.Dataset], variables: Mapping[str
     figure, rows = style.new_figure(0.5 + 1.7 * len(shown), [1.0] * len(shown))
     for axes, name in zip(rows, shown, strict=True):
         unit = _draw(axes, recordings, name)
-        axes.set_ylabel(style.axis_label(variables[name], unit, "\n"))
+        axes.set_ylabel(style.unit_label(variables[name], unit, "\n"))
         style.few_ticks(axes, 6)
         axes.margins(x=0.0)
     style.legend_above(rows[0])
@@ -759,13 +771,13 @@ def _moves_in_any(recording: xr.Dataset, name: str) -> bool:
 
 
 def _draw(axes: Axes, recordings: Mapping[str, xr.Dataset], name: str) -> str:
-    """Draw one variable of all recordings that have it; return its SI unit."""
+    """Draw one variable of all recordings that have it; return its unit."""
     scale, _ = style.time_scale(next(iter(recordings.values()))["time"].values)
-    unit = "1"
+    unit = axis_unit(recordings.values(), name)
     for k, (label, recording) in enumerate(recordings.items()):
         if name not in recording.data_vars:
             continue
-        line, turn = channel(recording, name), k // len(style.SEQUENCE)
+        line, turn = channel(recording, name, unit), k // len(style.SEQUENCE)
         axes.plot(
             *decimate(scale * line.time, line.values),
             linewidth=1.1,
@@ -773,5 +785,4 @@ def _draw(axes: Axes, recordings: Mapping[str, xr.Dataset], name: str) -> str:
             linestyle=_DASHES_OF_A_VARIABLE[turn % len(_DASHES_OF_A_VARIABLE)],
             label=style.plain(label) + _ROOM,
         )
-        unit = line.symbol
     return unit

@@ -28,6 +28,8 @@ GIVEN = """() => ({
   time: Array.from(run.time), changes: changes(), rows: place("figures").tBodies[0].rows.length,
   signals: Object.fromEntries(Object.entries(run.signals).map(([n, c]) => [n, Array.from(c)])),
 })"""
+EDGES = """() => [...document.querySelectorAll("#figures th[scope=col]")]
+  .map((each) => [each.textContent, each.getBoundingClientRect().right])"""
 SAID = '() => place("message").hidden ? "" : place("message").textContent'
 
 
@@ -416,3 +418,19 @@ def test_ranges_that_a_source_states_are_bands(tab):
     stated = sum(each["high"] - each["low"] for each in tab.page.evaluate("() => panels[0].stated"))
     assert (stated > 0.0) == (tab.file.stem == "wedge")
     assert (tab.page.evaluate(count) > 0.05) == (stated > 0.0)
+
+
+def test_two_kept_runs_leave_the_stated_values_in_view(chromium, tmp_path):
+    file = tmp_path / "kept.html"
+    bywire.page("hard-braking", file)
+    tab = Tab(chromium, file)
+    tab.page.set_viewport_size({"width": 1400, "height": 900})
+    tab.open()
+    for share in (600, 700):
+        tab.page.click("#keep")
+        tab.moved({"motor.R_m": share})
+    shown = dict(tab.page.evaluate(EDGES))
+    tab.page.close()
+    assert list(shown)[-2:] == ["limit", "stated"]
+    assert len(shown) == 6
+    assert max(shown.values()) <= 1400

@@ -98,7 +98,9 @@ function judge() {
       : element("td", {}, reason);
     const { text, where } = figure.stated ?? { text: "", where: "" };
     const stated = isStated ? [element("td", { title: where }, text)] : [];
-    return element("tr", {}, element("th", { scope: "row", title: figure.definition }, figure.name), value, ...beside, verdict, ...stated);
+    const parts = kept.length ? figure.name.split(/(?<=_)/) : [figure.name]; // leaves room for kept runs
+    const name = parts.flatMap((part) => [part, element("wbr", {})]);
+    return element("tr", {}, element("th", { scope: "row", title: figure.definition }, ...name), value, ...beside, verdict, ...stated);
   }));
 }
 

@@ -15,6 +15,7 @@ from matplotlib.lines import Line2D
 
 from bywire.core.typing import Array
 from bywire.report import style
+from bywire.report.channel import size_of
 from bywire.report.panels import Role
 from bywire.report.readable_axis import (
     CHARACTER,
@@ -23,7 +24,6 @@ from bywire.report.readable_axis import (
     few_labels,
     limit_text,
     scale_of,
-    size_of,
     write_out,
 )
 from bywire.report.study.drawn_cases import DrawnCases

@@ -13,6 +13,7 @@ from matplotlib.patches import Patch
 
 from bywire.core.typing import Array
 from bywire.report import style
+from bywire.report.channel import size_of
 from bywire.report.readable_axis import (
     CHARACTER,
     Scale,
@@ -22,7 +23,6 @@ from bywire.report.readable_axis import (
     limit_text,
     name_beyond,
     scale_of,
-    size_of,
 )
 from bywire.report.study.drawn_cases import BARS
 from bywire.report.style import legend_outside

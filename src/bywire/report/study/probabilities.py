@@ -14,6 +14,7 @@ from matplotlib.patches import Patch, Polygon
 
 from bywire.core.typing import Array
 from bywire.report import style
+from bywire.report.channel import size_of
 from bywire.report.panels import Role
 from bywire.report.readable_axis import (
     beyond,
@@ -21,7 +22,6 @@ from bywire.report.readable_axis import (
     limit_text,
     name_beyond,
     scale_of,
-    size_of,
     write_out,
 )
 from bywire.report.style import legend_outside

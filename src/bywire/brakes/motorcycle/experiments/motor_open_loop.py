@@ -11,12 +11,11 @@ from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis import effort, occupation
 from bywire.bench.kpis.families import evaluate, units_of
 from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.stimulus import Stimulus
+from bywire.bench.stimulus import Stimulus, required_stimulus
 from bywire.brakes.motorcycle.case import case_from_rest
 from bywire.brakes.motorcycle.experiments.friction_ramp import PEAK
 from bywire.brakes.motorcycle.parameters import DriveMode, MotorcycleParameters
 from bywire.brakes.motorcycle.trim import holding_current
-from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, TimeConstant, Unit
 
@@ -54,13 +53,7 @@ def cases(
     par: MotorcycleParameters, options: Options, stimulus: Stimulus | None
 ) -> tuple[Case, ...]:
     """Return the single run."""
-    if stimulus is None:
-        raise ParameterError(
-            "motor-open-loop needs a [stimulus] section: kind = step, ramp, sine, chirp, multisine "
-            "or table, with its parameters",
-            name="stimulus",
-            valid="kind = step, ramp, sine, chirp, multisine or table",
-        )
+    stimulus = required_stimulus(stimulus, "motor-open-loop")
     mode, name, unit = _SOURCES[options.source]
     i = holding_current(options.p_start, par)
     holding = {"A": i, "V": par.motor.R_m * i, "Pa": options.p_start}[unit]
