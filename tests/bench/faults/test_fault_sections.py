@@ -1,4 +1,4 @@
-"""Faults of a bench: what may fail is known of every brake, and what does not fit is refused."""
+"""Faults of a bench: the possible faults of every brake are known, and others are rejected."""
 
 from __future__ import annotations
 
@@ -210,7 +210,7 @@ def test_noise_and_dropouts_are_drawn_anew_by_their_seed_alone():
 
 
 def test_every_assembly_with_numbers_has_modes_with_values_that_they_take():
-    """Each mode's own value is admissible: its parameters can be made."""
+    """The value of each mode is admissible: its parameters can be constructed."""
     known = {cited.assembly: cited.name for cited in PARAMETER_SETS.all().values()}
     assert {name for places in faults().values() for name, _ in places} >= set(known)
     for assembly, cited in known.items():
