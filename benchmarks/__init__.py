@@ -1,1 +1,1 @@
-"""How fast bywire is, against hand-written C and against other simulators."""
+"""Speed of bywire compared with hand-written C and other simulators."""

@@ -1,4 +1,4 @@
-"""A browser without a window, in which pages of benches are tried: the system's own Chromium."""
+"""A headless browser for bench pages: the system's Chromium."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ def browser() -> Iterator[Any]:
     Yields
     ------
     playwright.sync_api.Browser
-        The system's Chromium; none is ever downloaded.
+        The system's Chromium. The benchmark never downloads one.
 
     Raises
     ------
     RunError
-        Where there is none, it does not start, or nothing drives it.
+        If Chromium or Playwright is missing, or if Chromium does not start.
     """
     try:
         from playwright.sync_api import Error, sync_playwright
     except ImportError:
-        raise RunError("playwright drives the browser: pip install playwright") from None
+        raise RunError("playwright is missing. Run: pip install playwright") from None
     path = next(filter(None, map(find_program, _NAMES)), None)
     if path is None:
-        raise RunError("no Chromium: install the package chromium")
+        raise RunError("Chromium is missing. Install the package chromium")
     with sync_playwright() as driver:
         try:
             opened = driver.chromium.launch(executable_path=path)

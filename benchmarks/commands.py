@@ -1,4 +1,4 @@
-"""Whole commands as users start them, in multiples of loading the libraries that bywire needs."""
+"""Run time of whole commands, relative to the import time of the libraries that bywire needs."""
 
 from __future__ import annotations
 
@@ -15,26 +15,26 @@ from bywire.core.child_process import python_command
 from bywire.simulation.compiler import usable_folder
 
 LIBRARIES = "import numpy, casadi, xarray, pydantic, pint, typer, rich"
-"""what L, the unit of these figures, is the time of: absolute times differ twofold by machine"""
+"""imports that define the unit L, because absolute times differ by a factor of two by machine"""
 _UNIT = python_command("-c", LIBRARIES)
-_ANSWERED = (0, 1)  # 1: a requirement is missed, which takes as long
-_SLOW = 8.0  # goals from which a command is run once
+_ANSWERED = (0, 1)  # 1: a requirement is not met, which takes as long
+_SLOW = 8.0  # goal above which a command runs only once
 
 
 @dataclass(frozen=True)
 class Command:
-    """A command whose time is a figure of the benchmark; each folder declares those of its things.
+    """A command whose run time is a figure of the benchmark. Each folder declares its commands.
 
     Parameters
     ----------
     name
         Name of the figure.
     arguments
-        What follows ``bywire``; ``{folder}`` is a folder of the benchmark's own.
+        Arguments of ``bywire``. ``{folder}`` is a temporary folder of the benchmark.
     goal
-        Times L that it may take.
+        Maximum run time in units of L.
     first
-        Arguments of a command that is run once before, for instance to record what is replayed.
+        Arguments of a command that runs once before, for example to record data for a replay.
     """
 
     name: str
@@ -44,12 +44,12 @@ class Command:
 
     @property
     def rounds(self) -> int:
-        """How often it is measured; the least counts, for nothing makes a program faster."""
+        """Number of measurements. The minimum counts, because disturbances only slow a program."""
         return 1 if self.goal > _SLOW else 7
 
 
 def measured(commands: Sequence[Command]) -> Iterator[Result]:
-    """Measure commands in turn with L, kernels compiled and files of Python's byte code there."""
+    """Measure commands in turn with L, with compiled kernels and Python byte code in place."""
     with tempfile.TemporaryDirectory() as folder:
         for command in commands:
             try:
@@ -72,9 +72,9 @@ def _measured(command: Command, folder: Path) -> Result:
         taken.append(_seconds(line))
     libraries.append(_seconds(_UNIT))
     least, unit = min(taken), min(libraries)
-    said = f"{' '.join(command.arguments)}: {least:.3g} s; L = {unit:.3g} s; "
-    said += f"least of {len(taken)} in turn" if len(taken) > 1 else "run once"
-    return at_most(command.name, least / unit, command.goal, "L", said.replace(" {folder}", " ..."))
+    note = f"{' '.join(command.arguments)}: {least:.3g} s; L = {unit:.3g} s; "
+    note += f"minimum of {len(taken)} in turn" if len(taken) > 1 else "run once"
+    return at_most(command.name, least / unit, command.goal, "L", note.replace(" {folder}", " ..."))
 
 
 def _line(arguments: Sequence[str], folder: Path) -> list[str]:
@@ -87,12 +87,12 @@ def _kernels() -> set[str]:
 
 
 def _seconds(line: Sequence[str]) -> float:
-    """Return the time of a process; what it says is not shown.
+    """Return the run time of a process, without showing its output.
 
     Raises
     ------
     CalledProcessError
-        When it does not come to an answer.
+        If the process fails.
     """
     begin = time.perf_counter()
     done = subprocess.run(
@@ -111,5 +111,5 @@ def _seconds(line: Sequence[str]) -> float:
 
 
 def environment() -> dict[str, str]:
-    """Return the environment of a user, whose Python keeps what it compiled of the sources."""
+    """Return a user's environment, in which Python saves its byte code."""
     return {k: v for k, v in child_process.environment().items() if k != "PYTHONDONTWRITEBYTECODE"}

@@ -1,4 +1,4 @@
-"""What the folders of the benchmark declare: general parts first, then those of each brake."""
+"""Declarations in the benchmark folders, first the general parts, then the parts of each brake."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ import benchmarks
 from bywire.core.brake import modules_below
 from bywire.core.registry import Named, instances
 
-_TOOLS = "peers"  # loads libraries that may be missing, and declares nothing
+_TOOLS = "peers"  # imports libraries that may be missing, and declares nothing
 
 Thing = TypeVar("Thing", bound=Named)
 
 
 def declared(kind: type[Thing]) -> dict[str, Thing]:
-    """Return the objects of a type that the modules in the folders declare, by name."""
+    """Return all declared objects of a type by name."""
     folders = [
         each.name
         for each in pkgutil.iter_modules(benchmarks.__path__)

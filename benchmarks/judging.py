@@ -1,4 +1,4 @@
-"""What the key figures of a study's cases take, beside their simulation."""
+"""Time that the key figures of a study's cases need, compared with their simulation."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from bywire.studies.plan import CHUNK, StudyPlan
 
 
 def simulated_and_judged(plan: StudyPlan, times: int) -> tuple[float, float]:
-    """Return the least processor times of a case's simulation and of its key figures [s].
+    """Return the minimum processor times of a case's simulation and of its key figures [s].
 
     Parameters
     ----------
     plan
-        Study of an experiment of one run that families of key figures judge.
+        Study of an experiment with one run, whose key figures come from families.
     times
-        How often its first chunk is computed.
+        Number of computations of the first chunk.
     """
     simulated, judged = (min(each) / CHUNK for each in zip(*_times(plan, times), strict=True))
     return simulated, judged
 
 
 def _times(plan: StudyPlan, times: int) -> Iterator[tuple[float, float]]:
-    """Yield what the runs of a chunk take, set up beforehand, and then their key figures [s]."""
+    """Yield the times of the runs in a chunk, after setup, and of their key figures [s]."""
     values = plan.values(0)
     benches = [
         changed(plan.bench, {name: column[k].item() for name, column in values.items()}, seed=k)
@@ -38,10 +38,10 @@ def _times(plan: StudyPlan, times: int) -> Iterator[tuple[float, float]]:
     assert isinstance(judge, FamilyJudge)
     for _ in range(times):
         begin = time.process_time()
-        (made,) = rounds(benches, threads=1, signals=partial(needed, judge.signals(options)))
+        (batch,) = rounds(benches, threads=1, signals=partial(needed, judge.signals(options)))
         computed = time.process_time()
-        group = made.trajectories
+        group = batch.trajectories
         assert isinstance(group, RunGroup)
-        rows = rows_of_group(group, made.cases[0].settle)
+        rows = rows_of_group(group, batch.cases[0].settle)
         judge.of_cases(rows, options, [run.par for run in group.runs])
         yield computed - begin, time.process_time() - computed

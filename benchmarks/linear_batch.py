@@ -19,12 +19,12 @@ from bywire.core.typing import Array
 
 @dataclass(frozen=True, eq=False)
 class LinearBatch:
-    """Jacobians of a model's continuous part at many points, dry friction removed.
+    """Jacobians of a model's continuous part at many points, without dry friction.
 
     Parameters
     ----------
     A, B, C, D
-        Shapes (points, n, n), (points, n, nu), (points, ny, n), (points, ny, nu); SI.
+        Shapes (points, n, n), (points, n, nu), (points, ny, n), (points, ny, nu), in SI units.
     rate
         dx/dt at the points, shape (points, n).
     """
@@ -45,7 +45,7 @@ def linearize_many(
     inputs: Sequence[str],
     outputs: Sequence[str],
 ) -> LinearBatch:
-    """Return what ``linearize`` returns, for many operating points of one parameter set.
+    """Return the result of ``linearize`` for many operating points of one parameter set.
 
     ``model``, ``par``: the system and its parameters; ``states``, ``memories``: operating points,
     shapes (points, n) and (points, nm), in the order of State and Memory; ``inputs``: fields of
@@ -54,13 +54,13 @@ def linearize_many(
     Raises
     ------
     UnknownNameError
-        When an input or output is unknown.
+        If an input or output is unknown.
     ParameterError
-        When the shapes do not fit.
+        If the shapes do not match.
 
     Notes
     -----
-    A contact that just touches counts as open here.
+    A contact that just touches counts as open.
     """
     for kind, names, known in (
         ("input", inputs, model.Memory._fields),
@@ -70,11 +70,11 @@ def linearize_many(
             if name not in known:
                 raise unknown_name(kind, name, known)
     count = len(states)
-    wanted = (count, len(model.State._fields)), (count, len(model.Memory._fields))
-    if (states.shape, memories.shape) != wanted:
+    valid = (count, len(model.State._fields)), (count, len(model.Memory._fields))
+    if (states.shape, memories.shape) != valid:
         raise ParameterError(
-            f"states and memories: shapes {wanted[0]} and {wanted[1]} are wanted, got "
-            f"{states.shape} and {memories.shape}"
+            f"states and memories have the shapes {states.shape} and {memories.shape}, but they "
+            f"must have {valid[0]} and {valid[1]}"
         )
     functions, p = smooth_functions(model, par), np.array(vector(par))
     repeated = np.repeat(p[None], count, axis=0)
@@ -95,9 +95,10 @@ def _map(function: Any, count: int) -> Any:
 
 
 def _mapped(function: Any, count: int, values: Sequence[Array]) -> list[Array]:
-    """Evaluate at all points; (points, ...) in, (points, rows, columns) out.
+    """Evaluate at all points, from (points, ...) to (points, rows, columns).
 
-    Buffers, because CasADi's own matrices cost more to convert than the Jacobians to compute.
+    The function uses buffers, because converting CasADi matrices costs more time than computing the
+    Jacobians.
     """
     mapped = _map(function, count)
     buffer, evaluate = mapped.buffer()

@@ -1,4 +1,4 @@
-"""How long it takes from the move of a page's slider to the painted curve, in a real browser."""
+"""Time from a slider's move on a page to the painted curve, in a real browser."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from benchmarks.browser import browser
 from benchmarks.result import Result, at_most
 from bywire.core.errors import RunError
 
-_MOVES, _FIRST = 60, 10  # the first ones are not counted: they compile
+_MOVES, _FIRST = 60, 10  # the first moves do not count, because they compile
 _MEDIAN, _MOST = 50.0, 100.0  # ms
 _MOVE = """async (moves) => {
   const slider = document.querySelector(".chosen input[type=range]"), taken = [];
@@ -37,14 +37,14 @@ _MOVE = """async (moves) => {
 
 
 def page_latency(name: str, write: Callable[[Path], object]) -> list[Result]:
-    """Measure a page in the system's browser, without a window and without a graphics processor.
+    """Measure a page in the system's browser, without a window or a graphics processor.
 
     Parameters
     ----------
     name
-        Of the figure of the median; ``_95`` is put before its unit for the other one.
+        Name of the median's figure. The other figure has ``_95`` before its unit.
     write
-        ``write(path)``: writes the page, whose first slider is moved.
+        ``write(path)``: writes the page. The benchmark moves its first slider.
     """
     slow = name.replace("_ms", "_95_ms")
     try:

@@ -1,4 +1,4 @@
-"""How large a bench in a page is, as a server sends it."""
+"""Size of a bench page as a server sends it."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ def page_size(name: str, write: Callable[[Path], tuple[int, int]], goal: float) 
     Parameters
     ----------
     name
-        Of the figure.
+        Name of the figure.
     write
         ``write(path)``: writes the page and returns its bytes, as a file and compressed.
     goal
-        The most that it may have, compressed [kB].
+        Maximum compressed size [kB].
     """
     with tempfile.TemporaryDirectory() as folder:
         size, compressed = write(Path(folder) / "page.html")
-    what = f"page of the bench, compressed; {size / 1e3:.0f} kB as it lies on a disk"
+    what = f"compressed bench page; {size / 1e3:.0f} kB on disk"
     return [at_most(name, compressed / 1e3, goal, "kB", what)]

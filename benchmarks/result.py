@@ -1,4 +1,4 @@
-"""One figure of the benchmark, and the machine it was measured on."""
+"""One figure of the benchmark, and the machine on which it was measured."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ class Result:
     Parameters
     ----------
     id
-        Name, for instance ``"single.hand_c"``.
+        Name, for example ``"single.hand_c"``.
     value, unit
-        What was measured; None where it could not be.
+        Measured value, None if it could not be measured.
     goal
-        The goal as text; empty where there is none.
+        Goal as text, empty without a goal.
     holds
-        Whether the goal is met; None where there is none or nothing was measured.
+        Whether the figure meets its goal, None without a goal or a value.
     note
-        How it was measured, or why not.
+        Method of measurement, or the reason for a missing value.
     is_failed
-        Whether its measurement failed, so that the note is the reason.
+        Whether the measurement failed. The note is then the reason.
     """
 
     id: str
@@ -47,10 +47,10 @@ class Result:
 
 
 def failed(name: str, error: Exception, unit: str = "1", goal: str = "") -> Result:
-    """Row of a measurement that failed, with the reason: what a process said last, or the error."""
+    """Row of a failed measurement, with the last output line of a process or the error text."""
     if isinstance(error, subprocess.CalledProcessError):
-        said = error.stderr or ""
-        text = said if isinstance(said, str) else said.decode(errors="replace")
+        output = error.stderr or ""
+        text = output if isinstance(output, str) else output.decode(errors="replace")
         last = (text.strip().splitlines() or ["no message"])[-1]
         reason = f"exit status {error.returncode}: {last}"
     else:
@@ -60,23 +60,23 @@ def failed(name: str, error: Exception, unit: str = "1", goal: str = "") -> Resu
 
 
 def at_most(name: str, value: float, limit: float, unit: str, note: str) -> Result:
-    """Return a figure that shall not exceed a limit."""
+    """Return a figure with an upper limit as its goal."""
     return Result(name, value, unit, f"<= {limit:g}", value <= limit, note)
 
 
 def at_least(name: str, value: float, limit: float, unit: str, note: str) -> Result:
-    """Return a figure that shall reach a limit."""
+    """Return a figure with a lower limit as its goal."""
     return Result(name, value, unit, f">= {limit:g}", value >= limit, note)
 
 
 def vector_doubles() -> int:
-    """Return how many doubles a vector of this processor holds."""
+    """Return the number of doubles in a vector register of this processor."""
     flags = _cpu_flags()
     return next((bits // 64 for flag, bits in _VECTOR_BITS if flag in flags), 2)
 
 
 def machine() -> dict[str, object]:
-    """Return what figures depend on: processor, cores, vector width, compiler, load."""
+    """Return what the figures depend on: processor, cores, vector width, compiler, load."""
     compiler = find_compiler()
     return {
         "processor": _cpu_name(),

@@ -1,4 +1,4 @@
-"""The whole benchmark, in one run: what the toolkit and every brake measure."""
+"""The whole benchmark in one run, with all parts of the toolkit and of every brake."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ class Part:
     Parameters
     ----------
     name
-        What the progress bar calls it.
+        Name in the progress bar.
     measure
-        ``measure()``: its figures, one by one where they take long.
+        ``measure()``: returns the figures, one by one if they take long.
     """
 
     name: str
@@ -34,7 +34,7 @@ class Part:
 
 @dataclass(frozen=True)
 class Benchmark(Answer):
-    """All figures, and the machine that they depend on."""
+    """All figures, and the machine on which they were measured."""
 
     machine: dict[str, object]
     results: tuple[Result, ...]
@@ -42,18 +42,18 @@ class Benchmark(Answer):
 
     @property
     def failures(self) -> list[str]:
-        """What could not be measured, and why."""
+        """Failed measurements and their reasons."""
         return [f"{r.id} failed: {r.note}" for r in self.results if r.is_failed]
 
     @property
     def holds(self) -> bool:
-        """Whether every part was measured; a goal that is missed is a figure like another."""
+        """Whether all parts were measured. Missing a goal is not a failure."""
         return not self.failures
 
     @property
     def partial(self) -> str:
-        """What an interrupted benchmark still shows."""
-        return "the figures above were measured before" if self.results else ""
+        """Remark on the results of an interrupted benchmark."""
+        return "the figures above were measured before the interruption" if self.results else ""
 
     def document(self) -> Document:
         """Return the figures with their goals."""
@@ -90,43 +90,43 @@ class Benchmark(Answer):
 def measure(
     progress: Callable[[str, float], None] | None = None, parts: Sequence[str] = ()
 ) -> Benchmark:
-    """Measure everything, which takes several minutes, or parts of it.
+    """Measure all parts, which takes several minutes, or some of them.
 
-    A part that fails is a row that names the reason. After Ctrl-C the finished rows are kept.
+    A part that fails becomes a row with the reason. After Ctrl-C the result has the finished rows.
 
     Parameters
     ----------
     progress
-        Called with the name of a part and its finished share, 0 to 1.
+        Called with the name of a part and its finished fraction, 0 to 1.
     parts
-        Names of the parts to measure, for instance ``["commands"]``; all where empty.
+        Names of the parts to measure, for example ``["commands"]``. Default: all.
 
     Returns
     -------
     Benchmark
-        Every figure in its own unit, with its goal.
+        All figures, each with its unit and goal.
 
     Raises
     ------
     UnknownNameError
-        When there is no such part.
+        If a part does not exist.
     CompilerError
-        Without a C compiler there is nothing to compare.
+        If there is no C compiler.
     """
     if find_compiler() is None:
-        raise CompilerError("the benchmark compares compiled C: install a C compiler")
+        raise CompilerError("the benchmark compares compiled C code. Install a C compiler")
     known = declared(Part)
-    wanted = {name: pick(known, name, "part of the benchmark") for name in parts} or known
+    selected = {name: pick(known, name, "part of the benchmark") for name in parts} or known
     here = machine()
     results: list[Result] = []
     try:
-        for label, part in wanted.items():
+        for label, part in selected.items():
             if progress is not None:
                 progress(f"benchmark: {label}", 0.0)
             try:
                 for result in part.measure():
                     results.append(result)
-            except Exception as error:  # of whatever kind: the other parts do not depend on it
+            except Exception as error:  # of any type, because other parts do not depend on it
                 results.append(failed(label, error))
             if progress is not None:
                 progress(f"benchmark: {label}", 1.0)

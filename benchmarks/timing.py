@@ -1,4 +1,4 @@
-"""Seconds of pieces of work, measured in turn, and of one call of a compiled kernel."""
+"""Run times of functions, measured in turn, and of one call of a compiled kernel."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ Work = Callable[[], float]
 
 
 def interleaved(works: dict[str, Work], rounds: int) -> dict[str, list[float]]:
-    """Run pieces of work in turn and return their seconds; each returns its own."""
+    """Run functions in turn and return their times [s], which they return themselves."""
     for work in works.values():
-        work()  # warm
+        work()  # warm-up
     seconds: dict[str, list[float]] = {name: [] for name in works}
     for _ in range(rounds):
         for name, work in works.items():
@@ -26,17 +26,17 @@ def interleaved(works: dict[str, Work], rounds: int) -> dict[str, list[float]]:
 
 
 def ratio(seconds: dict[str, list[float]], over: str, under: str) -> float:
-    """Return the median of the ratios of neighbors: the machine's drift cancels."""
+    """Return the median ratio of neighboring times, in which drift of the machine cancels."""
     return median(a / b for a, b in zip(seconds[over], seconds[under], strict=True))
 
 
 def least_ratio(seconds: dict[str, list[float]], over: str, under: str) -> float:
-    """Return the ratio of the least seconds of each: what other processes took is in none."""
+    """Return the ratio of the minimum times, which other processes affect least."""
     return min(seconds[over]) / min(seconds[under])
 
 
 def timed(work: Callable[[], object]) -> Work:
-    """Return work that tells its seconds."""
+    """Return a function that returns its run time [s]."""
 
     def measured() -> float:
         begin = time.perf_counter()
@@ -47,7 +47,7 @@ def timed(work: Callable[[], object]) -> Work:
 
 
 def processor_timed(work: Callable[[], object]) -> Work:
-    """Return work that tells its processor time in seconds, of all its threads together."""
+    """Return a function that returns its processor time [s], summed over all threads."""
 
     def measured() -> float:
         begin = time.process_time()
@@ -58,7 +58,7 @@ def processor_timed(work: Callable[[], object]) -> Work:
 
 
 def kernel(run: Run) -> Work:
-    """Return one call of the compiled kernel with everything prepared, as its opponent has it."""
+    """Return one call of the compiled kernel, with everything prepared as in the hand-written C."""
     engine = prepare(run.model, run.par).engine("compiled")
     request = request_for(run)
     rows = np.empty((request.schedule.rows, request.selection.size))

@@ -1,4 +1,4 @@
-"""Write docs/fault-rows.md: stated figures of faults beside those that our benches compute.
+"""Write docs/fault-rows.md: stated figures of faults next to computed figures.
 
 ``python docs/make_fault_rows.py``
 """
@@ -21,13 +21,12 @@ TABLES: dict[str, tuple[Any, ...]] = {
 HEAD = """# Faults: stated and computed figures
 
 The tables compare stated figures for faults with figures that bywire computes. The stated figures
-come from prototypes with the same equations. Some are earlier bywire results, which show that these
-figures have not changed. The tolerance is 10 %, 0.2 bar or 10 ms, whichever is larger. If figures
-disagree, they remain in the table, and the reason is below it. A dash means that there is no stated
-figure.
+come from prototypes with the same equations, and in some rows from earlier bywire results. The
+tolerance is 10 %, 0.2 bar or 10 ms, whichever is largest. If figures disagree, the reason is below
+the table. A dash means that there is no stated figure.
 
 [faults.md](faults.md) describes the faults and how to inject them. It also contains the results for
-a wheel's lost encoder, for which there are no stated figures. `python docs/make_fault_rows.py`
+a lost wheel encoder, for which there are no stated figures. `python docs/make_fault_rows.py`
 computes this page, and `tests/examples/test_fault_rows.py` checks it.
 """
 HEADING = ("fault", "figure", "stated", "computed", "unit", "agrees")

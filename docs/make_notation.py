@@ -183,9 +183,8 @@ def notation() -> str:
         "",
         NOTE,
         "",
-        "The tables give symbol, name in code, unit and meaning. The code uses SI units and",
-        "radians; bench files may use any unit of the same kind. A name that is a word has no",
-        "symbol.",
+        "The tables list symbol, name in the code, unit and meaning. The code uses SI units and",
+        "radians. Bench files accept any compatible unit. A name that is a word has no symbol.",
         "",
         "For signs, see [sign-conventions.md](sign-conventions.md).",
         "",
@@ -212,7 +211,7 @@ def notation_of_model(model: Any) -> str:
         lines += table(titles, parameter_rows(known[0].parameter_class))
     lines += ["## Signals", ""]
     if not known:
-        lines += ["This is a rig; its parameters are those of the tested brake.", ""]
+        lines += ["This is a rig. It uses the parameters of the tested brake.", ""]
     rows = merged(places_of(model).items())
     lines += table(("symbol", "name", "unit", "meaning", "where"), rows)
     return "\n".join(lines)
@@ -232,14 +231,14 @@ def bench_reference() -> str:
         "",
         NOTE,
         "",
-        "These are the names for bench files. To write one, see [bench-files.md](bench-files.md).",
+        "This page lists the names for [bench files](bench-files.md).",
         "",
         "## Experiments",
         "",
     ]
     titles = ("", "option", "", "default", "range or choices", "meaning")
     for e in EXPERIMENTS.all().values():
-        driven = ", takes a `[stimulus]`" if e.driven_unit else ""
+        driven = ", with a `[stimulus]`" if e.driven_unit else ""
         summary = e.summary[0].upper() + e.summary[1:]
         lines += [f"### {e.name}", "", f"{summary}. For a {e.assembly}{driven}.", ""]
         rows = [("", *row[1:]) for row in parameter_rows(e.options, e.defaults.flat())]
@@ -250,8 +249,8 @@ def bench_reference() -> str:
         "## Generic experiments",
         "",
         "These experiments work with any brake. Options select signals by name. A unit such as "
-        "`input` or `output` is that of the signal that the option of that name selects. By "
-        "default, levels are multiples of the signal's nominal magnitude.",
+        "`input` or `output` means the unit of the signal that the option with this name selects. "
+        "By default, levels are multiples of the signal's nominal magnitude.",
         "",
     ]
     for g in GENERIC_EXPERIMENTS.all().values():
@@ -289,7 +288,7 @@ def bench_reference() -> str:
         )
         for plant in PLANTS.all().values()
     )
-    lines += table(("plant", "meaning", "of", "at one of", "judged up to"), rows)
+    lines += table(("plant", "meaning", "of", "at one of", "compared up to"), rows)
     lines += ["## Stimuli", "", "`level` is the unit of the experiment's input.", ""]
     for s in STIMULI.all().values():
         lines += [f"### {s.name}", "", s.summary, ""]

@@ -1,7 +1,7 @@
-"""Record the moving picture of the README: ``python docs/make_picture.py``.
+"""Record the animated picture in the README: ``python docs/make_picture.py``.
 
 A browser opens the page of hard braking, and its slider changes the proportional gain of the
-pressure controller: curves and key figures follow. It needs Chromium
+pressure controller. The curves and key figures follow. The script needs Chromium
 (``BROWSER``, or on the path).
 """
 
@@ -36,10 +36,10 @@ MOVE = """(share) => {
 
 
 def frame(page: Page, share: float) -> Image.Image:
-    """Return the page with its first slider at a share of its way, in thousandths."""
+    """Return the page with its first slider at a position, in thousandths of its range."""
     page.evaluate(MOVE, round(share))
     page.wait_for_function(READY)
-    page.wait_for_timeout(350)  # curves out of sight follow later
+    page.wait_for_timeout(350)  # the page draws hidden curves later
     shot = Image.open(io.BytesIO(page.screenshot()))
     return shot.convert("RGB").resize(SHOWN, Image.Resampling.LANCZOS)
 

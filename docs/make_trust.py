@@ -14,14 +14,14 @@ from typing import Any
 from bywire.core.scratch import require_finished
 
 DOCS = Path(__file__).parent
-HEAD = """# Trust in identification: known parameters recovered
+HEAD = """# Validation of the identification methods
 
 In each study, bywire simulates experiments with sensor noise, each with its own seed. It then
 identifies the parameters from starting points that are up to 30 % off. The mean of the estimates
-must lie within 3 standard errors of the true value. The share of 95 % intervals that contain the
-true value must be statistically consistent with 90 to 99 %. If a row fails, it remains in the
-table, and the reason is below it. To run such a study, use `bywire identify METHOD --study COUNT`.
-[trust/](trust/) contains every result with its seed.
+must be within 3 standard errors of the true value. The fraction of 95 % intervals that contain the
+true value must be statistically consistent with 90 to 99 %. If a row fails, the reason is below the
+table. To run such a study, use `bywire identify METHOD --study COUNT`. [trust/](trust/) contains
+every result with its seed.
 
 """
 HEADING = (

@@ -1,6 +1,6 @@
 """Your own hydraulic brake in one file: motor, gear, rack, master cylinder, caliper.
 
-All elements come from `bywire.plant`; only the brake itself is new. The tutorial
+All elements come from `bywire.plant`. Only the brake itself is new. The tutorial
 "Your own hydraulic brake" explains this file from top to bottom.
 """
 
@@ -48,14 +48,14 @@ VoltagePerPressureTime = Annotated[float, Unit("V/(Pa*s)", 1e-5), Field(ge=0, al
 
 
 class Control(ParameterSet):
-    """Pressure control by the motor's voltage, PI with anti-windup."""
+    """PI pressure control with anti-windup, whose output is the motor voltage."""
 
     k_p: VoltagePerPressure
     """proportional gain"""
     k_i: VoltagePerPressureTime
     """integral gain"""
     v_max: Voltage
-    """largest voltage"""
+    """maximum voltage"""
     T_s: Duration
     """sample time"""
 
@@ -91,7 +91,7 @@ class Memory(NamedTuple):
 
 
 def control(x, m, u, par):
-    """Run the pressure control once; the integral stops while the voltage is limited."""
+    """Run the pressure control once. The integral stops while the voltage is limited."""
     c = par.control
     error = u.p_set - x.p_mc
     wanted = c.k_p * error + m.v_i
@@ -104,12 +104,12 @@ def control(x, m, u, par):
 
 
 class HydraulicBrake(Assembly[Parameters, Memory]):
-    """A brake with one dry friction at the motor shaft, from the gears and the cup seal."""
+    """A brake with one dry friction at the motor shaft, due to gears and cup seal."""
 
     name = "hydraulic-brake"
     Memory, Stimulus = Memory, Stimulus
     frictions = ("omega",)
-    limits = ("p_mc",)  # the cup seal lets fluid in: the pressure never falls below ambient
+    limits = ("p_mc",)  # the cup seal admits fluid, so the pressure never falls below ambient
     shared = ("fluid",)
 
     E_source = Integral("J", "energy from the supply", role=Role("source", "supply"))
@@ -118,7 +118,7 @@ class HydraulicBrake(Assembly[Parameters, Memory]):
     gear = Part(planetary_gear)
     rack = Part(rack, output={"x": "travel"})
     seal = Part(cup_seal)
-    E_friction = Integral("J", "loss of gears and seal", role=Role("sink", "dry friction"))
+    E_friction = Integral("J", "loss in gears and seal", role=Role("sink", "dry friction"))
     chamber = Part(master_cylinder, par="master_cylinder", state={"p": "p_mc"}, loss="E_damping")
     stop = Part(end_stop, work="W_stop", loss="E_stop", rarely=True)
     line = Part(pipeline, par="pipeline", output=("q", "Re"), loss="E_pipeline")
@@ -150,7 +150,7 @@ class HydraulicBrake(Assembly[Parameters, Memory]):
         w.shaft.u = shaft.Input(torque - sun.load, 0.0)
 
     def friction(self, w):
-        """Return the limits of the dry friction at the shaft; at rest it is between them."""
+        """Return the limits of the dry friction at the shaft. At rest it is between them."""
         per_force = w.rack.par.r_p / planetary_gear.ratio(w.gear.par)
         gears = planetary_gear.friction(w.gear.u, w.gear.par)
         gears = gears + rack.friction(w.rack.u, w.rack.par) / planetary_gear.ratio(w.gear.par)
@@ -158,7 +158,7 @@ class HydraulicBrake(Assembly[Parameters, Memory]):
         return ((-gears - per_force * seal.F_p, gears + per_force * seal.F_n),)
 
     def power(self, w):
-        """Return the powers that do not follow from the parts: supply and friction."""
+        """Return the powers that the parts do not determine: supply and friction."""
         return {
             "E_source": w.m.v * w.motor.x.i,
             "E_friction": -w.reaction[0] * w.shaft.x.omega,
@@ -175,12 +175,12 @@ class HydraulicBrake(Assembly[Parameters, Memory]):
 
 
 def travel_per_angle(par):
-    """Return the piston's travel over the motor's angle [m/rad]."""
+    """Return the piston travel per motor angle [m/rad]."""
     return par.rack.r_p / planetary_gear.ratio(par.gear)
 
 
 def held(par, p):
-    """Return the state and memory with which the motor alone holds a pressure [Pa]."""
+    """Return the state and memory at which the motor alone holds a pressure [Pa]."""
     cylinder, pads, fluid = par.master_cylinder, par.caliper, par.fluid
     taken = p * pads.A_pd**2 / pads.K_pd  # volume in the caliper
     chamber = cylinder.A_mc * (cylinder.s_mc - cylinder.x_rest)
@@ -206,7 +206,7 @@ def point(par, p):
 PRESSURE = Loop(
     name="hydraulic-pressure",
     assembly="hydraulic-brake",
-    summary="pressure control by the motor's voltage, 1 kHz",
+    summary="pressure control through the motor voltage, at 1 kHz",
     at=Quantity("pressure", "Pa", 30e5),
     inputs=("p_set",),
     output="p_mc",
@@ -222,7 +222,7 @@ PRESSURE = Loop(
 )
 
 _MOTOR = "catalogs of 60 mm brushed motors for 12 V"
-_LAYOUT = "30 bar at 10 A, 60 bar within the motor's voltage"
+_LAYOUT = "30 bar at 10 A, 60 bar within the motor voltage"
 _NUMBERS = {
     "motor.R_m": chosen(0.2, _MOTOR),
     "motor.L_m": chosen(2e-4, _MOTOR),
@@ -231,12 +231,12 @@ _NUMBERS = {
     "shaft.d": chosen(2e-5, "bearings and brushes"),
     "gear.z_sun": chosen(15.0, _LAYOUT),
     "gear.z_ring": chosen(75.0, _LAYOUT),
-    "gear.eta": chosen(0.96, "one stage of spur gears"),
+    "gear.eta": chosen(0.96, "one spur gear stage"),
     "rack.r_p": chosen(4e-3, _LAYOUT),
     "rack.eta": chosen(0.94, "straight teeth"),
-    "seal.F_pr": chosen(15.0, "two cups on a bore of 19 mm"),
-    "seal.f_p": chosen(6e-6, "2 % of the piston's load"),
-    "seal.f_n": chosen(6e-6, "the same in both directions"),
+    "seal.F_pr": chosen(15.0, "two cups in a 19 mm bore"),
+    "seal.f_p": chosen(6e-6, "2 % of the piston load"),
+    "seal.f_n": chosen(6e-6, "same in both directions"),
     "seal.k_brk": chosen(1.5, "elastomer, greased"),
     "seal.v_S": chosen(5e-4, "elastomer, greased"),
     "seal.mu": chosen(50.0, "elastomer, greased"),
@@ -247,16 +247,16 @@ _NUMBERS = {
     "fluid.V_air": chosen(0.0, "bled"),
     "fluid.n_air": chosen(1.2, "between isothermal and adiabatic"),
     "fluid.p_atm": chosen(101325.0, "standard atmosphere"),
-    "master_cylinder.A_mc": derived(2.835e-4, "bore of 19 mm"),
-    "master_cylinder.s_mc": chosen(0.03, "length of the chamber"),
+    "master_cylinder.A_mc": derived(2.835e-4, "19 mm bore"),
+    "master_cylinder.s_mc": chosen(0.03, "chamber length"),
     "master_cylinder.x_rest": chosen(1e-4, "retracted end"),
-    "master_cylinder.x_end": chosen(0.02, "stroke of 20 mm"),
+    "master_cylinder.x_end": chosen(0.02, "20 mm stroke"),
     "master_cylinder.x_nominal": chosen(5e-3, "travel at 30 bar"),
     "master_cylinder.k_damp": chosen(200.0, "guides"),
     "stop.k_stop": chosen(2e7, "steel on steel"),
-    "stop.tau_stop": chosen(1e-4, "a stop without noticeable rebound"),
-    "pipeline.d_pl": chosen(3.2e-3, "hose of a motorcycle"),
-    "pipeline.L_pl": chosen(0.8, "hose of a motorcycle"),
+    "stop.tau_stop": chosen(1e-4, "no noticeable rebound"),
+    "pipeline.d_pl": chosen(3.2e-3, "motorcycle hose"),
+    "pipeline.L_pl": chosen(0.8, "motorcycle hose"),
     "pipeline.k_lf": chosen(8.0, "Hagen-Poiseuille"),
     "pipeline.Re_max": chosen(2000.0, "laminar"),
     "caliper.law": chosen("linear", "pads and caliper as one spring"),
@@ -264,14 +264,14 @@ _NUMBERS = {
     "caliper.K_pd": chosen(6e6, "1.3 ml at 30 bar"),
     "caliper.p_table": chosen((), "no measured curve"),
     "caliper.V_table": chosen((), "no measured curve"),
-    "caliper.leak": chosen("tight", "a fault, off"),
-    "caliper.G_leak": chosen(0.0, "a fault, off"),
-    "caliper.fluid_heat": chosen("off", "a fault, off"),
-    "caliper.V_hot": chosen(5e-6, "volume of a caliper of this size"),
+    "caliper.leak": chosen("tight", "no fault"),
+    "caliper.G_leak": chosen(0.0, "no fault"),
+    "caliper.fluid_heat": chosen("off", "no fault"),
+    "caliper.V_hot": chosen(5e-6, "fluid volume of a caliper of this size"),
     "caliper.alpha_V": chosen(7e-4, "glycol ethers"),
-    "caliper.T_rate": chosen(0.0, "a fault, off"),
-    "control.k_p": chosen(2e-6, "set by hand, to be designed"),
-    "control.k_i": chosen(2e-5, "set by hand, to be designed"),
+    "caliper.T_rate": chosen(0.0, "no fault"),
+    "control.k_p": chosen(2e-6, "hand-tuned, before the design"),
+    "control.k_i": chosen(2e-5, "hand-tuned, before the design"),
     "control.v_max": chosen(12.0, "battery"),
     "control.T_s": chosen(1e-3, "1 kHz"),
 }
@@ -279,7 +279,7 @@ SET = CitedSet(
     "hydraulic-1",
     "hydraulic-brake",
     "our own layout",
-    "a hydraulic brake designed by hand",
+    "a hydraulic brake with hand-tuned control",
     Parameters,
     _NUMBERS,
 )

@@ -1,8 +1,8 @@
-"""Identify your own servo axis: measured angle and motor voltage in, parameters out.
+"""Identify your own servo axis: parameters from measured angle and motor voltage.
 
-The axis is an inertia with dry and viscous friction that differ by direction, and an offset of
-the drive. A simulation under closed-loop control replaces the bench. To identify your own
-measurement, give its file: `identify_servo_axis.py axis.csv`.
+The axis has an inertia, dry and viscous friction that differ by direction, and a drive offset. A
+simulation in closed loop replaces the bench. To identify your own measurement, specify its file:
+`identify_servo_axis.py axis.csv`.
 """
 
 import sys
@@ -41,7 +41,7 @@ Volt = Annotated[float, Unit("V")]
 
 
 class Axis(ParameterSet):
-    """Parameters in volts at the motor: torques divided by the torque per volt."""
+    """Parameters in volts at the motor, which are torques divided by the torque per volt."""
 
     J: Annotated[float, Unit("V*s**2/rad", 0.01)]
     d_p: Annotated[float, Unit("V*s/rad", 0.05)]
@@ -62,7 +62,7 @@ class Voltage(NamedTuple):
 
 
 class ServoAxis(Driven):
-    """The equation of motion: J d(omega)/dt = v - offset - d omega -+ T."""
+    """The equation of motion, J d(omega)/dt = v - offset - d omega -+ T."""
 
     name, State, Input = "axis", State, Voltage
     frictions = ("omega",)
@@ -79,15 +79,15 @@ class ServoAxis(Driven):
 
 
 TRUTH = Axis(J=0.02, d_p=0.05, d_n=0.07, T_p=0.6, T_n=0.4, offset=0.1, T_s=1e-3)
-# Motion determines T_p + offset and T_n - offset, but not all three: bywire reports this if you
-# ask for all. The drive's offset is known from its data sheet.
+# Motion determines T_p + offset and T_n - offset, but not all three. bywire reports this if you
+# request all three. The drive offset is known from the data sheet.
 NAMES = ("J", "d_p", "d_n", "T_p", "T_n")
 NOISE = 1e-4
-"""noise of the encoder [rad]; intervals follow from the residuals, not from this value"""
+"""encoder noise [rad]; confidence intervals come from the residuals, not from this value"""
 
 
 class ClosedLoop(ServoAxis):
-    """The bench: the angle follows a target."""
+    """The bench, where the angle follows a target."""
 
     def tasks(self, par):
         def tick(x, m, u, par):
@@ -116,16 +116,17 @@ def measured(seed=1, noise=NOISE):
 
 
 def filtered(data):
-    """Return the motion with its speed and acceleration, filtered by the same low-pass."""
+    """Return the motion with speed and acceleration, all with the same low-pass filter."""
     return differentiated(data, "theta", ("omega", "alpha"), cutoff=60.0, held=["v"])
 
 
 def identified(data):
-    """Return the parameters by inverse dynamics, by output error, and with instruments.
+    """Return the parameters from inverse dynamics, from output error, and with instruments.
 
-    Inverse dynamics works from any start. But noise of the angle, differentiated twice, looks like
-    acceleration, so J is too small by more than its interval. Output error has no such bias. Nor
-    has inverse dynamics with the fitted model's motion as instruments, which is free of noise.
+    Inverse dynamics works from any starting values. But angle noise, differentiated twice, looks
+    like acceleration, so J is too small by more than its confidence interval. Output error does not
+    have this bias. Inverse dynamics with the fitted model's noise-free motion as instruments does
+    not have it either.
     """
     rough = Axis(J=0.01, d_p=0, d_n=0, T_p=1, T_n=1, offset=0.1, T_s=1e-3)
     equation = Equation(ServoAxis(), "omega", "alpha", slowest=1.0, unit="V")
@@ -133,7 +134,7 @@ def identified(data):
     first = inverse_dynamics(*problem, bandwidth=30.0)
     if "J" in first.names and first["J"] < 0.0:
         raise ParameterError(
-            f"theta and v have opposite signs (J = {first['J']:.2g} V s^2/rad): negate one of them"
+            f"theta and v have opposite signs (J = {first['J']:.2g} V s^2/rad). Negate one of them"
         )
 
     known = rough.replace(first.parameters())
@@ -149,7 +150,7 @@ def identified(data):
 
 
 def apart(first, other):
-    """Return the unknowns whose two estimates differ by 3.5 standard deviations and 0.1 %."""
+    """Return unknowns whose two estimates differ by more than 3.5 standard deviations and 0.1 %."""
     names = [n for n in NAMES if n in first.names and n in other.names]
     reach = [np.hypot(*(e.deviations[e.names.index(n)] for e in (first, other))) for n in names]
     return [
@@ -167,12 +168,12 @@ if __name__ == "__main__":
         )
     except bywire.BywireError as error:
         sys.exit(f"identify_servo_axis: {error}")
-    print(f"residual angle: {NOISE * second.rms:.2g} rad; equals the encoder noise in a good fit")
+    print(f"residual angle: {NOISE * second.rms:.2g} rad (equals the encoder noise in a good fit)")
     print(f"output error\n{second}\n\ninverse dynamics with instruments\n{third}")
     for name in apart(first, second):
-        print(f"{name}: noise biases inverse dynamics without instruments: {first[name]:.4g}")
+        print(f"{name}: noise biases inverse dynamics without instruments ({first[name]:.4g})")
     for name in apart(third, second):
-        print(f"{name}: the equation of motion does not explain this record, do not use it")
+        print(f"{name}: do not use this value. The equation of motion does not explain the record")
     if not files:
         for name, (low, high) in zip(NAMES, second.intervals(0.999), strict=False):
             assert low < getattr(TRUTH, name) < high, name

@@ -1,13 +1,13 @@
 """Your own actuator in one file: a servo axis with dry friction.
 
-A DC motor turns an inertia against viscous friction and against dry friction that is larger
-forward than backward. An encoder counts its angle. A position (P) and a speed controller (PI with
-anti-windup) run at 1 kHz.
+A DC motor turns an inertia against viscous friction, and against dry friction that is larger
+forward than backward. An encoder counts its angle. A position controller (P) and a speed controller
+(PI with anti-windup) run at 1 kHz.
 
-Without the integral part the axis comes to an exact rest where the friction balances the motor
-torque from the position error. It is short of the target by up to T R_m / (K_e k_p k_angle) plus
-half a count, with the friction T in the direction of arrival. With the integral part the axis
-creeps until the encoder shows the target, and then also rests exactly.
+Without the integral part, the axis stops completely where friction balances the motor torque from
+the position error. It stops short of the target by up to T R_m / (K_e k_p k_angle) plus half a
+count, with the friction T in the direction of arrival. With the integral part, the axis creeps
+until the encoder shows the target, and then also stops completely.
 """
 
 from argparse import ArgumentParser
@@ -40,7 +40,7 @@ from bywire.plant import dc_motor, shaft
 
 
 class Parameters(ParameterSet):
-    """All parameters; bywire checks the unit and range of each."""
+    """All parameters. bywire checks the unit and range of each."""
 
     motor: dc_motor.Parameters
     shaft: shaft.Parameters
@@ -69,7 +69,7 @@ class Stimulus(NamedTuple):
 
 
 def control(x, m, u, par):
-    """Run the cascade once; the integral part stops while the voltage is limited."""
+    """Run the cascade once. The integral part stops while the voltage is limited."""
     seen = par.count * ops.floor(x.theta / par.count + 0.5)
     error = par.k_angle * (u.target - seen) - (seen - m.seen) / par.T_s
     wanted = par.k_p * error + m.v_i
@@ -78,16 +78,16 @@ def control(x, m, u, par):
 
 
 class ServoAxis(Assembly[Parameters, Memory]):
-    """Parts and wires; states, masses, balances, energies and recorded signals follow from them."""
+    """Parts and wires. They determine states, masses, balances, energies and recorded signals."""
 
     name = "servo-axis"
     Memory, Stimulus = Memory, Stimulus
-    frictions = ("omega",)  # this state's equation carries a set-valued force
+    frictions = ("omega",)  # this state's equation contains a set-valued force
 
     E_source = Integral("J", "energy from the source", role=Role("source", "source"))
     motor = Part(dc_motor, loss="E_copper")
     shaft = Part(shaft, loss="E_damping")
-    E_friction = Integral("J", "loss of the dry friction", role=Role("sink", "dry friction"))
+    E_friction = Integral("J", "dry friction loss", role=Role("sink", "dry friction"))
 
     def wire(self, w):
         """Connect the parts."""
@@ -95,16 +95,16 @@ class ServoAxis(Assembly[Parameters, Memory]):
         w.shaft.u = shaft.Input(dc_motor.output(w.motor.x, w.motor.par).torque, 0.0)
 
     def friction(self, w):
-        """Return the limits of the dry friction; at rest it is anywhere between them."""
+        """Return the limits of the dry friction. At rest it is anywhere between them."""
         return ((-w.par.T_forward, w.par.T_backward),)
 
     def power(self, w):
-        """Return the powers that do not follow from the parts."""
+        """Return the powers that the parts do not determine."""
         lost = -w.reaction[0] * w.shaft.x.omega
         return {"E_source": w.m.v * w.motor.x.i, "E_friction": lost}
 
     def tasks(self, par):
-        """Return the controllers and their sample times; several share one memory."""
+        """Return the controllers and their sample times. Several controllers share one memory."""
         return (Task("control", par.T_s, control),)
 
 
@@ -122,11 +122,11 @@ PAR = Parameters(
 )
 SERVO_1 = CitedSet("servo-1", "servo-axis", "", "a small axis", Parameters, PAR.flat())
 BRAKE = Brake("servo-axis", "a motor that turns an inertia against dry friction", __name__)
-TARGET = 3.0  # for one second; then back to zero for another one
+TARGET = 3.0  # for one second, then back to zero for another second
 
 
 def move(par):
-    """Return the trajectory there and back."""
+    """Return the trajectory to the target and back."""
     state, memory = ServoAxis().rest(par)
     run = bywire.Run(
         ServoAxis(),
@@ -140,8 +140,8 @@ def move(par):
 
 
 if __name__ == "__main__":
-    parser = ArgumentParser(description="Move a servo axis there and back.")
-    parser.add_argument("--plot", metavar="FILE", help="picture of the angle over time")
+    parser = ArgumentParser(description="Move a servo axis to a target and back.")
+    parser.add_argument("--plot", metavar="FILE", help="file for a plot of angle versus time")
     file = parser.parse_args().plot
     p_only, with_i = move(PAR.replace({"k_i": 0.0})), move(PAR)
     if file:
@@ -160,7 +160,7 @@ if __name__ == "__main__":
     assert abs(with_i["theta"][1999]) < resolution
     for run in (p_only, with_i):
         omega = run["omega"]
-        assert not np.concatenate((omega[800:1000], omega[1800:])).any()  # zero, not small
+        assert not np.concatenate((omega[800:1000], omega[1800:])).any()  # exactly zero
         lost = run["E_copper"] + run["E_damping"] + run["E_friction"]
         left = run["E_source"] - lost - run["E_stored"]
         assert np.max(np.abs(left)) < 1e-9 * run["E_source"][-1]

@@ -1,1 +1,1 @@
-"""Parts of the benchmark that need no brake."""
+"""Parts of the benchmark that do not need a brake."""

@@ -1,4 +1,4 @@
-"""Speed of commands: those of every brake, and those that no brake has a part in."""
+"""Speed of commands, those of all brakes and those without a brake."""
 
 from __future__ import annotations
 

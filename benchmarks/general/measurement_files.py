@@ -1,4 +1,4 @@
-"""Reading of measurement files, against the library that bywire reads them with."""
+"""Reading time of measurement files, compared with the library that bywire uses."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from bywire.data.measurement import read_measurement
 
 RATE, CHANNELS = 10_000, 20
 SECONDS = 120
-"""an hour would take 3 GB of disk; time grows with length, which the note says"""
+"""an hour would need 3 GB of disk space; the time is proportional to the length"""
 
 READ = ("c3", "c7", "c11", "c19")
 _ROUNDS = 7
@@ -27,7 +27,7 @@ _GOAL = 1.5
 
 
 def measured() -> list[Result]:
-    """Measure how long a few channels of an MDF 4 file take."""
+    """Measure the reading time of a few channels of an MDF 4 file."""
     try:
         asammdf = importlib.import_module("asammdf")
     except ImportError:
@@ -50,16 +50,16 @@ def measured() -> list[Result]:
             _GOAL,
             "times as long",
             f"{len(READ)} of {CHANNELS} channels of {SECONDS} s at {RATE} Hz, a thirtieth of an "
-            "hour: read in a child process, in SI, with instants that increase, "
-            f"{median(seconds['bywire']):.2g} s, over asammdf's select, "
-            f"{median(seconds['alone']):.2g} s; files above 0.5 GB are read piece by piece "
+            "hour. bywire reads them in a child process, in SI units, with increasing times, in "
+            f"{median(seconds['bywire']):.2g} s. asammdf's select takes "
+            f"{median(seconds['alone']):.2g} s. bywire reads files above 0.5 GB in pieces "
             "within bounded memory, which takes several times as long",
         )
     ]
 
 
 def _write(asammdf: Any, path: Path) -> None:
-    """Write a measurement of single-precision channels, as recorders do."""
+    """Write a measurement with single-precision channels, as recorders do."""
     time = np.arange(SECONDS * RATE) / RATE
     noise = np.random.default_rng(0).standard_normal(time.size).astype(np.float32)
     channels = [

@@ -1,4 +1,4 @@
-"""How long the site of the documentation takes: all of it anew, and again with nothing changed."""
+"""Build time of the documentation site, from scratch and again without changes."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ _LEFT = (".*", "_build", "_generated", "__pycache__", "results", "*.egg-info")
 
 
 def measured(root: Path = Path(__file__).parents[2]) -> list[Result]:
-    """Measure the site in a copy of a clone, where the clone's own site stays as it is.
+    """Measure the site in a copy of a clone, which leaves the clone's own site unchanged.
 
-    ``root``: the clone; by default the one that this file stands in.
+    ``root``: the clone; default: the clone that contains this file.
     """
     if importlib.util.find_spec("sphinx") is None:
         return _skipped(f"not installed: {how_to_install('docs')}")
@@ -42,13 +42,13 @@ def measured(root: Path = Path(__file__).parents[2]) -> list[Result]:
                 return [failed(name, error, "s", f"<= {goal:g}") for name, goal in _GOALS.items()]
     cold, warm = seconds
     return [
-        at_most("docs.build_s", cold, COLD, "s", "the site anew: sources, gallery, live pages"),
-        at_most("docs.rebuild_s", warm, WARM, "s", "the site again, nothing changed"),
+        at_most("docs.build_s", cold, COLD, "s", "full build: sources, gallery, live pages"),
+        at_most("docs.rebuild_s", warm, WARM, "s", "rebuild without changes"),
     ]
 
 
 def _made(root: Path) -> subprocess.CompletedProcess[str]:
-    """Make the site as ``tasks.py docs`` does."""
+    """Build the site as ``tasks.py docs`` does."""
     options = ("-q", "-W", "-n", "-b", "html", "docs", "docs/_build")
     return subprocess.run(
         python_command("-m", "sphinx", *options),

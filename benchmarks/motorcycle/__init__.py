@@ -1,1 +1,1 @@
-"""Speed of the master cylinder: the same problem by hand and by other simulators."""
+"""Speed of the motorcycle brake, compared with hand-written C and other simulators."""

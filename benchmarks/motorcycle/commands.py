@@ -1,4 +1,4 @@
-"""Whole commands on the master cylinder: runs, the paper, a design, a replay."""
+"""Whole commands on the motorcycle brake: runs, the paper, a design, a replay."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""CVODES through CasADi: variable-order BDF with exact Jacobians, the friction as a tanh."""
+"""CVODES through CasADi: variable-order BDF with exact Jacobians and tanh friction."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ MAX_STEPS = 1_000_000
 
 
 def available() -> bool:
-    """Return whether it can run: CasADi is among the requirements."""
+    """Return True, because CasADi is a requirement of bywire."""
     return True
 
 
@@ -37,14 +37,15 @@ def solve(
     par, stimulus, duration
         See ``problem``.
     width
-        Speed over which the friction changes its sign [rad/s].
+        Speed over which the friction changes sign [rad/s].
     tolerance
         Relative tolerance, and absolute tolerance of the scaled states.
 
     Notes
     -----
-    Largest error in 1.2 s of hard braking, where bywire with 20 us is at 0.004 bar, and seconds on
-    one machine. The error does not fall evenly: one code of the ECU's converter is 0.012 bar.
+    The table shows the maximum error in 1.2 s of hard braking (0.004 bar with bywire at 20 us), and
+    the time on one machine. The error does not decrease evenly, because one code of the ECU's
+    converter is 0.012 bar.
 
     =====  =========  ===========  =======
     width  tolerance  error [bar]  seconds

@@ -1,4 +1,4 @@
-"""diffrax on JAX: a stiff Runge-Kutta method, ECU and plant in one compiled program."""
+"""diffrax on JAX: a stiff Runge-Kutta method with ECU and plant in one compiled program."""
 
 from __future__ import annotations
 
@@ -39,24 +39,24 @@ def solve(
     tolerance: float = TOLERANCE,
     repeats: int = 1,
 ) -> Solution:
-    """Solve the problem in double precision, plant and ECU in one scan over the ticks.
+    """Solve the problem in double precision, with plant and ECU in one scan over the ticks.
 
     Parameters
     ----------
     par, stimulus, duration
         See ``problem``.
     width
-        Speed over which the friction changes its sign [rad/s].
+        Speed over which the friction changes sign [rad/s].
     tolerance
         Relative tolerance, and absolute tolerance of the scaled states.
     repeats
-        Runs after the one that compiles; the fastest counts.
+        Number of runs after the first run, which compiles. The fastest run counts.
 
     Notes
     -----
-    Kvaerno3 was the cheapest of Kvaerno3, 4 and 5 at this error. Largest error in 1.2 s of hard
-    braking with a width of 3e-4, where bywire with 20 us is at 0.004 bar, and seconds on one
-    machine:
+    Kvaerno3 was the fastest of Kvaerno3, 4 and 5 at this error. The table shows the maximum error
+    in 1.2 s of hard braking with a width of 3e-4 (0.004 bar with bywire at 20 us), and the time on
+    one machine:
 
     ========  =========  ===========  =======
     method    tolerance  error [bar]  seconds

@@ -1,4 +1,4 @@
-"""Single runs, ensembles and sensitivities against hand-written C."""
+"""Single runs, ensembles and sensitivities, compared with hand-written C."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ _ROUNDS, _ENSEMBLE_ROUNDS = 60, 7
 
 
 def single_and_sensitivities(par: MotorcycleParameters) -> list[Result]:
-    """Measure one hard-braking run against hand-written C, and the price of eight tangents."""
+    """Compare one hard-braking run with hand-written C, and measure the cost of eight tangents."""
     run = braking_run(par, hard_braking)
     ideal = replace(run, par=par.replace({"adc.law": "ideal"}))
     seconds = interleaved(
@@ -66,30 +66,30 @@ def single_and_sensitivities(par: MotorcycleParameters) -> list[Result]:
             ratio(seconds, "bywire", "hand"),
             1.0,
             "ratio",
-            "one hard-braking run of 1.2 s, all outputs, over hand-written C; same compiler "
-            "and flags, one call each",
+            "one hard-braking run of 1.2 s, all outputs, relative to hand-written C; same "
+            "compiler and flags, one call each",
         ),
         Result(
             "single.realtime_factor",
             run.duration / plain,
             "1",
-            note="simulated over wall time, a call from Python with all its preparation",
+            note="simulated time / wall time of a call from Python, including preparation",
         ),
         at_most(
             "sensitivities.plain",
             ratio(seconds, "tangents", "plain"),
             4.5,
             "ratio",
-            "eight directions with the value over a plain run",
+            "value and eight directions, relative to a plain run",
         ),
     ]
 
 
 def ensemble(par: MotorcycleParameters) -> list[Result]:
-    """Measure 1,024 variations in lanes against scalar C, a thread each.
+    """Compare 1,024 variations in lanes with scalar C, one thread each.
 
-    How many threads either side would take is set in different places (OMP_NUM_THREADS holds for
-    OpenMP alone), and both share out whole cases: a core's time is what differs.
+    The number of threads is set differently on each side (OMP_NUM_THREADS applies only to OpenMP),
+    and both sides distribute whole cases. Therefore the benchmark compares the time of one core.
     """
     run = braking_run(par, hard_braking)
     signals = ("p_mc", "i", "stuck")
@@ -114,8 +114,9 @@ def ensemble(par: MotorcycleParameters) -> list[Result]:
             0.7 * width,
             "times faster",
             f"{CASES} variations of {len(VARIED)} parameters, three signals and no energies "
-            "on both sides, over scalar C with the flags of a single run; least processor "
-            f"times of a thread each, in turn; 0.7 of the vector width, {width} doubles",
+            "on both sides, relative to scalar C with the flags of a single run; minimum "
+            "processor times of one thread each, in turn; the goal is 0.7 times the vector "
+            f"width of {width} doubles",
         ),
     ]
 

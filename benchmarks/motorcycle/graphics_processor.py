@@ -1,4 +1,4 @@
-"""Ensembles on a graphics processor against the lanes of two cores."""
+"""Ensembles on a graphics processor, compared with the lanes of two cores."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ from bywire.simulation.cuda import find_device
 from bywire.simulation.ensemble import simulate_ensemble
 
 LANES, THREADS = 1024, 32_768
-"""cases on either side: what a core takes half a second for, and a large processor at once"""
+"""cases on each side: half a second of work for a core, and one batch for a large processor"""
 CORES, RATIO, DIFFERENCE = 2, 50.0, 1e-9
-"""what it is compared with, and goals"""
+"""number of cores for comparison, and goals"""
 _ROUNDS = 3
 _SIGNALS = ("p_mc", "i", "stuck")
 
 
 def measured() -> list[Result]:
-    """Measure cases a second of a graphics processor, and whether its figures are ours."""
+    """Measure cases per second of a graphics processor, and check its results."""
     try:
         device = find_device()
     except (DeviceError, ParameterError) as error:
@@ -52,17 +52,17 @@ def measured() -> list[Result]:
             lanes / CORES / gpu,
             RATIO,
             "times faster",
-            f"hard brakings a second of {device.label}, {THREADS} variations of {len(VARIED)} "
-            f"parameters with their rows fetched, by the clock, over lanes of {CORES} cores, each "
-            f"as quick as the processor time of {LANES} says; {1e6 * gpu:.3g} and "
-            f"{1e6 * lanes:.3g} us a case, of one core",
+            f"hard-braking runs per second on {device.label} ({THREADS} variations of "
+            f"{len(VARIED)} parameters, wall time, including transfer of the rows), relative to "
+            f"lanes on {CORES} cores (from the processor time of {LANES} runs); {1e6 * gpu:.3g} us "
+            f"per case, and {1e6 * lanes:.3g} us on one core",
         ),
         at_most(
             "study.gpu_difference",
             float(apart.max()),
             DIFFERENCE,
             "1",
-            "largest difference of a signal, of its largest value, between the two",
+            "maximum difference of a signal between the two, relative to its maximum",
         ),
     ]
 

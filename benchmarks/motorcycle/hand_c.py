@@ -39,14 +39,14 @@ OUTPUTS = SUBJECT.outputs
 
 
 def indices(par: Par) -> str:
-    """Return the C enums that name the entries of the arrays, in the model's own order."""
+    """Return C enums with the names of the array entries, in the order of the model."""
     return SUBJECT.enums(par)
 
 
 class HandWritten(HandCode):
-    """The compiled library of the motorcycle brake; see ``HandCode``.
+    """The compiled library of the motorcycle brake (see ``HandCode``).
 
-    The second counter is the number of substeps near a stop or at the limit of the pressure.
+    The second counter is the number of substeps near a stop or at the pressure limit.
     """
 
     def __init__(self, par: Par, flags: tuple[str, ...] = SINGLE) -> None:

@@ -1,4 +1,4 @@
-"""Identification of the seal friction from the slow ramp, against SciPy with differences."""
+"""Identification of seal friction from the slow ramp, compared with SciPy with differences."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _SEED = 1
 
 
 def measured(par: MotorcycleParameters) -> list[Result]:
-    """Measure a whole identification: 50 s at 1 kHz, seven unknowns, 16 starts."""
+    """Measure a whole identification with 50 s at 1 kHz, seven unknowns and 16 starts."""
     options = METHOD.defaults
     assert isinstance(options, Options)
     data = METHOD.synthetic(par, options, _SEED)
@@ -52,17 +52,17 @@ def measured(par: MotorcycleParameters) -> list[Result]:
             in_runs,
             "runs",
             note=f"seal friction from a ramp of 50 s at 1 kHz, {len(unknowns)} unknowns, "
-            f"{STARTS} starts on all cores, uncertainty and replay included, {whole:.3g} s, "
-            "over one plain run of the ramp",
+            f"{STARTS} starts on all cores, including uncertainty and replay, {whole:.3g} s, "
+            "relative to one plain run of the ramp",
         ),
         at_least(
             "identify.scipy",
             peer_seconds / whole,
             5.0,
             "times faster",
-            "the same over scipy.optimize.least_squares with its own differences on the same "
-            f"slips and the same kernel, one start after another, {_PEER_STARTS} starts "
-            f"measured and {STARTS} reckoned, {peer_seconds:.3g} s",
+            "the same, relative to scipy.optimize.least_squares with its own differences, the "
+            f"same slips and the same kernel, one start after another; {_PEER_STARTS} starts "
+            f"measured, extrapolated to {STARTS} starts, {peer_seconds:.3g} s",
         ),
     ]
 

@@ -1,8 +1,8 @@
-"""LSODA through SciPy: BDF and Adams methods by turns, with an exact Jacobian.
+"""LSODA through SciPy: alternating BDF and Adams methods with an exact Jacobian.
 
-``odeint`` rather than ``solve_ivp``: the same LSODA without a loop of Python around its steps,
-twice as fast here. The right-hand side and its Jacobian are CasADi functions called through their
-buffers, some twenty times faster than the equations on floats.
+``odeint`` is used instead of ``solve_ivp``, because it is the same LSODA without a Python loop
+around its steps, and twice as fast here. The right-hand side and its Jacobian are CasADi functions
+that are called through their buffers, about twenty times faster than the equations on floats.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ MAX_STEPS = 100_000
 
 
 def available() -> bool:
-    """Return whether it can run: SciPy is among the requirements."""
+    """Return True, because SciPy is a requirement of bywire."""
     return True
 
 
@@ -44,14 +44,14 @@ def solve(
     par, stimulus, duration
         See ``problem``.
     width
-        Speed over which the friction changes its sign [rad/s].
+        Speed over which the friction changes sign [rad/s].
     tolerance
         Relative tolerance, and absolute tolerance of the scaled states.
 
     Notes
     -----
-    Largest error in 1.2 s of hard braking, where bywire with 20 us is at 0.004 bar, and seconds on
-    one machine:
+    The table shows the maximum error in 1.2 s of hard braking (0.004 bar with bywire at 20 us), and
+    the time on one machine:
 
     =====  =========  ===========  =======
     width  tolerance  error [bar]  seconds

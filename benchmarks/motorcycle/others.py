@@ -1,4 +1,4 @@
-"""The same braking in the simulators that users would pick instead."""
+"""The same braking in other simulators that users would choose instead."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from bywire.simulation.run import simulate
 
 @dataclass(frozen=True)
 class Peer:
-    """A peer, how much faster bywire shall be, and how long a braking it computes [s]."""
+    """A peer, the goal for bywire's speed relative to the peer, and the simulated time [s]."""
 
     name: str
     goal: float
@@ -44,12 +44,12 @@ PEERS = (
 
 
 def others(par: MotorcycleParameters) -> Iterator[Result]:
-    """Measure how much faster bywire is than each peer, at no worse an error."""
+    """Measure how much faster bywire is than each peer, and both errors."""
     exact = reference(par, hard_braking)
     for peer in PEERS:
         try:
             yield _compare(par, peer, exact)
-        except Exception as error:  # whatever another library, or another version of it, raises
+        except Exception as error:  # any error that another library or version may raise
             yield failed(f"peer.{peer.name}", error, "times faster", f">= {peer.goal:g}")
 
 
@@ -67,7 +67,7 @@ def _compare(par: MotorcycleParameters, peer: Peer, exact: Solution) -> Result:
     peer_error = error(solution, exact)
     note = f"errors: bywire {own_error:.4f} bar, {peer.name} {peer_error:.4f} bar"
     if peer_error < own_error:
-        note += "; the peer is the more exact here"
+        note += "; the peer is more accurate here"
     return at_least(
         f"peer.{peer.name}", solution.seconds / seconds, peer.goal, "times faster", note
     )

@@ -1,4 +1,4 @@
-"""PathSim: the plant as one ODE block, a variable-step GEAR method in Python."""
+"""PathSim: the plant as one ODE block, with a variable-step GEAR method in Python."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ DURATION = 0.3
 WIDTH = 3e-4
 TOLERANCE = 1e-3
 FIRST_STEP = 1e-5
-IMPLICIT = 1e-3  # tolerance of the implicit equations over that of a step
+IMPLICIT = 1e-3  # tolerance of the implicit equations relative to the step's tolerance
 
 
 def available() -> bool:
@@ -36,24 +36,25 @@ def solve(
     width: float = WIDTH,
     tolerance: float = TOLERANCE,
 ) -> Solution:
-    """Solve the problem, one block in one simulation that runs from tick to tick.
+    """Solve the problem with one block in one simulation that runs from tick to tick.
 
-    It is slow: by default 0.3 s, the first 0.1 s of the braking included, in which the largest
-    error of bywire falls too. Compare with bywire over the same time.
+    PathSim is slow, so the default is 0.3 s, with the first 0.1 s of the braking. The maximum error
+    of bywire is also in this interval. Compare with bywire over the same time.
 
     Parameters
     ----------
     par, stimulus, duration
         See ``problem``.
     width
-        Speed over which the friction changes its sign [rad/s].
+        Speed over which the friction changes sign [rad/s].
     tolerance
         Relative tolerance, and absolute tolerance of the scaled states.
 
     Notes
     -----
-    One block of CasADi functions, rather than a diagram of many blocks, favors it. Largest error in
-    0.3 s with a width of 3e-4, where bywire with 20 us is at 0.004 bar, and seconds on one machine:
+    One block of CasADi functions, instead of a diagram of many blocks, favors PathSim. The table
+    shows the maximum error in 0.3 s with a width of 3e-4 (0.004 bar with bywire at 20 us), and the
+    time on one machine:
 
     ========  =========  ===========  =======
     method    tolerance  error [bar]  seconds

@@ -1,10 +1,10 @@
-"""The one problem that all peers solve: hard braking of the motorcycle brake from rest.
+"""The problem that all peers solve: hard braking of the motorcycle brake from rest.
 
-Plant and sensors in continuous time, the ECU's duty cycle held between its ticks. The peers
-integrate smooth differential equations only, so that the dry friction is regularized for them,
-and the stops become one-sided springs; all else is the model's own equations. The limit of the
-chamber pressure at zero is left out: hard braking never meets it. The states are divided by their
-nominal magnitudes, so that one absolute tolerance serves all of them.
+Plant and sensors are in continuous time, and the ECU's duty cycle is held between its ticks. The
+peers integrate only smooth differential equations. Therefore their dry friction is regularized, and
+the stops become one-sided springs. All other equations come from the model. The problem omits the
+lower limit of the chamber pressure, because hard braking never reaches it. The states are divided
+by their nominal magnitudes, so one absolute tolerance applies to all of them.
 """
 
 from __future__ import annotations
@@ -33,15 +33,15 @@ SCALE = np.array([signal.nominal for signal in signals_of(MotorcycleBrake.State)
 
 
 class Solution(NamedTuple):
-    """What a peer computed.
+    """Solution of a peer.
 
     Parameters
     ----------
     time, p_mc
-        Ticks of the ECU [s] and master-cylinder pressure there [Pa], shape (rows,).
+        Ticks of the ECU [s] and master-cylinder pressure at the ticks [Pa], shape (rows,).
     seconds
-        Time spent in the integrator alone: without compilation, and without the ECU where it
-        runs in Python, which favors the peer.
+        Time of the integrator alone, without compilation, and without the ECU if it runs in
+        Python, which favors the peer.
     """
 
     time: Array
@@ -50,7 +50,7 @@ class Solution(NamedTuple):
 
 
 def hard_braking(t: Array) -> Array:
-    """Return the stimulus: from 6 to 37 bar after 0.2 s; rows of Stimulus at the times ``t``."""
+    """Return the stimulus, a step from 6 to 37 bar at 0.2 s, as rows at the times ``t``."""
     rows = np.zeros((t.size, len(Stimulus._fields)))
     rows[:, Stimulus._fields.index("p_set")] = np.where(t >= 0.2 - 1e-9, 37e5, 6e5)
     return rows
@@ -75,13 +75,13 @@ def braking_run(
 
 
 def reference(par: MotorcycleParameters, stimulus: Demand, duration: float = DURATION) -> Solution:
-    """Return bywire's own solution with steps of 2.5 us, which errors are taken against."""
+    """Return bywire's solution with steps of 2.5 us, the reference for errors."""
     done = simulate(braking_run(par, stimulus, duration, 2.5e-6), ("p_mc",))
     return Solution(done.time, done["p_mc"], 0.0)
 
 
 def error(solution: Solution, exact: Solution) -> float:
-    """Return the largest difference of the pressures at the solution's ticks [bar]."""
+    """Return the maximum pressure difference at the solution's ticks [bar]."""
     return float(np.abs(solution.p_mc - exact.p_mc[: solution.p_mc.size]).max()) / 1e5
 
 
@@ -97,7 +97,7 @@ def rates(z: Any, duty: Any, par: Any, width: float) -> tuple[Any, ...]:
     par
         Parameters.
     width
-        Speed over which the friction changes its sign, as tanh(omega / width) [rad/s].
+        Speed over which the friction changes sign, as tanh(omega / width) [rad/s].
     """
     model = MotorcycleBrake()
     x = MotorcycleBrake.State(*(float(s) * z[k] for k, s in enumerate(SCALE)))
@@ -124,7 +124,7 @@ def tanh(z: Any) -> Any:
 def march(
     advance: Advance, par: MotorcycleParameters, stimulus: Demand, duration: float
 ) -> Solution:
-    """Run the ECU tick by tick in Python around a peer's integrator, which alone is timed.
+    """Run the ECU tick by tick in Python around a peer's integrator, and time the integrator.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Whole processes: start-up cold and warm, and peak memory."""
+"""Whole processes: cold and warm start, and peak memory."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from bywire.core.child_process import python_command
 
 _BENCH = 'experiment = "hard-braking"\nparameters = "dardanelli2010"\n'
 _ROUNDS = 5
-# The kernel's own mark of this program: getrusage would carry the parent's peak over.
+# Use the kernel's own value for this program, because getrusage would include the parent's peak.
 _MEMORY = """
 import sys
 from bywire.cli.main import main

@@ -1,4 +1,4 @@
-"""Studies of many cases: what hard brakings take, how much of it is simulation, and commands."""
+"""Studies of many cases: time per hard-braking run, its simulation part, and commands."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ bench = "hard-braking"
 [requirements]
 overshoot = "<= 15 % with 90 %"
 """
-# As studies/tolerances.toml: five quantities, three figures judged.
+# Like studies/tolerances.toml: five quantities, three key figures with requirements.
 _MANY = """
 bench = "hard-braking"
 [vary]
@@ -51,14 +51,14 @@ overshoot = "<= 15 % with 99 %"
 steady_state_error = "<= 0.1 bar"
 rise_time = "<= 100 ms with 95 %"
 """
-_COMMANDS = 2  # of which the quicker one counts
+_COMMANDS = 2  # number of commands, of which the faster one counts
 _CHUNKS = 4
 _ROUNDS = 3
-_WARM = 4  # chunks of each process beforehand
-_STEADY = 4.0  # s that processes are timed: a cluster's last tasks take half a second
-_TURNS = 3  # of processes and cluster, of which the quicker one counts
-_CASES = 1024  # of the study whose memory is measured
-# The kernel's own mark of this program, its workers apart.
+_WARM = 4  # warm-up chunks of each process
+_STEADY = 4.0  # s of measurement: a cluster's last tasks take half a second
+_TURNS = 3  # turns of processes and cluster, of which the fastest counts
+_CASES = 1024  # cases of the study whose memory is measured
+# The kernel's own value for this program, without its workers.
 _MEMORY = """
 import sys
 from bywire.cli.main import main
@@ -72,7 +72,7 @@ with open("/proc/self/status") as status:
 
 
 def studies() -> Iterator[Result]:
-    """Measure the cases of a study on one core, and the memory of its command."""
+    """Measure the cases of a study on one core, and the memory of the study command."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "study.toml"
         path.write_text(_STUDY, encoding="utf-8")
@@ -86,15 +86,15 @@ def studies() -> Iterator[Result]:
             1e6 * whole / cores,
             600.0,
             "s",
-            f"a million stops with all key figures on {cores} cores, {1e3 * whole:.3g} ms of a "
-            f"core each, measured over {_CHUNKS * CHUNK}",
+            f"a million stops with all key figures on {cores} cores, {1e3 * whole:.3g} ms of core "
+            f"time each, measured over {_CHUNKS * CHUNK} stops",
         )
         yield at_most(
             "study.kpi_share",
             judged / simulated,
             0.05,
             "1",
-            f"key figures, {1e6 * judged:.3g} us a case, over its simulation with noise, "
+            f"key figures, {1e6 * judged:.3g} us per case, relative to its simulation with noise, "
             f"{1e3 * simulated:.3g} ms",
         )
         yield _of_steps(Path(folder))
@@ -102,7 +102,7 @@ def studies() -> Iterator[Result]:
             "study.beside_share",
             (whole - simulated - judged) / simulated,
             "1",
-            note="cases made and checked, warnings and books over the simulation",
+            note="creating and checking cases, warnings and balances, relative to the simulation",
         )
         yield _command(Path(folder))
         if Path("/proc/self/status").exists():
@@ -119,7 +119,7 @@ def _seconds(plan: StudyPlan) -> float:
 
 
 def _of_steps(folder: Path) -> Result:
-    """Measure the same of steps of the current, which have a static gain as well."""
+    """Measure the same for pressure steps, which also have a static gain."""
     path = folder / "steps.toml"
     path.write_text(_STUDY.replace("hard-braking", "pressure-step"), encoding="utf-8")
     simulated, judged = simulated_and_judged(read_study(path), _ROUNDS)
@@ -128,12 +128,12 @@ def _of_steps(folder: Path) -> Result:
         judged / simulated,
         0.05,
         "1",
-        f"the same of pressure steps: {1e6 * judged:.3g} us over {1e3 * simulated:.3g} ms",
+        f"the same for pressure steps: {1e6 * judged:.3g} us and {1e3 * simulated:.3g} ms",
     )
 
 
 def _command(folder: Path) -> Result:
-    """Measure the command of a study from its beginning to its report, kernels built before."""
+    """Measure a study command from start to report, with kernels already built."""
     study, seconds, spent = folder / "many.toml", [], []
     study.write_text(_MANY, encoding="utf-8")
     for k in range(_COMMANDS + 1):
@@ -151,13 +151,13 @@ def _command(folder: Path) -> Result:
         min(seconds[1:]),
         8.0,
         "s",
-        f"a study of 10,000 stops from the command line to its report on {cores} cores, warm, by "
-        f"the clock; {min(spent[1:]):.3g} s of processor time in all of its processes",
+        f"a study of 10,000 stops from command line to report on {cores} cores, warm, wall time; "
+        f"{min(spent[1:]):.3g} s of processor time in all its processes",
     )
 
 
 def _of_children() -> float:
-    """Return the processor time of all processes that have ended and were waited for [s]."""
+    """Return the processor time of all finished child processes [s]."""
     ended = os.times()
     return ended.children_user + ended.children_system
 
@@ -190,9 +190,9 @@ def _memory(study: Path, out: Path) -> Result:
 
 
 def _efficiency(plan: StudyPlan, cores: int, seconds: float) -> Result:
-    """Compare workers of a cluster on this machine with plain processes, both once they run.
+    """Compare the workers of a cluster on this machine with plain processes, after warm-up.
 
-    In turn, for a shared machine is now quicker and now slower; ``seconds`` are those of a chunk.
+    Both run in turn, because the speed of a shared machine varies. ``seconds``: time of one chunk.
     """
     allow_dask()
     distributed = library("distributed", "clusters", "cluster")
@@ -214,13 +214,13 @@ def _efficiency(plan: StudyPlan, cores: int, seconds: float) -> Result:
         max(clustered) / max(plain),
         0.95,
         "1",
-        f"cases a second of {cores} workers of dask.distributed, started as docs/studies.md "
-        f"says, over {cores} plain processes; the better of {_TURNS} turns of each",
+        f"cases per second of {cores} dask.distributed workers, started as in docs/studies.md, "
+        f"relative to {cores} plain processes; the best of {_TURNS} turns each",
     )
 
 
 def _rate(executor: Executor, plan: StudyPlan, cores: int, chunks: int) -> float:
-    """Return chunks a second [1/s], once each process has had several."""
+    """Return chunks per second [1/s], after each process has computed several."""
     with executor.opened(plan) as compute:
         computed = compute(range(_WARM * cores + chunks))
         for _ in range(_WARM * cores):

@@ -1,4 +1,4 @@
-"""The regularized plant as CasADi functions, for peers that are called from Python."""
+"""The regularized plant as CasADi functions, for peers that Python calls."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Plant:
 
 
 def plant(par: MotorcycleParameters, width: float) -> Plant:
-    """Return the regularized plant with the values of the parameters as constants."""
+    """Return the regularized plant with parameter values as constants."""
     z, duty = ca.SX.sym("z", len(MotorcycleBrake.State._fields)), ca.SX.sym("duty")
     return Plant(z, duty, ca.vertcat(*rates(z, duty, par, width)))
 
@@ -38,26 +38,26 @@ def slope_and_jacobian(par: MotorcycleParameters, width: float) -> tuple[Buffere
 
 
 class Buffered:
-    """A CasADi function on fixed arrays, without the cost of its conversions.
+    """A CasADi function on fixed arrays, without conversion costs.
 
     Parameters
     ----------
     function
-        Of dense arguments, with one dense result.
+        Function with dense arguments and one dense result.
     """
 
     def __init__(self, function: Any) -> None:
         self._buffer, self._trigger = function.buffer()
         self._inputs: list[Array] = [np.zeros(function.numel_in(k)) for k in range(function.n_in())]
         rows, columns = function.size_out(0)
-        self._output: Array = np.zeros((columns, rows))  # CasADi counts down the columns
+        self._output: Array = np.zeros((columns, rows))  # CasADi stores columns
         for k, array in enumerate(self._inputs):
             self._buffer.set_arg(k, array.data)
         self._buffer.set_res(0, self._output.data)
 
     def __call__(self, *arguments: Array | float) -> Array:
-        """Return a copy of the result: of one column as a vector, else as a matrix."""
-        for own, given in zip(self._inputs, arguments, strict=True):
-            own[:] = given
+        """Return a copy of the result, a vector if it has one column, otherwise a matrix."""
+        for array, argument in zip(self._inputs, arguments, strict=True):
+            array[:] = argument
         self._trigger()
         return self._output[0].copy() if len(self._output) == 1 else self._output.T.copy()

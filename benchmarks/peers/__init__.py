@@ -1,1 +1,1 @@
-"""Comparison partners of the speed benchmark: one file per tool that a user would pick instead."""
+"""Peers in the speed benchmark, one file per tool that users would choose instead."""

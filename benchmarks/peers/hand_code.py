@@ -1,4 +1,4 @@
-"""Hand-written C of a brake: compiled, loaded, called."""
+"""Compile, load and call the hand-written C of a brake."""
 
 from __future__ import annotations
 
@@ -20,33 +20,33 @@ from bywire.simulation.native import pointer
 from bywire.simulation.run import Run
 
 WITHOUT_SUMS = ("-DWITHOUT_SUMS",)
-"""leaves out the energies, whose outputs then mean nothing: where none of them is recorded"""
-_COUNTERS = 2  # the first one: substeps that did not settle
+"""omits the energies, whose outputs are then meaningless, for runs that do not record energies"""
+_COUNTERS = 2  # the first counter: substeps that did not settle
 
 
 @dataclass(frozen=True)
 class Call:
-    """A prepared call: every use of it repeats the same computation from the start.
+    """A prepared call that repeats the same computation from the start each time.
 
     Parameters
     ----------
     names, values
-        Outputs, values of shape (cases, rows, signals); filled by each call.
+        Outputs, with values of shape (cases, rows, signals). Each call fills them.
     state
-        State and Memory at the start, then counters; shape (cases, length); filled by each call.
+        Initial State and Memory, then counters, shape (cases, length). Each call fills them.
     substeps
-        Substeps of all cases together.
+        Total number of substeps of all cases.
     """
 
     names: tuple[str, ...]
     values: Array
     state: Array
     substeps: int
-    _inputs: tuple[NDArray[Any], ...]  # kept alive: the arguments are bare addresses
+    _inputs: tuple[NDArray[Any], ...]  # must stay alive, because the arguments are bare addresses
     _call: Callable[[], None]
 
     def __call__(self) -> float:
-        """Compute once and return the seconds that it took."""
+        """Compute once and return the run time [s]."""
         begin = time.perf_counter()
         self._call()
         return time.perf_counter() - begin
@@ -62,27 +62,27 @@ class Call:
 
     @property
     def extra(self) -> int:
-        """The second counter, whose meaning the C states."""
+        """The second counter, whose meaning depends on the C code."""
         return int(self.state[:, -1].sum())
 
 
 class HandCode:
-    """The compiled library, for one run or for an ensemble of scalar runs, one by one.
+    """The compiled library, for one run or for an ensemble of scalar runs one by one.
 
     Parameters
     ----------
     subject
         The brake.
     par
-        Any parameter set of the structure that the C covers.
+        Any parameter set with the structure that the C covers.
     flags
-        ``SINGLE``, with which bywire's own single runs are compiled, and ``WITHOUT_SUMS`` beside
-        it; on top of the flags that all kernels get, so that code is compared and not settings.
+        ``SINGLE``, the flags of bywire's single runs, and optionally ``WITHOUT_SUMS``. They are in
+        addition to the flags of all kernels, so the benchmark compares code and not settings.
 
     Raises
     ------
     CompilerError
-        Without a C compiler.
+        If there is no C compiler.
     """
 
     def __init__(
@@ -94,17 +94,17 @@ class HandCode:
         self._run.restype = self._ensemble.restype = None
 
     def single(self, run: Run) -> Call:
-        """Prepare one run, all outputs recorded."""
+        """Prepare one run that records all outputs."""
         outputs = self._subject.outputs
         shared, state, values = arrays(run, [run.par], outputs)
         arguments = (*plan_arguments(run, shared), pointer(state), pointer(values))
         return Call(outputs, values, state, _substeps(run), shared, lambda: self._run(*arguments))
 
     def ensemble(self, run: Run, cases: Sequence[ParameterSet], signals: Sequence[str]) -> Call:
-        """Prepare one run per parameter set, with the initial values and the stimulus of ``run``.
+        """Prepare one run per parameter set, with initial values and stimulus from ``run``.
 
-        ``run``: its own parameters count only as structure; ``cases``: parameter sets; ``signals``:
-        outputs to record.
+        ``run``: a run whose parameters determine only the structure; ``cases``: parameter sets;
+        ``signals``: outputs to record.
         """
         shared, state, values = arrays(run, cases, signals)
         selected = np.array([self._subject.outputs.index(s) for s in signals], dtype=np.int32)
@@ -122,16 +122,16 @@ class HandCode:
 
 
 def load(text: str, flags: tuple[str, ...], entry: str) -> tuple[str, ctypes.CDLL]:
-    """Compile C with a function and return what a table calls it, and the library.
+    """Compile C with a function, and return its label in tables and the library.
 
     Raises
     ------
     CompilerError
-        Without a C compiler, or when it refuses.
+        If there is no C compiler, or if the compilation fails.
     """
     compiler = find_compiler()
     if compiler is None:
-        raise CompilerError("the hand-written C needs a C compiler: install one")
+        raise CompilerError("the hand-written C needs a C compiler. Install one")
     library, _ = load_library(text, flags, compiler, entry)
     return f"hand-written C, {compiler.label}, {' '.join(flags)}", library
 
@@ -139,18 +139,18 @@ def load(text: str, flags: tuple[str, ...], entry: str) -> tuple[str, ctypes.CDL
 def arrays(
     run: Run, cases: Sequence[ParameterSet], signals: Sequence[str]
 ) -> tuple[tuple[Array, Array], Array, Array]:
-    """Return parameters and stimulus, the states at the start, and room for the outputs.
+    """Return parameters and stimulus, initial states, and arrays for the outputs.
 
     Raises
     ------
     ValueError
-        When the run records at another rate than its slowest controller's.
+        If the recording rate differs from the rate of the slowest controller.
     """
     schedule = run.schedule()
     if schedule.record_frames != max(schedule.task_frames) or min(schedule.task_frames) != 1:
         raise ValueError(
-            "the hand-written C records once per tick of the slowest controller: set record to "
-            "its sample time"
+            "the hand-written C records once per tick of the slowest controller. Set record to "
+            "the sample time of this controller"
         )
     parameters = np.array([list(par.leaves().values()) for par in cases], dtype=np.float64)
     stimulus = np.ascontiguousarray(run.stimulus(schedule.stimulus_times), dtype=np.float64)
@@ -160,7 +160,7 @@ def arrays(
 
 
 def plan_arguments(run: Run, shared: tuple[Array, Array]) -> tuple[Any, ...]:
-    """Return the arguments of a C function that parameters, steps and stimulus make."""
+    """Return the arguments of a C function for parameters, steps and stimulus."""
     parameters, stimulus = shared
     schedule = run.schedule()
     return (

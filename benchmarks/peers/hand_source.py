@@ -1,4 +1,4 @@
-"""Hand-written C of a brake: its source put together for a parameter set."""
+"""Assemble the hand-written C source of a brake for a parameter set."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from bywire.core.parameters import ParameterSet
 
 @dataclass(frozen=True)
 class Subject:
-    """A brake, and the hand-written C that there is of it.
+    """A brake and its hand-written C.
 
     Parameters
     ----------
     folder
         Where the files are.
     source, indices, shared
-        Files in that folder: the scheme; what it includes for the generated indices;
-        what it includes for the parts that it shares with other schemes.
+        Files in that folder: the scheme, its include file for the generated indices, and its
+        include files for parts that it shares with other schemes.
     model
         The brake's model, whose signals the indices name.
     flow
         NamedTuple of the integrals over the run.
     choices
-        The choices that the C covers: name of a parameter, its admissible texts.
+        Choices that the C covers, as parameter names with their valid values.
     """
 
     folder: Path
@@ -39,11 +39,11 @@ class Subject:
 
     @property
     def outputs(self) -> tuple[str, ...]:
-        """The model's outputs in order."""
+        """Outputs of the model in order."""
         return tuple(self.model.Output._fields)
 
     def enums(self, par: ParameterSet) -> str:
-        """Return the C enums that name the entries of the arrays, in the model's own order."""
+        """Return C enums with the names of the array entries, in the order of the model."""
         lists: dict[str, Iterable[str]] = {
             "P": (name.replace(".", "_") for name in par.leaves()),
             "X": self.model.State._fields,
@@ -60,19 +60,19 @@ class Subject:
     def text(self, par: ParameterSet, scheme: str | None = None) -> str:
         """Return the complete C source for the structure of a parameter set.
 
-        ``scheme``: another file in place of ``source``.
+        ``scheme``: a file to use instead of ``source``.
 
         Raises
         ------
         ValueError
-            When the set makes a choice that the hand-written C does not cover.
+            If the parameter set contains a choice that the hand-written C does not cover.
         """
         values = par.flat()
         for name, covered in self.choices.items():
             if values[name] not in covered:
                 raise ValueError(
-                    f"{name} = {values[name]!r}: the hand-written C covers "
-                    f"{' and '.join(map(repr, covered))} only"
+                    f"{name} = {values[name]!r} is not covered by the hand-written C, only "
+                    f"{' and '.join(map(repr, covered))}"
                 )
         pieces = {self.indices: self.enums(par)}
         pieces |= {name: (self.folder / name).read_text() for name in self.shared}

@@ -1,4 +1,4 @@
-"""Peer: python-control linearizes the continuous part of a model by finite differences."""
+"""Peer python-control, which linearizes the continuous part of a model by finite differences."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from bywire.core.typing import Array
 
 
 def nonlinear_system(point: Point) -> Any:
-    """Return the continuous part, dry friction removed, as ``control.NonlinearIOSystem``.
+    """Return the continuous part, without dry friction, as ``control.NonlinearIOSystem``.
 
-    Its equations are the model's own functions on Python's numbers; which contacts are closed is
-    found at every call, from inverses that are worked out beforehand.
+    Its equations are the model's own functions on Python numbers. Each call determines which
+    contacts are closed, from precomputed inverses.
     """
     import control
 
@@ -43,7 +43,7 @@ def nonlinear_system(point: Point) -> Any:
 
 
 def by_differences(system: Any, point: Point) -> Array:
-    """Return A by ``control.linearize``."""
+    """Return A from ``control.linearize``."""
     import control
 
     return np.asarray(control.linearize(system, list(point.state), list(point.memory)).A)
@@ -52,7 +52,7 @@ def by_differences(system: Any, point: Point) -> Array:
 def _inverses(C: Array) -> tuple[Array, Array]:
     """Return stiffnesses K of all subsets of closed contacts, and the maps that test them.
 
-    A subset holds where its map leaves nothing below zero: F of its contacts, C F - d elsewhere.
+    A subset is valid if its map has no negative result: F of its contacts, C F - d elsewhere.
     """
     n = len(C)
     stiffnesses, tests = [], []

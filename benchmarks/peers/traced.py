@@ -1,7 +1,7 @@
-"""Arrays of JAX that the model's equations accept.
+"""JAX arrays that the model's equations accept.
 
-``core.ops`` calls NumPy for what it does not know, and NumPy cannot work on values that JAX is
-tracing; an object with ``_bywire_op`` brings its own functions.
+``core.ops`` calls NumPy for unknown types, but NumPy cannot work on values that JAX traces. An
+object with ``_bywire_op`` supplies its own functions.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ _NAMES = {"fabs": "abs", "fmax": "maximum", "fmin": "minimum"}
 
 
 class Traced:
-    """A traced scalar with the arithmetic, the comparisons and the functions of the equations."""
+    """A traced scalar with arithmetic, comparisons, and the functions in the equations."""
 
     def __init__(self, value: Any) -> None:
         self.value = value
@@ -32,7 +32,7 @@ class Traced:
         return Traced(self.value - _bare(other))
 
     def __rsub__(self, other: Any) -> Traced:
-        """Return the difference, the other way round."""
+        """Return the reversed difference."""
         return Traced(_bare(other) - self.value)
 
     def __mul__(self, other: Any) -> Traced:
@@ -44,7 +44,7 @@ class Traced:
         return Traced(self.value / _bare(other))
 
     def __rtruediv__(self, other: Any) -> Traced:
-        """Return the quotient, the other way round."""
+        """Return the reversed quotient."""
         return Traced(_bare(other) / self.value)
 
     def __neg__(self) -> Traced:
@@ -52,15 +52,15 @@ class Traced:
         return Traced(-self.value)
 
     def __lt__(self, other: Any) -> Traced:
-        """Return whether it is smaller."""
+        """Return whether the value is smaller."""
         return Traced(self.value < _bare(other))
 
     def __gt__(self, other: Any) -> Traced:
-        """Return whether it is larger."""
+        """Return whether the value is larger."""
         return Traced(self.value > _bare(other))
 
     def __ge__(self, other: Any) -> Traced:
-        """Return whether it is larger or equal."""
+        """Return whether the value is larger or equal."""
         return Traced(self.value >= _bare(other))
 
     __radd__ = __add__
@@ -72,10 +72,10 @@ def _bare(x: Any) -> Any:
 
 
 def stacked(values: Iterable[Any]) -> Any:
-    """Vector of traced scalars, and of numbers where an equation is a constant."""
+    """Return a vector of traced scalars, and of numbers if an equation is constant."""
     return jnp.stack([jnp.asarray(_bare(value), dtype=float) for value in values])
 
 
 def traced_signals(tuple_type: Any, values: Any) -> Any:
-    """Return a signal tuple of the entries of a traced vector."""
+    """Return the entries of a traced vector as a signal tuple."""
     return tuple_type(*(Traced(value) for value in values))

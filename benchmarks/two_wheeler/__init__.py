@@ -1,1 +1,1 @@
-"""Speed of the two-wheeler: a controlled stop by hand."""
+"""Speed of the two-wheeler in a controlled stop, compared with hand-written C."""

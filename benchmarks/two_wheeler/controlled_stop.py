@@ -1,4 +1,4 @@
-"""A controlled stop of the two-wheeler against hand-written C."""
+"""A controlled stop of the two-wheeler, compared with hand-written C."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _ROUNDS, _STEP, _DURATION = 20, 20e-6, 4.5
 
 
 def controlled_stop(par: TwoWheelerParameters) -> Run:
-    """Return a stop from 30 m/s on wet asphalt by slip control, and half a second of standstill."""
+    """Return a slip-controlled stop from 30 m/s on wet asphalt, and half a second at standstill."""
     options = cast(StraightStopOptions, STRAIGHT_STOP.defaults)
     wet = options.replace({"surface": "wet-asphalt", "v_0": 30.0, "duration": _DURATION})
     case, *_ = STRAIGHT_STOP.cases(par, wet, None)
@@ -27,7 +27,7 @@ def controlled_stop(par: TwoWheelerParameters) -> Run:
 
 
 def single() -> list[Result]:
-    """Measure one controlled stop against hand-written C."""
+    """Compare one controlled stop with hand-written C."""
     run = controlled_stop(cast(TwoWheelerParameters, parameters("sport600")))
     par = cast(TwoWheelerParameters, run.par)
     opponent = HandWrittenStop(par).single(run)
@@ -39,14 +39,14 @@ def single() -> list[Result]:
             ratio(seconds, "bywire", "hand"),
             1.0,
             "ratio",
-            f"one stop of {run.duration:g} s by slip control, all outputs, over hand-written "
-            "C; same scheme, compiler and flags, one call each",
+            f"one slip-controlled stop of {run.duration:g} s, all outputs, relative to "
+            "hand-written C; same scheme, compiler and flags, one call each",
         ),
         Result(
             "vehicle.single.substep",
             1e9 * median(seconds["bywire"]) / substeps,
             "ns",
-            note="a substep of vehicle, brakes and books, one call of the kernel",
+            note="one substep of vehicle, brakes and energy balances, in one call of the kernel",
         ),
     ]
 

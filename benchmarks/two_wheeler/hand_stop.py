@@ -36,7 +36,7 @@ SUBJECT = Subject(
 
 
 class HandWrittenStop(HandCode):
-    """The compiled library of the two-wheeler; see ``HandCode``.
+    """The compiled library of the two-wheeler (see ``HandCode``).
 
     The second counter is the number of substeps that took more than one pass.
     """

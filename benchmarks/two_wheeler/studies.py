@@ -1,4 +1,4 @@
-"""Studies of a vehicle's stops: how much of them is simulation."""
+"""Studies of vehicle stops: the fraction of time that is simulation."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _ROUNDS = 3
 
 
 def studies() -> list[Result]:
-    """Measure the key figures of stops beside their simulation."""
+    """Measure the time of key figures of stops, relative to their simulation."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "study.toml"
         path.write_text(_STUDY, encoding="utf-8")
@@ -35,8 +35,8 @@ def studies() -> list[Result]:
             judged / simulated,
             0.05,
             "1",
-            f"key figures of a vehicle's stop, {1e6 * judged:.3g} us a case, over its simulation, "
-            f"{1e3 * simulated:.3g} ms",
+            f"key figures of a vehicle stop, {1e6 * judged:.3g} us per case, relative to its "
+            f"simulation, {1e3 * simulated:.3g} ms",
         ),
     ]
 

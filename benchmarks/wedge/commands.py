@@ -1,4 +1,4 @@
-"""Whole commands on the wedge brake: a run, the paper."""
+"""Whole commands on the wedge brake: a run, and the paper."""
 
 from __future__ import annotations
 

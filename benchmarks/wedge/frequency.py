@@ -1,4 +1,4 @@
-"""Frequency responses in one ensemble, and linear models against python-control's."""
+"""Frequency responses in one ensemble, and linear models compared with python-control."""
 
 from __future__ import annotations
 
@@ -25,17 +25,17 @@ FREQUENCIES = tuple(np.geomspace(1.0, 100.0, 40).tolist())
 AMPLITUDES = (0.5, 1.0, 2.0)
 BANDWIDTHS = [12.0, 60.0]
 BATCH = 1000
-"""operating points that are linearized at once"""
+"""number of operating points to linearize at once"""
 _ROUNDS, _PAIRS = 15, 2
 
 
 def measured(par: WedgeParameters) -> list[Result]:
-    """Measure everything about frequency responses and linear models."""
+    """Measure all figures of frequency responses and linear models."""
     return [ensemble(par), *linear_models(par)]
 
 
 def ensemble(par: WedgeParameters) -> Result:
-    """Measure Figs. 5 and 6 as one ensemble against the same runs one after another."""
+    """Compare Figs. 5 and 6 as one ensemble with the same runs one after another."""
     loop = LOOPS.find("screw-position")
     sweep = Sweep(
         loop.inputs,
@@ -48,7 +48,7 @@ def ensemble(par: WedgeParameters) -> Result:
     run = loop.point(par, 0.0).run()
     together = timed(partial(frequency_response, run, sweep))
     apart = timed(partial(frequency_response, run, sweep, lanes=False))
-    together()  # warm; the other one is long enough not to need it
+    together()  # warm-up; the other function is long enough not to need it
     pairs = [(together(), apart()) for _ in range(_PAIRS)]
     seconds = {"together": [a for a, _ in pairs], "apart": [b for _, b in pairs]}
     count = len(FREQUENCIES) * len(AMPLITUDES) * len(BANDWIDTHS)
@@ -57,14 +57,15 @@ def ensemble(par: WedgeParameters) -> Result:
         ratio(seconds, "apart", "together"),
         5.0,
         "times faster",
-        f"{count} sines of Figs. 5 and 6, each until it repeats: all cores and lanes, "
-        f"{median(seconds['together']):.2g} s, over the compiled single run on one core, "
-        f"{median(seconds['apart']):.2g} s; single runs carry their energies",
+        f"{count} sines of Figs. 5 and 6, each until it repeats: "
+        f"{median(seconds['together']):.2g} s on all cores and lanes, "
+        f"{median(seconds['apart']):.2g} s with compiled single runs on one core, which also "
+        "compute energies",
     )
 
 
 def linear_models(par: WedgeParameters) -> list[Result]:
-    """Measure the closed wedge brake's linear model, and the plant's against python-control's."""
+    """Measure the linear model of the closed loop, and compare the plant with python-control."""
     loop = LOOPS.find("moment")
     point = loop.point(loop.smooth(par), loop.at.default)
     names = tuple(point.model.Memory._fields)
@@ -116,18 +117,18 @@ def linear_models(par: WedgeParameters) -> list[Result]:
             10.0,
             "ms",
             "closed wedge brake with its moment, position and current control at "
-            f"{loop.at.default:g} N m, lifted to 1 ms, once built; on a busy machine most of "
-            "it is the wait for threads of the library that takes the matrix exponential",
+            f"{loop.at.default:g} N m, lifted to 1 ms, already built; on a busy machine most of "
+            "the time is waiting for the threads of the matrix exponential",
         ),
         at_least(
             "linearize.python_control",
             BATCH * ratio(seconds, "peer", "batch"),
             50.0,
             "times faster",
-            "exact Jacobians of the wedge brake's continuous part at each of a batch of "
-            f"{BATCH} points, {1e6 * median(seconds['batch']) / BATCH:.2g} us, over "
-            "control.linearize (differences) of the same equations as a NonlinearIOSystem, "
-            f"{1e3 * median(seconds['peer']):.2g} ms; entries of A differ by "
+            "exact Jacobians of the wedge brake's continuous part, "
+            f"{1e6 * median(seconds['batch']) / BATCH:.2g} us per point in a batch of {BATCH}; "
+            "control.linearize (differences) of the same equations as a NonlinearIOSystem "
+            f"takes {1e3 * median(seconds['peer']):.2g} ms; entries of A differ by "
             f"{difference:.1g} of the largest",
         ),
         Result(
@@ -135,7 +136,7 @@ def linear_models(par: WedgeParameters) -> list[Result]:
             ratio(seconds, "peer", "one"),
             "times faster",
             note="the same for a single call of linearize, "
-            f"{1e3 * median(seconds['one']):.2g} ms, most of it the way into Python's numbers",
+            f"{1e3 * median(seconds['one']):.2g} ms, mostly for conversion to Python numbers",
         ),
     ]
 

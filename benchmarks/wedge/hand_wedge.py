@@ -13,10 +13,10 @@ from bywire.simulation.compiler import SINGLE
 
 
 class _Wedge(Subject):
-    """The wedge brake, whose C covers two kinds of encoders."""
+    """The wedge brake, whose C covers two types of encoder."""
 
     def text(self, par: ParameterSet, scheme: str | None = None) -> str:
-        """Return the complete C source; see ``Subject.text``."""
+        """Return the complete C source (see ``Subject.text``)."""
         quantized = int(par.flat()["encoder.law"] == "quantized")
         return f"enum {{ QUANTIZED = {quantized} }};\n" + super().text(par, scheme)
 
@@ -46,7 +46,7 @@ SUBJECT = _Wedge(
 
 
 class HandWrittenWedge(HandCode):
-    """The compiled library of the wedge brake; see ``HandCode``.
+    """The compiled library of the wedge brake (see ``HandCode``).
 
     The second counter is the number of passes.
     """

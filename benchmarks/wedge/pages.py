@@ -1,4 +1,4 @@
-"""Size of the brake's page, and how quickly it follows a slider."""
+"""Size of the brake's page, and its response time to a slider."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from bywire.usecases.export import page
 
 
 def _written(path: Path) -> tuple[int, int]:
-    made = page("moment-pulses", path)
-    return made.size, made.compressed
+    written = page("moment-pulses", path)
+    return written.size, written.compressed
 
 
 def _measured() -> list[Result]:

@@ -18,7 +18,7 @@ SIGNALS = ("x", "y_M")
 
 
 class Solution(NamedTuple):
-    """Wedge travel [m] and shown moment [N m] at the recorded instants, seconds that they took."""
+    """Wedge travel [m] and measured moment [N m] at the recorded times, and the run time [s]."""
 
     x: Array
     y_M: Array
@@ -31,13 +31,13 @@ def solve(run: Run, width: float, width_v: float, step: float) -> Solution:
     Parameters
     ----------
     run
-        The problem; its own step does not count.
+        The problem, whose own step does not count.
     width, width_v
-        Speeds over which the frictions of the shafts [rad/s] and of the wedge [m/s] change their
-        signs, as tanh(omega / width).
+        Speeds over which shaft friction [rad/s] and wedge friction [m/s] change sign, as
+        tanh(omega / width).
     step
-        Step [s]. Where the speeds are zero it is stable up to 2.8 times width times inertia over
-        friction; somewhat longer steps chatter within the width and cost little.
+        Step [s]. At zero speed it is stable up to 2.8 times width times inertia divided by
+        friction. Slightly longer steps chatter within the width and cost little accuracy.
     """
     own = replace(run, step=step)
     _, library = load(SUBJECT.text(own.par, "tanh_rk4_wedge.c"), SINGLE, "tanh_run")

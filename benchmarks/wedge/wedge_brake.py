@@ -1,4 +1,4 @@
-"""The wedge brake against hand-written C, and against friction as it is usually regularized."""
+"""The wedge brake compared with hand-written C, and with the usual regularized friction."""
 
 from __future__ import annotations
 
@@ -46,19 +46,20 @@ VARIED = (
 )
 SIGNALS = ("x", "y_M", "i_1")
 _ROUNDS, _ENSEMBLE_ROUNDS = 30, 3
-# Regularized friction: the step at which a run takes a second, and the widths of least error there.
+# Regularized friction: the step at which a run takes one second, and the widths with the least
+# error at this step.
 _WIDTH, _WIDTH_V, _TANH_STEP = 0.03, 1e-5, 1e-6
 
 
 def fig7(par: WedgeParameters, step: float = STEP) -> Run:
-    """Return the run of Fig. 7: a step of the moment demand, then pulses."""
+    """Return the run of Fig. 7, a step of the moment demand and then pulses."""
     options = cast(PulsesOptions, MOMENT_PULSES.defaults)
     case, *_ = MOMENT_PULSES.cases(par, options, None)
     return as_run(case, step)
 
 
 def measured(par: WedgeParameters) -> list[Result]:
-    """Measure everything about the wedge brake."""
+    """Measure all figures of the wedge brake."""
     return [*single(par), *ensemble(par), *regularized(par)]
 
 
@@ -81,21 +82,21 @@ def single(par: WedgeParameters) -> list[Result]:
             ratio(seconds, "bywire", "hand"),
             1.0,
             "ratio",
-            f"one run of Fig. 7, {run.duration:g} s, all outputs, over hand-written C of a "
-            f"fully iterated implicit midpoint, {passes:.2f} passes per substep; same "
+            f"one run of Fig. 7, {run.duration:g} s, all outputs, relative to hand-written C "
+            f"with a fully iterated implicit midpoint, {passes:.2f} passes per substep; same "
             "compiler and flags, one call each",
         ),
         Result(
             "wedge.single.realtime_factor",
             run.duration / median(seconds["plain"]),
             "1",
-            note="simulated over wall time, a call from Python with all its preparation",
+            note="simulated time / wall time of a call from Python, including preparation",
         ),
     ]
 
 
 def ensemble(par: WedgeParameters) -> list[Result]:
-    """Measure 256 variations in lanes against scalar C, a thread each."""
+    """Compare 256 variations in lanes with scalar C, one thread each."""
     run = fig7(par)
     draw = np.random.default_rng(0)
     leaves = par.leaves()
@@ -117,8 +118,9 @@ def ensemble(par: WedgeParameters) -> list[Result]:
             0.7 * width,
             "times faster",
             f"{CASES} variations of {len(VARIED)} parameters, three signals and no energies "
-            "on both sides, over scalar C with the flags of a single run; least processor "
-            f"times of a thread each, in turn; 0.7 of the vector width, {width} doubles",
+            "on both sides, relative to scalar C with the flags of a single run; minimum "
+            "processor times of one thread each, in turn; the goal is 0.7 times the vector "
+            f"width of {width} doubles",
         ),
     ]
 
@@ -135,8 +137,8 @@ def regularized(par: WedgeParameters) -> list[Result]:
 
     Notes
     -----
-    Root mean square of the wedge travel's error, and seconds on one machine, where bywire takes
-    0.03 s with an error of 0.17 nm (20 us) and 0.003 s with 10 nm (200 us):
+    The table shows the root-mean-square error of the wedge travel, and the time on one machine,
+    where bywire takes 0.03 s with an error of 0.17 nm (20 us) and 0.003 s with 10 nm (200 us):
 
     ======  ==========  =========  ==========  =======
     rad/s   m/s         step [us]  error [nm]  seconds
@@ -148,7 +150,7 @@ def regularized(par: WedgeParameters) -> list[Result]:
     0.01    3e-6        0.2        68          5.0
     ======  ==========  =========  ==========  =======
     """
-    ideal = par.replace({"encoder.law": "ideal"})  # one count of it would hide small errors
+    ideal = par.replace({"encoder.law": "ideal"})  # one encoder count would hide small errors
     run = fig7(ideal)
     exact = simulate(fig7(ideal, FINE), tanh_rk4.SIGNALS)
     own = simulate(run, tanh_rk4.SIGNALS)
@@ -160,10 +162,10 @@ def regularized(par: WedgeParameters) -> list[Result]:
     better = any(theirs < ours for theirs, ours in zip(others, errors, strict=True))
     note = (
         f"tanh of {_WIDTH:g} rad/s and {_WIDTH_V:g} m/s, RK4 with {_TANH_STEP * 1e6:g} us in C; "
-        f"rms errors: bywire {errors[0] * 1e9:.2g} nm and {errors[1]:.2g} N m, "
+        f"RMS errors: bywire {errors[0] * 1e9:.2g} nm and {errors[1]:.2g} N m, "
         f"tanh {others[0] * 1e9:.2g} nm and {others[1]:.2g} N m"
     )
-    note += "; the peer is the more exact here" if better else "; at equal error it is slower still"
+    note += "; the peer is more accurate here" if better else "; at equal error it is even slower"
     return [at_least("wedge.peer.tanh_rk4", solution.seconds / seconds, 20.0, "times faster", note)]
 
 

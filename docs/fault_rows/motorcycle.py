@@ -31,20 +31,18 @@ CONDUCTANCE = "m**3/(s*Pa)"
 FROZEN = (1.7, 19.8, 36.9, 51.4, 51.4, 37.1, 16.6)
 AHEAD = 0.75e-3 / 20e-3
 PHASE = (
-    "the stated phases are for a dither that is three quarters of an ECU "
-    "sample ahead, and the final pressure differs by up to 13 bar from sample"
-    " to sample. With the same lead, all seven pressures agree within 1.8 "
-    "bar, and four of them within 0.1 bar. In the other three cases, the "
-    "brake is still releasing, and a duty cycle of 0.005 corresponds to 1.8 "
-    "bar"
+    "in the prototype, the dither is three quarters of an ECU sample ahead. The final pressure "
+    "changes by up to 13 bar from sample to sample. With the same lead, all seven pressures "
+    "agree to within 1.8 bar, and four of them to within 0.1 bar. In the other three cases, the "
+    "brake is still releasing, and a duty cycle of 0.005 corresponds to 1.8 bar"
 )
 LATE = (
     "with a delay of five ticks, the current loop is unstable. Its phase "
     "crosses -180 degrees at 44 Hz, where its gain is 1.28. Without dither, "
-    "it oscillates at 41 Hz with 18 A. It amplifies the 50 Hz dither 4.6 "
-    "times to 13.5 A, in addition to 3.6 A at 41 Hz. So close to the "
-    "resonance, the result depends strongly on the gain. With 10 % more or "
-    "less integral gain, it is 12.1 or 8.1 A, and with 17 % less, it is 7 A. "
+    "it oscillates at 41 Hz with 18 A. It amplifies the 50 Hz dither by a factor of 4.6 to 13.5 "
+    "A, in addition to 3.6 A at 41 Hz. Near the resonance, the result depends strongly on the "
+    "gain. With 10 % more or less integral gain, the ripple is 12.1 or 8.1 A. With 17 % less, it"
+    " is 7 A. "
     "The definition of the stated figure is not known. In the computed "
     "current, half the range is 17.3 A, the mean deviation is 8.8 A, and the "
     "difference from the fault-free current is 6.5 A"
@@ -57,7 +55,7 @@ def _seal() -> list[Row]:
         Row("seal.swollen 1.9", "remaining pressure without power", 3.0, "bar", ends(RELEASES)),
         Row(
             "seal.swollen 3",
-            "share of time stuck, step from 6 to 37 bar",
+            "fraction of time stuck, step from 6 to 37 bar",
             87.0,
             "%",
             figure("share_stuck", "seal.swollen", 3.0, factor=100.0),
@@ -102,11 +100,11 @@ def _supply() -> list[Row]:
             "ms",
             figure("rise_time", weak, factor=1e3),
         ),
-        Row(weak + " 6 V", "increase of the rise time", 40.0, "%", ratio("rise_time", weak)),
+        Row(weak + " 6 V", "increase in rise time", 40.0, "%", ratio("rise_time", weak)),
         Row(weak + " 6 V", "overshoot", 12.0, "%", figure("overshoot", weak)),
         Row(
             weak + " 6 V",
-            "share of time at the duty limit",
+            "fraction of time at the duty limit",
             7.0,
             "%",
             figure("share_sat_duty", weak, factor=100),
@@ -125,7 +123,7 @@ def _supply() -> list[Row]:
             for fault in (one("bridge.stuck", duty),)
             for row in (
                 Row(
-                    f"bridge.stuck {duty:g}", "over 45 bar after", after, "ms", passes(fault, 45.0)
+                    f"bridge.stuck {duty:g}", "above 45 bar after", after, "ms", passes(fault, 45.0)
                 ),
                 Row(f"bridge.stuck {duty:g}", "steady pressure", (52.0, 54.0), "bar", ends(fault)),
                 Row(f"bridge.stuck {duty:g}", "current", current, "A", ends(fault, "i", 1.0)),
@@ -136,7 +134,7 @@ def _supply() -> list[Row]:
 
 def _motor_and_sensors() -> list[Row]:
     return [
-        Row("motor.hot 2", "increase of the rise time", 8.0, "%", ratio("rise_time", "motor.hot")),
+        Row("motor.hot 2", "increase in rise time", 8.0, "%", ratio("rise_time", "motor.hot")),
         Row(
             "motor.hot 2",
             "steady-state error",
@@ -152,9 +150,9 @@ def _motor_and_sensors() -> list[Row]:
             1.43,
             "1",
             current_ratio,
-            "the ECU does not know that the magnets are weak, so its dither is also "
-            "weaker. The piston sticks permanently, and friction carries part of the "
-            "load. If the ECU knows the torque constant, the figure is 1.42",
+            "the ECU's parameters are for strong magnets, so its dither is also weaker. The "
+            "piston sticks permanently, and friction supports part of the load. With the correct"
+            " torque constant in the ECU, the figure is 1.42",
         ),
         Row("current.stuck 0", "peak", 45.5, "bar", most(one("current.stuck", "0 A"))),
         Row("current.stuck 0", "time of the peak", 36.0, "ms", peak_time),
@@ -198,7 +196,7 @@ def _motor_and_sensors() -> list[Row]:
             for row in (
                 Row(
                     f"pressure.stuck {level} bar",
-                    "over 45 bar after",
+                    "above 45 bar after",
                     after,
                     "ms",
                     passes(fault, 45.0),
@@ -236,8 +234,8 @@ def _controller() -> list[Row]:
             ends(one("ecu.dropped", 5), rows=1000),
             "the ECU runs only every fifth tick, but bywire's controller treats "
             "differences over five sample times as differences over one sample time. "
-            "Its derivative term is then five times as large, and the demand "
-            "alternates between +-20 A",
+            "The derivative term is then five times as large, and the demand alternates between "
+            "+-20 A",
         ),
         Row("bridge.late 5", "peak", 38.5, "bar", most(one("bridge.late", 5))),
         Row(
@@ -250,15 +248,17 @@ def _controller() -> list[Row]:
         ),
         Row(
             "bridge.late 5",
-            "the same with 17 % less integral gain",
+            "ripple of the current with 17 % less integral gain",
             None,
             "A",
             late_with_less,
-            note="without dither, the current loop no longer oscillates (see above)",
+            note=(
+                "with this gain and without dither, the current loop does not oscillate (see above)"
+            ),
         ),
         Row(
             "ecu.frozen",
-            "lowest pressure of seven phases",
+            "minimum pressure of seven phases",
             min(FROZEN),
             "bar",
             lambda: min(frozen()),
@@ -266,14 +266,14 @@ def _controller() -> list[Row]:
         ),
         Row(
             "ecu.frozen",
-            "highest pressure of seven phases",
+            "maximum pressure of seven phases",
             max(FROZEN),
             "bar",
             lambda: max(frozen()),
         ),
         Row(
             "ecu.frozen",
-            "largest deviation of the seven phases, dither 0.75 ms ahead",
+            "maximum deviation of the seven phases, dither 0.75 ms ahead",
             None,
             "bar",
             lambda: max(
@@ -296,12 +296,12 @@ def _fluid() -> list[Row]:
     slow = one(LEAK, f"1e-14 {CONDUCTANCE}")
     return [
         Row("fluid.air 0.0088 ml", "travel at 37 bar", 8.62, "mm", lambda: travel(little)),
-        Row("fluid.air 0.0088 ml", "the same without air", 8.53, "mm", lambda: travel(())),
+        Row("fluid.air 0.0088 ml", "travel at 37 bar without air", 8.53, "mm", lambda: travel(())),
         Row("fluid.air-in-line 1.28 ml", "steady pressure", 0.6, "bar", ends(AIR, options=APPLY)),
         Row("fluid.air-in-line 1.28 ml", "current", 19.8, "A", ends(AIR, "i", 1.0, options=APPLY)),
         Row(
             "fluid.air-in-line 0.123 ml",
-            "highest pressure",
+            "maximum pressure",
             37.0,
             "bar",
             ends(one("fluid.air-in-line", "0.123 ml", FROM_START), options=APPLY),

@@ -1,4 +1,4 @@
-"""A stated figure of a fault beside the computed one."""
+"""A stated figure of a fault, next to the computed figure."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 FLOORS = {"bar": 0.2, "ms": 10.0}
-"""smallest tolerance by unit, used if a tenth of the stated figure is less"""
+"""minimum tolerance by unit, used if a tenth of the stated figure is smaller"""
 
 
 @dataclass(frozen=True)
@@ -20,17 +20,17 @@ class Row:
     what
         Name of the figure.
     stated
-        Stated figure, or its least and largest value; None if none is stated.
+        Stated figure, or its minimum and maximum; None without a stated figure.
     unit
-        Of both figures.
+        Unit of both figures.
     computed
-        Runs our bench and returns the figure.
+        Function that runs the bench and returns the figure.
     because
         Reason for a disagreement; empty if the figures agree.
     note
-        Explanation of a figure that agrees, or for which none is stated.
+        Explanation of a figure that agrees or has no stated figure.
     daily
-        Whether every test run can afford it.
+        Whether the row is fast enough for every test run.
     """
 
     fault: str
@@ -43,7 +43,7 @@ class Row:
     daily: bool = False
 
     def agrees(self, value: float) -> bool:
-        """Return whether a value is within a tenth, or the unit's floor, of the stated one."""
+        """Return whether a value is within the tolerance: a tenth, or the unit's minimum."""
         if self.stated is None:
             return True
         low, high = self.stated if isinstance(self.stated, tuple) else (self.stated, self.stated)

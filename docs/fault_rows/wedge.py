@@ -163,27 +163,25 @@ WORN = ("power-off-hold", (), "heart.worn")
 WOUND = ("moment-ramp", (), "moment.stuck", 0.0)
 LOST = ("moment-ramp", (), "caliper.pad-lost")
 CONTROLLED = (
-    "28 is the ripple in Fig. 7 while the moment control holds 200 N m. With "
-    "stationary screws, it is 21.0. The disc turns at 9.5 Hz, near the loop's"
-    " crossover at 8 Hz. Without friction, the control reduces 21.0 by 12 % "
-    "to 18.4 N m. Shafts that stick at every reversal respond late, which "
-    "increases the ripple. It is 27.5 N m with lossless screws, 31.5 with "
-    "bywire's friction, and 28.4 at 950 N m"
+    "28 N m is the ripple in Fig. 7 while the moment control holds 200 N m. With stationary "
+    "screws, the ripple is 21.0 N m. The disc turns at 9.5 Hz, near the loop's crossover at 8 "
+    "Hz. Without friction, the control reduces the ripple by 12 % to 18.4 N m. Shafts that stick"
+    " at every reversal respond late, which increases the ripple. It is 27.5 N m with lossless "
+    "screws, 31.5 N m with bywire's friction, and 28.4 N m at a moment of 950 N m"
 )
 FIVEFOLD = (
-    "140 is five times 28, but the contribution of sticking does not increase"
-    " with the runout. Relative to stationary screws, the ripple is 1.48 at "
+    "140 N m is five times 28 N m, but the contribution of sticking does not increase with the "
+    "runout. Relative to stationary screws, the ripple is 1.48 at "
     "4 um, 1.19 at 8 um, 1.07 at 12 um and 0.98 at 20 um"
 )
 STANDING = (
-    "the formula is 2 mu_B r_B K_cal times the peak-to-peak runout, which "
-    "gives 21.0 N m and five times this value"
+    "2 mu_B r_B K_cal times the peak-to-peak runout is 21.0 N m, and five times this value with "
+    "five times the runout"
 )
 CREEP = (
-    "0.1 mm corresponds to 0.863 rad at the motors, which takes 7.19 ms at "
-    "the gap mode's 120 rad/s. If the ECU does not know that the gap has "
-    "grown, the additional gap lies beyond the assumed contact point. There, "
-    "the brake moves at only 10 rad/s, which takes 86.3 ms"
+    "0.1 mm corresponds to 0.863 rad at the motors, which takes 7.19 ms at the gap mode's 120 "
+    "rad/s. If the ECU assumes the original gap, the additional gap is beyond the assumed "
+    "contact point. There, the brake moves at only 10 rad/s, which takes 86.3 ms"
 )
 
 
@@ -193,7 +191,7 @@ def _motors() -> list[Row]:
         *(
             Row(
                 "power.stuck 1",
-                f"remaining moment of 500 N m at mu_B {mu_B:g}",
+                f"remaining moment (initially 500 N m) at mu_B {mu_B:g}",
                 kept,
                 "N m",
                 figure("moment_end", hold, (("wedge.mu_B", mu_B),)),
@@ -218,7 +216,7 @@ def _motors() -> list[Row]:
         ),
         Row(
             "drive_1.stuck 0",
-            "largest force of the other motor, 20 A",
+            "maximum force of the other motor, 20 A",
             4084.0,
             "N",
             strongest,
@@ -238,7 +236,7 @@ def _motors() -> list[Row]:
         *(
             Row(
                 f"drive_{k}.stuck 0",
-                "moment achieved of 950 N m at mu_B 0.2",
+                "achieved moment (demand 950 N m) at mu_B 0.2",
                 None,
                 "N m",
                 held("M_B", "moment-ramp", friction(0.2), f"drive_{k}.stuck", 0.0, options=HIGH),
@@ -247,17 +245,16 @@ def _motors() -> list[Row]:
         ),
         Row(
             "screw_1.jammed",
-            "largest travel of the wedge",
+            "maximum travel of the wedge",
             (0.0, 40.0),
             "um",
             moved,
-            "26 um are free play. The other 27 um come from the spring of 24 N/um, "
-            "which pressed the wedge against the jammed screw with 647 N and then "
-            "relaxes",
+            "26 um of the travel are free play. The other 27 um come from the spring of 24 N/um,"
+            " which presses the wedge against the jammed screw with 647 N and then relaxes",
         ),
         Row(
             "motor_1.shorted",
-            "moment achieved of 200 N m",
+            "achieved moment (demand 200 N m)",
             None,
             "N m",
             held("M_B", "moment-ramp", (), "motor_1.shorted", options=LOW),
@@ -267,7 +264,7 @@ def _motors() -> list[Row]:
 
 def _sensors() -> list[Row]:
     return [
-        Row("encoder_1.offset", "force fight, tens of N per um", (10.0, 99.0), "N/um", fight),
+        Row("encoder_1.offset", "force fight", (10.0, 99.0), "N/um", fight),
         Row(
             "moment.offset 50 N m",
             "change of the moment",
@@ -298,7 +295,7 @@ def _mechanics() -> list[Row]:
         ),
         Row(
             "caliper.pad-lost",
-            "largest moment at any travel",
+            "maximum moment at any travel",
             0.0,
             "N m",
             lambda: float(np.abs(rows_of("M_B", 0.0, *LOST, onset=FROM_START)).max()),
@@ -313,7 +310,7 @@ def _mechanics() -> list[Row]:
         ),
         Row(
             "heart.worn 5",
-            "the same for a fault-free brake",
+            "preload without power, fault-free brake",
             454.0,
             "N",
             figure("preload_end", "power-off-hold"),
@@ -334,7 +331,7 @@ def _mechanics() -> list[Row]:
         ),
         Row(
             "wedge_friction.worn 5",
-            "remaining moment of 500 N m without power",
+            "remaining moment (initially 500 N m) without power",
             None,
             "N m",
             figure("moment_end", "power-off-hold", (), "wedge_friction.worn", onset=FROM_START),

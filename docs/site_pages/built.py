@@ -1,4 +1,4 @@
-"""What a built site must keep: links that lead somewhere, nothing from other hosts, pictures."""
+"""Checks of a built site: no dead links, nothing from other hosts, all figures present."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ _ELSEWHERE = re.compile(
 
 
 def faults(folder: Path, pictures: Mapping[str, int]) -> Iterator[str]:
-    """Yield what is wrong with a site.
+    """Yield the faults of a site.
 
     Parameters
     ----------
     folder
         The site.
     pictures
-        Page -> how many figures it must show at least.
+        Page -> minimum number of figures that it must show.
     """
     for path in sorted(folder.rglob("*.html")):
         page = path.relative_to(folder).with_suffix("").as_posix()
@@ -39,7 +39,7 @@ def faults(folder: Path, pictures: Mapping[str, int]) -> Iterator[str]:
         if loaded := _ELSEWHERE.search(text):
             yield f"{page} loads from another host: {loaded.group()}"
         if page.startswith("live/"):
-            continue  # a page of its own, whose script makes its links
+            continue  # a separate page, whose script creates its links
         if text.count("<img") < pictures.get(page, 0):
             yield f"{page} does not show its {pictures[page]} figures"
         for target in sorted(set(_LINK.findall(text))):

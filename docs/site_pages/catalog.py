@@ -1,4 +1,4 @@
-"""A page for each kind of thing in the registry, with the text of ``bywire list NAME``."""
+"""A page for each kind of object in the registry, with the text of ``bywire list NAME``."""
 
 from __future__ import annotations
 
@@ -28,18 +28,18 @@ from site_pages.markdown import block_lines, plain, section_lines, table_lines
 
 @dataclass(frozen=True)
 class Topic:
-    """A page for one or several kinds of things.
+    """A page for one or several kinds of objects.
 
     Parameters
     ----------
     title, about
         Heading, and the sentence below it.
     names
-        Kind of thing, as `bywire.describe` calls it -> a function that returns all names.
+        Kind of object, as `bywire.describe` calls it -> a function that returns all names.
     are_apart
-        Each has a page of its own.
+        Whether each object has its own page.
     command
-        Returns the lines below the description of each, with a marked block.
+        Function that returns the lines below each description, with a marked block.
     """
 
     title: str
@@ -84,7 +84,7 @@ TOPICS = {
     ),
     "experiments": Topic(
         "Experiments",
-        "Names for the key `experiment` of a bench file, with options and key figures.",
+        "Names for the key `experiment` in a bench file, with options and key figures.",
         {
             "experiment": lambda: EXPERIMENTS.all(),
             "generic experiment": lambda: GENERIC_EXPERIMENTS.all(),
@@ -94,7 +94,7 @@ TOPICS = {
     ),
     "stimuli": Topic(
         "Stimuli",
-        "Inputs of an experiment over time, for `[stimulus]` of a bench file.",
+        "Inputs of an experiment over time, for the section `[stimulus]` of a bench file.",
         {"stimulus": lambda: STIMULI.all()},
     ),
     "key-figures": Topic(
@@ -108,17 +108,17 @@ TOPICS = {
         {"loop": lambda: LOOPS.all(), "plant": lambda: PLANTS.all()},
     ),
     "methods": Topic(
-        "Methods of identification",
+        "Identification methods",
         "Names for `identify`.",
         {"method": lambda: METHODS.all(), "method of any bench": lambda: BENCH_METHODS.all()},
     ),
     "studies": Topic(
-        "Studies and lives",
+        "Sizing studies and life projections",
         "Names for `study size` and `life`.",
         {"study": lambda: STUDIES.all(), "life": lambda: LIVES.all()},
     ),
     "campaigns": Topic(
-        "Campaigns of faults",
+        "Fault campaigns",
         "Names for `faults`.",
         {"campaign": lambda: CAMPAIGNS.all()},
     ),
@@ -145,7 +145,7 @@ def texts() -> Iterator[tuple[str, str]]:
 
 
 def described_as(kind: str, name: str) -> dict[str, Any]:
-    """Return the description of a name as a kind of thing."""
+    """Return the description of a name as a kind of object."""
     return next(each for each in described(name) if each["kind"] == kind)
 
 
@@ -154,12 +154,12 @@ def _lines(thing: dict[str, Any], level: int) -> list[str]:
 
 
 def faults_page() -> str:
-    """Return the page of all faults, one per line: most differ only by their signal."""
+    """Return the page of all faults, one per line, because most differ only by their signal."""
     lines = [
         "# Faults",
         "",
-        "Names for `[[faults]]` of a bench file and for `--fault`. `bywire list NAME` shows all "
-        "about one fault.",
+        "Names for `[[faults]]` in a bench file and for `--fault`. `bywire list NAME` shows the "
+        "details of a fault.",
         "",
     ]
     rows = ([f"`{name}`", plain(summary)] for name, summary in all_things()["faults"].items())
@@ -167,12 +167,13 @@ def faults_page() -> str:
 
 
 def loop_figures_page() -> str:
-    """Return the page of the figures of loops, one per line."""
+    """Return the page of all loop figures, one per line."""
     lines = [
-        "# Figures of loops",
+        "# Loop figures",
         "",
-        "Figures that `--require` of `bywire design`, or a file of requirements, can limit, by "
-        "either name. `bywire margins --json` reports figures with a second name under that name.",
+        "`bywire design --require`, or a file with requirements, can set limits for these figures. "
+        "If a figure has a second name, `bywire margins --json` uses it, and requirements accept "
+        "both names.",
         "",
     ]
     rows = (
@@ -180,7 +181,7 @@ def loop_figures_page() -> str:
             f"`{figure.name}`",
             f"`{figure.margin}`" if figure.margin else "",
             "" if figure.unit == "1" else figure.unit,
-            "less" if figure.is_less_better else "more",
+            "lower" if figure.is_less_better else "higher",
             plain(figure.meaning),
         ]
         for figure in LOOP_FIGURES.values()
@@ -190,7 +191,7 @@ def loop_figures_page() -> str:
 
 
 def brakes_page() -> str:
-    """Return the page of the brakes that come with bywire, with schematics of their models."""
+    """Return the page of the included brakes, with schematics of their models."""
     rows = ([f"`{brake.name}`", plain(brake.summary)] for brake in brakes().values())
     lines = ["# Brakes", "", *table_lines(["brake", "description"], rows)]
     main = {cited.assembly: name for name, cited in reversed(PARAMETER_SETS.all().items())}

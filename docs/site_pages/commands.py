@@ -1,4 +1,4 @@
-"""All commands with their arguments and options, from their help."""
+"""Page of all commands with their arguments and options, from their help."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from site_pages.markdown import plain, table_lines
 
 
 def commands() -> dict[str, Any]:
-    """Return the words a user types -> the command; subcommands replace their group."""
+    """Return the words that a user types -> the command; subcommands replace their group."""
     return dict(_leaves("bywire", program()))
 
 
@@ -30,7 +30,7 @@ def page() -> str:
         "",
         "Each command calls a public function, with the same checks and warnings. `bywire COMMAND "
         "--help` prints the same text. Add `--system PATH` to use your own brake with any command. "
-        "One page with all commands: [](../cheat-sheet.md).",
+        "The [](../cheat-sheet.md) lists all commands on one page.",
         "",
     ]
     for words, command in commands().items():

@@ -1,4 +1,4 @@
-"""A page for each physical element and control law: equations, parameters, signals, faults."""
+"""Page of each physical element and control law: equations, parameters, signals, faults."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _ROOMS = {"elements": "Elements", "laws": "Laws"}
 
 
 def modules() -> dict[str, dict[str, ModuleType]]:
-    """Return titles of rooms -> names -> elements and laws, general ones first."""
+    """Return title of a folder -> name -> element or law; general folders come first."""
     rooms = {"Elements": _inside(plant), "Control laws": _inside(control)}
     for brake in brakes().values():
         for folder, title in _ROOMS.items():
@@ -37,7 +37,7 @@ def _inside(package: ModuleType) -> dict[str, ModuleType]:
 
 
 def index() -> str:
-    """Return the page that lists them."""
+    """Return the page that lists all elements and laws."""
     lines = ["Elements and control laws", "=" * 25, ""]
     for title, inside in modules().items():
         lines += [title, "-" * len(title), "", ".. toctree::", "   :maxdepth: 1", ""]

@@ -27,10 +27,10 @@ GENERATED = HERE / "_generated"
 GALLERY = HERE.parent / "examples" / "gallery"
 FIGURES = GENERATED / "gallery-figures"
 _log = logging.getLogger(__name__)
-_shown: dict[str, list[results.Shown]] = {}  # page -> what its marked blocks show
-_pictures: dict[str, list[str]] = {}  # marker of a page -> thumbnails in its place
+_shown: dict[str, list[results.Shown]] = {}  # page -> results of its marked blocks
+_pictures: dict[str, list[str]] = {}  # marker in a page -> thumbnails that replace it
 
-# Links of pages in this folder that leave it in the repository -> the page that replaces them.
+# Links that leave this folder in the repository -> the page that replaces them on the site.
 _MOVED = {
     "../examples/emb_caliper": "_generated/third-brake.md",
     "../examples/emb_caliper/README.md": "_generated/third-brake.md",
@@ -41,7 +41,7 @@ _MOVED = {
 
 
 def setup(app: Sphinx) -> dict[str, Any]:
-    """Connect everything."""
+    """Connect the generated pages, results, links, formulas and checks to Sphinx."""
     app.connect("builder-inited", _make_pages, priority=100)  # before the gallery
     app.connect("env-get-outdated", _pages_with_results)
     app.connect("source-read", _show_results)
@@ -91,7 +91,7 @@ def _follow_links(app: Sphinx, name: str, source: list[str]) -> None:
 
 
 class FileScraper:
-    """Scraper of the figures that an example writes into the folder of its ``--out``."""
+    """Scraper of the figures that an example writes into its ``--out`` folder."""
 
     def __call__(self, block: Any, block_vars: dict[str, Any], gallery_conf: Any) -> str:
         """Return the new figures as reStructuredText."""
@@ -107,12 +107,12 @@ class FileScraper:
 
 
 def name_script(gallery_conf: Any, script: str) -> None:
-    """Give an example the ``__file__`` that it has as a script."""
+    """Set ``__file__`` for an example, as for a script."""
     vars(builtins)["__file__"] = str(GALLERY / Path(script).name)
 
 
 def arguments(gallery_conf: Any, script: dict[str, Any]) -> list[str]:
-    """Return the arguments of an example of the gallery."""
+    """Return the arguments of a gallery example."""
     FIGURES.mkdir(parents=True, exist_ok=True)
     return ["--out", str(FIGURES)]
 

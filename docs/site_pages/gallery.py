@@ -1,4 +1,4 @@
-"""Thumbnails of all figures on the pages of the site, each with its command."""
+"""Thumbnails of all figures on the site's pages, each with its command."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from site_pages.results import Shown, Step, steps
 MARKER = "<!-- pictures -->"
 PAPER_MARKER = "<!-- pictures of the papers -->"
 EXPERIMENTS = "_generated/experiments/"
-_SIZE = (480, 360)  # px; of a higher figure, the upper part
+_SIZE = (480, 360)  # px; a higher figure is cut off below
 # An experiment is shown by the first of its figures whose name begins with one of these.
 _FIRST = (
     "step-response",
@@ -32,14 +32,14 @@ _FIRST = (
 def lines(
     texts: Mapping[str, str], shown: Mapping[str, list[Shown]], folder: Path, place: str
 ) -> Iterator[str]:
-    """Yield the cards by page, and write their thumbnails beside the figures.
+    """Yield the cards by page, and write their thumbnails next to the figures.
 
     Parameters
     ----------
     texts
         Page -> its text.
     shown
-        Page -> what its marked blocks show.
+        Page -> results of its marked blocks.
     folder
         Folder of all figures.
     place
@@ -95,7 +95,7 @@ def _card(page: str, command: str, file: Path, place: str) -> str:
 
 
 def paper_lines(folder: Path, place: str) -> Iterator[str]:
-    """Yield the cards of the figures that are drawn for the papers.
+    """Yield the cards of the papers' figures.
 
     Parameters
     ----------

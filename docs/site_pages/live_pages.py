@@ -1,4 +1,4 @@
-"""Benches that compute in the reader's browser."""
+"""Page with benches that run in the reader's browser."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from site_pages.markdown import plain
 ROOT = Path(__file__).parents[2]
 BENCHES = {
     "hard-braking": (
-        "Motorcycle brake: a step of the brake pressure",
+        "Motorcycle brake: a step in the brake pressure",
         "hard-braking",
         ("seal.T_pr", "ecu.dither.gain", "ecu.pressure.k_p", "motor.R_m"),
     ),
@@ -38,9 +38,9 @@ def page() -> str:
         "",
         "# Live benches",
         "",
-        "The brake's own kernel, compiled to WebAssembly, runs in this page. Move a slider, and "
-        "curves and key figures follow. The page sends nothing anywhere. To make such a file of "
-        "your own bench, see [](../page.md).",
+        "The brake's own kernel, compiled to WebAssembly, runs in this page. Move a slider to "
+        "update the curves and key figures. The page does not send any data. To create such a "
+        "page for your own bench, see [](../page.md).",
         "",
     ]
     for name, (title, *_) in BENCHES.items():

@@ -1,4 +1,4 @@
-"""All generated pages, and the condition under which they are generated again."""
+"""All generated pages, and the check whether to generate them again."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def write(folder: Path, said: Callable[[str], None]) -> None:
         return
     if stamp.exists():
         stamp.unlink()
-    kept = {"gallery", RESULTS}  # they know themselves what has changed
+    kept = {"gallery", RESULTS}  # they have their own records of changes
     for path in folder.iterdir() if folder.exists() else ():
         if path.name not in kept:
             shutil.rmtree(path) if path.is_dir() else path.unlink()

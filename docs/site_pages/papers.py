@@ -1,4 +1,4 @@
-"""Each published source: its statements beside the computed values, with figures."""
+"""Page of each published source: its statements next to the computed values, with figures."""
 
 from __future__ import annotations
 
@@ -15,5 +15,5 @@ def sources() -> list[str]:
 
 
 def page(source: str, folder: Path) -> str:
-    """Return the page of a source, computed now, and write its figures into the folder."""
+    """Compute and return the page of a source, and write its figures into the folder."""
     return document_page(bywire.reproduce(source).document(), folder / f"{source}-figures")

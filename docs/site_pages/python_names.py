@@ -24,7 +24,7 @@ def public() -> dict[str, Any]:
 def homes() -> dict[str, str]:
     """Return the full name of an object -> the name that users import."""
     known = {}
-    for face in (authoring, bywire):  # of two names, the shorter
+    for face in (authoring, bywire):  # if there are two names, use the shorter one
         for name in face.__all__:
             thing = getattr(face, name)
             home = getattr(thing, "__module__", "")
@@ -39,8 +39,8 @@ def page() -> str:
         "Python",
         "======",
         "",
-        "``import bywire`` is fast: modules load on first use. A function that is also a command "
-        "takes the same arguments and gives the same warnings.",
+        "``import bywire`` is fast, because modules load on first use. If a function is also a "
+        "command, both have the same arguments and warnings.",
         "",
     ]
     functions = {n: f for n, f in public().items() if inspect.isfunction(f)}
@@ -100,9 +100,9 @@ def errors_page() -> str:
             "Errors",
             "======",
             "",
-            "A command that fails prints one line and exits with the status below. Status 1 means "
-            "that a requirement or check is not met, status 130 that the command was interrupted. "
-            "Messages with causes and remedies: :doc:`../troubleshooting`.",
+            "If a command fails, it prints one line and exits with the status below. Status 1 "
+            "means that a requirement or check is not met. Status 130 means that you interrupted "
+            "the command. For messages with causes and remedies, see :doc:`../troubleshooting`.",
             "",
             ".. automodule:: bywire.core.errors",
             "   :members:",

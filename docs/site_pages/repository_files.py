@@ -1,4 +1,4 @@
-"""Pages of files of the repository: bench files, the third brake, the changelog."""
+"""Pages that show files of the repository: bench files, the third brake, the changelog."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ def benches_page() -> str:
     lines = [
         "# Bench and study files",
         "",
-        "These files are in `benches/` and `studies/` of the repository. For every key, see "
-        "[](../bench-files.md) and [](../studies.md).",
+        "These files are in the repository's folders `benches/` and `studies/`. "
+        "[](../bench-files.md) and [](../studies.md) describe all keys.",
         "",
     ]
     for folder in ("benches", "studies"):

@@ -41,7 +41,7 @@ _NOT_PAGES = {"_build", "_generated", "trust"}
 
 
 class PageError(Exception):
-    """A marked block that does not do what its page says."""
+    """A marked block whose commands or figures do not match its page."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Step:
     language
         ``sh`` or ``python``; nothing for a file.
     text
-        Its content.
+        Content of the block.
     figures
         Names of the figures to show.
     file
@@ -80,7 +80,7 @@ class Shown:
     text
         Terminal output.
     figures
-        Paths of figures that it wrote -> their file names in the folder of what is kept.
+        Paths of figures that it wrote -> their file names in the folder of stored results.
     """
 
     text: str
@@ -88,9 +88,9 @@ class Shown:
 
 
 def pages(folder: Path = DOCS) -> dict[str, str]:
-    """Return all pages in a folder as paths from `DOCS`, without their ending -> text.
+    """Return all pages in a folder as paths from `DOCS`, without their extension -> text.
 
-    Pages in its folder ``_generated`` are left out.
+    Pages in its folder ``_generated`` are omitted.
     """
     paths = sorted(folder.rglob("*.md"))
     return {
@@ -181,7 +181,7 @@ def _run(language: str, command: str, folder: Path) -> str:
 
 
 def _wrapped(line: str) -> str:
-    """Return a line of prose as a terminal shows it; rows of tables stay whole."""
+    """Return a line of prose, wrapped as in a terminal; table rows are not wrapped."""
     is_prose = len(line) > COLUMNS and "  " not in line.strip()
     return textwrap.fill(line, COLUMNS, break_long_words=False) if is_prose else line
 
@@ -190,20 +190,20 @@ def _lines(text: str) -> list[str]:
     return [line for line in text.replace("\\\n", "").splitlines() if line.strip()]
 
 
-# --- All pages, and what is kept of them
+# --- All pages, and their stored results
 
 
 def start(
     pool: ThreadPoolExecutor, texts: Mapping[str, str], folder: Path, sources: str
 ) -> dict[str, Future[list[Shown]]]:
-    """Start all pages with marked blocks, in processes beside each other.
+    """Start all pages with marked blocks, in parallel processes.
 
     Parameters
     ----------
     texts
         Page -> its text.
     folder
-        Folder of what is kept: a folder per page.
+        Folder of stored results, with one folder per page.
     sources
         Digest of the sources that the commands run.
     """
@@ -215,7 +215,7 @@ def start(
 
 
 def _kept(todo: list[Step], folder: Path, sources: str) -> list[Shown]:
-    """Return what the steps show; run them only if they or the sources have changed."""
+    """Return the output of the steps; run them only if they or the sources have changed."""
     content = json.dumps([sources, COLUMNS, *map(asdict, todo)])
     digest = hashlib.sha256(content.encode()).hexdigest()
     record = folder / "shown.json"
@@ -237,7 +237,7 @@ def with_results(markdown: str, shown: list[Shown], place: str) -> str:
     Parameters
     ----------
     shown
-        What its steps show.
+        Output of its steps.
     place
         Path from the page to the folder of its figures.
     """

@@ -1,4 +1,4 @@
-"""What the search of the site must find."""
+"""Check of the site's search: queries, and the page that each must find."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ def missed(
     index
         Text of ``searchindex.js``.
     stem
-        Returns the stem of a word, as the index has it.
+        Function that returns the stem of a word, as in the index.
     queries
-        Words -> the page that has all of them.
+        Words -> the page that contains all of them.
     """
     read = json.loads(index[index.index("{") : index.rindex("}") + 1])
     pages = read["docnames"]

@@ -1,4 +1,4 @@
-// A button on each block of code that copies its text; output of a terminal has none.
+// A button that copies the text of a code block; terminal output has no button.
 document.addEventListener("DOMContentLoaded", () => {
   for (const block of document.querySelectorAll("div.highlight")) {
     const text = block.querySelector("pre");

@@ -1,5 +1,5 @@
-// Tables to look things up in: a field that filters all rows of the page, and headings that sort.
-const LONG = 20; // rows of a table from which on its page has a field
+// Long tables get a field that filters all rows of the page, and headings that sort.
+const LONG = 20; // minimum number of rows for a filter field
 
 document.addEventListener("DOMContentLoaded", () => {
   const article = document.querySelector("article.bd-article");

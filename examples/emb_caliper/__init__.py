@@ -1,6 +1,6 @@
-"""An electro-mechanical disc brake for cars: your own actuator, written outside bywire.
+"""An electro-mechanical disc brake for cars, as your own actuator outside bywire.
 
-Motor, planetary gear and ball screw press the pads of a floating caliper together; force, speed
+Motor, planetary gear and ball screw press the pads of a floating caliper together. Force, speed
 and current control form a cascade. See the README next to this file.
 """
 

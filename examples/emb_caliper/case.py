@@ -1,4 +1,4 @@
-"""Shared part of the experiments: runs that start at rest at a clamp force."""
+"""Runs that start at rest at a clamp force, for all experiments."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def case_from_rest(
     drive
         Quantity that the stimulus commands.
     F
-        Clamp force at the start [N]; 0 for the parked piston.
+        Initial clamp force [N]; 0 for the parked piston.
     stimulus, duration, label
         As in `Case`.
     timing

@@ -1,4 +1,4 @@
-"""The brake's ECU: force, speed and current control in a cascade, at their sample times."""
+"""The brake's ECU with force, speed and current control in a cascade, at their sample times."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from emb_caliper.parameters import CaliperBrakeParameters as Par
 
 
 class Stimulus(NamedTuple):
-    """External inputs; ``drive`` determines which of them acts."""
+    """External inputs. ``drive`` determines which of them acts."""
 
     F_set: Annotated[float, Signal("N", "force demand", 1e4)]
     omega_set: Annotated[float, Signal("rad/s", "speed demand", 100.0)]
     i_set: Annotated[float, Signal("A", "current demand", 10.0)]
     v_set: Annotated[float, Signal("V", "voltage demand", 10.0)]
-    noise_F: Annotated[float, Signal("1", "noise of the force channel")]
+    noise_F: Annotated[float, Signal("1", "force channel noise")]
 
 
 class Memory(NamedTuple):
@@ -44,7 +44,7 @@ class Memory(NamedTuple):
 
 
 class Readings(NamedTuple):
-    """Readings of the sensors at a tick; resolver and current sensor are ideal."""
+    """Sensor readings at a tick. Resolver and current sensor are ideal."""
 
     F_cl: Annotated[float, Signal("N", "clamp force", 1e4)]
     theta: Annotated[float, Signal("rad", "motor angle", 50.0)]
@@ -95,12 +95,12 @@ def source_tick(r: Readings, m: Memory, u: Stimulus, par: Par) -> Memory:
 
 
 def travel_per_angle(par: Any) -> float:
-    """Return the piston's travel per angle of the motor [m/rad]."""
+    """Return the piston travel per motor angle [m/rad]."""
     return ball_screw.slope(par.screw) / planetary_gear.ratio(par.gear)
 
 
 def _force_control(m: Memory, u: Stimulus, par: Par) -> Memory:
-    """Return the memory with a new speed set point: press, or park clear of the disc."""
+    """Return the memory with a new speed set point, which presses the pads or parks the piston."""
     ecu = par.ecu
     state, out = limited_pi.force(
         limited_pi.ForceState(m.force_integral),
@@ -122,7 +122,7 @@ def _force_control(m: Memory, u: Stimulus, par: Par) -> Memory:
 
 
 def _factor(m: Memory, par: Par) -> float:
-    """Return the factor on the force controller's gains."""
+    """Return the factor on the gains of the force controller."""
     if par.ecu.scheduling == "off":
         return 1.0
     n = ops.fmax(travel_per_angle(par) * m.theta_meas - par.caliper.clearance, 0.0)

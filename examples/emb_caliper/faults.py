@@ -1,4 +1,4 @@
-"""Faults of the brake in addition to those that its elements declare."""
+"""Faults of the brake in addition to the faults of its elements."""
 
 from __future__ import annotations
 

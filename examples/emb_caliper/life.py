@@ -1,4 +1,4 @@
-"""Life of the caliper without an adjuster: the clearance grows, and with it the time to clamp."""
+"""Life of a caliper without an adjuster, whose clearance and clamp time increase with wear."""
 
 from __future__ import annotations
 
@@ -25,18 +25,18 @@ from emb_caliper.parameters import CaliperBrakeParameters
 
 
 class WearParameters(ParameterSet):
-    """Pads, their load in a stop, and the limit of the brake's dead time."""
+    """Pads, their load in a stop, and the limit of the dead time."""
 
     pads: pad_wear.Parameters
     disc: warm_stops.Parameters
     W_stop: Annotated[float, Unit("J", 1e5), Field(gt=0, allow_inf_nan=False)]
-    """friction work of a stop"""
+    """friction work per stop"""
     h_new: Length
     """thickness of a new pad"""
     h_min: Length
     """thickness at which pads are replaced"""
     t_most: Duration
-    """longest admissible time until the force rises"""
+    """maximum time until the force rises"""
 
 
 def begin(par: CaliperBrakeParameters, wear: WearParameters) -> dict[str, float]:
@@ -47,7 +47,7 @@ def begin(par: CaliperBrakeParameters, wear: WearParameters) -> dict[str, float]
 def follows(
     z: Mapping[str, float], par: CaliperBrakeParameters, wear: WearParameters
 ) -> dict[str, float]:
-    """Return the clearance; the measured curve of the caliper does not change."""
+    """Return the clearance. The measured curve of the caliper does not change."""
     return {"caliper.clearance": z["clearance"]}
 
 
@@ -76,27 +76,27 @@ def between(
 
 
 def left(z: Mapping[str, float], par: Any, wear: WearParameters) -> dict[str, float]:
-    """Return the remaining lining, and the margin of the dead time to its limit."""
+    """Return the remaining lining, and the dead time's margin to its limit."""
     return {"lining": z["h_pad"] - wear.h_min, "time": wear.t_most - z["dead_time"]}
 
 
 CALIPER_PADS = Life(
     name="caliper-pads",
-    summary="pads of a caliper without adjuster, until they are worn or the brake is too slow",
+    summary="pads of a caliper without an adjuster, until they are worn or the brake is too slow",
     experiment="clamp-step",
     wear=WearParameters,
     values={
-        "pads.kappa_0": chosen(3.6e-14, "180 cm^3 of pad over about 5 GJ: a car's front axle"),
-        "pads.T_hot": chosen(503.0, "230 degC, usual for organic linings"),
+        "pads.kappa_0": chosen(3.6e-14, "180 cm^3 of lining per 5 GJ, front axle of a car"),
+        "pads.T_hot": chosen(503.0, "230 degC, typical of organic linings"),
         "pads.T_act": chosen(2760.0, "four times the wear at 400 degC"),
         "pads.n_pads": chosen(2.0, "a floating caliper"),
         "pads.A_pad": chosen(50e-4, "front pads of a mid-size car"),
-        "pads.E_pad": chosen(5e8, "not used here: the caliper's curve was measured"),
+        "pads.E_pad": chosen(5e8, "unused, because the caliper has a measured curve"),
         "disc.C_d": chosen(3.4e3, "7 kg of cast iron"),
-        "disc.tau_d": chosen(300.0, "minutes, in the wind of driving"),
+        "disc.tau_d": chosen(300.0, "a few minutes in the air stream"),
         "W_stop": chosen(174e3, "450 kg from 100 km/h"),
         "h_new": chosen(10e-3, "front pads of a mid-size car"),
-        "h_min": chosen(2e-3, "usual limit of wear"),
+        "h_min": chosen(2e-3, "usual wear limit"),
         "t_most": chosen(0.15, "3 m of additional stopping distance at 130 km/h"),
     },
     states={

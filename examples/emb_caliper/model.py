@@ -1,4 +1,4 @@
-"""The brake: DC motor, planetary gear, ball screw, floating caliper, and its ECU."""
+"""The brake with DC motor, planetary gear, ball screw, floating caliper, and ECU."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from emb_caliper.parameters import CaliperBrakeParameters as Par
 
 
 class EmbCaliper(Assembly[Par, ecu.Memory]):
-    """One dry friction on the shaft; contacts of the pads and of two end stops."""
+    """Brake with one dry friction on the shaft, and contacts at the pads and two end stops."""
 
     name: ClassVar[str] = "emb-caliper"
     Memory: ClassVar = ecu.Memory
@@ -32,7 +32,7 @@ class EmbCaliper(Assembly[Par, ecu.Memory]):
     motor = Part(dc_motor, loss="E_copper")
     rotor = Part(rotor, loss="E_viscous")
     dry = Part(load_friction, par="friction")
-    E_friction = Integral("J", "loss of the dry friction", role=Role("sink", "dry friction"))
+    E_friction = Integral("J", "dry friction loss", role=Role("sink", "dry friction"))
     gear = Part(planetary_gear)
     screw = Part(ball_screw, output=("x",))
     pads = Part(
@@ -45,7 +45,7 @@ class EmbCaliper(Assembly[Par, ecu.Memory]):
     i_dc = Wire("A", "battery current", 10.0)
     torque = Wire("N*m", "motor torque", 1.0)
     T_fr = Shown("N*m", "friction torque", 0.1)
-    F_stop = Shown("N", "end-stop load on the piston", 1e3)
+    F_stop = Shown("N", "end stop load on the piston", 1e3)
     stuck = Shown("1", "shaft stuck")
     P_el = Shown("W", "electrical power from battery or source", 100.0)
 
@@ -82,7 +82,7 @@ class EmbCaliper(Assembly[Par, ecu.Memory]):
     )
 
     def wire(self, w: Self) -> None:
-        """Connect the parts: electrics, motion from the rotor outward, loads back to it."""
+        """Connect the parts: electrics, motion from rotor to pads, loads from pads to rotor."""
         w.voltage, w.i_dc = _electrics(w)
         w.supply.u = battery_supply.Input(w.i_dc)
         w.motor.u = dc_motor.Input(w.voltage, w.rotor.x.omega)
@@ -106,7 +106,7 @@ class EmbCaliper(Assembly[Par, ecu.Memory]):
         return ((-limit, limit),)
 
     def power(self, w: Self) -> dict[str, float]:
-        """Return the powers of source and dry friction, and 1 while the shaft is stuck."""
+        """Return the power of source and dry friction, and 1 while the shaft is stuck."""
         battery = battery_supply.power_source(w.supply.u, w.supply.par)
         return {
             "E_source": w.voltage * w.motor.x.i if w.par.drive == "voltage" else battery,
@@ -125,7 +125,7 @@ class EmbCaliper(Assembly[Par, ecu.Memory]):
         }
 
     def tasks(self, par: Par) -> tuple[Task, ...]:
-        """Return the controllers of the drive mode, from the slowest loop inward."""
+        """Return the controllers of the drive mode, from the outer loop inward."""
         current = Task("current", par.ecu.T_current, _reading(ecu.current_tick))
         if par.drive == "voltage":
             return (Task("source", par.ecu.T_current, _reading(ecu.source_tick)),)
@@ -137,10 +137,10 @@ class EmbCaliper(Assembly[Par, ecu.Memory]):
 
     def watch(self, recording: Any, par: Any) -> list[str]:
         """Return the warnings about a recording."""
-        said = super().watch(recording, par)
+        warnings = super().watch(recording, par)
         if "F_stop" in recording and bool((recording["F_stop"] != 0).any()):
-            said.append("the piston reached an end stop")
-        return said
+            warnings.append("the piston reached an end stop")
+        return warnings
 
 
 def travel(x: rotor.State, par: Par) -> ball_screw.Output:
@@ -165,7 +165,7 @@ def _electrics(w: EmbCaliper) -> tuple[float, float]:
 
 
 def _reading(law: Callable[..., ecu.Memory]) -> Callable[[Any, Any, Any, Any], ecu.Memory]:
-    """Return a controller's tick with the readings of the sensors."""
+    """Return a controller's tick with the sensor readings."""
 
     def tick(x: Any, m: ecu.Memory, u: ecu.Stimulus, par: Par) -> ecu.Memory:
         piston = travel(rotor.State(x.theta, x.omega), par)

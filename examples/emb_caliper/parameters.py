@@ -37,18 +37,18 @@ class StopParameters(end_stop.Parameters):
     def _leaves_a_stroke(self) -> StopParameters:
         if not self.x_rest < 0.0 < self.x_end:
             raise ValueError(
-                f"x_rest = {self.x_rest:g} m must be below 0 m, where the piston parks, and "
-                f"x_end = {self.x_end:g} m above"
+                f"x_rest = {self.x_rest:g} m must be < 0 m, where the piston parks, and "
+                f"x_end = {self.x_end:g} m must be > 0 m"
             )
         return self
 
 
 class EcuParameters(ParameterSet):
-    """The ECU: sample times, controllers, and its model of the brake.
+    """Sample times and controllers of the ECU, and its model of the brake.
 
-    ``scheduling``: ``"stiffness"`` divides the force controller's gains by the expected stiffness
-    at the piston's travel, relative to the stiffness at first contact. ``load``: ``"fed-forward"``
-    adds the current that the measured force needs without friction.
+    ``scheduling``: ``"stiffness"`` divides the gains of the force controller by the expected
+    stiffness at the piston travel, relative to the stiffness at first contact. ``load``:
+    ``"fed-forward"`` adds the current that the measured force needs without friction.
     """
 
     T_force: Duration
@@ -60,9 +60,9 @@ class EcuParameters(ParameterSet):
     k_park: PerTime
     """gain of the position control for parking"""
     scheduling: Literal["off", "stiffness"]
-    """whether the force controller's gains follow the stiffness"""
+    """whether the gains of the force controller follow the stiffness"""
     load: Literal["off", "fed-forward"]
-    """whether a feed-forward adds the current that holds the force"""
+    """whether feed-forward adds the current that holds the force"""
     force: limited_pi.ForceParameters
     speed: limited_pi.SpeedParameters
     current: current_pi.Parameters
@@ -79,7 +79,7 @@ class EcuParameters(ParameterSet):
 
 
 class CaliperBrakeParameters(ParameterSet):
-    """The whole brake: plant, force sensor, ECU."""
+    """The whole brake with plant, force sensor and ECU."""
 
     supply: battery_supply.Parameters
     bridge: h_bridge.Parameters
@@ -95,14 +95,14 @@ class CaliperBrakeParameters(ParameterSet):
     adc: adc.Parameters
     ecu: EcuParameters
     drive: DriveMode
-    """quantity that the stimulus commands; voltage is an ideal source at the motor"""
+    """quantity that the stimulus commands; "voltage" is an ideal source at the motor"""
 
     @model_validator(mode="after")
     def _stop_is_beyond(self) -> CaliperBrakeParameters:
         needed = self.caliper.clearance + self.caliper.n_max
         if not self.stop.x_end > needed:
             raise ValueError(
-                f"stop.x_end = {self.stop.x_end:g} m must be beyond the measured curve of the "
-                f"caliper, caliper.clearance + caliper.n_max = {needed:g} m"
+                f"stop.x_end = {self.stop.x_end:g} m must be > caliper.clearance + caliper.n_max "
+                f"= {needed:g} m, the end of the caliper's measured curve"
             )
         return self

@@ -1,4 +1,4 @@
-"""Equilibria: state and memory that hold a clamp force at rest, without friction."""
+"""Equilibria, with state and memory that hold a clamp force at rest without friction."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from emb_caliper.parameters import CaliperBrakeParameters as Par
 
 
 def overlap_at(F: float, par: Par) -> float:
-    """Return the overlap [m] at rest that gives a clamp force [N].
+    """Return the overlap [m] at rest at a clamp force [N].
 
     Raises
     ------
     ParameterError
-        When the force is negative, or beyond the measured curve.
+        If the force is negative, or beyond the measured curve.
     """
     most = floating_caliper.elastic(par.caliper.n_max, par.caliper)
     if not 0.0 <= F <= most:
         raise ParameterError(
-            f"a clamp force of {F / 1e3:g} kN is not valid: it must be >= 0 kN and <= "
-            f"{most / 1e3:.4g} kN, where the caliper's measured curve ends (caliper.n_max)"
+            f"a clamp force of {F / 1e3:g} kN is not valid. It must be >= 0 kN and <= "
+            f"{most / 1e3:.4g} kN, the end of the caliper's measured curve (caliper.n_max)"
         )
 
-    from scipy.optimize import brentq  # imported late: a run from rest does not need it
+    from scipy.optimize import brentq  # imported here, because a run from rest does not need it
 
     def missing(n: float) -> float:
         return float(floating_caliper.elastic(n, par.caliper)) - F
@@ -41,7 +41,7 @@ def holding_current(F: float, par: Par) -> float:
 
 
 def state_at(F: float, par: Par) -> Any:
-    """Return the state at rest at a clamp force [N]; without force the piston is parked at 0."""
+    """Return the state at rest at a clamp force [N]. At zero force the piston is parked at 0."""
     x = par.caliper.clearance + overlap_at(F, par) if F > 0.0 else 0.0
     return EmbCaliper.state(
         motor=dc_motor.State(holding_current(F, par)),
@@ -50,10 +50,10 @@ def state_at(F: float, par: Par) -> Any:
 
 
 def memory_at(F: float, par: Par) -> Memory:
-    """Return the memory with which every controller, or the ideal source, holds that state."""
+    """Return the memory with which each controller, or the ideal source, holds this state."""
     i = holding_current(F, par)
     v = par.motor.R_m * i
-    # D (V_bat - R_bat D i) = v, by a fixed point that contracts with R_bat i / V_bat.
+    # Solve D (V_bat - R_bat D i) = v by fixed-point iteration (contraction R_bat i / V_bat).
     duty = v / par.supply.V_bat
     for _ in range(50):
         duty = v / (par.supply.V_bat - par.supply.R_bat * duty * i)

@@ -1,14 +1,14 @@
-"""Hard braking: one bench file, one thing changed
-===============================================
+"""Hard braking: one bench file with one change
+============================================
 
 The bench demands a pressure step from 6 to 37 bar, as in Fig. 7a of Dardanelli, Alli, Savaresi
-(2010). Its ECU shakes the piston with a dither current that just overcomes the seals' breakaway
-torque: gain 1. This script changes the gain.
+(2010). Its ECU shakes the piston with a dither current. At gain 1, the dither just overcomes the
+breakaway torque of the seals. This script changes the gain.
 
-Without dither the piston sticks before the pressure reaches its demand. It stays more than half a
-bar off, exactly at rest, although the controller's integral grows. Dither removes the error, at the
-cost of energy and of a ripple that grows with its gain. At every gain the overshoot stays below the
-15 % that the paper allows.
+Without dither the piston sticks before the pressure reaches its demand. The pressure stays more
+than half a bar off, with the piston exactly at rest, although the controller's integral grows.
+Dither removes the error, but it costs energy and causes a ripple that increases with the gain. At
+every gain the overshoot stays below the 15 % that the paper allows.
 """
 
 from argparse import ArgumentParser
@@ -28,7 +28,7 @@ bench = bywire.load(Path(__file__).parents[2] / "benches" / "hard_braking.toml")
 gains = (0.0, 0.75, 1.0, 1.5, 2.0)
 results = {g: bywire.run(replace(bench, overrides={"ecu.dither.gain": g})) for g in gains}
 
-# Requirements judge KPIs; everything else is in the recording.
+# Requirements check key figures. Everything else is in the recording.
 overshoot, error, ripple, energy = {}, {}, {}, {}
 print("gain  overshoot  mean error  ripple     stuck  energy")
 for gain, result in results.items():
@@ -57,7 +57,7 @@ if out:
 
 assert all(value < 15.0 for value in overshoot.values())
 assert abs(error[0.0]) > 0.5
-assert ripple[0.0] == 0.0  # stuck: not small, zero
+assert ripple[0.0] == 0.0  # exactly zero, because the piston is stuck
 assert all(abs(error[gain]) < 0.1 for gain in gains[1:])
 assert ripple[0.75] < ripple[1.0] < ripple[1.5] < ripple[2.0]
 assert energy[0.0] < energy[1.0] < energy[2.0]

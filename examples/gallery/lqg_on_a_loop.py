@@ -1,14 +1,14 @@
 """LQG from python-control, on the exact sampled model of a loop
 =============================================================
 
-``bywire design`` designs loops from requirements. Other textbook methods (LQR, observers, pole
-placement, loop shaping) come from python-control: a loop's models are ``control.StateSpace``
-systems that contain all delays, filters and inner loops.
+``bywire design`` designs loops from requirements. For other textbook methods (LQR, observers, pole
+placement, loop shaping), use python-control. A loop's models are ``control.StateSpace`` systems
+that contain all delays, filters and inner loops.
 
-Here a regulator with an integrator and a Kalman predictor takes the place of the motorcycle
-brake's pressure PID. Its plant is the brake with its current loop, from the current demand to the
-pressure. It is faster than the PID of the catalog, and shows a textbook result: the margin of full
-state feedback is lost when an observer has to estimate the states.
+Here a regulator with an integrator and a Kalman predictor replaces the pressure PID of the
+motorcycle brake. Its plant is the brake with its current loop, from the current demand to the
+pressure. The regulator is faster than the PID in the catalog, and it shows a textbook result: full
+state feedback loses its margin when an observer has to estimate the states.
 """
 
 import math
@@ -35,11 +35,11 @@ whole = closed_loop(
 )
 kept = whole.effective()
 A, B = whole.A[np.ix_(kept, kept)], whole.B[kept]
-scale = np.linalg.norm(B, axis=1) + np.abs(A).max(axis=1) * 1e-6  # of the states
+scale = np.linalg.norm(B, axis=1) + np.abs(A).max(axis=1) * 1e-6  # scale of each state
 A, B, C = A / scale[:, None] * scale, B / scale[:, None], whole.C[:, kept] * scale / BAR
 n, T = len(kept), whole.period
 
-# The integral of the error is an additional state; the regulator weighs it and the current.
+# The integral of the error is an additional state. The regulator weights it and the current.
 A_i = np.block([[A, np.zeros((n, 1))], [-T * C, np.eye(1)]])
 B_i = np.vstack([B, np.zeros((1, 1))])
 Q = np.zeros((n + 1, n + 1))
@@ -66,12 +66,12 @@ pid = loop.closed(par, AT)
 t = np.arange(0.0, 0.4, T)
 steps = {
     "LQG": control.step_response(closed, t).outputs,
-    "PID of the catalog": control.step_response(pid.state_space(), t).outputs,
+    "PID in the catalog": control.step_response(pid.state_space(), t).outputs,
 }
 rise = {name: float(t[np.argmax(y >= 0.9)]) for name, y in steps.items()}
 print(
     f"phase margin {margin:.0f} degree at {crossover / 2 / math.pi:.1f} Hz, "
-    f"{margin_states:.0f} degree with all states"
+    f"{margin_states:.0f} degree with full state feedback"
 )
 print(", ".join(f"{name}: 90 % after {1e3 * value:.0f} ms" for name, value in rise.items()))
 
@@ -80,11 +80,11 @@ if out:
     axes = figure.subplots()
     for name, y in steps.items():
         axes.plot(t, y, label=name)
-    axes.set(xlabel="time [s]", ylabel="pressure over its step", title="Without friction")
+    axes.set(xlabel="time [s]", ylabel="pressure / step height", title="Without friction")
     axes.legend()
     out.mkdir(parents=True, exist_ok=True)
     figure.savefig(out / "lqg_on_a_loop.png", dpi=150)
 
 assert np.abs(closed.poles()).max() < 1.0
-assert rise["LQG"] < rise["PID of the catalog"]
+assert rise["LQG"] < rise["PID in the catalog"]
 assert margin_states > 55.0 > 45.0 > margin > 30.0

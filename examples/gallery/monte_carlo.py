@@ -1,12 +1,12 @@
-"""Monte Carlo: 256 motorcycles whose seals differ
-===============================================
+"""Monte Carlo: 256 motorcycles with different seals
+=================================================
 
-Five friction parameters of the seals vary independently, by 25 % (log-normal, one standard
+Five friction parameters of the seals vary independently by 25 % (log-normal, one standard
 deviation), while the ECU assumes the nominal values. All cases run in parallel, in the lanes of the
 vector unit and on all cores.
 
-With dither nine in ten brakes hold the pressure within a quarter of a bar. Without dither each
-brake sticks wherever its friction allows. The band is several times wider, and it stays so.
+With dither, nine in ten brakes hold the pressure within a quarter of a bar. Without dither, each
+brake sticks wherever its friction allows. The band is several times wider, and stays wide.
 """
 
 import time
@@ -19,7 +19,7 @@ from matplotlib.figure import Figure
 import bywire
 from bywire.authoring import as_run
 
-parser = ArgumentParser(description="Show how far the pressure spreads with the seals' friction.")
+parser = ArgumentParser(description="Show how much the pressure varies with seal friction.")
 parser.add_argument("--out", type=Path, help="folder for the figure")
 out = parser.parse_args().out
 
@@ -28,7 +28,7 @@ VARIED = ("seal.T_pr", "seal.f_cfr_p", "seal.f_cfr_n", "seal.k_brk_p", "seal.k_b
 nominal = bywire.parameters("dardanelli2010").leaves()
 draw = np.random.default_rng(2010).standard_normal
 variations = {name: nominal[name] * np.exp(0.25 * draw(CASES)) for name in VARIED}
-for name in ("seal.k_brk_p", "seal.k_brk_n"):  # breakaway is never below Coulomb friction
+for name in ("seal.k_brk_p", "seal.k_brk_n"):  # breakaway is never less than Coulomb friction
     variations[name] = np.maximum(variations[name], 1.0)
 
 bands = {}
@@ -39,7 +39,7 @@ for label, gain in (("without dither", 0.0), ("with dither", 1.0)):
     started = time.perf_counter()
     ensemble = bywire.simulate_ensemble(as_run(case, bench.step), variations, ["p_mc"])
     elapsed = time.perf_counter() - started
-    # The mean over one dither period: the ripple is not the subject here.
+    # Average over one dither period, because the ripple is not the subject here.
     p = np.apply_along_axis(np.convolve, 1, ensemble["p_mc"] / BAR, np.ones(20) / 20, "valid")
     t = ensemble.time[10:-9] - case.settle
     bands[label] = np.percentile(p, [5, 50, 95], axis=0)

@@ -1,13 +1,13 @@
-"""A bench in Python, without a file: find the weakest battery that is sufficient
-==============================================================================
+"""A bench in Python without a file: find the lowest sufficient battery voltage
+============================================================================
 
-The winding is hot (0.5 ohm instead of 0.35) and the battery's leads are old (40 mohm). The
-pressure must still rise to 35 bar within 0.1 s and overshoot by 15 % at most. A bench is a frozen
-object: `replace` returns a changed copy, and `run` judges it.
+The winding is hot (0.5 ohm instead of 0.35) and the battery leads are old (40 mohm). The pressure
+must still rise to 35 bar within 0.1 s and overshoot by 15 % at most. A bench is a frozen object.
+`replace` returns a changed copy, and `run` runs it and checks its requirements.
 
 Bisection finds the lowest battery voltage that passes, between 6 and 7 V. Down to 10 V the rise
-hardly takes longer. Below 10 V the duty cycle saturates, the rise slows down, and the overshoot is
-the first requirement that fails.
+time hardly increases. Below 10 V the duty cycle saturates, the rise slows down, and the overshoot
+is the first requirement that fails.
 """
 
 from argparse import ArgumentParser
@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 
 import bywire
 
-parser = ArgumentParser(description="Find the weakest battery with which a brake still passes.")
+parser = ArgumentParser(description="Find the lowest battery voltage at which a brake passes.")
 parser.add_argument("--out", type=Path, help="folder for the figure")
 out = parser.parse_args().out
 
@@ -51,7 +51,7 @@ while passes - fails > 0.05:
         passes = middle
     else:
         fails = middle
-print(f"the battery may fall to {passes:.2f} V")
+print(f"the battery voltage may fall to {passes:.2f} V")
 for verdict in tried[fails][0].verdicts:
     print(f"  at {fails:.2f} V {verdict.kpi} {verdict.limit}: {'' if verdict.met else 'not '}met")
 

@@ -1,12 +1,13 @@
-"""Friction of a sealed piston: its growth with pressure, and the error of the loop alone
-======================================================================================
+"""Friction of a sealed piston: growth with pressure, and the error of the loop height
+===================================================================================
 
-The pressure that a seal holds also presses on the seal: its friction is F_0 + f p, as in eq. (16)
-of Dardanelli, Alli, Savaresi (2010). The usual estimate is half the height of the loop of force
-over travel. If a regulator lets the pressure differ between the two directions, part of that height
-is pressure times area. Here the pressure differs by 0.06 bar, which adds 1.5 N.
+The pressure behind a seal also presses on the seal, so its friction is F_0 + f p, as in eq. (16) of
+Dardanelli, Alli, Savaresi (2010). The usual estimate is half the height of the loop of force versus
+travel. If a regulator lets the pressure differ between the two directions, part of that height is
+pressure times area. Here the pressure differs by 0.06 bar, which adds 1.5 N.
 
-Use --data for measured records (x [mm], p [bar], F [N] over t, any file of `bywire convert`).
+Use --data for measured records (x [mm], p [bar], F [N] versus t, any file that `bywire convert`
+writes).
 """
 
 from argparse import ArgumentParser
@@ -19,7 +20,7 @@ from bywire.authoring import METHODS, Effort, measured
 
 parser = ArgumentParser(description="Identify the friction of a sealed piston.")
 parser.add_argument("--data", type=Path, nargs="+", help="records, one per pressure")
-parser.add_argument("--map", type=Path, help="mapping file for their columns")
+parser.add_argument("--map", type=Path, help="mapping file for the columns")
 parser.add_argument("--out", type=Path, help="folder for the figure")
 arguments = parser.parse_args()
 
@@ -56,7 +57,7 @@ if arguments.out:
     arguments.out.mkdir(parents=True, exist_ok=True)
     figure.savefig(arguments.out / "seal_friction.png", dpi=150)
 
-# The loop's error is half of the pressure difference, times the area.
+# The error of the loop is half the pressure difference times the area.
 level = np.array([3e5, 6e5])
 excess = loop_0 + loop_f * level - friction["F_0"] - friction["f"] * level
 assert np.all(np.abs(excess - 0.5 * between * friction["A"]) < 0.25 * np.abs(excess))

@@ -1,14 +1,15 @@
-"""Which parameters move the pressure, and when
-============================================
+"""Which parameters affect the pressure, and when
+==============================================
 
 The kernel computes exact derivatives of a whole run, here of the pressure in hard braking, with
-respect to any number of parameters. Multiplied by one per cent of the parameter they are in bar.
+respect to any number of parameters. The script multiplies them by one percent of the parameter, so
+they are in bar.
 
 While the pressure rises, caliper, pads, motor constant, gear and piston matter most. Friction
-matters little, because dither removes it. At the end the controller's integral has removed all
-effects but one: the ECU subtracts a fixed ambient pressure from the sensor's absolute reading, so
-one per cent of ambient pressure remains as 0.01 bar, in the opposite direction. The pipeline's
-four parameters act through one resistance: no test of this kind can separate them.
+matters little, because dither removes it. At the end, the controller's integral has removed all
+effects except one. The ECU subtracts a fixed ambient pressure from the sensor's absolute reading,
+so one percent of ambient pressure remains as 0.01 bar in the opposite direction. The four
+parameters of the pipeline act through one resistance, so no test of this type can separate them.
 """
 
 from argparse import ArgumentParser
@@ -21,12 +22,12 @@ from matplotlib.figure import Figure
 import bywire
 from bywire.authoring import as_run
 
-parser = ArgumentParser(description="Show which parameters move the pressure.")
+parser = ArgumentParser(description="Show which parameters affect the pressure.")
 parser.add_argument("--out", type=Path, help="folder for the figure")
 out = parser.parse_args().out
 
 BAR, PERCENT = 1e5, 0.01
-# A quantized reading has zero derivative, which would open the loop. So the converter is ideal.
+# The converter is ideal, because a quantized reading has zero derivative and would open the loop.
 bench = bywire.Bench("hard-braking", "dardanelli2010", overrides={"adc.law": "ideal"})
 case = bench.cases()[0]
 run = as_run(case, bench.step)
@@ -45,9 +46,9 @@ peak = {name: np.max(np.abs(moves[name][rise])) for name in names}
 left = {name: np.mean(moves[name][end]) for name in names}
 ranked = sorted(names, key=peak.__getitem__, reverse=True)
 for name in ranked[:12]:
-    print(f"{name:24s} {peak[name]:6.3f} bar in the rise, {left[name]:+7.4f} bar at the end")
+    print(f"{name:24s} {peak[name]:6.3f} bar during rise, {left[name]:+7.4f} bar at the end")
 
-# The same by finite differences, for one parameter: two more runs.
+# For one parameter, compute the same by finite differences from two more runs.
 up, down = (
     bywire.simulate(replace(run, par=run.par.replace({"motor.K_e": values["motor.K_e"] * factor})))
     for factor in (1.001, 0.999)
@@ -57,11 +58,11 @@ difference = (up["p_mc"] - down["p_mc"]) / 0.002 * PERCENT / BAR
 if out:
     figure = Figure(figsize=(7.0, 4.5), layout="constrained")
     axes = figure.subplots()
-    axes.barh(ranked[11::-1], [peak[name] for name in ranked[11::-1]], label="largest, in the rise")
+    axes.barh(ranked[11::-1], [peak[name] for name in ranked[11::-1]], label="maximum during rise")
     axes.plot(
         [abs(left[name]) for name in ranked[11::-1]], ranked[11::-1], "k.", label="at the end"
     )
-    axes.set(xlabel="change of the pressure per 1 % [bar]")
+    axes.set(xlabel="pressure change per 1 % [bar]")
     axes.legend()
     out.mkdir(parents=True, exist_ok=True)
     figure.savefig(out / "sensitivities.png", dpi=150)

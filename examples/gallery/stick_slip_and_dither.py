@@ -1,14 +1,15 @@
-"""Stick-slip: a slow current ramp, without and with dither
-========================================================
+"""Stick-slip: a slow current ramp without and with dither
+=======================================================
 
-The current demand rises to 5 A and falls again, 0.2 A/s, as in eq. (17) and Fig. 5 of
+The current demand rises to 5 A and falls again at 0.2 A/s, as in eq. (17) and Fig. 5 of
 Dardanelli, Alli, Savaresi (2010). Without dither the piston sticks most of the time. It breaks
-away where the motor's torque overcomes load and breakaway torque, eqs. (8), (16) and (18):
+away where the motor torque overcomes load and breakaway torque, eqs. (8), (16) and (18):
 
     eta_g K_e i = k_g A_mc p + k_brk,p (T_pr + f_cfr,p p)
 
-and slips to a pressure at least half as large again: the staircase. With dither the pressure
-follows the current in both directions, and the loop loses most of its area.
+The piston then slips to a pressure that is at least 50 % higher, so the curve looks like a
+staircase. With dither the pressure follows the current in both directions, and the loop loses most
+of its area.
 """
 
 from argparse import ArgumentParser
@@ -29,13 +30,13 @@ result = bywire.run(bench)
 kpis = {kpi.name: kpi.value for kpi in result.kpis}
 rough, dithered = result.recordings["without-dither"], result.recordings["with-dither"]
 
-# A slip begins at the last recorded instant of sticking, and ends at the pressure of the next one.
+# A slip begins at the last sample of sticking, and ends at the pressure where the next one begins.
 stuck = rough["stuck"].values > 0
 pressure, current = rough["p_mc"].values, rough["i"].values
 top = int(np.argmax(pressure))
 begins = np.flatnonzero(stuck[:top] & ~stuck[1 : top + 1])
 afterward = np.append(pressure[begins[1:]], pressure[top])
-chosen = pressure[begins] > 1.0 * BAR  # at low pressure the current's resolution matters
+chosen = pressure[begins] > 1.0 * BAR  # at low pressure the current resolution matters
 begins, before, after = begins[chosen], pressure[begins[chosen]], afterward[chosen]
 
 par = bench.par
@@ -46,13 +47,13 @@ print("breaks away at    predicted   pressure before       and after")
 for slipped, expected, low, high in zip(current[begins], predicted, before, after, strict=True):
     print(f"{slipped:12.3f} A {expected:10.3f} A {low / BAR:13.2f} bar {high / BAR:11.2f} bar")
 print(f"stuck for {100 * kpis['share_stuck_undithered']:.0f} % of the time")
-print(f"loop area with dither over the area without: {kpis['loop_area_ratio']:.2f}")
+print(f"ratio of the loop areas with and without dither: {kpis['loop_area_ratio']:.2f}")
 
 if out:
     figure = Figure(figsize=(7.0, 4.5), layout="constrained")
     axes = figure.subplots()
     for recording, label in ((rough, "without dither"), (dithered, "with dither")):
-        mean = recording[["p_mc", "i_meas"]].rolling(time=20, center=True).mean()  # over a period
+        mean = recording[["p_mc", "i_meas"]].rolling(time=20, center=True).mean()  # one period
         axes.plot(mean["p_mc"] / BAR, mean["i_meas"], label=label)
     axes.plot(before / BAR, predicted, "k.", label="predicted breakaway")
     axes.set(xlabel="pressure [bar]", ylabel="measured current [A]")

@@ -1,9 +1,9 @@
-"""Fading pads: the friction of a wedge brake, tracked through brakings
-====================================================================
+"""Fading pads: track the friction of a wedge brake over several brake applications
+================================================================================
 
-From braking to braking the pads' coefficient of friction falls, as in hot pads. Moment and normal
-force determine it, M = mu_B 2 r_B F_N (Roberts et al. 2003), a relation that is linear in mu_B. A
-Kalman filter models mu_B as a random walk, with the rate of maximum likelihood.
+The pad friction coefficient decreases from one application to the next, as in hot pads. Moment and
+normal force determine it, M = mu_B 2 r_B F_N (Roberts et al. 2003). This relation is linear in
+mu_B. A Kalman filter models mu_B as a random walk, with a rate from maximum likelihood.
 """
 
 from argparse import ArgumentParser
@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 import bywire
 from bywire.authoring import track
 
-parser = ArgumentParser(description="Track friction that fades from braking to braking.")
+parser = ArgumentParser(description="Track friction that fades from application to application.")
 parser.add_argument("--out", type=Path, help="folder for the figure")
 out = parser.parse_args().out
 
@@ -45,8 +45,8 @@ counts = within & (mu["used"].values > 0)
 expected = np.interp(mu["time"].values, record["time"].values, truth)
 error = (mu["value"].values - expected)[counts]
 inside = ((mu["low"] <= expected) & (expected <= mu["high"])).values[counts]
-print(f"{counts.sum()} turns of the disc, root mean square error {np.sqrt(np.mean(error**2)):.5f}")
-print(f"95 % bands that hold the truth: {100 * inside.mean():.0f} %")
+print(f"{counts.sum()} disc revolutions, root-mean-square error {np.sqrt(np.mean(error**2)):.5f}")
+print(f"95 % bands that contain the true value: {100 * inside.mean():.0f} %")
 
 if out:
     figure = Figure(figsize=(7.0, 4.0), layout="constrained")
@@ -54,11 +54,11 @@ if out:
     axes.plot(record["time"], truth, "k--", linewidth=1.0, label="true value")
     axes.fill_between(mu["time"], mu["low"], mu["high"], alpha=0.3, label="95 % band")
     axes.plot(mu["time"], mu["value"], label="tracked")
-    axes.set(xlabel="time [s]", ylabel="coefficient of friction [-]", ylim=(0.28, 0.4))
+    axes.set(xlabel="time [s]", ylabel="friction coefficient [-]", ylim=(0.28, 0.4))
     axes.legend()
     out.mkdir(parents=True, exist_ok=True)
     figure.savefig(out / "tracked_friction.png", dpi=150)
 
 assert counts.sum() > 40
-assert np.sqrt(np.mean(error**2)) < 0.001  # the drift is ten times that from braking to braking
+assert np.sqrt(np.mean(error**2)) < 0.001  # the drift per application is ten times larger
 assert inside.mean() > 0.85

@@ -1,4 +1,4 @@
-"""What the tests of the Python face share."""
+"""Fixtures that tests of the Python interface share."""
 
 from undrawn import drawn, undrawn_unless_asked
 

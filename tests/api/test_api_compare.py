@@ -1,4 +1,4 @@
-"""Benches beside each other: only what differs, verdicts, curves; and what cannot be compared."""
+"""Comparison of benches: differences, verdicts, curves, and sources that bywire cannot compare."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ QUICK = {"options.duration": "40 ms", "options.settle": "10 ms"}
 
 @pytest.fixture(scope="module")
 def results():
-    """Return a braking, the same with another winding, and with requirements."""
+    """Return a brake application, a variant with another winding, and one with requirements."""
     base = bywire.run("hard-braking", {**QUICK, "requirements.overshoot": "<= 15 %"})
     warm = bywire.run(
         "hard-braking",
@@ -39,7 +39,7 @@ def results():
 
 @pytest.fixture(scope="module")
 def folders(results, tmp_path_factory):
-    """Return their result folders."""
+    """Return the result folders of the benches."""
     top = tmp_path_factory.mktemp("results")
     with undrawn():
         for result, name in zip(results, ("base", "warm"), strict=True):
@@ -72,14 +72,14 @@ def test_key_figures_are_those_of_the_runs_with_their_change(results, folders):
     frame = comparison.tables()["Key figures that differ"]
     row = frame[frame["name"] == "peak_current"].iloc[0]
     assert row["change"] == pytest.approx(warm - base)
-    # What no run defines is the same in both.
+    # A figure that no run defines counts as equal.
     undefined = [e for e in comparison.figures if all(math.isnan(v) for v in e.values)]
     assert undefined
     assert not any(each.differs for each in undefined)
 
 
 def test_a_change_smaller_than_the_steps_error_is_not_distinct(results, folders, tmp_path):
-    """By what is in memory, and by what a folder says; without an estimate nothing is claimed."""
+    """The verdict is the same from memory and from a folder. It needs an error estimate."""
     changed = {**QUICK, "requirements.overshoot": "<= 15 %", "motor.R_m": "0.3500002 ohm"}
     near = bywire.run("hard-braking", changed)
     with undrawn():
@@ -102,7 +102,7 @@ def test_a_change_smaller_than_the_steps_error_is_not_distinct(results, folders,
 
 
 def test_an_error_that_no_step_shows_is_kept_in_a_folder(results, tmp_path):
-    """An infinite error is null in JSON, as one that was not estimated: the record tells which."""
+    """An infinite error is null in JSON, like a missing estimate. The record distinguishes them."""
     unknown = replace(results[0], kpis=tuple(replace(k, error=math.inf) for k in results[0].kpis))
     with undrawn():
         unknown.write(tmp_path / "unknown")
@@ -129,7 +129,7 @@ def test_a_run_without_requirements_is_not_part_of_a_good_verdict():
 
 
 def test_a_verdict_that_the_step_leaves_open_stays_open(folders, tmp_path):
-    """A folder says what its run could not decide; so does the comparison."""
+    """A folder records undecided requirements, and the comparison reports them."""
     near = tmp_path / "near"
     near.mkdir()
     record = json.loads((folders[1] / "result.json").read_text(encoding="utf-8"))
@@ -271,7 +271,7 @@ def test_a_damaged_recording(folders, tmp_path):
 
 
 def test_a_folder_whose_settings_another_bench_lacks(results, folders):
-    """Other options: what only one of two benches has stands beside a gap."""
+    """If only one of two benches has an option, the other column is empty."""
     ramp = bywire.run("seal-stribeck")
     (row,) = [e for e in bywire.compare(results[0], ramp).settings if e.name == "options.p_to"]
     assert row.values == (37e5, None)

@@ -35,7 +35,7 @@ def test_a_simulated_winding_shows_itself_and_is_written_whole(tmp_path: Path) -
     assert {Path(file).name for file in kept["files"]} == names
     bench = bywire.load(tmp_path / "parameters.toml")
     assert bench.par.leaves()["motor.R_m"] == pytest.approx(found.parameters["motor.R_m"])
-    found.write(tmp_path)  # over its own result
+    found.write(tmp_path)  # overwrites the file's own result
     other = bywire.identify("friction-model", synthetic=1, options={"duration": "4 s"})
     with pytest.raises(bywire.BywireError, match="contains a result of motor-winding"):
         other.write(tmp_path)

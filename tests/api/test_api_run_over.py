@@ -1,4 +1,4 @@
-"""A bench over a range: table, verdicts at each value, curves; and what is no range."""
+"""Runs over a range: table, verdicts at each value, curves, and invalid ranges."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The report of a run: verdict and changes first, figures before tables."""
+"""Report of a run, with verdict and changes first, and figures before tables."""
 
 from __future__ import annotations
 

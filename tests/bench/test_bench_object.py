@@ -118,10 +118,10 @@ def test_name_of_a_file_is_the_default(tmp_path):
     ("changes", "error", "text"),
     [
         ({"experiment": "hard-breaking"}, UnknownNameError, "did you mean 'hard-braking'"),
-        ({"experiment": 3}, ParameterError, "experiment = 3 .* a text"),
+        ({"experiment": 3}, ParameterError, "experiment = 3 .* a string"),
         ({"parameters": "x"}, UnknownNameError, "unknown parameter set 'x'"),
-        ({"parameters": None}, ParameterError, "parameters = None .* a text"),
-        ({"name": 3}, ParameterError, "name = 3 .* a text"),
+        ({"parameters": None}, ParameterError, "parameters = None .* a string"),
+        ({"name": 3}, ParameterError, "name = 3 .* a string"),
         ({"overrides": {"motor.R_m": -1}}, ParameterError, "must be > 0 ohm"),
         ({"overrides": {"motor.R_m": math.nan}}, ParameterError, "any finite number in ohm"),
         ({"overrides": {"motor.R_m": "1 bar"}}, UnitError, "bar cannot be converted to ohm"),

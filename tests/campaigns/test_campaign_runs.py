@@ -230,7 +230,7 @@ def test_what_was_killed_goes_on_with_the_same_bits(campaign, file, folder, monk
         ),
         ("healthy = 8", "healthy = 1000000", "a whole number from 4 to 10000"),
         ('"0 bar", "50 bar"]', "20]", "wrong unit"),
-        ('["0 bar", "50 bar"]', "[]", "List a value, or use leave_out"),
+        ('["0 bar", "50 bar"]', "[]", "or use leave_out"),
         ("[values]", '[values]\n"battery.lost" = 3', "battery.lost: this fault has no value"),
         ('above_healthy = "5 bar"', "above_healthy = 5", "wrong unit"),
         ('signal = "p_pd"\nbelow', 'signal = ["p_pd"]\nbelow', "unknown signal of criterion"),

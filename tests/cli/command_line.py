@@ -1,4 +1,4 @@
-"""What the tests of the command line share: outcomes, and bench files to start from."""
+"""Helpers that tests of the command line share: outcomes, and bench files to start from."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ LONG = (
 
 
 class Outcome(NamedTuple):
-    """What a command left."""
+    """Outcome of a command."""
 
     status: int
     out: str
@@ -32,7 +32,7 @@ class Outcome(NamedTuple):
 
     @property
     def object(self) -> dict[str, Any]:
-        """The one JSON object on standard output; anything else there is a mistake."""
+        """The JSON object on standard output, which must contain nothing else."""
         found = json.loads(self.out, parse_constant=_refused)
         assert isinstance(found, dict)
         return found
@@ -43,7 +43,7 @@ def _refused(text: str) -> None:
 
 
 def refused(outcome: Outcome, *texts: str, status: int = 2) -> None:
-    """Check that an outcome is one line of error that holds some texts."""
+    """Check that an outcome is a single error line that contains some texts."""
     assert outcome.status == status
     assert outcome.out == ""
     assert len(outcome.lines) == 1
@@ -52,5 +52,5 @@ def refused(outcome: Outcome, *texts: str, status: int = 2) -> None:
 
 
 def no_half_files(folder: Path) -> None:
-    """Check that a folder holds no file that was only begun."""
+    """Check that a folder contains no incomplete file."""
     assert not [path.name for path in folder.rglob("*") if path.name.startswith(".")]

@@ -1,4 +1,4 @@
-"""The command line, called in this process where it does not matter, in its own where it does."""
+"""Command line, called in this process, or in a separate process where the test needs one."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def bywire(
 
 @pytest.fixture
 def process() -> Callable[..., Outcome]:
-    """Return a function that runs the installed program ``bywire`` to its end."""
+    """Return a function that runs the installed program ``bywire`` until it exits."""
 
     def call(*arguments: str | Path, **environment: str) -> Outcome:
         done = subprocess.run(
@@ -53,7 +53,7 @@ def process() -> Callable[..., Outcome]:
 
 @pytest.fixture
 def bench(tmp_path: Path) -> Callable[..., Path]:
-    """Return a function that writes a bench file, by default of a quick braking."""
+    """Return a function that writes a bench file. Default: a short brake application."""
 
     def write(text: str | bytes = BRAKING + QUICK, name: str = "bench.toml") -> Path:
         path = tmp_path / name

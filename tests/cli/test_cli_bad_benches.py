@@ -1,4 +1,4 @@
-"""Every file of ``tests/benches_bad`` is refused with one line that says what its head expects."""
+"""bywire rejects every file in ``tests/benches_bad`` with one line that its header specifies."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ MARK = "# expect: "
 
 
 def expected(path: Path) -> list[str]:
-    """Return the texts that the message about a file must hold."""
+    """Return the texts that the message about a file must contain."""
     lines = path.read_text(encoding="utf-8").splitlines()
     return [line.removeprefix(MARK) for line in lines if line.startswith(MARK)]
 
@@ -29,13 +29,13 @@ def test_bad_bench_file_gets_one_clear_line(bywire, tmp_path, path):
     assert len(err) < 500
     for text in expected(path):
         assert text in err
-    assert time.process_time() - started < 5.0  # whatever else the machine does
-    assert not list(tmp_path.glob("out/*"))  # refused before anything is written
+    assert time.process_time() - started < 5.0  # independent of the machine's load
+    assert not list(tmp_path.glob("out/*"))  # rejected before bywire writes anything
 
 
 @pytest.mark.parametrize("name", ["syntax", "unknown_experiment", "negative", "wrong_unit"])
 def test_whoever_asks_for_json_gets_the_same_line(bywire, name):
-    """Read as text, as a bench, as its parameters: nothing stands where an object belongs."""
+    """Files are read as text, bench and parameters, and a scalar never replaces an object."""
     path = FOLDER / f"{name}.toml"
     status, out, err = bywire("run", path, "--json")
     assert (status, out) == (2, "")
@@ -54,7 +54,7 @@ def test_message_names_the_file(bywire):
 
 @pytest.mark.parametrize("name", ["negative", "wrong_unit", "unknown_option", "step_zero"])
 def test_the_corrected_file_runs(bywire, bench, name):
-    """The gate above can pass: without its mistake, a file is taken."""
+    """The test above can fail, because bywire accepts a file without its mistake."""
     text = (FOLDER / f"{name}.toml").read_text(encoding="utf-8")
     for wrong, right in (
         ('"-0.4 ohm"', '"0.4 ohm"'),

@@ -1,4 +1,4 @@
-"""Files that are no bench files: missing, folders, binary, empty, hostile."""
+"""Files that are not bench files: missing, folders, binary, empty, hostile."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Columns named where a file is read, without a mapping file: replay, identify, convert, forms."""
+"""Column names specified without a mapping file: replay, identify, convert, forms."""
 
 from __future__ import annotations
 
@@ -45,9 +45,9 @@ NAMED = ("--input", "F_set=Kraft [lbf]", "--output", "x=Weg [inch]", "--time", "
 
 @pytest.fixture
 def rig(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """Return a table in inches and pounds whose columns have no unit, beside its bench."""
+    """Return a table in inches and pounds whose columns have no unit, next to its bench."""
     with forgotten():
-        registry._loaded.clear()  # brakes of other tests offer their parameter sets, too
+        registry._loaded.clear()  # brakes of other tests also provide parameter sets
         bywire.load_system(SPRING_AXIS)
         monkeypatch.chdir(tmp_path)
         (tmp_path / "axis.toml").write_text(BENCH)
@@ -79,7 +79,7 @@ def rig(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 
 def nrmse(replay: Replay) -> float:
-    """Return the one output's error over its range [%]."""
+    """Return the only output's error relative to its range [%]."""
     (fit,) = replay.fits
     return next(figure.value for figure in fit.kpis if figure.name == "nrmse")
 
@@ -107,7 +107,7 @@ def test_identify_takes_columns_and_noise(bywire: Bywire, rig: Path) -> None:
         "other.csv",
         "--json",
     )
-    refused(done, "other.csv")  # the held-out file is read as the other one is
+    refused(done, "other.csv")  # bywire reads the held-out file in the same way as the other file
     (rig.parent / "other.csv").write_text(rig.read_text() + "0.3010,0,0,0\n")
     done = bywire(
         "identify",
@@ -125,12 +125,12 @@ def test_identify_takes_columns_and_noise(bywire: Bywire, rig: Path) -> None:
         "--json",
     )
     assert done.object["parameters"]["k"] == pytest.approx(9e3, rel=1e-9)
-    assert "warning" not in done.err  # the record is the model's own
+    assert "warning" not in done.err  # the model itself produced the record
     assert done.object["figures"]["x.noise"]["value"] == pytest.approx(1e-6)
 
 
 def test_a_check_that_fails_says_what_to_try_next(bywire: Bywire, rig: Path) -> None:
-    """The spring is 10 % too stiff, and nothing but the damping is searched."""
+    """The spring is 10 % too stiff, and the fit estimates only the damping."""
     done = bywire(
         "identify",
         "output-error",
@@ -228,7 +228,7 @@ def test_one_message_shows_what_to_type_for_all_columns_without_units(
 
 
 def test_columns_with_brackets_and_commas_in_their_names(bywire: Bywire, tmp_path: Path) -> None:
-    """Rows of Simulink's To File: what the message says works once units are filled in."""
+    """For rows of Simulink's To File, the message's advice works after filling in the units."""
     savemat(tmp_path / "rows.mat", {"ans": np.vstack([np.arange(99.0), np.ones((2, 99))])})
     words = ("convert", tmp_path / "rows.mat", tmp_path / "out.nc")
     outcome = bywire(*words)

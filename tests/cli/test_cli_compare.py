@@ -24,7 +24,7 @@ def test_folder_and_experiment_beside_each_other(bywire, tmp_path):
 
 
 def test_what_was_run_in_a_folder_of_an_experiments_name(bywire, tmp_path, monkeypatch):
-    """A result folder goes before the experiment of its name, an empty folder does not."""
+    """A result folder takes precedence over an experiment of its name. An empty folder does not."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "hard-braking").mkdir()
     run_now = bywire("compare", "hard-braking", "hard-braking", *QUICK, "--json").object

@@ -1,4 +1,4 @@
-"""The tab key: names that fit, files beside them, parameters of the bench that is named."""
+"""Tab completion of names, files, and parameters of the specified bench."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ BENCHES = names_of("experiments", "generic_experiments", ending=".toml")
 def test_names(complete, typed, wanted):
     completed = dict(complete(typed))
     assert wanted in completed
-    assert completed[wanted]  # what it is
+    assert completed[wanted]  # its meaning
     assert all(name.startswith(typed) for name in completed)
 
 
@@ -50,7 +50,7 @@ def test_parameters_are_those_of_the_bench():
     ]
     assert [name for name, _ in varied(["hard-braking"], "motor.R")] == ["motor.R_m"]
     assert changeable(["hard-braking"], "motor.R_m=0") == []
-    of_all = dict(changeable(["pressure"], ""))  # a loop: any set's
+    of_all = dict(changeable(["pressure"], ""))  # for a loop, from any set
     assert {"motor.R_m=", "wedge.mu_B="} <= of_all.keys()
 
 

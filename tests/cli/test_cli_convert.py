@@ -23,7 +23,7 @@ SEAL = Path(__file__).parents[3] / "shared" / "data" / "seal_friction" / "O-ring
 
 @pytest.fixture
 def run(tmp_path):
-    """A measurement at 100 Hz with a pause, and its mapping."""
+    """Measurement at 100 Hz with a pause, and its mapping."""
     rows = "".join(f"{10 * k},{k},{0.1 * k:.1f}\n" for k in range(200) if not 50 <= k < 80)
     (tmp_path / "run.csv").write_text("t,p,x\n" + rows)
     (tmp_path / "map.toml").write_text(MAPPING)
@@ -96,7 +96,7 @@ def test_refusals(bywire, run, tmp_path, monkeypatch, arguments, text):
 
 @pytest.mark.skipif(not SEAL.exists(), reason="the measured seal is not there")
 def test_the_measured_seal(bywire, tmp_path):
-    """Strokes from 5 mm to 30 mm: force over pressure is the bore's area, 49.1 mm² and seal."""
+    """For strokes from 5 mm to 30 mm, force per pressure is the bore area, 49.1 mm², plus seal."""
     (tmp_path / "map.toml").write_text(
         'time = { column = 1, unit = "ms" }\n[signals.x]\ncolumn = 5\nunit = "mm"\n'
         '[signals.p]\ncolumn = 6\nunit = "bar"\n[signals.F]\ncolumn = 7\nunit = "N"\n'

@@ -1,4 +1,4 @@
-"""The command design: gains, what binds, what cannot be met, files that run."""
+"""Command design: gains, binding requirements, infeasible requirements, bench files that run."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def test_design_over_a_range_names_what_binds(bywire):
         "phase_margin >= 60 deg",
     }
     gains = found["gains"]
-    # The command margins says the same of these gains.
+    # The command margins agrees for these gains.
     settings = [text for name, value in gains.items() for text in ("--set", f"{name}={value} Hz")]
     shown = bywire("margins", "moment", *settings, "--json").object
     margins = shown["margins"]
@@ -150,7 +150,7 @@ def test_the_bench_looks_at_the_worst_corner_too(bywire):
     outcome = bywire(*arguments, "--verbose")
     assert outcome.status in (0, 1)
     assert "bandwidth, sine of 1 A at motor.R_m = 0." in outcome.out
-    assert "(worst of 2 corners)" in " ".join(outcome.out.split())  # lines may be broken
+    assert "(worst of 2 corners)" in " ".join(outcome.out.split())  # lines may be wrapped
     assert "ecu.current.k_p" in outcome.out
 
 
@@ -185,7 +185,7 @@ def test_a_gain_schedule_as_a_bench_file_that_runs(bywire, tmp_path):
         "high": [3.7e6],
     }
     assert found["gains"].keys() == {"ecu.schedule.low.k_p"}
-    # Less gain has more phase margin, until the floor of the steady-state error has less room.
+    # Less gain has more phase margin, until the limit on the steady-state error binds.
     bound = {one["requirement"] for one in found["regions"]["low"]["binding"]}
     assert bound & {"phase_margin >= 60 deg", "steady_state_error <= 5 %"}
     assert found["across"]["worst"]["slack"] == min(

@@ -1,4 +1,4 @@
-"""Dither on the command line: the loop about its motion under it, and its design."""
+"""Dither on the command line: the loop linearized about its motion, and its design."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The command faults, and runs with a fault."""
+"""Command faults, and runs with a fault."""
 
 from __future__ import annotations
 

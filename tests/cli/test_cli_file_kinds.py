@@ -1,4 +1,4 @@
-"""A file that another command takes: the error says what it is, and which command takes it."""
+"""For another command's file, the error states the file's kind and the right command."""
 
 from __future__ import annotations
 

@@ -38,7 +38,7 @@ def test_a_simulated_measurement_can_be_fed_back(bywire: Bywire, tmp_path: Path)
     again = bywire("identify", "seal-friction", out / "measurement.nc", "--json")
     assert again.status == 0
     assert first.object["put_in"]["A"] == 4.9e-4
-    assert again.object["put_in"] == {}  # measured, as far as anyone can tell
+    assert again.object["put_in"] == {}  # measured, as far as bywire can determine
     for name in ("estimates", "figures", "checks"):
         assert again.object[name] == first.object[name]
     assert json.loads((out / "estimate.json").read_text())["estimates"] == again.object["estimates"]
@@ -63,7 +63,7 @@ def test_a_bench_file_says_what_failed_and_what_it_cannot_do(
     assert wrong.status == 1
     first = (tmp_path / "wrong" / "parameters.toml").read_text().splitlines()[0]
     assert first.startswith("# CHECK FAILED, do not use this file: residual_over_noise = ")
-    assert wrong.object["options"] == {}  # all of them only simulate
+    assert wrong.object["options"] == {}  # all of them affect only simulations
     refused(
         bywire("identify", "motor-winding", data, "--option", "rotor=turning"),
         "rotor",
@@ -132,7 +132,7 @@ def test_a_study_keeps_out_of_other_folders(bywire: Bywire, tmp_path: Path) -> N
     found = bywire("identify", "friction-model", "--synthetic", "1", *law, "--json")
     assert found.status == 0
     assert found.object["put_in"]["F_c"] == 20.0
-    assert found.object["start"] == {}  # it needs none
+    assert found.object["start"] == {}  # it needs no stimulus
     refused(
         bywire("identify", "seal-friction", "--study", "2", "--out", tmp_path),
         "contains a result of friction-model",
@@ -225,7 +225,7 @@ def test_refusals(bywire: Bywire, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("dither", ["off", "sine"])
 def test_parameters_go_on_as_a_bench_file(tmp_path: Path, dither: str) -> None:
-    """What the experiment sets itself is said, not set."""
+    """A parameter that the experiment sets becomes a comment, not a setting."""
     par = parameters("dardanelli2010")
     changes = {"ecu.dither.waveform": dither, "seal.T_pr": 0.0123, "motor.R_m": 0.321}
     path = tmp_path / "parameters.toml"
@@ -265,7 +265,7 @@ def test_values_lie_beside_their_checks_when_the_report_is_interrupted(
         stop.setattr("bywire.report.drawing.save_figure", stopped)
         outcome = bywire(*arguments)
     assert outcome.status == 130
-    assert f"the report in {out} is not complete: the same command writes it" in outcome.err
+    assert f"the report in {out} is incomplete" in outcome.err
     kept = {"measurement.nc", "parameters.toml", "estimate.json"}
     assert {p.name for p in out.iterdir()} == {*kept, UNFINISHED}
     left = json.loads((out / "estimate.json").read_text())

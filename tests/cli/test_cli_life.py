@@ -1,4 +1,4 @@
-"""The command life."""
+"""Command life."""
 
 from __future__ import annotations
 

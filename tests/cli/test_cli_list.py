@@ -113,7 +113,7 @@ def test_every_experiment_says_what_it_drives(bywire: Bywire) -> None:
         assert rows or one.static is not None, name
     text = bywire("list", "hard-braking").out
     assert "p_set   bar   pressure demand  motorcycle-brake" in text
-    assert "'bywire list motorcycle-brake': the signals in a recording" in text
+    assert "'bywire list motorcycle-brake'" in text
 
 
 def test_every_loop_and_plant_says_input_output_and_states(bywire: Bywire) -> None:
@@ -148,7 +148,7 @@ def test_a_parameter_a_group_a_signal_and_a_key_figure(bywire: Bywire) -> None:
     assert figure["unit"] == "%"
     assert "hard-braking" in figure["experiments"].split(", ")
     distance = only(bywire("list", "stopping_distance", "--json"), "KPI")
-    assert distance["unit"] == "um, mm or m"  # as reports write it, by its size
+    assert distance["unit"] == "um, mm or m"  # in the unit that reports choose by size
     refused(bywire("list", "motor.R_n"), "unknown name 'motor.R_n'", "'motor.R_m'")
 
 

@@ -1,4 +1,4 @@
-"""The commands on loops: linearize, frequency-response, margins."""
+"""Commands for loops: linearize, frequency-response, margins."""
 
 from __future__ import annotations
 
@@ -215,7 +215,7 @@ def test_bad_input(bywire, arguments, texts):
     refused(bywire(*arguments), *texts)
 
 
-SENSOR_ON_ITS_CORNER = ("--set", "pressure_sensor.p_high=2101325 Pa")  # 20 bar above the ambient
+SENSOR_ON_ITS_CORNER = ("--set", "pressure_sensor.p_high=2101325 Pa")  # 20 bar above ambient
 WITHOUT_GAIN = tuple(
     word for name in ("k_p", "k_i", "k_d") for word in ("--set", f"ecu.pressure.{name}=0")
 )
@@ -239,7 +239,7 @@ def test_every_linear_model_names_the_operation_on_its_corner(bywire, command, r
 
 
 def test_a_stated_side_of_a_corner_is_taken(bywire):
-    """Below its end the sensor is the usual one; above, nothing is fed back."""
+    """Below its upper limit the sensor works as usual. Above the limit, there is no feedback."""
     usual = bywire("margins", "pressure", "--json").object["margins"]
     asked = ("margins", "pressure", *SENSOR_ON_ITS_CORNER, "--json", "--side")
     below, above = (bywire(*asked, side) for side in ("below", "above"))

@@ -1,4 +1,4 @@
-"""Messages that can be read: short, with a next step; and nothing of a library among results."""
+"""Readable messages: short, with a next step, and no library output among results."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def test_a_full_disk_is_said_with_place_and_next_step(bywire, bench, monkeypatch
 
 @pytest.mark.parametrize("error", [OSError(28, "No space left on device"), KeyError("comment")])
 def test_what_a_library_prints_is_no_result(capsys, monkeypatch, tmp_path, error):
-    """Asammdf shows all that it knows before it raises."""
+    """Asammdf prints all its information before it raises an error."""
 
     def loud(*_, **__):
         print(1000 * "dump ")

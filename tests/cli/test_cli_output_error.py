@@ -40,7 +40,7 @@ def bench(tmp_path: Path) -> Path:
 
 
 def run_file(path: Path, p_start: float, f: str, seed: int) -> Path:
-    """Write what the bench's sensors would show, with other parameters than it has."""
+    """Write the bench's sensor signals, simulated with other parameters than the bench's."""
     made = bywire.run(
         bywire.Bench(
             "motor-open-loop",
@@ -107,7 +107,7 @@ def test_files_become_a_bench_file(bywire: Bywire, bench: Path, tmp_path: Path) 
         assert low - 0.5 * (high - low) < value < high + 0.5 * (high - low)
         assert high - low < 0.03 * value
     assert found.object["options"]["loss"] == "huber"
-    assert found.object["start"]["motor.R_m"] == pytest.approx(0.7)  # the bench's lies outside
+    assert found.object["start"]["motor.R_m"] == pytest.approx(0.7)  # the bench's value is outside
     assert found.object["start"]["run1:start.p_start"] == pytest.approx(12e5, rel=0.05)
     assert (
         json.loads((out / "estimate.json").read_text())["parameters"]

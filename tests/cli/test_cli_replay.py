@@ -17,7 +17,7 @@ Bywire = Callable[..., Outcome]
 
 @pytest.fixture(scope="module")
 def stop(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return the file of a braking whose brake has less friction than the parameter set's."""
+    """Return the file of a braking with less friction than in the parameter set."""
     bench = package.Bench(
         "moment-pulses",
         "roberts2003",

@@ -13,12 +13,12 @@ from bywire.reproduction.reproduction import SOURCES, Reproduction
 
 @pytest.fixture
 def quick(monkeypatch):
-    """Put an empty reproduction in place of the long computation, and count its calls."""
+    """Replace the long computation with an empty reproduction that counts its calls."""
     source = next(iter(SOURCES.all().values()))
     calls = []
 
     class Quick:
-        """What the command asks of a source."""
+        """Source with the attributes that the command uses."""
 
         @staticmethod
         def reproduce(progress):

@@ -1,4 +1,4 @@
-"""What ``bywire run`` prints and leaves in its folder."""
+"""Printed output of ``bywire run``, and files in its folder."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from command_line import BRAKING, OPEN_LOOP, QUICK, no_half_files, refused
 import bywire as package
 
 NAMES = ["../../escaped", "/escaped", "a/b\\c", "..", "con", "x" * 300, "<script>alert(1)</script>"]
-CURVE = BRAKING.replace("hard-braking", "seal-stribeck")  # the quickest result
+CURVE = BRAKING.replace("hard-braking", "seal-stribeck")  # the fastest result
 STEP = '[stimulus]\nkind = "step"\nstart = 0\nend = "20 A"\nt_step = "10 ms"\n'
 UNDEFINED = '\n[requirements]\nsettling_time = "<= 10 s"\n'
 
@@ -56,7 +56,7 @@ def test_name_is_text_and_never_a_path(bywire, bench, tmp_path, name):
     assert all(p.parent == inner for p in found)
     page = (inner / "report.html").read_text(encoding="utf-8")
     assert "<script>alert" not in page
-    assert page.count("<script") == ("<svg" in page)  # the one that zooms figures
+    assert page.count("<script") == ("<svg" in page)  # the script that zooms figures
 
 
 def test_folder_is_made_with_its_parents(bywire, bench, tmp_path):
@@ -154,8 +154,8 @@ def test_an_experiment_runs_by_its_name(bywire):
 def test_a_file_comes_before_an_experiment_of_its_name(bywire, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "hard-braking").write_text("nothing = 1")
-    refused(bywire("run", "hard-braking"), "experiment is missing")
-    # A folder is no bench file: that of the last results does not stand in the way.
+    refused(bywire("run", "hard-braking"), "unknown key of a bench file 'nothing'")
+    # A folder is not a bench file, so the previous result folder does not interfere.
     (tmp_path / "seal-stribeck").mkdir()
     assert bywire("run", "seal-stribeck").status == 0
 
@@ -177,7 +177,7 @@ def test_what_a_run_did_instead_stands_above_its_key_figures(bywire, bench):
     ):
         assert text in above
     shown = bywire("run", bench(), *changes, "--json").object
-    assert shown["status"] == "done"  # nothing was required
+    assert shown["status"] == "done"  # no requirements
     assert any(text.startswith("misses its set point") for text in shown["remarks"])
     plain = bywire("run", bench(BRAKING))
     assert plain.out.startswith("name  ")

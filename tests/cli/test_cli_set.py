@@ -1,4 +1,4 @@
-"""Changes of a bench from the command line."""
+"""Changes to a bench from the command line."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def test_number_without_a_unit_gets_the_same_answer_in_file_and_change(bywire, b
     changed = bywire("run", bench(), "--set", f"motor.R_m={number}")
     written = bywire("run", bench(f"{BRAKING}[set]\nmotor.R_m = {value}\n"))
     refused(changed, f"motor.R_m = '{number}' {said}", "'0.5 ohm'")
-    assert changed.err.replace(f"'{number}'", number) == written.err  # quoted as it stands there
+    assert changed.err.replace(f"'{number}'", number) == written.err  # quoted as in the file
 
 
 def test_zero_and_pure_numbers_need_no_unit(bywire, bench):
@@ -131,12 +131,12 @@ def test_shares_and_patterns_change_what_is_there(bench):
     path = str(bench(f'{BRAKING}{QUICK}\n[set]\nseal.c = "2 s/rad"\n"motor.*" = "+10%"\n'))
     changed = package.run(path, {"seal.T_pr": "+50%", "seal.c": " - 5 %"}).bench.par.leaves()
     assert changed["seal.T_pr"] == pytest.approx(1.5 * cited["seal.T_pr"], rel=1e-12)
-    assert changed["seal.c"] == pytest.approx(0.95 * 2.0, rel=1e-12)  # of what the file gives
+    assert changed["seal.c"] == pytest.approx(0.95 * 2.0, rel=1e-12)  # relative to the file's value
     for name in ("motor.R_m", "motor.K_e"):
         assert changed[name] == pytest.approx(1.1 * cited[name], rel=1e-12)
     assert changed["gear.eta_g"] == cited["gear.eta_g"]
     plain = package.Bench("hard-braking", "dardanelli2010", {"seal.*": "+50%", "seal.c": "2 s/rad"})
-    assert plain.par.seal.c == 2.0  # what is written out goes before a pattern
+    assert plain.par.seal.c == 2.0  # a full name takes precedence over a pattern
     twice = plain.with_overrides({"seal.c": "+50%"})
     assert twice.par.seal.c == pytest.approx(3.0)
     margins = package.margins("pressure", overrides={"seal.*": "-10%"})
@@ -146,7 +146,7 @@ def test_shares_and_patterns_change_what_is_there(bench):
 @pytest.mark.parametrize(
     ("change", "texts"),
     [
-        ("seels.*=+50%", ["none is matched", "'seels.*'", "'seal.*'"]),
+        ("seels.*=+50%", ["parameter pattern", "'seels.*'", "'seal.*'"]),
         ("gear.law=+50%", ["gear.law = '+50%'", "is a choice (now paper), which cannot change"]),
         ("*.law=+50%", ["every quantity that matches the pattern is 0"]),
         ("motor.R_m=-150%", ["motor.R_m = -0.175 ohm", "> 0 ohm", "got '-150%'"]),

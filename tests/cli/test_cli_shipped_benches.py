@@ -1,4 +1,4 @@
-"""Every command that takes a bench, on every bench file of the repository."""
+"""Every command that accepts a bench, with every bench file in the repository."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ QUICK = {
     ],
 )
 def test_a_command_takes_a_shipped_bench(bywire, tmp_path: Path, command: str, file: Path) -> None:
-    """It gives its result, or says in a line what this bench has that it cannot take."""
+    """The command succeeds, or states in one line why it does not accept the bench."""
     text = file.read_text(encoding="utf-8")
     chosen = next(line for line in text.splitlines() if line.startswith("parameters"))
     given = {"bench": file, "out": tmp_path, "parameters": chosen.split('"')[1]}

@@ -16,13 +16,13 @@ from bywire import __version__
 from bywire.bench.experiment import EXPERIMENTS
 from bywire.usecases import use_cases
 
-CURVE = 'experiment = "seal-stribeck"\nparameters = "dardanelli2010"\n'  # the quickest result
+CURVE = 'experiment = "seal-stribeck"\nparameters = "dardanelli2010"\n'  # the fastest result
 MISSED = CURVE + '[requirements]\nbreakaway_apply = "<= 1 mN*m"\n'
 STRICT = QUICK + '\n[requirements]\npeak_current = "<= 1 A"\nenergy = ">= 1 kJ"\n'
 
 
 def shell(command: str, **environment: str) -> subprocess.CompletedProcess[str]:
-    """Run a line of the shell with the program in place of ``bywire``."""
+    """Run a shell line with the installed program in place of ``bywire``."""
     line = command.replace("bywire ", f"{shlex.quote(str(SCRIPT))} ")
     return subprocess.run(
         ["bash", "-o", "pipefail", "-c", line],

@@ -1,4 +1,4 @@
-"""The command study."""
+"""Command study."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The commands of studies of many cases."""
+"""Commands for studies with many cases."""
 
 from __future__ import annotations
 
@@ -134,7 +134,7 @@ def test_the_name_of_a_study_file_is_no_sizing_study(
     there = Path(place, study.name)
     (tmp_path / place).mkdir(exist_ok=True)
     study.rename(tmp_path / there)
-    (tmp_path / "tolerance.toml").write_text('life = "wedge-pads"\n')  # near, and no study
+    (tmp_path / "tolerance.toml").write_text('life = "wedge-pads"\n')  # a similar name
     refused(bywire("study", word), f"run the study file {there}, type 'bywire study run {there}'")
     refused(bywire("study", "run", word), f"Did you mean {there}?")
     assert not (tmp_path / word).exists()

@@ -56,9 +56,9 @@ PUSH = Experiment("push", "spring-axis", "a push", Options, Options(), cases, ju
 
 @pytest.fixture(autouse=True)
 def _forgotten() -> Iterator[None]:
-    """Forget what a command loads."""
+    """Unload the brakes that a command loads."""
     with forgotten():
-        registry._loaded.clear()  # brakes of other tests offer their parameter sets, too
+        registry._loaded.clear()  # brakes of other tests also provide parameter sets
         yield
 
 
@@ -84,7 +84,7 @@ def test_run_with_requirements_and_a_report(bywire: Bywire, tmp_path: Path, fron
         tmp_path / "out",
     )
     done = bywire(*SYSTEM, *command) if front else bywire(*command, *SYSTEM)
-    assert done.status == 1  # it overshoots, as it must
+    assert done.status == 1  # it overshoots, as expected
     assert done.object["kpis"]["overshoot"]["value"] > 1.0
     page = (tmp_path / "out" / "report.html").read_text()
     assert "a mass on a spring" not in page.partition("<body")[0]
@@ -244,7 +244,7 @@ def test_a_set_for_an_assembly_that_does_not_exist_is_said(bywire: Bywire, tmp_p
     (tmp_path / "odd_axis.py").write_text(wrong)
     system = ("--system", tmp_path / "odd_axis.py")
     line = wrong[: wrong.index('CitedSet("')].count("\n") + 1
-    for _ in range(2):  # made anew, then kept
+    for _ in range(2):  # rebuilt, then cached
         done = bywire("list", "--json", *system)
         assert f"odd_axis.py, line {line}: parameter set 'spring-axis-one'" in done.err
         assert "did you mean 'spring-axis'?" in done.err

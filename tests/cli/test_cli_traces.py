@@ -1,4 +1,4 @@
-"""Measured rides from bench files: found beside the bench file, refused where doubtful."""
+"""Measured rides in bench files, found next to the bench file, and rejected if doubtful."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ RIDE = HEADER + "".join(f"{k / 100:.2f},{9 + 0.2 * k:.1f}\n" for k in range(30))
 
 @pytest.fixture
 def ride(bench, tmp_path):
-    """Return a function that writes a trace and a bench file that names it."""
+    """Return a function that writes a trace and a bench file that refers to the trace."""
 
     def write(text, name="ride.csv", options=""):
         data = text if isinstance(text, bytes) else text.encode()

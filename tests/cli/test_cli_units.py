@@ -1,4 +1,4 @@
-"""Units on the command line and in bench files: what is refused, and in which words."""
+"""Units on the command line and in bench files: rejected units and their messages."""
 
 from __future__ import annotations
 

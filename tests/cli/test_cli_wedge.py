@@ -1,4 +1,4 @@
-"""The wedge brake's experiments on the command line: one line of error, or figures with reasons."""
+"""Experiments of the wedge brake on the command line: one error line, or key figures."""
 
 from __future__ import annotations
 
@@ -24,4 +24,4 @@ def test_hold_without_rows_is_no_traceback(bywire, change):
 
 def test_unmet_demand_is_a_warning(bywire):
     outcome = bywire("run", "moment-pulses", "--set", "flywheel.Omega_0=0 rad/s")
-    assert "bywire: warning: the demand of 200 N*m was not reached" in outcome.err
+    assert re.search(r"bywire: warning: .* 200 N\*m", outcome.err)

@@ -47,4 +47,4 @@ def test_new_file_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
     assert list(element.functions) == ["output"]
     refused = [demand.settle() for demand in demands_on(element)]
     assert {f.outcome for f in refused} == {"broken"}
-    assert all("no type for ['x', 'return']" in f.text for f in refused)
+    assert all("['x', 'return']" in f.text for f in refused)

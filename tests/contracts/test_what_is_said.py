@@ -55,8 +55,8 @@ def test_what_broke_a_contract_is_said() -> None:
     sample = Sampler({"reading": Annotated[float, Signal("1", "x")]}, {}).sample()
     assert element.name == "plant.adc"
     assert described({}) == ""
-    assert described({"par.law": "ideal"}) == "; with par.law = ideal"
-    assert described({}, sample, [0.25]) == "; with reading = 0.25"
+    assert described({"par.law": "ideal"}) == " (with par.law = ideal)"
+    assert described({}, sample, [0.25]) == " (with reading = 0.25)"
     assert described({}, sample, [0.25], is_broken=False) == ""
 
 

@@ -37,7 +37,7 @@ def check_provenance(found: CitedSet) -> None:
         assert len(cited.where.strip()) > 3, name
         if cited.kind == "paper":
             # A place in the source, so that it can be looked up.
-            place = r"Table|Tab\.|section|Section|eq\.|Eq\.|\(\d+\)|Fig|page|p\. |the ECU knows"
+            place = r"Table|Tab\.|section|Section|eq\.|Eq\.|\(\d+\)|Fig|page|p\. |as in the plant"
             assert re.search(place, cited.where), f"{name}: {cited.where!r} names no place"
 
 

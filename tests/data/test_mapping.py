@@ -54,7 +54,7 @@ def test_a_mapping_file_means_what_it_says(tmp_path):
         (
             signal(column=0),
             ParameterError,
-            r"\[signals.p\] column = 0: .*columns are counted from 1",
+            r"\[signals.p\] column = 0: .*or its number, counted from 1",
         ),
         (signal(limits=["1 bar", "0 bar"]), ParameterError, "the lower value first"),
         (signal(limits="1 bar"), ParameterError, r"\[signals.p\] limits"),
@@ -104,7 +104,7 @@ def test_refused_mapping_files(tmp_path, content, text):
         (
             {"signals": {"q": {"column": "p_sensr"}}},
             FileError,
-            r"no column 'p_sensr' \(signals.q.column\): is it 'p_sensor'\? its columns are t,",
+            r"no column 'p_sensr' \(signals.q.column\).*'p_sensor'\? Its columns are t,",
         ),
         (
             {"signals": {"p_sensor": {"unit": "MPa"}}},

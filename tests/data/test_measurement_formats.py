@@ -63,7 +63,7 @@ def test_one_signal_alone_is_read_by_the_rules_of_the_mapping(tmp_path, name):
     found = read_measurement(file_of(tmp_path, name), mapping)
     np.testing.assert_array_equal(found["p"], -measurement()["p_mc"].values)
     np.testing.assert_allclose(found["time"], measurement()["time"] - 1e-3, rtol=1e-12)
-    with pytest.raises(FileError, match=r"no column 'p_cm'.*is it 'p_mc'"):
+    with pytest.raises(FileError, match=r"no column 'p_cm'.*Did you mean 'p_mc'"):
         read_measurement(file_of(tmp_path, name), {"signals": {"p": {"column": "p_cm"}}})
 
 
@@ -160,7 +160,7 @@ def test_hdf5_files_of_h5py(tmp_path):
         file["rig/p"].attrs["unit"] = "Pa"
         file["away"] = h5py.ExternalLink("other.h5", "/secret")
         file["round"] = h5py.SoftLink("/")
-    with pytest.warns(MeasurementWarning, match="'away', 'round': it is a link"):
+    with pytest.warns(MeasurementWarning, match="'away', 'round'. Reason: it is a link"):
         found = read_measurement(tmp_path / "a.h5")
     assert list(found.data_vars) == ["rig.p"]
     np.testing.assert_array_equal(found["rig.p"], VALUES)

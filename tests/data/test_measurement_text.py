@@ -130,7 +130,7 @@ def test_a_temperature_is_no_time(tmp_path, header):
     [
         ("t [s],x [m]\n0,1\n1,2\n1,3\n", "line 4: 1 s is repeated"),
         ("t [s],x [m]\n0,1\n\n2,2\n1,3\n", "line 5: 1 s comes after 2"),
-        ("t [s],x [m]\n0,1\n,2\n1,3\n", "line 3: nan s is not an instant"),
+        ("t [s],x [m]\n0,1\n,2\n1,3\n", "line 3: nan s is not a time"),
         ("t [s],x [m]\n0,1\n1,fast\n", "line 3, column 'x': 'fast' is not a finite number"),
         ("t [s],x [m]\n0,1\n1,1e999\n", "line 3, column 'x': '1e999' is not a finite number"),
         ("t [s],x [m]\n0,1\n1\n", "line 3: 1 cells, but the first row has 2"),
@@ -138,7 +138,7 @@ def test_a_temperature_is_no_time(tmp_path, header):
         ('t [s],x [m]\n0,1\n1,"2\n', "line 3: .*quotation marks"),
         ("t [s];x [m]\n0;1.5\n1;2,5\n", "mixes decimal comma and decimal point"),
         ("t [s],x [m]\n0,1\n", r"too few rows \(1\)"),
-        ("x [m],y [m]\n0,1\n1,2\n", " its columns are x, y"),
+        ("x [m],y [m]\n0,1\n1,2\n", " Its columns are x, y"),
         (b"t [s],x [m]\n0,1\n1,2\xb5\n", "line 3, column 'x': '2µ' is not a finite number"),
         (b"Rig 3\nt [s],x [m]\n0,0,1,5\n0,1,1,6\n", "commas separate the columns and are also"),
         (b"", r"is empty \(0 bytes\)"),

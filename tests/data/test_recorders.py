@@ -96,7 +96,7 @@ def test_rows_as_to_file_writes_them(tmp_path, rows):
     found, notes = read_with_notes(tmp_path / "a.mat", last)
     np.testing.assert_array_equal(found["time"], TIME)
     np.testing.assert_array_equal(found["y"], (rows - 1) * FIRST)
-    assert "The first one increases, so bywire reads it as time in s" in notes[0]
+    assert "so bywire reads it as time in s" in notes[0]
     savemat(tmp_path / "a.mat", {"ans": np.stack([FIRST * 0, SECOND])})
     with pytest.raises(FileError, match="has no time column"):
         read_with_notes(tmp_path / "a.mat", {"signals": {"y": {"column": "ans(2,:)", "unit": "m"}}})
@@ -208,8 +208,8 @@ def test_codes_with_a_text_are_no_pressures(tmp_path, codes):
     wanted[[50] if codes == "a code" else [50, 70]] = np.nan
     np.testing.assert_allclose(found["p"], wanted, rtol=1e-12)
     assert any(note.startswith("p: missing samples: ") for note in notes)
-    assert any("'f': a formula converts it" in note for note in notes)
-    assert any("'text': it contains text" in note for note in notes)
+    assert any("'f'. Reason: a formula converts it" in note for note in notes)
+    assert any("'text'. Reason: it contains text" in note for note in notes)
 
 
 def test_states_keep_their_numbers_and_lack_only_what_was_not_there(tmp_path):

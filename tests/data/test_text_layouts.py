@@ -179,7 +179,7 @@ def test_the_same_measurement_in_every_layout(tmp_path, layout):
             HEADER + rows().replace("0.200,", "# x\n0.200,"),
             "comment lines skipped: 1",
         ),
-        ("t [s],note,p [bar]\n" + rows(",a,"), "not read: 'note': it contains text"),
+        ("t [s],note,p [bar]\n" + rows(",a,"), "not read: 'note'. Reason: it contains text"),
         (
             HEADER + rows().replace("0.100,", "0.100,OVLD\n0.105,"),
             "p: missing samples: 1 .1 x 'OVLD'",
@@ -286,7 +286,7 @@ def test_a_remark_in_cp1252_far_below_the_head_is_read_with_the_note(tmp_path):
 def test_bytes_that_are_not_text_in_any_table_are_refused(tmp_path, byte):
     path = tmp_path / "a.csv"
     path.write_bytes(b"t [s],p [bar]\n0,1\n1,2\xb5" + bytes([byte]))
-    with pytest.raises(FileError, match=r"line 3 is not UTF-8 text, nor cp1252.*encoding = '"):
+    with pytest.raises(FileError, match=r"line 3 is neither UTF-8 nor cp1252.*encoding = '"):
         read_measurement(path)
 
 
@@ -294,11 +294,11 @@ def test_bytes_that_are_not_text_in_any_table_are_refused(tmp_path, byte):
     ("content", "text"),
     [
         (HEADER + "0,1\n1,2,3\n", "line 3: 3 cells, .*skip_lines in the mapping"),
-        ("Time,p [bar]\n12:34,1\n12:35,2\n", "'Time': its times or dates"),
-        ("t;p\ns;foo\n0;1\n1;2\n", "its columns are s, foo"),
+        ("Time,p [bar]\n12:34,1\n12:35,2\n", "'Time'. Reason: its times or dates"),
+        ("t;p\ns;foo\n0;1\n1;2\n", "Its columns are s, foo"),
         ("t;p;x\ns;bar;foo\n0;1;2\n1;2;3\n", "column 'x': the unit 'foo' is not known"),
         ("t [s] p [bar]\n0 1\n1\n", "line 3: 1 cells, .*use a mark such as nan"),
-        ("Date,p [bar]\n03/04/2026,1\n03/04/2026,2\n", "'Date': its times or dates"),
+        ("Date,p [bar]\n03/04/2026,1\n03/04/2026,2\n", "'Date'. Reason: its times or dates"),
         ("time [s],p [bar]\n09:12:33.5,1\n9.7,2\n", "line 2, .*is a time stamp"),
         (
             lvm("One", ["X_Value\tp\tu", "0\t1\t1", "1\t2\t1", "Channels\t2"]),
@@ -316,9 +316,9 @@ def test_doubtful_tables_are_refused(tmp_path, content, text):
 @pytest.mark.parametrize(
     ("content", "kind", "text"),
     [
-        ({"missing": [True]}, ParameterError, "missing = .* write texts and numbers"),
+        ({"missing": [True]}, ParameterError, "missing = .* write strings and numbers"),
         ({"missing": {"a": 1}}, ParameterError, "missing = "),
-        ({"titles": "no"}, ParameterError, "titles = 'no': it must be true or false"),
+        ({"titles": "no"}, ParameterError, "titles = 'no': it must be true"),
         (
             {"encoding": "cp1225"},
             UnknownNameError,

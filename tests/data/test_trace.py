@@ -56,7 +56,7 @@ def test_without_names_every_column_comes_in_si(tmp_path):
     ("content", "text"),
     [
         ("", r"is empty \(0 bytes\)"),
-        ("0,1\n1,2\n", "no column 'pedal' .*its columns are 1, 2"),
+        ("0,1\n1,2\n", "no column 'pedal' .*Its columns are 1, 2"),
         (HEADER + "0,1\n0.01,fast\n", "line 3, column 'pedal': 'fast' is not a finite number"),
         (HEADER + "0,1\n0.01,1_000\n", "line 3, column 'pedal': '1_000' is not a finite number"),
         (HEADER + "0,1\n0.01,1e999\n", "line 3, column 'pedal': '1e999' is not a finite number"),
@@ -68,13 +68,13 @@ def test_without_names_every_column_comes_in_si(tmp_path):
         (HEADER + '0,"1\n0.01,2\n', "line 2: .* quotation marks"),
         (HEADER + "0,1\n", r"too few rows \(1\)"),
         ("time [s];pedal [mm]\n0;1,5\n0.1;2\n", "line 3, column 'time': '0.1' mixes decimal"),
-        ("time [s], pedl [mm]\n0,1\n1,2\n", r"no column 'pedal'.* is it 'pedl'"),
+        ("time [s], pedl [mm]\n0,1\n1,2\n", r"no column 'pedal'.* Did you mean 'pedl'"),
         (
             "clock [s], pedal [mm]\n0,1\n1,2\n",
             "a column 'time",
         ),
         ("time [s], pedal [mm], Pedal [mm]\n0,1,1\n1,2,1\n", "two columns named 'pedal'"),
-        (b"time [s], pedal [mm]\n0,1\n1,2\x81\n", "not UTF-8 text, nor cp1252 .* Save it as UTF-8"),
+        (b"time [s], pedal [mm]\n0,1\n1,2\x81\n", "neither UTF-8 nor cp1252 .* Save it as UTF-8"),
     ],
 )
 def test_refused_files(tmp_path, content, text):

@@ -41,7 +41,7 @@ def test_the_page_is_current():
 
 
 def test_a_row_without_a_reason_is_told():
-    row = next(row for row in ROWS if row.what == "largest force of the other motor, 20 A")
+    row = next(row for row in ROWS if row.what == "maximum force of the other motor, 20 A")
     wrong = type(row)(row.fault, row.what, 0.8 * row.stated, row.unit, row.computed)
     assert wrong_ones([wrong])
     assert wrong_ones([type(row)(row.fault, row.what, row.stated, row.unit, row.computed, "so")])

@@ -217,7 +217,7 @@ def test_noise_that_the_record_does_not_tell_is_no_proof_of_a_model() -> None:
     check = next(c for c in identified(bench(), data, own).checks if c.name == "noise_not_told")
     assert check.value == 1.0
     assert not check.holds
-    assert "p_mc varies from sample to sample" in check.note
+    assert "p_mc changes from sample to sample" in check.note
     assert 'outputs "p_mc=NOISE bar"' in check.note
     assert all(c.holds for c in identified(bench(), record(bench(), 2), own).checks)
     given = identified(bench(), record(bench(), 2)).checks

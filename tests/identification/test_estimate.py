@@ -76,7 +76,7 @@ def test_at_a_bound_is_a_twentieth_of_a_deviation_or_a_millionth_of_the_scale() 
 
 def test_what_means_nothing() -> None:
     """An interval that reaches beyond zero, or a bound; the same with either sign."""
-    assert ESTIMATE.vague() == {"offset.i": "is -3 +- 4.5 A: it may be zero"}
+    assert ESTIMATE.vague() == {"offset.i": "is -3 +- 4.5 A, so it may be zero"}
     at_end = replace(ESTIMATE, values=np.array([50.0, -4.5, 0.8]))
     assert at_end.vague() == {"motor.R_m": "is at its bound, 50 ohm"}
 

@@ -345,7 +345,7 @@ def test_several_starts_of_a_model_of_ones_own(axis: ModuleType, data: xr.Datase
     [
         (lambda d: d.rename(theta="phi"), "unknown measured signal 'theta': valid names are"),
         (lambda d: d.isel(time=slice(None, None, 10)), "cutoff = 60 Hz is not valid"),
-        (lambda d: d.assign(theta=-d["theta"]), r"opposite signs \(J = -0.02 .*negate one"),
+        (lambda d: d.assign(theta=-d["theta"]), r"\(J = -0.02 V s"),
         (None, "none.nc cannot be read"),
     ],
 )

@@ -108,7 +108,7 @@ def test_what_the_data_does_not_tell_is_kept_and_named() -> None:
     found = estimate(decay(white(1), more=True))
     assert found.names == ("a", "b")
     assert [k.unknown.name for k in found.kept] == ["c"]
-    assert "times its usual magnitude 3" in found.kept[0].reason
+    assert "times its usual magnitude of 3" in found.kept[0].reason
     assert found["a"] == pytest.approx(2.0, abs=0.02)
 
 
@@ -181,7 +181,7 @@ def test_a_model_that_does_not_fit_is_not_sent_for_excitation() -> None:
     y = np.linspace(0.0, 5.0, 50)
     unknown = Unknown("x", 1.0, scale=1e-3)
     poor = Problem((unknown,), lambda v: ((v[0] - y) / 0.01, np.full((50, 1), 100.0)))
-    with pytest.raises(ParameterError, match="the model does not fit"):
+    with pytest.raises(ParameterError, match="The model does not fit"):
         estimate(poor)
     fair = Problem((unknown,), lambda v: ((v[0] - y) / 2.0, np.full((50, 1), 0.5)))
     with pytest.raises(ParameterError, match="Excite the system more"):

@@ -54,7 +54,7 @@ def test_files_become_records_and_uneven_time_is_resampled_and_said(tmp_path: Pa
     paths = [write_measurement(uneven, tmp_path / f"{k}.nc") for k in "ab"]
     found = measured(paths, None, {"p": "Pa"})
     assert len(found.notes) == 2
-    assert "resampled, because" in found.notes[0]
+    assert "resampled to" in found.notes[0]
     one = split(found.data)["a"]
     np.testing.assert_allclose(np.diff(one["p"].values), 0.02, rtol=1e-9)
 

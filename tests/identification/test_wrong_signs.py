@@ -34,7 +34,7 @@ def test_signs_that_do_not_fit_together_are_refused(name: str) -> None:
     data = method.synthetic(par, method.defaults, 1)
     assert all(c.holds for c in method.identify(data, par, method.defaults, Effort()).checks)
     for signal, words in REFUSED[name].items():
-        with pytest.raises(ParameterError, match=f"{words} .*Set sign = -1 for it in the mapping"):
+        with pytest.raises(ParameterError, match=f"{words} .*sign = -1"):
             method.identify(negated(data, signal), par, method.defaults, Effort())
 
 

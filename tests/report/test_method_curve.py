@@ -71,7 +71,7 @@ def test_records_in_a_row_are_named_and_told_apart() -> None:
     for axes in (upper, lower):
         borders = [b for b in axes.lines if list(b.get_xdata()) == [50.5, 50.5]]
         assert len(borders) == 1
-    assert lower.get_xlabel() == "time, records in a row [s]"
+    assert lower.get_xlabel() == "time, records joined [s]"
     assert set(after_one_another({"": np.arange(3.0)})) == {"time"}
 
 
@@ -105,7 +105,7 @@ def test_a_band_is_named() -> None:
     ("half", "said"),
     [
         (0.1, "95 % band (± 0.1 N at most)"),
-        (1e-3, "95 % band (± 0.001 N at most, within the line)"),
+        (1e-3, "95 % band (± 0.001 N at most, hidden by the line)"),
     ],
 )
 def test_a_band_that_the_line_hides_is_told(half: float, said: str) -> None:

@@ -1,4 +1,4 @@
-"""A server of a small folder, in this process."""
+"""Server for a small folder, in this process."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ else:
 
 
 class Answer(NamedTuple):
-    """What a server answered."""
+    """Reply of a server."""
 
     status: int
     headers: Any
@@ -45,7 +45,7 @@ class Answer(NamedTuple):
 
 
 class Visitor:
-    """Somebody who asks a server, by default with the token of its link."""
+    """Client of a server, by default with the token of the server's link."""
 
     def __init__(self, server: Opened, folder: Path) -> None:
         self.server, self.folder = server, folder
@@ -69,7 +69,7 @@ class Visitor:
         return self("POST", "/api/jobs", {"task": task, "form": form})
 
     def ended(self, number: int) -> dict[str, Any]:
-        """Return what is told of a job that has ended."""
+        """Return the state of a job that has ended."""
         job = self.server.service.jobs.find(str(number))
         assert job.ended.wait(60)
         return dict(self("GET", f"/api/jobs/{number}").object)
@@ -77,7 +77,7 @@ class Visitor:
 
 @pytest.fixture(scope="module")
 def visit(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Visitor]:
-    """Yield somebody who asks a server that ends with the module."""
+    """Yield a client of a server that ends with the module."""
     outside = tmp_path_factory.mktemp("outside")
     (outside / "secret.csv").write_text("secret")
     folder = tmp_path_factory.mktemp("served")
@@ -98,7 +98,7 @@ def visit(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Visitor]:
 
 @pytest.fixture
 def standin(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Have jobs be processes that only speak as a job's does: they take no time to start."""
+    """Replace jobs by processes that only send a job's messages, because they start fast."""
 
     def started(_: Path) -> subprocess.Popen[bytes]:
         return subprocess.Popen(

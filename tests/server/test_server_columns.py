@@ -1,4 +1,4 @@
-"""Columns of a measurement before any question: units to choose from, and a first plot."""
+"""Columns of a measurement, with units to choose from and a first plot."""
 
 from __future__ import annotations
 
@@ -153,7 +153,7 @@ def test_a_dropped_file_shows_its_columns_and_fills_the_form_in(visit, chromium,
     assert page.input_value("#replay-input") == "p_set=Demand [bar]"
     assert page.input_value("#replay-output") == "p_pd=p_pd [MPa]"
     assert page.input_value("#replay-time") == "Zeit [ms]"
-    assert "over Zeit, 0 to 999 ms" in page.inner_text(".columns caption")
+    assert "Zeit, 0 to 999 ms" in page.inner_text(".columns caption")
     page.select_option(USE.format("Temp"), "output p_pd")  # a signal has one column
     assert page.input_value("#replay-output") == "p_pd=Temp"
     page.click("form[data-task=replay] button[type=submit]")

@@ -1,4 +1,4 @@
-"""Forms say what commands say, and what does not fit is said beside its field."""
+"""Forms show the same messages as commands, each next to its field."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ lasting = "20 ms"
 
 @pytest.fixture(scope="module")
 def folder(visit) -> None:
-    """Have files of each kind in the folder that is served."""
+    """Write files of each kind to the served folder."""
     (visit.folder / "small.toml").write_text(CAMPAIGN)
     (visit.folder / "wrong.toml").write_text(CAMPAIGN.replace('"motor.hot"', '"motor.hott"'))
     (visit.folder / "pads.toml").write_text('life = "wedge-pads"\n[vary]\n"stop.gap" = "+-5 %"\n')
@@ -145,7 +145,7 @@ def test_no_thing_leads_out_of_the_folder(visit, task, field):
         answer = visit.begin(task, **{field: path, **others})
         assert answer.status in (404, 422)
         assert "secret" not in answer.object["error"].replace("secret.csv", "")
-    # A link that is called as an experiment, and leads to somebody else's results.
+    # A link that has an experiment's name, and leads to another user's results.
     link = visit.folder / "seal-stribeck"
     link.symlink_to(visit.folder.parent)
     try:
@@ -234,7 +234,7 @@ def test_unknown_fields_are_no_field_s(visit):
 
 
 def computed(visit, task: Task, asked: dict[str, Any], out: Path) -> dict[str, Any]:
-    """Compute what was asked in this process, as that of a job does; return its last word."""
+    """Run a job's request in this process, and return the final message."""
     told: list[dict[str, Any]] = []
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(visit.folder)
@@ -265,13 +265,13 @@ def test_a_campaign_goes_on_fault_by_fault_and_another_goes_elsewhere(visit, mon
         judged.append(failing.name)
         return judge(plan, failing, healthy)
 
-    monkeypatch.setattr(os, "cpu_count", lambda: 1)  # one thread: faults one after the other
+    monkeypatch.setattr(os, "cpu_count", lambda: 1)  # one thread, so faults run one after another
     monkeypatch.setattr(running, "judge_fault", ended)
     with pytest.raises(RunError, match="seeded"):
         computed(visit, task, asked, out)
     kept = {path: path.read_bytes() for path in (out / "faults").iterdir()}
     assert len(kept) == 2
-    # What is asked again goes on where it ended; what is changed begins in a folder of its own.
+    # The same request continues in its folder. A changed request starts in a new folder.
     assert jobs.begun(task, asked) == out
     assert jobs.begun(task, {**asked, "set": {"motor.R_m": "0.4 ohm"}}) is None
     monkeypatch.setattr(

@@ -1,4 +1,4 @@
-"""Who may ask, and what for: each refusal has its status and one message."""
+"""Access control, in which each rejection has its status and one message."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def test_the_link_gives_a_cookie_and_leads_on_without_the_token(visit):
 def test_nothing_is_answered_without_the_token(visit, method, path):
     for token, word in (
         ("", "missing"),
-        ("x" * 43, "each start of the server"),
+        ("x" * 43, "each start"),
         ("\xe4", "token"),
     ):
         answer = visit(method, path, token=token)
@@ -84,7 +84,7 @@ def test_every_answer_has_a_policy(visit):
     assert b"<style" not in page
     assert b"<script>" not in page
     assert b"http" not in page.replace(b"xhttp", b"")
-    # What the folder holds may run its scripts, but as nobody: without cookies and network.
+    # Files in the folder may run scripts, but without an origin, cookies or network.
     policy = visit("GET", "/file/page.html").headers["Content-Security-Policy"]
     assert policy.startswith("sandbox allow-scripts allow-downloads; default-src 'none'")
     assert "allow-same-origin" not in policy
@@ -163,8 +163,10 @@ def test_who_still_sends_what_is_refused_can_read_why(visit):
     with socket.create_connection((HERE, port)) as sending:
         sending.sendall(head.encode())
         while sending.recv(10_000):
-            pass  # until all is said
-        for _ in range(3):  # a closed connection is noticed by the piece after the next
+            pass  # until the message is complete
+        for _ in range(
+            3
+        ):  # the client notices a closed connection only with the next piece but one
             sending.sendall(b"x" * 1000)
             time.sleep(0.05)
 
@@ -198,7 +200,7 @@ def test_a_body_that_nobody_reads_is_no_further_request(visit):
 
 
 def test_two_who_ask_at_once_are_both_answered(visit):
-    """One that sends its body slowly does not keep the other waiting."""
+    """A client that sends its body slowly does not delay others."""
     port, token = visit.server.port, visit.server.service.token
     with socket.create_connection((HERE, port)) as slow, ThreadPoolExecutor(4) as pool:
         slow.sendall(
@@ -239,7 +241,7 @@ def test_a_port_and_a_folder_that_do_not_do(visit, tmp_path):
 
 
 def test_a_client_that_is_gone_before_the_end_of_an_answer_is_no_error():
-    """What the system says of it, ENOTCONN, is no ConnectionError of Python's."""
+    """The system's error ENOTCONN is not a ConnectionError in Python."""
 
     class Gone:
         def shutdown(self, how):

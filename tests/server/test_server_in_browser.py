@@ -1,4 +1,4 @@
-"""The pages of a server in a real browser: forms, dropped files, jobs, and no other request."""
+"""Pages of a server in a real browser: forms, dropped files, jobs, no external requests."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def test_forms_files_and_jobs(visit, chromium, tmp_path):
     page.click(RUN)
     page.press("#jobs button", "Enter")
     page.wait_for_function(f"() => ({NEWEST})() === 'canceled'")
-    # files: one that is taken, one that is too large, one of no format
+    # files: valid, too large, and of unknown format
     assert noise == []
     upload = "form[data-task=replay] .upload"
     (tmp_path / "a rig.csv").write_text("time,p\n0,1\n")
@@ -49,7 +49,7 @@ def test_forms_files_and_jobs(visit, chromium, tmp_path):
     )
     (tmp_path / "large.csv").write_bytes(bytes(3_000_001))
     page.set_input_files(upload, tmp_path / "large.csv")
-    page.wait_for_selector("text=large.csv has 4 MB, but the limit is 3 MB")
+    page.wait_for_selector("text=large.csv is 4 MB")
     (tmp_path / "text.docx").write_text("x")
     page.set_input_files(upload, tmp_path / "text.docx")
     page.wait_for_selector("text='text.docx' does not have the extension of a measurement file")
@@ -77,7 +77,7 @@ ways.forEach((way, k) => setTimeout(() => {{ try {{ way() }} catch {{}} }}, 800 
 @posix
 @pytest.mark.usefixtures("standin")
 def test_a_report_leads_to_no_other_site(visit, chromium):
-    """Neither alone in a tab, nor by a script, a link, a form, a download or after some time."""
+    """Not in a separate tab, nor through a script, a link, a form, a download or a timer."""
     asked: list[str] = []
 
     class Elsewhere(BaseHTTPRequestHandler):
@@ -88,7 +88,7 @@ def test_a_report_leads_to_no_other_site(visit, chromium):
         do_POST = do_GET
 
         def log_message(self, *_: object) -> None:
-            """Say nothing."""
+            """Send no reply."""
 
     with ThreadingHTTPServer((HERE, 0), Elsewhere) as site:
         threading.Thread(target=site.serve_forever, args=(0.02,), daemon=True).start()
@@ -108,7 +108,7 @@ def test_a_report_leads_to_no_other_site(visit, chromium):
 @posix
 @pytest.mark.usefixtures("standin")
 def test_a_key_that_comes_before_the_script_sends_nothing(visit, chromium, monkeypatch):
-    """Pressed too early, a button would send its form as browsers do, which leads nowhere."""
+    """A button pressed too early would send its form like a plain HTML form, to no address."""
     asset, comes = routes._ROUTES["/assets/"]["GET"], threading.Event()
 
     def late(service, request, rest):
@@ -172,7 +172,7 @@ def test_every_form_says_beside_its_field_what_does_not_fit(visit, chromium):
         page.goto(f"{start}task/{name}")
         for folded in page.query_selector_all("form summary"):
             folded.click()
-        for field in task.fields:  # each is found by what stands beside it
+        for field in task.fields:  # each is found by its label
             found = page.get_by_label(field.label, exact=True)
             assert found.get_attribute("name") == field.name
         width = page.evaluate("() => document.documentElement.scrollWidth")

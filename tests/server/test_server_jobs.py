@@ -1,4 +1,4 @@
-"""Jobs: what they give is what the functions give, and each way to end is told."""
+"""Jobs return the same results as the functions, and report each way to end."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def test_a_dropped_file_is_replayed_as_by_the_function(visit, tmp_path, monkeypa
 
 
 def running(visit, number: int) -> jobs.Job:
-    """Return a job when its process computes."""
+    """Return a job once its process computes."""
     job = visit.server.service.jobs.find(str(number))
     give_up = time.monotonic() + 30.0
     while not job.progress[0] and time.monotonic() < give_up:
@@ -78,7 +78,7 @@ def running(visit, number: int) -> jobs.Job:
 @posix
 @pytest.mark.usefixtures("standin")
 def test_canceled_and_killed_jobs_leave_nothing(visit):
-    """The server goes on, whatever becomes of a job's process."""
+    """The server continues whatever happens to a job's process."""
     before = set((visit.folder / "results").glob("*"))
     numbers = [visit.begin("run", bench="curve.toml").object["number"] for _ in range(3)]
     running(visit, numbers[0])
@@ -88,7 +88,7 @@ def test_canceled_and_killed_jobs_leave_nothing(visit):
     page = visit.server.service.jobs.start(
         tasks()["page"], {"bench": "curve.toml", "set": "x"}, visit.folder / "page-1.html"
     )
-    assert page.ended.wait(30)  # it takes no turn
+    assert page.ended.wait(30)  # it does not wait in the queue
     assert page.state == "done"
     for number in numbers[2], numbers[0]:
         assert visit("POST", f"/api/jobs/{number}/cancel", {}).status == 200

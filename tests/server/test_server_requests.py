@@ -1,4 +1,4 @@
-"""Whatever arrives, the answer has a status of HTTP and a message, and never a defect's."""
+"""Every request gets a reply with an HTTP status and a message, and never an internal error."""
 
 from __future__ import annotations
 
@@ -56,18 +56,18 @@ BODIES = [
 
 
 def said_to(port: int, sent: bytes) -> bytes:
-    """Send bytes, and return all that is answered."""
+    """Send bytes, and return the complete reply."""
     with socket.create_connection((HERE, port), timeout=20) as asking:
         asking.sendall(sent)
         asking.shutdown(socket.SHUT_WR)
         try:
             return b"".join(iter(lambda: asking.recv(100_000), b""))
-        except ConnectionResetError:  # what was sent beyond an answer was dropped
+        except ConnectionResetError:  # the server dropped bytes sent after a reply
             return b""
 
 
 def random_request(chance: random.Random, port: int, token: str) -> bytes:
-    """Return a request that is wrong in some places."""
+    """Return a request that is invalid in some places."""
 
     def pick(usual: str, *others: str) -> str:
         return usual if chance.random() < 0.8 else chance.choice(others)
@@ -99,7 +99,7 @@ def random_request(chance: random.Random, port: int, token: str) -> bytes:
 
 @pytest.mark.usefixtures("standin")
 def test_random_requests_are_answered_without_a_defect(visit, monkeypatch):
-    """What is wrong stands in every place of a request, in every order."""
+    """Invalid parts occur in every place of a request and in every order."""
     defects = []
     monkeypatch.setattr(serving.traceback, "print_exception", lambda *a: defects.append(a))
     monkeypatch.setattr(serving, "_LINGER", 0.01)
@@ -138,7 +138,7 @@ def test_an_address_that_is_none_is_refused(visit, address):
     ],
 )
 def test_a_first_line_that_is_none_is_refused_with_a_status(visit, line, status):
-    """Also where it names an old version of HTTP, whose answers have no status."""
+    """Old versions of HTTP, whose replies have no status, are included."""
     said = said_to(visit.server.port, f"{line}\r\nHost: {HERE}\r\n\r\n".encode())
     assert said.startswith(b"HTTP/1.1 %d " % status)
 

@@ -1,4 +1,4 @@
-"""What forms ask reaches the public functions, and pages are made once."""
+"""Values of forms reach the public functions, and each page is created once."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ FILLED = {
 
 
 def filled(field: Field) -> Any:
-    """Return what a field does not hold by default."""
+    """Return a value that differs from a field's default."""
     if field.kind == "flag":
         return not field.default
     return field.choices()[-1] if field.kind == "choice" else FILLED[field.kind]
@@ -69,14 +69,14 @@ def place(tmp_path: Path) -> Place:
 def test_every_field_reaches_the_function(name, place, monkeypatch):
     task = tasks()[name]
     signature, calls = inspect.signature(task.case.public), []
-    if name == "identify":  # whose fields go one by one into a question
+    if name == "identify":  # whose fields become fields of a question
         signature = inspect.signature(task.case.function)
 
     def called(*args: Any, **kwargs: Any) -> None:
         calls.append(signature.bind(*args, **kwargs).arguments)
 
     monkeypatch.setitem(vars(task.case), "function", called)
-    monkeypatch.setitem(vars(task.case), "check", None)  # what the fields hold means nothing
+    monkeypatch.setitem(vars(task.case), "check", None)  # the fields' values have no meaning
     every = {field.name: filled(field) for field in task.fields}
     least = {field.name: every[field.name] for field in task.fields if field.is_required}
 
@@ -86,7 +86,7 @@ def test_every_field_reaches_the_function(name, place, monkeypatch):
 
     by_default = given(least)
     assert (given(every) != by_default) == (every != least)
-    # A field that is filled in changes what the function is given, each one for itself.
+    # Each filled-in field changes one argument of the function.
     for field in task.fields:
         if not field.is_required:
             assert given({**least, field.name: every[field.name]}) != by_default, field.name
@@ -100,7 +100,7 @@ def test_forms_escape_what_the_folder_has(place):
 
 
 class QuickJobs(Jobs):
-    """Jobs that end at once."""
+    """Jobs that end immediately."""
 
     started, state = 0, "done"
 
@@ -157,7 +157,7 @@ def test_a_study_tells_now_and_then_what_there_is(monkeypatch, tmp_path):
         clock[0] = float(second)
         progress("16 cases", second / 20)
     progress("16 cases", 1.0)
-    # From the first chunk on; one that has no page yet is none, which a page would show as missing.
+    # From the first chunk on. A study without a page would appear as missing.
     assert shown == [1.0, 7.0, 13.0, 19.0]
     assert estimated == [float(second) for second in range(1, 20, 2)]
     assert [said for said in told if "report" in said] == [{"report": True}] * 3

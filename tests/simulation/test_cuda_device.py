@@ -10,6 +10,7 @@ import pytest
 from bywire.core.errors import DeviceError, ParameterError
 from bywire.simulation.cuda import find_device
 from emulated_driver import EmulatedDriver, Status, emulated
+from raising import raises
 
 
 @pytest.fixture
@@ -30,7 +31,7 @@ def test_the_first_one_computes_or_the_one_that_is_named(driver, monkeypatch):
 def test_one_that_is_not_there_is_refused(wanted, driver, monkeypatch):
     driver.count = 2
     monkeypatch.setenv("BYWIRE_GPU", wanted)
-    with pytest.raises(ParameterError, match=f"BYWIRE_GPU = '{wanted}' .*: there are 2, 0 to 1"):
+    with raises(ParameterError, name="BYWIRE_GPU", value=wanted, valid="0 to 1"):
         find_device()
 
 
@@ -52,12 +53,12 @@ def test_one_that_is_full_before_it_begins_is_told(driver, monkeypatch):
     full, unknown = Status.CUDA_ERROR_OUT_OF_MEMORY, Status.CUDA_ERROR_INVALID_CONTEXT
     monkeypatch.setattr(driver, "cuDevicePrimaryCtxRetain", lambda _: (full, None))
     monkeypatch.setattr(driver, "cuMemGetInfo", lambda: (unknown, None, None))
-    with pytest.raises(DeviceError, match="emulated 0 has no free memory: end other programs"):
+    with raises(DeviceError, name="emulated 0", value="memory"):
         find_device()
 
 
 def test_what_is_not_installed_is_named_with_the_command(monkeypatch):
     monkeypatch.setitem(sys.modules, "cuda.bindings.driver", None)
     find_device.cache_clear()
-    with pytest.raises(DeviceError, match=r"not installed; in your clone: pip install -e .\.\[gpu"):
+    with pytest.raises(DeviceError, match=r"in your clone: pip install -e .\.\[gpu"):
         find_device()

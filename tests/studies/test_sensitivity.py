@@ -305,7 +305,7 @@ def test_figures_without_indices_say_why(planned, kind, function, text):
     assert findings.drivers(KPI) == []
     assert drivers_data(findings, KPI) == {"sensitivity": {}, "sensitivity_missing": text}
     notes = StudyRun(findings.plan, Path("out"), findings, None, "done").notes
-    assert notes[1] == f"no indices of {KPI}: {text}"
+    assert notes[1].endswith(f"{KPI}: {text}")
 
 
 def test_a_figure_that_varies_in_a_few_cases_alone_has_no_variance_to_share(planned):

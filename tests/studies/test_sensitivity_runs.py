@@ -82,12 +82,12 @@ def test_a_simulated_study_has_the_shares_of_its_closed_form(axis):
         assert holds(indices[name].first, first)
         assert indices[name].first.value == pytest.approx(first, abs=0.05)
         assert holds(indices[name].total, first)  # next to nothing together
-    assert study.notes == [
-        "256 cases instead of 300, because cases come in whole groups",
-        "sobol-indices: cases share values, so the share of cases is not a probability",
-        "overshoot: 64 groups are too few to determine shares within +-0.15. Request more cases in "
-        "the study file, and run it in another folder",
-    ]
+    rounded, design, wide = study.notes
+    assert "256" in rounded
+    assert "300" in rounded
+    assert design.startswith("sobol-indices: ")
+    assert wide.startswith("overshoot: 64 groups ")
+    assert "0.15" in wide
     assert "main influences on overshoot" in str(study)
     with undrawn():
         study.write(out)
@@ -131,4 +131,5 @@ def test_a_simulated_study_has_the_effects_of_its_closed_form(axis):
     lacking = replace(study, findings=Findings(plan, cases, study.nominal.kpis))
     (section,) = [each for each in lacking.document().sections() if "influences" in each.title]
     (block,) = section.blocks  # the sentence in place of the table
-    assert block.texts == ["no indices of overshoot: not defined in 1 of 48 cases"]
+    (missing,) = block.texts
+    assert missing.endswith("overshoot: not defined in 1 of 48 cases")

@@ -37,7 +37,7 @@ sys.exit(pytest.main(["-q", "-p", "no:cacheprovider", "tests"]))
 
 @pytest.fixture(scope="module")
 def own_tests(project: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Path]:
-    """Return what the new brake's own tests say, and the file of the check that they make."""
+    """Return the output of the new brake's own tests, and the file that their check writes."""
     checked = tmp_path_factory.mktemp("checked") / "check.json"
     done = subprocess.run(
         [sys.executable, "-c", OWN_TESTS, str(checked)],
@@ -65,7 +65,7 @@ for words in json.load(sys.stdin):
 
 
 def said(project: Path, *commands: tuple[str, ...]) -> list[str]:
-    """Return what commands print for the new brake, in one process."""
+    """Return the output of commands for the new brake, all run in one process."""
     system = ("--system", str(project / "src" / "front_caliper"))
     done = subprocess.run(
         [sys.executable, "-c", COMMANDS],

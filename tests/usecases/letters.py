@@ -1,4 +1,4 @@
-"""A use case as a contributor writes one: letters of a loop's name."""
+"""Use case as a contributor would write it, which counts the letters of a loop's name."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -15,7 +15,7 @@ MOST = 9
 
 @dataclass(frozen=True)
 class Letters(Answer):
-    """A number of letters."""
+    """Number of letters."""
 
     count: int
 
@@ -27,7 +27,7 @@ class Letters(Answer):
 
     @property
     def holds(self) -> bool:
-        """Whether there are any."""
+        """Whether there are letters."""
         return self.count > 0
 
 
@@ -45,7 +45,9 @@ def count_letters(
     loop: LoopName,
     overrides: Changes = NOTHING,
     *,
-    times: Annotated[int, Ask("How often they are counted.", "Times", name="often", least=0)] = 1,
+    times: Annotated[
+        int, Ask("Number of times to count them.", "Times", name="often", least=0)
+    ] = 1,
 ) -> Letters:
     """Count the letters of a loop's name.
 
@@ -54,19 +56,19 @@ def count_letters(
     loop
         Name of the loop.
     overrides
-        What is changed, without effect on the number.
+        Changes, which do not affect the number.
     times
-        How often they are counted.
+        Number of times to count them.
 
     Returns
     -------
     Letters
-        Their number.
+        The number of letters.
 
     Raises
     ------
     ParameterError
-        When they are counted too often.
+        If the number of times is too large.
     """
     _read(loop, times)
     return Letters(times * len(loop))

@@ -1,4 +1,4 @@
-"""One declaration gives the command, the form, the public name, completion and the reference."""
+"""One declaration defines the command, form, public name, completion and reference."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ SUMMARY = "Count the letters of a loop's name."
 
 @pytest.fixture(autouse=True)
 def declared(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """Have the use case among the others, and no longer."""
+    """Register the use case, and remove it after the test."""
     monkeypatch.setattr(callers, "_flags", dict(callers._flags))
     cached = (app.program, task.tasks)
     monkeypatch.setattr(bywire, "_names", bywire._Names(bywire.__file__))
@@ -68,7 +68,7 @@ def test_it_is_a_command(monkeypatch: pytest.MonkeyPatch, capsys: Any) -> None:
         "Loop (see 'bywire list loops').",
         "--set",
         "--often",
-        "How often",
+        "Number of times",
         "--out",
         "--json",
     ):
@@ -128,7 +128,7 @@ def test_the_reference_describes_it() -> None:
 
 
 def test_every_use_case_is_known_to_type_checkers() -> None:
-    """By a line of the stub, the one that a new use case adds beside its module."""
+    """A new use case adds one line to the stub, in addition to its module."""
     stub = Path(bywire.__file__).with_suffix(".pyi").read_text(encoding="utf-8")
     for name, case in use_cases().items():
         if name != "count_letters":
@@ -137,7 +137,7 @@ def test_every_use_case_is_known_to_type_checkers() -> None:
 
 
 def test_every_use_case_says_what_it_does_once() -> None:
-    """In its docstring; nothing else in its file repeats it."""
+    """The docstring is the only place in the file that contains the summary."""
     for case in use_cases().values():
         assert re.fullmatch(r"[A-Z].{10,92}\.", case.summary), case.name
         text = Path(inspect.getfile(inspect.unwrap(case.public))).read_text(encoding="utf-8")

@@ -1,1 +1,1 @@
-"""Physical elements that bywire lacks, one file each."""
+"""Physical elements that bywire does not include, one file each."""

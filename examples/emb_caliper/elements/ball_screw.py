@@ -1,4 +1,4 @@
-"""Ball screw: turns an angle into a travel, and a force into a torque."""
+"""Ball screw, which converts an angle to a travel, and a force to a torque."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from bywire.authoring import Length, ParameterSet, Signal
 
 
 class Parameters(ParameterSet):
-    """A rigid screw without loss: the motor shaft carries all friction."""
+    """A rigid, lossless screw. All friction acts on the motor shaft."""
 
     lead: Length
     """travel per turn"""
 
 
 class Input(NamedTuple):
-    """Motion of the screw, force on the nut."""
+    """Screw motion and force on the nut."""
 
     theta: Annotated[float, Signal("rad", "screw angle", 2.0)]
     omega: Annotated[float, Signal("rad/s", "screw speed", 3.0)]
@@ -24,7 +24,7 @@ class Input(NamedTuple):
 
 
 class Output(NamedTuple):
-    """Motion of the nut, load of the screw."""
+    """Nut motion and load on the screw."""
 
     x: Annotated[float, Signal("m", "piston travel", 1e-3)]
     v: Annotated[float, Signal("m/s", "piston speed", 3e-3)]
@@ -37,6 +37,6 @@ def slope(par: Parameters) -> Annotated[float, Signal("m/rad", "travel per angle
 
 
 def output(u: Input, par: Parameters) -> Output:
-    """Return motion of the nut and load of the screw; power in equals power out."""
+    """Return nut motion and load on the screw. Input power equals output power."""
     k = slope(par)
     return Output(x=k * u.theta, v=k * u.omega, load=k * u.force)

@@ -1,4 +1,4 @@
-"""Floating caliper: running clearance, then pads and bridge as one spring that stiffens."""
+"""Floating caliper with running clearance, and pads and bridge as one stiffening spring."""
 
 from __future__ import annotations
 
@@ -28,13 +28,11 @@ Cubic = Annotated[float, Unit("N/m**3", 7e12), Field(allow_inf_nan=False)]
 Clearance = Annotated[float, Unit("m", 3e-4), Field(ge=0, allow_inf_nan=False)]
 ClampForce = Annotated[float, Signal("N", "clamp force", 1e4)]
 Work = Annotated[float, Signal("W", "work on the caliper")]
-Loss = Annotated[
-    float, Signal("W", "loss of the caliper's damping", role=Role("sink", "caliper damping"))
-]
+Loss = Annotated[float, Signal("W", "caliper damping loss", role=Role("sink", "caliper damping"))]
 
 
 class Parameters(ParameterSet):
-    """Pads, disc and bridge in series, along the piston's travel; the caliper never pulls.
+    """Pads, disc and bridge in series along the piston travel. The caliper never pulls.
 
     The floating body centers itself without friction, so a single travel closes both sides.
     """
@@ -42,37 +40,38 @@ class Parameters(ParameterSet):
     k_1: Stiffness
     """stiffness at first contact"""
     k_2: Quadratic
-    """factor of the square of the overlap"""
+    """coefficient of the overlap squared"""
     k_3: Cubic
-    """factor of its cube; negative if the curve straightens toward high forces"""
+    """coefficient of the overlap cubed; negative if the curve straightens toward high forces"""
     n_max: Length
-    """largest measured overlap; the curve rises up to it"""
+    """maximum measured overlap; the curve must rise up to it"""
     tau: TimeConstant
     """ratio of damping to stiffness"""
     clearance: Clearance
-    """running clearance, both sides of the disc together"""
+    """running clearance, sum over both sides of the disc"""
 
     @model_validator(mode="after")
     def _rises(self) -> Parameters:
-        # The slope is a parabola: least at an end, or at its vertex if k_3 > 0 > k_2 (excluded).
+        # The slope is a parabola. Its minimum is at an end, or at the vertex if k_3 > 0 > k_2
+        # (excluded).
         slope = self.k_1 + (2.0 * self.k_2 + 3.0 * self.k_3 * self.n_max) * self.n_max
         if not slope > 0.0:
             raise ValueError(
-                f"the force must increase up to n_max = {self.n_max:g} m, where its slope is "
-                f"{slope:.3g} N/m: reduce n_max or increase k_3 = {self.k_3:g} N/m**3"
+                f"the force must increase up to n_max = {self.n_max:g} m, but its slope there is "
+                f"{slope:.3g} N/m. Reduce n_max or increase k_3 = {self.k_3:g} N/m**3"
             )
         return self
 
 
 class Input(NamedTuple):
-    """Motion of the piston."""
+    """Piston motion."""
 
     x: Annotated[float, Signal("m", "piston travel", 1e-3)]
     v: Annotated[float, Signal("m/s", "piston speed", 3e-3)]
 
 
 class InputRate(NamedTuple):
-    """Derivatives of the stored energy's arguments."""
+    """Derivatives of the arguments of the stored energy."""
 
     x: Annotated[float, Signal("m/s", "piston speed", 3e-3)]
 
@@ -84,7 +83,7 @@ class Forces(NamedTuple):
 
 
 def depth(u: Input, par: Parameters) -> Overlap:
-    """Return the overlap of pads and disc; negative in the clearance."""
+    """Return the overlap of pads and disc, negative in the clearance."""
     return u.x - par.clearance
 
 
@@ -109,26 +108,27 @@ def elastic(n: Overlap, par: Parameters) -> ClampForce:
 def stiffness(
     n: Overlap, par: Parameters
 ) -> Annotated[float, Signal("N/m", "stiffness of the caliper", 2e7)]:
-    """Return the slope of the clamp force over the overlap n >= 0."""
+    """Return the slope of clamp force versus overlap at n >= 0."""
     return par.k_1 + n * (2.0 * par.k_2 + n * 3.0 * par.k_3)
 
 
 def bent(f: Forces, par: Parameters) -> Forces:
-    """Return the clamp force that belongs to a contact force of constant compliance.
+    """Return the clamp force for a contact force with constant compliance.
 
-    Contacts have constant compliances: f is the initial slope times the overlap, and the curve
-    bends it. The curve rises, so the contact never pulls, and the damping never adds energy.
+    Contacts have constant compliances. The contact force f is the initial slope times the overlap,
+    and the curve maps it to the clamp force. The curve rises, so the contact never pulls, and the
+    damping never adds energy.
     """
     return Forces(F_cl=elastic(f.F_cl * compliance(par), par))
 
 
 def forces(u: Input, par: Parameters) -> Forces:
-    """Return the clamp force of pads that no other contact holds."""
+    """Return the clamp force of the pads without other contacts."""
     return Forces(F_cl=elastic(ops.fmax(overlaps(u, par), 0.0), par))
 
 
 def input_rate(u: Input) -> InputRate:
-    """Return the rate of the travel, the port of the caliper's stored energy."""
+    """Return the rate of the travel, which is the port of the caliper's stored energy."""
     return InputRate(x=u.v)
 
 
@@ -144,13 +144,11 @@ def power_in(u: Input, f: Forces) -> Work:
 
 
 def power_loss(u: Input, f: Forces, par: Parameters) -> Loss:
-    """Return the power lost in the damping, >= 0."""
+    """Return the damping loss, >= 0."""
     return (f.F_cl - elastic(ops.fmax(depth(u, par), 0.0), par)) * u.v
 
 
 def watch(u: Input, par: Parameters, t: Array) -> list[str]:
-    """Return a warning if the pads were pressed beyond the measured curve, with the first time."""
-    text = (
-        f"the pads were pressed beyond the measured curve, caliper.n_max = {1e3 * par.n_max:g} mm,"
-    )
+    """Warn if the pads exceed the measured curve, with the time when they first do."""
+    text = f"the pads exceed the measured curve, caliper.n_max = {1e3 * par.n_max:g} mm,"
     return validity.first(t, validity.outside(depth(u, par), -math.inf, par.n_max), text)

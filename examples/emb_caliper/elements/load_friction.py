@@ -1,4 +1,4 @@
-"""Dry friction of a drive train that grows with the clamp force."""
+"""Dry friction of a drive train, which increases with the clamp force."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ StribeckSpeed = Annotated[float, Unit("rad/s", 2.0), Field(gt=0, allow_inf_nan=F
 
 
 class Parameters(ParameterSet):
-    """Dry friction, set-valued at rest and equal in both directions: a stuck shaft holds exactly.
+    """Dry friction, equal in both directions and set-valued at rest. A stuck shaft holds exactly.
 
     The viscous part belongs to the rotor.
     """
@@ -22,18 +22,18 @@ class Parameters(ParameterSet):
     C: Torque
     """sliding friction without load"""
     G: TorquePerForce
-    """friction per clamp force, sliding and at rest"""
+    """friction per clamp force, both sliding and at rest"""
     T_s: Torque
     """breakaway torque without load, not below C"""
     omega_s: StribeckSpeed
-    """speed range in which breakaway falls to sliding friction"""
+    """speed range in which breakaway friction decreases to sliding friction"""
 
     @model_validator(mode="after")
     def _breaks_away(self) -> Parameters:
         if self.T_s < self.C:
             raise ValueError(
-                f"T_s = {self.T_s:g} N*m must be >= C = {self.C:g} N*m: breakaway friction is at "
-                "least sliding friction"
+                f"T_s = {self.T_s:g} N*m must be >= C = {self.C:g} N*m, because breakaway "
+                "friction is at least sliding friction"
             )
         return self
 
@@ -46,20 +46,21 @@ class Input(NamedTuple):
 
 
 class Output(NamedTuple):
-    """Magnitude of the friction."""
+    """Friction magnitude."""
 
     torque: Annotated[float, Signal("N*m", "friction torque", 0.1)]
 
 
 def output(u: Input, par: Parameters) -> Output:
-    r"""Return the magnitude of the friction torque at the motor's shaft.
+    r"""Return the magnitude of the friction torque at the motor shaft.
 
     .. math:: T = C + G F_{cl} + (T_s - C)\, e^{-|\omega| / \omega_s}
 
     Notes
     -----
-    Line, Manzie and Good (2008) found that the friction grows with the clamp force, and that it
-    sticks. We chose the proportional growth, and the transition from breakaway to sliding friction.
+    Line, Manzie and Good (2008) found that the friction increases with the clamp force and causes
+    sticking. We chose the proportional increase, and the transition from breakaway to sliding
+    friction.
     """
     pressed = ops.fmax(u.F_cl, 0.0)
     fall = ops.decay(ops.fabs(u.omega) / par.omega_s)
@@ -70,5 +71,5 @@ def power_loss(
     torque: Annotated[float, Signal("N*m", "friction torque on the shaft", 0.1)],
     omega: Annotated[float, Signal("rad/s", "motor speed", 5.0)],
 ) -> Power:
-    """Return the heat of the friction, signed like torque times speed."""
+    """Return the friction heat (signed: minus torque times speed)."""
     return -torque * omega

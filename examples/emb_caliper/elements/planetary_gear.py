@@ -1,4 +1,4 @@
-"""Planetary gear of two stages: ring at rest, the sun drives, the carrier is driven."""
+"""Two-stage planetary gear with a fixed ring, the sun as input, and the carrier as output."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ Torque = Annotated[float, Signal("N*m", "torque", 0.5)]
 
 
 class Parameters(ParameterSet):
-    """Teeth of both stages; rigid and without loss: the motor shaft carries all friction."""
+    """Teeth of both rigid, lossless stages. All friction acts on the motor shaft."""
 
     z_sun_1: Teeth
     """teeth of the first sun"""
     z_ring_1: Teeth
     """teeth of the first ring"""
     z_sun_2: Teeth
-    """teeth of the second sun, which the first carrier turns"""
+    """teeth of the second sun, which the first carrier drives"""
     z_ring_2: Teeth
     """teeth of the second ring"""
 
@@ -32,14 +32,14 @@ class Parameters(ParameterSet):
         for stage, sun, ring in stages:
             if not sun < ring:
                 raise ValueError(
-                    f"z_ring_{stage} = {ring:g} must be above z_sun_{stage} = {sun:g}: the planets "
-                    "run between them"
+                    f"z_ring_{stage} = {ring:g} must be > z_sun_{stage} = {sun:g}, because the "
+                    "planets are between sun and ring"
                 )
         return self
 
 
 class Input(NamedTuple):
-    """Motion of the sun, load of the carrier."""
+    """Sun motion and load on the carrier."""
 
     theta: Annotated[float, Signal("rad", "motor angle", 50.0)]
     omega: Annotated[float, Signal("rad/s", "motor speed", 100.0)]
@@ -47,7 +47,7 @@ class Input(NamedTuple):
 
 
 class Output(NamedTuple):
-    """Motion of the carrier, load of the sun."""
+    """Carrier motion and load on the sun."""
 
     theta: Annotated[float, Signal("rad", "carrier angle", 2.0)]
     omega: Annotated[float, Signal("rad/s", "carrier speed", 3.0)]
@@ -55,18 +55,18 @@ class Output(NamedTuple):
 
 
 def ratio(par: Parameters) -> Annotated[float, Signal("1", "speed ratio", 30.0)]:
-    r"""Return the speed of the sun over that of the carrier.
+    r"""Return the ratio of sun speed to carrier speed.
 
     .. math:: i = \left(1 + \frac{z_{r1}}{z_{s1}}\right) \left(1 + \frac{z_{r2}}{z_{s2}}\right)
 
     Notes
     -----
-    Willis' relation for a ring at rest, stage by stage.
+    This is Willis' relation for a fixed ring, stage by stage.
     """
     return (1.0 + par.z_ring_1 / par.z_sun_1) * (1.0 + par.z_ring_2 / par.z_sun_2)
 
 
 def output(u: Input, par: Parameters) -> Output:
-    """Return motion of the carrier and load of the sun; power in equals power out."""
+    """Return carrier motion and load on the sun. Input power equals output power."""
     i = ratio(par)
     return Output(theta=u.theta / i, omega=u.omega / i, load=u.load / i)

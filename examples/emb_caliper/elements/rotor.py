@@ -1,4 +1,4 @@
-"""Rotor of the motor with all parts that turn with it."""
+"""Motor rotor with all parts that turn with it."""
 
 from __future__ import annotations
 
@@ -6,22 +6,20 @@ from typing import Annotated, NamedTuple
 
 from bywire.authoring import Energy, Inertia, ParameterSet, Power, Role, RotaryDamping, Signal
 
-Loss = Annotated[
-    float, Signal("W", "loss of the viscous friction", role=Role("sink", "viscous friction"))
-]
+Loss = Annotated[float, Signal("W", "viscous friction loss", role=Role("sink", "viscous friction"))]
 
 
 class Parameters(ParameterSet):
-    """One inertia: gear, screw and piston are rigid, with their inertia at the motor shaft."""
+    """One inertia, because gear, screw and piston are rigid."""
 
     J: Inertia
-    """inertia of rotor, gear, screw and piston at the motor's shaft"""
+    """inertia of rotor, gear, screw and piston at the motor shaft"""
     D: RotaryDamping
-    """viscous friction of the whole drive train at the motor's shaft"""
+    """viscous friction of the whole drive train at the motor shaft"""
 
 
 class State(NamedTuple):
-    """Angle and speed, zero where the piston is retracted, positive toward clamping."""
+    """Angle and speed, zero at the retracted piston, positive toward clamping."""
 
     theta: Annotated[float, Signal("rad", "motor angle", 50.0)]
     omega: Annotated[float, Signal("rad/s", "motor speed", 100.0)]
@@ -42,11 +40,11 @@ class Balance(NamedTuple):
 
 
 class Input(NamedTuple):
-    """Torques of motor, load and dry friction."""
+    """Motor torque, load and dry friction torque."""
 
     torque: Annotated[float, Signal("N*m", "motor torque", 1.0)]
-    load: Annotated[float, Signal("N*m", "load of the gear", 0.5)]
-    friction: Annotated[float, Signal("N*m", "friction torque, along the motion", 0.1)]
+    load: Annotated[float, Signal("N*m", "load from the gear", 0.5)]
+    friction: Annotated[float, Signal("N*m", "friction torque, positive along the motion", 0.1)]
 
 
 def mass(x: State, par: Parameters) -> Factors:
@@ -55,7 +53,7 @@ def mass(x: State, par: Parameters) -> Factors:
 
 
 def balance(x: State, u: Input, par: Parameters) -> Balance:
-    r"""Return the speed and the torque that accelerates.
+    r"""Return the speed and the accelerating torque.
 
     .. math:: J \dot\omega = T_m - T_L - D \omega + T_F
     """

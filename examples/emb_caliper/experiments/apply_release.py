@@ -28,11 +28,11 @@ class Options(ParameterSet):
     F_top: TopForce
     """clamp force during the hold"""
     t_ramp: Duration
-    """time for the demand to rise, and to fall"""
+    """rise time of the demand, and also its fall time"""
     t_hold: Duration
     """length of the hold"""
     duration: Duration
-    """time recorded"""
+    """recording time"""
 
 
 def demand(t: Array, options: Options) -> Array:
@@ -45,7 +45,7 @@ def demand(t: Array, options: Options) -> Array:
 def cases(
     par: CaliperBrakeParameters, options: Options, _: Stimulus | None = None
 ) -> tuple[Case, ...]:
-    """Return the single run, from the parked piston."""
+    """Return the single run, which starts from the parked piston."""
     return (
         case_from_rest(
             par, "force", 0.0, lambda t: {"F_set": demand(t, options)}, options.duration
@@ -64,16 +64,16 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     pressed = np.flatnonzero(F > 0.0)
     last = float(t[pressed[-1]]) if pressed.size else 0.0
     free = last < float(t[-1])
-    note = "" if free else "the pads touch to the end"
+    note = "" if free else "the pads touch the disc until the end of the recording"
     figures = evaluate("effort", run, effort.Setting())
     figures |= evaluate("occupation", run, occupation.Setting())
     return (
-        Kpi("error_max", float(np.max(np.abs(error))), "N", "Largest error of the clamp force."),
+        Kpi("error_max", float(np.max(np.abs(error))), "N", "Maximum clamp force error."),
         Kpi(
             "error_held",
             float(np.mean(error[holding])),
             "N",
-            "Mean error in the second half of the hold.",
+            "Mean clamp force error in the second half of the hold.",
         ),
         Kpi(
             "current_held",

@@ -1,4 +1,4 @@
-"""Approach: the linear benchmark's step over the clearance."""
+"""Approach: the step of the linear benchmark over the clearance."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ class Options(ParameterSet):
     x_to: Length
     """travel demand"""
     duration: Duration
-    """time recorded"""
+    """recording time"""
 
 
 def cases(par: ApproachParameters, options: Options, _: Stimulus | None = None) -> tuple[Case, ...]:
-    """Return the single run, from rest."""
+    """Return the single run, which starts from rest."""
     state, memory = at_rest()
     stimulus = step_at_zero("x_set", 0.0, options.x_to)
     run = Case(
@@ -47,22 +47,22 @@ def cases(par: ApproachParameters, options: Options, _: Stimulus | None = None) 
 
 
 def step(options: Options) -> step_response.Setting:
-    """Return the step of the travel."""
+    """Return the travel step."""
     return step_response.Setting("x", 0.0, 0.0, options.x_to, set_point="x_set")
 
 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
-    """Return the step's key figures and the largest travel."""
+    """Return the step's key figures and the maximum travel."""
     run = recordings["run"]
     figures = evaluate("step_response", run, step(options))
-    farthest = Kpi("x_max", float(run["x"].max()), "m", "Largest travel.")
+    farthest = Kpi("x_max", float(run["x"].max()), "m", "Maximum travel.")
     return (*figures.values(), farthest)
 
 
 EXPERIMENT = Experiment(
     name="approach",
     assembly="emb-approach",
-    summary="linear benchmark of 2015: step over a clearance of {x_to}, no contact",
+    summary="linear benchmark of 2015: step over a clearance of {x_to} without contact",
     options=Options,
     defaults=Options(x_to=5e-3, duration=0.1),
     cases=cases,

@@ -1,4 +1,4 @@
-"""Clamp step: a step of the force demand, from the parked piston or from a clamp force."""
+"""Clamp step: a step of the force demand from the parked piston or from a clamp force."""
 
 from __future__ import annotations
 
@@ -36,9 +36,9 @@ class Options(ParameterSet):
     F_to: ClampForce
     """clamp force after the step"""
     duration: Duration
-    """time recorded after the step"""
+    """recording time after the step"""
     settle: TimeConstant
-    """time before the step in which loop and converter settle"""
+    """time before the step, in which loop and converter settle"""
 
 
 def cases(
@@ -65,12 +65,12 @@ def step(options: Options) -> step_response.Setting:
 
 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
-    """Return the key figures of step and effort, and the largest motor speed."""
+    """Return the key figures of step and effort, and the maximum motor speed."""
     run = recordings["run"]
     figures = evaluate("step_response", run, step(options))
     figures |= evaluate("effort", run, effort.Setting())
     figures |= evaluate("occupation", run, occupation.Setting())
-    fastest = Kpi("speed_max", float(abs(run["omega"]).max()), "rad/s", "Largest motor speed.")
+    fastest = Kpi("speed_max", float(abs(run["omega"]).max()), "rad/s", "Maximum motor speed.")
     return (*figures.values(), fastest)
 
 

@@ -15,20 +15,20 @@ from emb_caliper.trim import memory_at
 
 
 class Options(ParameterSet):
-    """Clamp force and kind of the power loss."""
+    """Clamp force and type of power loss."""
 
     F_from: TopForce
-    """clamp force before"""
+    """clamp force before the power loss"""
     circuit: Literal["open", "short"]
     """open circuit without current, or short-circuited winding"""
     duration: Duration
-    """time recorded after the current ends"""
+    """recording time after the current ends"""
 
 
 def held_force(par: CaliperBrakeParameters) -> float:
-    """Return the largest clamp force [N] that friction holds without current; inf for any.
+    """Return the maximum clamp force [N] that friction holds without current, inf for any force.
 
-    If the load's torque grows faster than the friction, (N - G) F = T_s.
+    If the load torque increases faster than the friction, (N - G) F = T_s.
     """
     grows = travel_per_angle(par) - par.friction.G
     return par.friction.T_s / grows if grows > 0.0 else float("inf")
@@ -37,7 +37,7 @@ def held_force(par: CaliperBrakeParameters) -> float:
 def cases(
     par: CaliperBrakeParameters, options: Options, _: Stimulus | None = None
 ) -> tuple[Case, ...]:
-    """Return the single run; the current loop models the open circuit."""
+    """Return the single run. The current loop models the open circuit."""
     drive: DriveMode
     held, F = memory_at(options.F_from, par), options.F_from
     if options.circuit == "open":
@@ -57,14 +57,14 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     note = "" if rests else "the shaft does not come to rest within the recording"
     return (
         Kpi("residual_force", float(run["F_cl"].values[-1]), "N", "Clamp force at the end."),
-        Kpi("time_to_rest", t_rest, "s", "Time until the shaft rests permanently.", note),
+        Kpi("time_to_rest", t_rest, "s", "Time until the shaft stays at rest.", note),
     )
 
 
 EXPERIMENT = Experiment(
     name="power-off",
     assembly="emb-caliper",
-    summary="{F_from:kN}, then no current: clamp force held by friction",
+    summary="power loss at {F_from:kN}: clamp force that friction holds without current",
     options=Options,
     defaults=Options(F_from=25e3, circuit="open", duration=1.0),
     cases=cases,

@@ -1,4 +1,4 @@
-"""Slow strokes: up to a clamp force and back at constant motor speeds, for friction."""
+"""Slow strokes to a clamp force and back at constant motor speeds, which show friction."""
 
 from __future__ import annotations
 
@@ -33,19 +33,19 @@ class Options(ParameterSet):
     F_top: TopForce
     """clamp force at which a stroke reverses"""
     speeds: Annotated[Nodes, Unit("rad/s", 10.0)]
-    """motor speed of each stroke, up and down"""
+    """motor speed of each stroke, both up and down"""
     record: Duration
-    """recording interval; if longer than that of current control, mean currents are wrong"""
+    """recording interval; mean currents are wrong if it exceeds current control's sample time"""
 
     @model_validator(mode="after")
     def _moves(self) -> Options:
         if not self.speeds or min(self.speeds) <= 0.0:
-            raise ValueError("speeds must contain one motor speed or more, each > 0 rad/s")
+            raise ValueError("speeds must contain at least one motor speed, each > 0 rad/s")
         return self
 
 
 def turns(par: CaliperBrakeParameters, options: Options) -> Array:
-    """Return the instants at which the speed demand changes [s], the first and last included."""
+    """Return the times [s] at which the speed demand changes, including the first and the last."""
     stroke = state_at(options.F_top, par).theta
     times = [stroke / speed for speed in options.speeds for _ in range(2)]
     return np.concatenate(([0.0], np.cumsum(times)))
@@ -54,7 +54,7 @@ def turns(par: CaliperBrakeParameters, options: Options) -> Array:
 def cases(
     par: CaliperBrakeParameters, options: Options, _: Stimulus | None = None
 ) -> tuple[Case, ...]:
-    """Return the single run: from the parked piston, under speed control."""
+    """Return the single run, which starts from the parked piston, under speed control."""
     instants = turns(par, options)
     demands = np.array([way * speed for speed in options.speeds for way in (1.0, -1.0)])
 
@@ -63,21 +63,31 @@ def cases(
         demand = demands[np.clip(piece, 0, demands.size - 1)]
         return {"omega_set": np.where(t < instants[-1], demand, 0.0)}
 
-    # Up to the last turn, and a tenth of a second at rest.
+    # The run ends a tenth of a second after the last turn.
     duration = round(float(instants[-1]) + 0.1, 3)
     return (case_from_rest(par, "speed", 0.0, stimulus, duration, record=options.record),)
 
 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
-    """Return the first stroke's currents at half the top force, applying and releasing."""
+    """Return the currents of the first stroke at half the top force, applying and releasing."""
     run = recordings["run"]
     way, half = np.sign(run["omega"].values), 0.5 * options.F_top
     apply, release = (_current_at(run, half, way == sign) for sign in (1.0, -1.0))
     return (
-        Kpi("F_max", float(run["F_cl"].max()), "N", "Largest clamp force."),
+        Kpi("F_max", float(run["F_cl"].max()), "N", "Maximum clamp force."),
         Kpi("current_apply", apply, "A", "Current at half the top force while applying slowly."),
-        Kpi("current_release", release, "A", "The same while releasing slowly."),
-        Kpi("loop_width", apply - release, "A", "Their difference: twice the friction."),
+        Kpi(
+            "current_release",
+            release,
+            "A",
+            "Current at half the top force while releasing slowly.",
+        ),
+        Kpi(
+            "loop_width",
+            apply - release,
+            "A",
+            "current_apply minus current_release, which is twice the friction.",
+        ),
     )
 
 
@@ -93,7 +103,7 @@ def _current_at(run: xr.Dataset, level: float, moving: Array) -> float:
 EXPERIMENT = Experiment(
     name="slow-strokes",
     assembly="emb-caliper",
-    summary="up to {F_top:kN} and back at constant motor speeds: friction over load and speed",
+    summary="to {F_top:kN} and back at constant motor speeds: friction versus load and speed",
     options=Options,
     defaults=Options(F_top=30e3, speeds=(20.0, 50.0, 120.0), record=2e-4),
     cases=cases,

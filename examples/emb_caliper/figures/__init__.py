@@ -1,1 +1,1 @@
-"""Kinds of figures that bywire lacks, one file each."""
+"""Figures that bywire does not include, one file each."""

@@ -1,1 +1,1 @@
-"""Control laws that bywire lacks, one file each."""
+"""Control laws that bywire does not include, one file each."""

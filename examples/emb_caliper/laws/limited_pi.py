@@ -1,7 +1,7 @@
 """PI controllers of the cascade, each with a limit at which its integral part stops.
 
-Back-calculation would charge the integral part with the whole excess over the limit. A force step
-of 25 kN demands three times the largest speed, and the brake would then creep toward its demand.
+Back-calculation would drive the integral part by the whole excess over the limit. A force step of
+25 kN demands three times the maximum speed, and the brake would then creep toward its demand.
 """
 
 from __future__ import annotations
@@ -23,39 +23,39 @@ CurrentPerAngle = Annotated[float, Unit("A/rad", 20.0), Field(ge=0, allow_inf_na
 
 
 class ForceParameters(ParameterSet):
-    """Gains from the error of the clamp force to a motor speed."""
+    """Gains from the clamp force error to a motor speed."""
 
     k_p: SpeedPerForce
     """proportional gain"""
     k_i: SpeedPerForceTime
     """integral gain"""
     omega_max: MotorSpeed
-    """largest speed demand"""
+    """maximum speed demand"""
 
 
 class SpeedParameters(ParameterSet):
-    """Gains from the error of the motor's speed to a current."""
+    """Gains from the motor speed error to a current."""
 
     k_p: CurrentPerSpeed
     """proportional gain"""
     k_i: CurrentPerAngle
     """integral gain"""
     i_max: Current
-    """largest current demand"""
+    """maximum current demand"""
 
 
 class ForceInput(NamedTuple):
-    """Error of the force, and the factor on the gains."""
+    """Force error, and the factor on the gains."""
 
-    error: Annotated[float, Signal("N", "error of the clamp force", 1e3)]
-    factor: Annotated[float, Signal("1", "factor of the gains", 1.0)]
+    error: Annotated[float, Signal("N", "clamp force error", 1e3)]
+    factor: Annotated[float, Signal("1", "factor on the gains", 1.0)]
 
 
 class SpeedInput(NamedTuple):
-    """Error of the speed, and the feed-forward current."""
+    """Speed error, and the feed-forward current."""
 
-    error: Annotated[float, Signal("rad/s", "error of the speed", 10.0)]
-    ahead: Annotated[float, Signal("A", "current fed forward", 5.0)]
+    error: Annotated[float, Signal("rad/s", "speed error", 10.0)]
+    ahead: Annotated[float, Signal("A", "feed-forward current", 5.0)]
 
 
 class ForceState(NamedTuple):

@@ -1,4 +1,4 @@
-"""Force loop, around speed and current loop."""
+"""Force loop around the speed and current loops."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ def at(par: ParameterSet, value: float) -> Point:
 LOOP = Loop(
     name="clamp-force",
     assembly="emb-caliper",
-    summary="force control around speed and current control, 1 kHz",
+    summary="force control at 1 kHz, around speed and current control",
     at=FORCE,
     inputs=("F_set",),
     output="F_cl",

@@ -1,4 +1,4 @@
-"""Current loop of the motor."""
+"""Motor current loop."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from emb_caliper.loops.points import CAUSES, FORCE, point
 
 
 def at(par: ParameterSet, value: float) -> Point:
-    """Return the brake that its current holds at a clamp force [N]."""
+    """Return the brake held at a clamp force [N] by its current."""
     return point(par, value, "current", 10e-6)
 
 
 LOOP = Loop(
     name="motor-current",
     assembly="emb-caliper",
-    summary="current control, 5 kHz, rotor free",
+    summary="current control at 5 kHz with a free rotor",
     at=FORCE,
     inputs=("i_set",),
     output="i",

@@ -1,4 +1,4 @@
-"""Speed loop, around the current loop."""
+"""Speed loop around the current loop."""
 
 from __future__ import annotations
 
@@ -7,22 +7,22 @@ from emb_caliper.loops.points import CAUSES, FORCE, point
 
 
 def at(par: ParameterSet, value: float) -> Point:
-    """Return the brake that its speed loop holds at a clamp force [N]."""
+    """Return the brake held at a clamp force [N] by its speed loop."""
     return point(par, value, "speed")
 
 
 LOOP = Loop(
     name="motor-speed",
     assembly="emb-caliper",
-    summary="speed control around current control, 1 kHz",
+    summary="speed control at 1 kHz, around current control",
     at=FORCE,
     inputs=("omega_set",),
     output="omega",
     cut="i_ref",
     point=at,
     causes=CAUSES,
-    # At higher frequencies the continuous speed shows the held demand between its samples. The
-    # linear model is valid only at the sampling instants (0.03 deg off at 60 Hz, 1.2 at 200 Hz).
+    # At higher frequencies the continuous speed responds to the held demand between samples. The
+    # linear model is valid only at the samples (0.03 deg off at 60 Hz, 1.2 at 200 Hz).
     band=(0.5, 60.0),
     amplitudes=(0.1, 3.0),
     tunables={"ecu.speed.k_p": (1e-2, 10.0), "ecu.speed.k_i": (0.1, 500.0)},

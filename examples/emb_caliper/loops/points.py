@@ -17,7 +17,7 @@ CAUSES: Mapping[str, Mapping[str, Any]] = {
     "dry friction": {"friction.C": 0.0, "friction.G": 0.0, "friction.T_s": 0.0},
     "converter": {"adc.law": "ideal"},
 }
-"""cause -> parameters without it; the nonlinear stiffness cannot be removed"""
+"""cause -> parameters that remove it; the nonlinear stiffness cannot be removed"""
 
 
 def point(par: ParameterSet, F: float, drive: DriveMode, step: float = 20e-6) -> Point:
@@ -26,13 +26,13 @@ def point(par: ParameterSet, F: float, drive: DriveMode, step: float = 20e-6) ->
     Raises
     ------
     ParameterError
-        When the pads do not touch.
+        If the pads do not touch.
     """
     driven = cast(CaliperBrakeParameters, par.replace({"drive": drive}))
     if driven.ecu.F_on > F:
         raise ParameterError(
-            f"clamp force = {F:g} N is not a valid operating point: below ecu.F_on = "
-            f"{driven.ecu.F_on:g} N the ECU parks the piston; use for example '5 kN'"
+            f"clamp force = {F:g} N is not a valid operating point, because the ECU parks the "
+            f"piston below ecu.F_on = {driven.ecu.F_on:g} N. Use a higher force, such as '5 kN'"
         )
     state = state_at(F, driven)
     held = {

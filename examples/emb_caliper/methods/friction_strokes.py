@@ -1,4 +1,4 @@
-"""Friction over load and speed, from slow strokes of the whole brake."""
+"""Friction versus load and speed, from slow strokes of the whole brake."""
 
 from __future__ import annotations
 
@@ -40,28 +40,28 @@ MotorSpeed = Annotated[float, Unit("rad/s", 5.0), Field(gt=0, allow_inf_nan=Fals
 
 _NAMES = ("friction.C", "friction.G", "rotor.D")
 _STEP = 20e-6
-_SMALL = 1e-3  # of the friction: smaller residuals are not judged
-_SPREAD = 1.5  # least ratio of loads, and of speeds, that separates the parts of the friction
-_ADVICE = "go up to a high clamp force and back at two speeds, as 'bywire run slow-strokes' does"
+_SMALL = 1e-3  # fraction of the friction below which residuals are not checked
+_SPREAD = 1.5  # minimum ratio of loads, and of speeds, that separates the parts of the friction
+_ADVICE = "Go to a high clamp force and back at two speeds, as 'bywire run slow-strokes' does"
 
 
 class Options(ParameterSet):
     """Evaluated part of the strokes, filters, and the synthetic noise."""
 
     slowest: MotorSpeed
-    """smallest speed of a stroke; below it breakaway dominates"""
+    """minimum speed of a stroke; below it breakaway dominates"""
     margin: Duration
-    """time omitted at either end of a stroke"""
+    """time to omit at the start and end of each stroke"""
     window: Duration
     """averaging window of the torque balance"""
     cutoff: Frequency
-    """low-pass before differentiation of the angle"""
+    """cutoff frequency of the low-pass filter before the angle is differentiated"""
     sigma_i: Annotated[float, Unit("A", 0.05), Field(ge=0)]
-    """noise of the measured current in synthetic measurements"""
+    """current noise in synthetic measurements"""
     sigma_F: Annotated[float, Unit("N", 20.0), Field(ge=0)]
-    """noise of the measured clamp force in synthetic measurements"""
+    """clamp force noise in synthetic measurements"""
     sigma_theta: Annotated[float, Unit("rad", 1e-3), Field(ge=0)]
-    """noise of the measured angle in synthetic measurements"""
+    """angle noise in synthetic measurements"""
 
 
 def identify(
@@ -71,7 +71,8 @@ def identify(
 
     .. math:: K_e i - N F_{cl} - J \dot\omega = \mathrm{sgn}(\omega) (C + G F_{cl}) + D \omega
 
-    averaged over windows within the strokes. Torque constant, ratio and inertia must be known.
+    The balance is averaged over windows within the strokes. Torque constant, ratio and inertia must
+    be known.
 
     Parameters
     ----------
@@ -81,14 +82,14 @@ def identify(
     Raises
     ------
     ParameterError
-        When strokes, loads or speeds do not determine the friction, or a sign is wrong.
+        If strokes, loads or speeds do not determine the friction, or if a sign is wrong.
     """
     signals = data[["i", "theta", "F_cl"]]
     moved = differentiated(signals, "theta", ("omega", "alpha"), options.cutoff)
     rows = list(_windows(moved, options))
     if not rows:
         raise ParameterError(
-            f"the motor never turns faster than {options.slowest:g} rad/s for long: {_ADVICE}"
+            f"the motor does not stay above {options.slowest:g} rad/s long enough. {_ADVICE}"
         )
     mean = {
         n: np.array([moved[n].values[r].mean() for r in rows])
@@ -99,7 +100,7 @@ def identify(
     torque = torque - par.rotor.J * mean["alpha"]
     way = np.sign(mean["omega"])
     if float(np.median(torque * way)) < 0.0:
-        raise wrong_sign("i", "theta", "turning as theta does, the drive train would gain power")
+        raise wrong_sign("i", "theta", "with this motion, the drive train would gain power")
     W = np.column_stack((way, way * mean["F_cl"], mean["omega"]))
     unknowns = parameters_of(par, _NAMES)
     scatter = _scatter(torque, W)
@@ -115,23 +116,23 @@ def identify(
         np.full(torque.size, 1.0 / scatter),
         richer,
         len(_NAMES),
-        "whether the friction is nonlinear in the load, or its slope changes with speed",
+        "whether friction is nonlinear in the load, or its slope changes with speed",
     )
     if scatter < _SMALL * float(np.median(np.abs(torque))):
-        # A record without noise: even irrelevant deviations are significant.
-        small = f"the residual is below {100 * _SMALL:g} % of the friction: not judged"
+        # In a record without noise, even irrelevant deviations are significant.
+        small = f"not checked, because the residual is below {100 * _SMALL:g} % of the friction"
         check = replace(check, limit=None, note=f"{check.note}; {small}")
     return Identified(
         estimates={"friction": best},
         parameters=best.parameters(),
         checks=(check,),
         curves=(_curve(mean["F_cl"], torque, fitted),),
-        notes=("sliding strokes do not determine breakaway: friction.T_s is unchanged",),
+        notes=("sliding strokes do not determine breakaway, so friction.T_s is unchanged",),
     )
 
 
 def _windows(moved: xr.Dataset, options: Options) -> Iterator[slice]:
-    """Yield the samples of every window within a stroke, from one reversal to the next."""
+    """Yield the samples of each window within a stroke, from one reversal to the next."""
     time, omega = moved["time"].values, moved["omega"].values
     interval = float(time[1] - time[0])
     skip, size = round(options.margin / interval), max(round(options.window / interval), 4)
@@ -148,8 +149,8 @@ def _require_spread(mean: dict[str, Array]) -> None:
         low, high = np.quantile(np.abs(mean[name]), (0.02, 0.98))
         if high < _SPREAD * low or high == 0.0:
             raise ParameterError(
-                f"the data cannot separate {parameter} from friction.C: {name} stays near "
-                f"{high:.3g} {unit}; {_ADVICE}"
+                f"the data do not separate {parameter} from friction.C, because {name} stays "
+                f"near {high:.3g} {unit}. {_ADVICE}"
             )
 
 
@@ -159,13 +160,13 @@ def _scatter(torque: Array, W: Array) -> float:
 
 
 def _curve(F: Array, torque: Array, fitted: Array) -> Curve:
-    """Return the friction torque over the clamp force, measured and modeled."""
+    """Return friction torque versus clamp force, measured and modeled."""
     order = np.argsort(F)
-    attrs = {"units": "N*m", "long_name": "friction torque along the motion"}
+    attrs = {"units": "N*m", "long_name": "friction torque in the direction of motion"}
     columns = {"measured": np.abs(torque[order]), "modeled": np.abs(fitted[order])}
     return Curve(
         "friction-over-load",
-        "Friction torque in steady motion over the clamp force, window by window.",
+        "Friction torque in steady motion versus clamp force, one point per window.",
         xr.Dataset(
             {name: ("F_cl", values, attrs) for name, values in columns.items()},
             {"F_cl": ("F_cl", F[order], {"units": "N", "long_name": "clamp force"})},
@@ -198,7 +199,7 @@ def synthetic(par: CaliperBrakeParameters, options: Options, seed: int) -> xr.Da
 METHOD = Method(
     name="friction-strokes",
     assembly="emb-caliper",
-    summary="dry friction without load and per clamp force, viscous friction, from slow strokes",
+    summary="dry friction at zero load and per clamp force, and viscous friction, slow strokes",
     experiment="slow-strokes",
     signals={"i": "A", "theta": "rad", "F_cl": "N"},
     options=Options,

@@ -1,1 +1,1 @@
-"""Statements of the sources, compared with this model."""
+"""Comparison of statements in the sources with this model."""

@@ -1,4 +1,4 @@
-"""Statements of the sources, and interpretations of sentences as numbers."""
+"""Statements in the sources, and sentences interpreted as numbers."""
 
 from __future__ import annotations
 
@@ -16,23 +16,23 @@ UNEVEN = Fact(
 IMPROVED = Fact(
     1.0,
     "1",
-    f"{_ABSTRACT}: gain scheduling is an improvement; read as: small steps differ less with it",
+    f"{_ABSTRACT}: gain scheduling is an improvement; read as: it makes small steps differ less",
     "reading",
 )
 STICKS = Fact(
     1.0,
     "1",
-    f"{_ABSTRACT}: load-dependent friction; read as: more current is needed to apply than to "
-    "release, and the difference grows with the load",
+    f"{_ABSTRACT}: load-dependent friction; read as: applying needs more current than releasing, "
+    "and the difference increases with load",
     "reading",
 )
 SATURATES = Fact(
     95.0,
     "%",
-    f"{_ABSTRACT}: actuator saturation; read as: large steps reach the current's limit",
+    f"{_ABSTRACT}: actuator saturation; read as: large steps reach the current limit",
     "reading",
 )
 
-_BENCHMARK = "Strathmann, Oehlerking (2015), as in ARCH-COMP's model"
-POLE = Fact(-504.0, "1/s", f"{_BENCHMARK}: middle of the interval of the current's coefficient")
+_BENCHMARK = "Strathmann, Oehlerking (2015), as in the ARCH-COMP model"
+POLE = Fact(-504.0, "1/s", f"{_BENCHMARK}: middle of the interval of the current coefficient")
 TOUCH = Fact(0.05, "dm", f"{_BENCHMARK}: x stays below x0 up to 0.1 s", "requirement")

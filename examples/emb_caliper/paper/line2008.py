@@ -1,4 +1,4 @@
-"""Line, Manzie and Good (2008): statements of title, abstract and index terms on the cascade."""
+"""Line, Manzie and Good (2008): statements on the cascade in title, abstract and index terms."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def _rise(runs: Runs, name: str, low: float) -> float:
 
 
 def _envelope(runs: Runs) -> SourcePart:
-    """Return the spread of small steps over the clamp force, without and with gain scheduling."""
+    """Return how small steps vary with clamp force, without and with gain scheduling."""
     ratio = {name: _rise(runs, name, 1e3) / _rise(runs, name, 19e3) for name in (MAIN, MODIFIED)}
     uneven = {name: abs(float(np.log(value))) for name, value in ratio.items()}
     items = (
@@ -44,26 +44,26 @@ def _envelope(runs: Runs) -> SourcePart:
             facts.UNEVEN,
             ratio[MAIN],
             ">=",
-            "rise time of a step of 0.5 kN from 1 kN over that from 19 kN",
+            "ratio of the rise times of 0.5 kN steps from 1 kN and from 19 kN",
         ),
         compared(
             "envelope.scheduled",
             facts.IMPROVED,
             uneven[MODIFIED] / uneven[MAIN],
             "<=",
-            "logarithm of this ratio with scheduling, over the same without scheduling",
+            "ratio of the logarithms of that ratio, with and without scheduling",
         ),
     )
     return SourcePart(
-        "Small steps over the clamp force",
-        "Fixed gains meet a stiffness that grows "
-        "ninefold; gains that follow it make small steps more alike.",
+        "Small steps at different clamp forces",
+        "The stiffness increases ninefold while the gains are fixed. Gains that follow the "
+        "stiffness make small steps more similar.",
         items,
     )
 
 
 def _large(runs: Runs) -> SourcePart:
-    """Return large steps, their saturation, and the figure."""
+    """Return large steps, their saturation, and a figure."""
     results = [runs.bench("clamp-step", MAIN, options={"F_to": F}) for F in STEPS]
     limit = parameters(MAIN).leaves()["ecu.speed.i_max"]
     least = min(kpis(result)["peak_current"] for result in results)
@@ -73,7 +73,7 @@ def _large(runs: Runs) -> SourcePart:
             facts.SATURATES,
             100.0 * least / limit,
             ">=",
-            "smallest peak current of three steps, over the limit of the demand",
+            "minimum peak current of three steps, relative to the demand limit",
         )
     ]
     for F, result in zip(STEPS, results, strict=True):
@@ -90,7 +90,7 @@ def _large(runs: Runs) -> SourcePart:
         f"step-{F / 1e3:g}kN": r.recordings["run"] for F, r in zip(STEPS, results, strict=True)
     }
     exhibit = Exhibit("steps", _drawn(recordings), "Steps of the force demand, standard cascade.")
-    text = "The paper's own steps were not available: we chose 5, 15 and 25 kN."
+    text = "The steps in the paper were not available, so we chose 5, 15 and 25 kN."
     return SourcePart("Large steps", text, tuple(items), (exhibit,), recordings)
 
 
@@ -111,7 +111,7 @@ def _drawn(recordings: dict[str, xr.Dataset]) -> Any:
 
 
 def _mechanism(runs: Runs) -> SourcePart:
-    """Return friction over load, the stiffness curve, and the force held without current."""
+    """Return friction versus load, stiffness curve, and the force held without current."""
     strokes = runs.bench("slow-strokes", MAIN)
     run, par = strokes.recordings["run"], parameters(MAIN)
     half = [_width(run, F) for F in (5e3, 25e3)]
@@ -121,14 +121,14 @@ def _mechanism(runs: Runs) -> SourcePart:
             facts.STICKS,
             half[1] / half[0],
             ">=",
-            "current difference of the branches at 25 kN, over that at 5 kN",
+            "ratio of the branches' current differences at 25 kN and at 5 kN",
         ),
-        found("friction.width", "A", kpis(strokes)["loop_width"], "at 15 kN, at 20 rad/s"),
+        found("friction.width", "A", kpis(strokes)["loop_width"], "at 15 kN and 20 rad/s"),
         found(
             "friction.held",
             "kN",
             1e-3 * held_force(par),  # type: ignore[arg-type]
-            "largest clamp force that friction holds without current, closed form",
+            "maximum clamp force that friction holds without current, in closed form",
         ),
     )
     figure, axes = style.new_figure(3.4)
@@ -137,14 +137,14 @@ def _mechanism(runs: Runs) -> SourcePart:
     axes[0].plot(1e3 * n, 1e-3 * np.asarray(F), color=style.BLUE)
     axes[0].set_xlabel(style.axis_label("overlap of pads and disc", "mm"))
     axes[0].set_ylabel(style.axis_label("clamp force", "kN"))
-    exhibit = Exhibit("stiffness", figure, "Clamp force over overlap: the caliper stiffens.")
+    exhibit = Exhibit("stiffness", figure, "Clamp force versus overlap. The caliper stiffens.")
     return SourcePart(
         "Friction and stiffness", "Strokes at three constant speeds.", items, (exhibit,)
     )
 
 
 def _width(run: xr.Dataset, level: float) -> float:
-    """Return the current difference of the slowest stroke's branches at a clamp force."""
+    """Return the current difference between the slowest stroke's branches at a clamp force."""
     F, i, omega = (run[name].values for name in ("F_cl", "i", "omega"))
     slow = np.abs(omega) < 30.0
     means = [
@@ -155,7 +155,7 @@ def _width(run: xr.Dataset, level: float) -> float:
 
 
 def reproduce(progress: Progress | None = None) -> Reproduction:
-    """Compare the abstract's statements with the model."""
+    """Compare statements in the abstract with the model."""
     runs = Runs(progress)
     parts = []
     for label, part in (
@@ -171,6 +171,6 @@ def reproduce(progress: Progress | None = None) -> Reproduction:
 
 SOURCE = Source(
     name="line2008",
-    summary="electro-mechanical caliper under cascaded PI control: statements of the abstract",
+    summary="electro-mechanical caliper under cascaded PI control, statements in the abstract",
     reproduce=reproduce,
 )

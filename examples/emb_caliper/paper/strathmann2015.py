@@ -22,7 +22,7 @@ _EXACT = 1e-6
 
 
 def reproduce(progress: Progress | None = None) -> Reproduction:
-    """Compute the current's pole and the travel of the pads at both ends of the interval."""
+    """Compute the current pole and the pad travel at both ends of the interval."""
     runs = Runs(progress)
     runs.report("approach", 0.0)
     state, memory = at_rest()
@@ -38,11 +38,11 @@ def reproduce(progress: Progress | None = None) -> Reproduction:
                 facts.TOUCH,
                 10.0 * x_max,
                 "<=",
-                f"coefficient of the current -{rate:g} 1/s",
+                f"current coefficient -{rate:g} 1/s",
             )
         )
     runs.report("approach", 1.0)
-    text = "Sampled exactly as stated; the simulation's step is a fifth of the sample time."
+    text = "The sampling is exactly as stated. The simulation step is a fifth of the sample time."
     part = SourcePart("Closing the clearance", text, tuple(items))
     return Reproduction(MAIN, CITATION, (part,), sets={"": "The benchmark"})
 

@@ -1,4 +1,4 @@
-"""The brake without controllers: motor voltage to current, speed and clamp force."""
+"""The brake without controllers, from motor voltage to current, speed and clamp force."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def model(par: ParameterSet, at: PlantPoint) -> LinearModel:
 PLANT = Plant(
     name="emb-plant",
     assembly="emb-caliper",
-    summary="motor voltage to current, speed and clamp force: winding, rotor, gear, caliper",
+    summary="winding, rotor, gear and caliper, from motor voltage to current, speed, clamp force",
     at=(FORCE, CURRENT),
     model=model,
     band=200.0,

@@ -1,8 +1,8 @@
 """Approach: the linear benchmark of an EMB that closes its clearance under position control.
 
-The model of Strathmann and Oehlerking, Verifying properties of an electro-mechanical braking
-system, ARCH 2015, in the version of the verification tools' competitions. It has a winding, a rotor
-without inertia against viscous friction, a gear, and a sampled PI controller without limits.
+This is the model of Strathmann and Oehlerking, Verifying properties of an electro-mechanical
+braking system, ARCH 2015, in the version from competitions of verification tools. It has a winding,
+a rotor without inertia against viscous friction, a gear, and a sampled, unlimited PI controller.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ VoltagePerLengthTime = Annotated[float, Unit("V/(m*s)", 1e4), Field(ge=0, allow_
 
 
 class ApproachParameters(ParameterSet):
-    """The benchmark's constants."""
+    """Constants of the benchmark."""
 
     motor: dc_motor.Parameters
     d_rot: RotaryDamping
@@ -89,7 +89,7 @@ def tick(x: State, m: Memory, u: Stimulus, par: ApproachParameters) -> Memory:
 
 
 def speed(x: State, par: ApproachParameters) -> float:
-    """Return the motor's speed [rad/s]: torque over viscous friction, no inertia."""
+    """Return the motor speed [rad/s], which is torque divided by viscous friction."""
     return dc_motor.output(dc_motor.State(x.i), par.motor).torque / par.d_rot
 
 

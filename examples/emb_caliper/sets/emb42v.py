@@ -1,8 +1,9 @@
-"""A 42 V brake of the same size as that of Line, Manzie and Good (2008).
+"""A 42 V brake of the same size as the brake of Line, Manzie and Good (2008).
 
 The full text of the paper was not available, only title, abstract and index terms. Of Line, Manzie
-and Good (2006) only the abstract and the description of the mechanism were available. So no number
-is marked as printed: the numbers in circulation for this brake are chosen and marked as unverified.
+and Good (2006), only the abstract and the description of the mechanism were available. Therefore no
+number is marked as printed. The commonly quoted numbers for this brake are chosen and marked as
+unverified.
 """
 
 from __future__ import annotations
@@ -17,18 +18,18 @@ SOURCE = (
     "IEEE Trans. Control Systems Technology 16(3), 446-457, 2008; mechanism: the same authors, "
     "Robust control of an automotive electromechanical brake, IFAC, 2006"
 )
-_TOLD = "in circulation for the source's actuator; unverified"
-_CURVE = "-7.23 x^3 + 33.7 x^2 - 4.97 x kN (x in mm), unverified, from its positive root on"
+_TOLD = "commonly quoted for the source's actuator, unverified"
+_CURVE = "-7.23 x^3 + 33.7 x^2 - 4.97 x kN (x in mm), from its positive root on, unverified"
 _MOTOR = "EMB motor in the benchmark of Strathmann and Oehlerking (ARCH 2015)"
 
-_A, _B, _C = -7.23e12, 33.7e9, -4.97e6  # of the cubic's powers, SI
-_TOUCH = (-_B + math.sqrt(_B * _B - 4.0 * _A * _C)) / (2.0 * _A)  # its root: the pads touch
+_A, _B, _C = -7.23e12, 33.7e9, -4.97e6  # coefficients of the cubic, SI
+_TOUCH = (-_B + math.sqrt(_B * _B - 4.0 * _A * _C)) / (2.0 * _A)  # its root, where the pads touch
 
 _PLANT = {
     "supply.V_bat": chosen(42.0, "for planned 42 V vehicles; 40 A at 300 rad/s need 41 V"),
     "supply.R_bat": chosen(0.02, "battery and leads of this class"),
     "bridge.D_max": chosen(1.0, "|D| <= 1"),
-    "bridge.f_pwm": chosen(20e3, "inaudible; informative"),
+    "bridge.f_pwm": chosen(20e3, "inaudible; for information only"),
     "motor.R_m": chosen(0.5, _MOTOR),
     "motor.L_m": chosen(1e-3, _MOTOR),
     "motor.K_e": chosen(0.0697, _TOLD),
@@ -38,11 +39,11 @@ _PLANT = {
     "friction.G": chosen(1.17e-5, _TOLD),
     "friction.T_s": chosen(0.0379, _TOLD),
     "friction.omega_s": chosen(2.0, "breakaway vanishes at a few turns per minute"),
-    "gear.z_sun_1": chosen(16.0, "30.25 in two equal stages: 0.0263 mm/rad with the screw"),
-    "gear.z_ring_1": chosen(72.0, "30.25 in two equal stages: 0.0263 mm/rad with the screw"),
-    "gear.z_sun_2": chosen(16.0, "30.25 in two equal stages: 0.0263 mm/rad with the screw"),
-    "gear.z_ring_2": chosen(72.0, "30.25 in two equal stages: 0.0263 mm/rad with the screw"),
-    "screw.lead": chosen(5e-3, "a ball screw of this load; 0.0263 mm/rad is unverified"),
+    "gear.z_sun_1": chosen(16.0, "30.25 in two equal stages, 0.0263 mm/rad with the screw"),
+    "gear.z_ring_1": chosen(72.0, "30.25 in two equal stages, 0.0263 mm/rad with the screw"),
+    "gear.z_sun_2": chosen(16.0, "30.25 in two equal stages, 0.0263 mm/rad with the screw"),
+    "gear.z_ring_2": chosen(72.0, "30.25 in two equal stages, 0.0263 mm/rad with the screw"),
+    "screw.lead": chosen(5e-3, "a ball screw for this load; 0.0263 mm/rad is unverified"),
     "caliper.k_1": derived((3.0 * _A * _TOUCH + 2.0 * _B) * _TOUCH + _C, _CURVE),
     "caliper.k_2": derived(_B + 3.0 * _A * _TOUCH, _CURVE),
     "caliper.k_3": derived(_A, _CURVE),
@@ -50,19 +51,19 @@ _PLANT = {
     "caliper.tau": chosen(1e-4, "small compared with the viscous friction"),
     "caliper.clearance": chosen(3e-4, "0.15 mm on either side of the disc"),
     "stop.k_stop": chosen(2e7, "stiff compared with the pads, slow compared with the step"),
-    "stop.tau_stop": chosen(1e-3, "a stop without noticeable rebound"),
+    "stop.tau_stop": chosen(1e-3, "no noticeable rebound"),
     "stop.x_rest": chosen(-5e-4, "clear of the parking position"),
     "stop.x_end": chosen(4e-3, "worn pads are not modeled"),
     "F_span": chosen(40e3, "above the highest demand"),
-    "adc.law": chosen("quantized", "a converter has a resolution"),
-    "adc.codes": chosen(4096.0, "12 bit"),
-    "adc.noise": chosen(0.0, "an experiment's choice"),
+    "adc.law": chosen("quantized", "real converters have a finite resolution"),
+    "adc.codes": chosen(4096.0, "12 bits"),
+    "adc.noise": chosen(0.0, "the experiment decides"),
 }
 
 _DESIGN = "tuned on the linear model at 20 kN"
 _ECU = {
-    "ecu.T_force": chosen(1e-3, "a usual rate of chassis controllers"),
-    "ecu.T_current": chosen(2e-4, "a usual rate of current control; whole substeps of 20 us"),
+    "ecu.T_force": chosen(1e-3, "common rate of chassis controllers"),
+    "ecu.T_current": chosen(2e-4, "common rate of current control; whole substeps of 20 us"),
     "ecu.F_on": chosen(200.0, "above the resolution of the force sensor"),
     "ecu.k_park": chosen(30.0, "parks within 0.2 s without overshoot"),
     "ecu.scheduling": chosen("off", "the standard cascade has fixed gains"),
@@ -74,24 +75,24 @@ _ECU = {
     "ecu.speed.k_i": chosen(30.0, "a fifth of the crossover"),
     "ecu.speed.i_max": chosen(40.0, _TOLD),
     "ecu.current.k_p": chosen(0.04, "about 270 Hz: k_p = w L / V"),
-    "ecu.current.k_i": chosen(20.0, "zero on the winding's pole"),
+    "ecu.current.k_i": chosen(20.0, "zero at the winding's pole"),
     "ecu.current.T_t": chosen(2e-3, "time constant of the winding"),
     "ecu.current.D_max": chosen(1.0, "|D| <= 1"),
     "drive": chosen("force", "the experiment decides"),
 }
 
 _MODIFIED = {
-    "ecu.scheduling": chosen("stiffness", "the abstract names gain scheduling"),
-    "ecu.load": chosen("fed-forward", "the load part of the abstract's feedback linearization"),
+    "ecu.scheduling": chosen("stiffness", "the abstract mentions gain scheduling"),
+    "ecu.load": chosen("fed-forward", "load part of the feedback linearization in the abstract"),
     "ecu.force.k_p": chosen(0.2, "the product of gain and stiffness is 0.2 k_1 everywhere"),
-    "ecu.force.k_i": chosen(0.2, "as k_p"),
+    "ecu.force.k_i": chosen(0.2, "same as k_p"),
 }
 
 CASCADE = CitedSet(
     name="emb42v",
     assembly="emb-caliper",
     source=SOURCE,
-    summary="42 V electro-mechanical caliper, standard cascade of PI controllers",
+    summary="42 V electro-mechanical caliper with a standard cascade of PI controllers",
     parameter_class=CaliperBrakeParameters,
     values=_PLANT | _ECU,
 )

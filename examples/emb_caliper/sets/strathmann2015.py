@@ -2,7 +2,7 @@
 
 The values come from the models of the competitions that use it (ARCH-COMP; CORA, JuliaReach) and
 from the problem statement in the archive (cps-vo.org, node 67351). The paper itself was not
-available. Lengths are interpreted as decimeters: x0 = 0.05 is a clearance of 5 mm.
+available. We interpret lengths as decimeters, so x0 = 0.05 is a clearance of 5 mm.
 """
 
 from __future__ import annotations
@@ -14,14 +14,14 @@ SOURCE = (
     "T. Strathmann, J. Oehlerking, Verifying properties of an electro-mechanical braking system, "
     "Workshop on Applied Verification for Continuous and Hybrid Systems (ARCH), 2015"
 )
-_HERE = "benchmark's model in ARCH-COMP"
+_HERE = "benchmark model in ARCH-COMP"
 _DM = f"{_HERE}, per dm"
 
 BENCHMARK = CitedSet(
     name="strathmann2015",
     assembly="emb-approach",
     source=SOURCE,
-    summary="linear benchmark: an EMB closes its clearance under sampled PI control",
+    summary="linear benchmark of an EMB that closes its clearance under sampled PI control",
     parameter_class=ApproachParameters,
     values={
         "motor.R_m": paper(0.5, _HERE),

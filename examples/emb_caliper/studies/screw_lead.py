@@ -1,4 +1,4 @@
-"""Lead of the screw: apply time of the brake, and holding current."""
+"""Screw lead: its effect on apply time and holding current."""
 
 from __future__ import annotations
 
@@ -38,15 +38,15 @@ class Options(ParameterSet):
     """The designs to compare."""
 
     lead_min: Length
-    """shortest lead"""
+    """minimum lead"""
     lead_max: Length
-    """longest lead"""
+    """maximum lead"""
     leads: Count
     """number of leads"""
     clearance_min: Length
-    """smallest running clearance"""
+    """minimum running clearance"""
     clearance_max: Length
-    """largest running clearance"""
+    """maximum running clearance"""
     clearances: Count
     """number of clearances"""
     F_to: TopForce
@@ -60,17 +60,17 @@ class Options(ParameterSet):
 
 
 ASSUMPTIONS = (
-    "A step of the force demand from the parked piston, the whole brake with friction, its "
-    "controllers as they are: the speed limit is the same for every lead.",
-    "A brake that cannot press on slowly, friction included, within the current limit counts as "
-    "none.",
-    "Friction per clamp force stays as it is at the motor's shaft; only the load's torque follows "
-    "the lead.",
+    "The force demand steps from the parked piston. The brake has friction, and its controllers "
+    "are unchanged, so the speed limit is the same for all leads.",
+    "A design is infeasible if the brake cannot apply slowly against friction within the current "
+    "limit.",
+    "Friction per clamp force is constant at the motor shaft. Only the load torque depends on the "
+    "lead.",
 )
 
 
 def compute(par: CaliperBrakeParameters, options: Options, progress: Progress) -> Findings:
-    """Return apply time, energy and holding current over lead and clearance."""
+    """Return apply time, energy and holding current versus lead and clearance."""
     leads = np.linspace(options.lead_min, options.lead_max, options.leads)
     gaps = np.linspace(options.clearance_min, options.clearance_max, options.clearances)
     chosen = clamp_step.EXPERIMENT.defaults.replace({"F_to": options.F_to})
@@ -92,11 +92,11 @@ def compute(par: CaliperBrakeParameters, options: Options, progress: Progress) -
         {
             "t_apply": variable(values[:, :, 0], dims, "s", "time to 90 % of the clamp force"),
             "energy": variable(values[:, :, 1], dims, "J", "electrical energy until then"),
-            "i_press": variable(pressing, dims, "A", "current for slow pressing"),
+            "i_press": variable(pressing, dims, "A", "current for slow application"),
             "i_hold": variable(np.array(held), ("lead",), "A", "holding current without friction"),
         },
         {
-            "lead": variable(leads, ("lead",), "m", "lead of the screw"),
+            "lead": variable(leads, ("lead",), "m", "screw lead"),
             "clearance": variable(gaps, ("clearance",), "m", "running clearance"),
         },
     )
@@ -105,8 +105,8 @@ def compute(par: CaliperBrakeParameters, options: Options, progress: Progress) -
     times = np.where(able, nearest["t_apply"].values, np.nan)
     if not np.isfinite(times).any():
         raise ParameterError(
-            f"no lead presses with {options.F_to / 1e3:g} kN within ecu.speed.i_max = "
-            f"{par.ecu.speed.i_max:g} A: reduce F_to or lead_min"
+            f"no lead reaches {options.F_to / 1e3:g} kN within ecu.speed.i_max = "
+            f"{par.ecu.speed.i_max:g} A. Reduce F_to or lead_min"
         )
     best = int(np.nanargmin(times))
     given = Mark("given brake", par.screw.lead, par.caliper.clearance)
@@ -116,9 +116,9 @@ def compute(par: CaliperBrakeParameters, options: Options, progress: Progress) -
             "lead_fastest",
             float(leads[best]),
             "m",
-            "Lead that applies fastest at the given clearance.",
+            "Lead with the shortest apply time at the given clearance.",
         ),
-        Kpi("t_apply_fastest", float(nearest["t_apply"][best]), "s", "Its apply time."),
+        Kpi("t_apply_fastest", float(nearest["t_apply"][best]), "s", "Apply time with this lead."),
         Kpi(
             "i_hold_fastest",
             float(held[best]),
@@ -126,14 +126,17 @@ def compute(par: CaliperBrakeParameters, options: Options, progress: Progress) -
             "Current that holds the clamp force with this lead.",
         ),
         Kpi(
-            "i_hold_given", holding_current(options.F_to, par), "A", "The same with the given lead."
+            "i_hold_given",
+            holding_current(options.F_to, par),
+            "A",
+            "Current that holds the clamp force with the given lead.",
         ),
     )
     applied = Map(
         "t_apply",
         "lead",
         "clearance",
-        "Time from the demand to 90 % of the clamp force over lead and running clearance.",
+        "Time from the demand to 90 % of the clamp force, versus lead and running clearance.",
         (fastest, given),
         {"beyond the current limit": ("i_press", par.ecu.speed.i_max)},
     )
@@ -143,7 +146,7 @@ def compute(par: CaliperBrakeParameters, options: Options, progress: Progress) -
 
 
 def _applied(par: CaliperBrakeParameters, options: ParameterSet) -> tuple[float, float]:
-    """Return the time to 90 % of the clamp force [s] and the energy until then [J]."""
+    """Return the time to 90 % of the clamp force [s], and the energy until then [J]."""
     (case,) = clamp_step.cases(par, options)  # type: ignore[arg-type]
     computed = simulate(as_run(case, 20e-6), ("F_cl", "E_source"))
     wanted: step_response.Setting = clamp_step.step(options)  # type: ignore[arg-type]
@@ -160,7 +163,7 @@ def _applied(par: CaliperBrakeParameters, options: ParameterSet) -> tuple[float,
 STUDY = Study(
     name="screw-lead",
     assembly="emb-caliper",
-    summary="apply time, energy and holding current over the screw's lead and the clearance",
+    summary="apply time, energy and holding current versus screw lead and clearance",
     options=Options,
     defaults=Options(
         lead_min=4e-3,
@@ -173,7 +176,7 @@ STUDY = Study(
     ),
     compute=compute,
     ruled={
-        "screw.lead": "the study varies it: set lead_min and lead_max",
-        "caliper.clearance": "the study varies it: set clearance_min and clearance_max",
+        "screw.lead": "set the study's options lead_min and lead_max",
+        "caliper.clearance": "set the study's options clearance_min and clearance_max",
     },
 )

@@ -15,12 +15,12 @@ from bywire.analysis.response.sweep import Sweep
 from bywire.core.parameters import ParameterSet
 from bywire.core.typing import Array, Complex, Progress
 
-_PATIENCE = 12  # largest number of windows for loops with friction, which may never repeat exactly
+_PATIENCE = 12  # maximum number of windows for loops with friction, which may never repeat exactly
 GAIN, PHASE = 0.01, 0.1
 """maximum difference of gain [dB] and phase [degree] that counts as agreement"""
 NOTHING, LIMITS, EVERYTHING = "", "limits", "all"
 """active nonlinearities: none, at a small amplitude; only limits of currents, voltages and rates,
-which act at a large amplitude; all"""
+at a large amplitude; all"""
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Agreement:
     gain, phase
         Measured minus linear response in dB and degree, shape (n,), by active nonlinearities
         (`NOTHING`, `LIMITS`, one cause, `EVERYTHING`). NaN where the output stuck or did not
-        settle. The limits act in all cases except `NOTHING`: see `beyond_limits` for the separate
+        settle. The limits act in all cases except `NOTHING`; `beyond_limits` returns the separate
         effect of a cause.
     step_gain, step_phase
         Effect of the finite simulation step on the linear model: midpoint rule minus exact model
@@ -69,9 +69,9 @@ class Agreement:
     def largest(self) -> list[str]:
         """Cause with the largest effect on the response at each frequency, shape (n,).
 
-        Limits count by their own effect, other causes by their additional effect. Causes with which
-        the output sticks or does not settle count as largest; several are joined. The entry is
-        empty if no effect is larger than the tolerance of agreement.
+        Limits count by their own effect, other causes by their additional effect. Causes that make
+        the output stick or prevent settling count as largest; several are joined. The entry is
+        empty if no effect exceeds the tolerance of agreement.
         """
         moves = {LIMITS: (self.gain[LIMITS], self.phase[LIMITS])}
         singles = [c for c in self.gain if c not in (NOTHING, LIMITS, EVERYTHING)]
@@ -108,8 +108,8 @@ def agreement(
     frequencies
         Frequencies [Hz], ascending.
     amplitudes
-        Two amplitudes of the sine, in the input's SI unit: one that is small enough to avoid
-        limits, and one that is as large as in use, so that friction does not stick.
+        Two amplitudes of the sine, in the input's SI unit: one small enough to avoid limits, and
+        one as large as in use, so that friction does not stick.
     step
         Substep [s]; the operating point's own by default.
 

@@ -1,6 +1,6 @@
 """Crossings of a level by a response: gain and phase crossovers, margins, bandwidth.
 
-The response may be computed or measured, over ascending frequencies. Between its points it is
+The response may be computed or measured, at ascending frequencies. Between its points, it is
 interpolated linearly on logarithmic axes, or evaluated exactly if it is available as a function.
 """
 
@@ -20,7 +20,7 @@ Response = Callable[[Array], Complex]
 """``response(frequencies [Hz]) -> complex``, shape (n,) each"""
 
 DROP = math.sqrt(0.5)
-"""fraction of the start to which a response has fallen at its bandwidth: -3 dB"""
+"""fraction of its initial magnitude to which a response has fallen at its bandwidth: -3 dB"""
 NEARLY_ZERO = 1.0
 """phase [degree] at the lower end that still counts as 0: a loop of finite gain"""
 _BRACKETS = 4000  # points of the grid that brackets crossings of a function of frequency
@@ -32,10 +32,10 @@ class Crossing(NamedTuple):
     Parameters
     ----------
     frequency
-        In Hz.
+        Frequency [Hz].
     margin
         Phase margin there [degree]: 180 plus the phase. The phase is unwrapped from the lowest
-        frequency, where it is between -360 and 0: a loop with integral action begins near -90.
+        frequency, where it is between -360 and 0: a loop with integral action starts near -90.
     falls
         Whether the gain falls there.
     """
@@ -58,10 +58,10 @@ def gain_crossings(
     Parameters
     ----------
     frequencies, L
-        Frequencies [Hz], ascending, and loop gain there (negative feedback not counted), shape
-        (n,) each.
+        Frequencies [Hz], ascending, and loop gain there (without the sign of negative feedback),
+        shape (n,) each.
     response
-        The loop gain as a function, for crossings to rounding error.
+        The loop gain as a function, to solve for crossings to rounding error.
     """
     size, phase = np.log(np.abs(L)), np.unwrap(np.angle(-L))
     # L between -360 and 0 degree is -L between -180 and 180.
@@ -89,8 +89,8 @@ class Margin(EqualWhereUndefined):
     crossover
         Highest frequency at which the loop gain falls to 1 [Hz]; NaN if it never does.
     phase
-        Smallest phase margin of all frequencies at which the loop gain is 1 [degree]; NaN likewise.
-        The one nearest to -1 counts, for falling and rising gain.
+        Minimum phase margin of all frequencies at which the loop gain is 1 [degree]; NaN likewise.
+        The frequency nearest to -1 counts, for falling and rising gain.
     at
         Frequency of the phase margin [Hz]; NaN likewise.
     """
@@ -101,7 +101,7 @@ class Margin(EqualWhereUndefined):
 
 
 def margin_of(crossings: Sequence[Crossing]) -> Margin:
-    """Return crossover and phase margin of a loop gain that passes 1 at some crossings."""
+    """Return crossover and phase margin of a loop gain with these crossings of 1."""
     falls = [crossing.frequency for crossing in crossings if crossing.falls]
     if not falls:
         return Margin(math.nan, math.nan)
@@ -116,7 +116,7 @@ def margin(loop: Response, band: tuple[float, float]) -> Margin:
 
 
 def measured_margin(frequencies: Array, L: Complex) -> Margin:
-    """Return crossover and phase margin of a loop gain known at some frequencies [Hz] only.
+    """Return crossover and phase margin of a loop gain that is known only at some frequencies [Hz].
 
     The margin is the distance from -1, within 180 degree. It is NaN if the gain does not fall to 1
     within the frequencies. The crossover is then infinite if the gain ends above 1. Without loop
@@ -143,9 +143,9 @@ def fall(
     frequencies
         Ascending [Hz], shape (n,).
     start
-        Magnitude that counts as 1, in the gain's unit: that at standstill.
+        Reference magnitude, in the gain's unit: that at standstill.
     response
-        The response as a function, for a frequency to rounding error.
+        The response as a function, to solve for the frequency to rounding error.
 
     Returns
     -------
@@ -194,7 +194,7 @@ class GainFactor(NamedTuple):
     Parameters
     ----------
     factor
-        Above 1 if the loop gain may grow by it, below 1 if it may fall to it.
+        Above 1 if the loop gain may grow by this factor, below 1 if it may fall to it.
     frequency
         Frequency at which the loop gain times the factor is -1 [Hz].
     """
@@ -213,7 +213,7 @@ def gain_factors(
     frequencies, L
         Frequencies [Hz], ascending, and loop gain there, shape (n,) each.
     response
-        The loop gain as a function, for factors to rounding error.
+        The loop gain as a function, to solve for factors to rounding error.
     """
     factors = []
     for k in map(int, np.flatnonzero(np.diff(np.signbit(L.imag)))):
@@ -228,25 +228,25 @@ def gain_factors(
 
 
 def real_factor(real: float, frequency: float) -> list[GainFactor]:
-    """Return the factor of a loop gain that is real at a frequency [Hz]; None if it is positive."""
+    """Return the factor of a loop gain that is real at a frequency [Hz]; empty if positive."""
     if not (math.isfinite(real) and real < 0.0):
         return []
     return [GainFactor(-1.0 / real, frequency)]
 
 
 def upper_factor(factors: Sequence[GainFactor]) -> GainFactor:
-    """Return the factor by which a stable loop's gain may grow, and its frequency; or inf, NaN."""
+    """Return the factor by which a stable loop's gain may grow; inf without a limit."""
     return min((each for each in factors if each.factor > 1.0), default=_ANY_GROWTH)
 
 
 def lower_factor(factors: Sequence[GainFactor]) -> GainFactor:
-    """Return the share to which a stable loop's gain may fall, and its frequency; else 0, NaN."""
+    """Return the factor to which a stable loop's gain may fall; 0 without a limit."""
     lower = (each for each in factors if _LEAST_FACTOR < each.factor < 1.0)
     return max(lower, default=_ANY_FALL)
 
 
 _ANY_GROWTH, _ANY_FALL = GainFactor(math.inf, math.nan), GainFactor(0.0, math.nan)
-_LEAST_FACTOR = 1e-9  # below it, L is at a pole on the border of stability, where it is infinite
+_LEAST_FACTOR = 1e-9  # below it, L is infinite, at a pole on the stability limit
 
 
 def _passing(frequencies: Array, values: Array, k: int) -> float:

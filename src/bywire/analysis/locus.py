@@ -1,4 +1,4 @@
-"""Root locus: poles of a loop or plant over any parameter, and its borders of stability."""
+"""Root locus: poles of a loop or plant over any parameter, and its stability limits."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ class Border:
     value
         Value of the parameter [SI].
     rate
-        Crossing pole, as a rate [1/s]; for a pair, the one with positive frequency.
+        Crossing pole, as a rate [1/s]; for a pair, the pole with positive frequency.
     above
-        Whether the loop is stable above the value; else below it.
+        Whether the loop is stable above the value; otherwise, it is stable below.
     """
 
     value: float
@@ -50,14 +50,14 @@ class Locus:
     values
         Its values [SI], ascending, shape (n,).
     poles
-        Poles of the model, shape (n, states); a column is one pole, followed from value to value.
+        Poles of the model, shape (n, states); each column follows one pole from value to value.
     period
         Sample time [s]; 0 for a continuous model, whose poles are rates.
     stable
         Whether the loop is stable, shape (n,).
     borders
-        Values at which that changes. A loop that becomes unstable and stable again between two
-        values seems stable.
+        Values at which stability changes. A loop that becomes unstable and stable again between
+        two values appears to be stable.
     """
 
     name: str
@@ -70,7 +70,7 @@ class Locus:
 
     @property
     def rates(self) -> Complex:
-        """The poles as rates of continuous motions [1/s], shape (n, states); -inf for dead ones."""
+        """The poles as rates of continuous motions [1/s], shape (n, states); -inf if deadbeat."""
         if not self.period:
             return self.poles
         alive = self.poles != 0.0
@@ -89,8 +89,8 @@ def locus(
     loop, par, value
         The loop and its operating point.
     name, unit
-        Dotted name of a parameter, or that of the loop's operating quantity; its SI unit. Over a
-        gain of the controller this is the classical root locus.
+        Dotted name of a parameter, or of the loop's operating quantity, and its SI unit. For a
+        gain of the controller, this is the classical root locus.
     values
         Values [SI], ascending, at least two.
 
@@ -115,7 +115,7 @@ def locus_of(
     Parameters
     ----------
     model
-        ``model(value [SI]) -> LinearModel``, of equal size and sample time for all values.
+        ``model(value [SI]) -> LinearModel``, with the same size and sample time for all values.
     name, unit
         Varied quantity and its SI unit.
     values
@@ -128,7 +128,7 @@ def locus_of(
     """
     if len(values) < 2:
         raise ParameterError(
-            f"{name}: a locus needs at least two values, got {len(values)}",
+            f"a locus over {name} needs at least two values, but it has {len(values)}",
             name=name,
             value=str(len(values)),
             valid=">= 2 values",
@@ -162,7 +162,7 @@ def _followed(before: Complex, poles: Complex) -> Complex:
 
 
 def _outermost(model: LinearModel) -> tuple[complex, float]:
-    """Return the least stable pole as a rate [1/s], and its excess; integrators left out.
+    """Return the least stable pole as a rate [1/s], and its excess, without integrators.
 
     The excess is its distance outside the unit circle, or to the right of the imaginary axis.
     """
@@ -188,7 +188,7 @@ def _border(
     model: Callable[[float], LinearModel], between: tuple[float, float], above: bool
 ) -> Border:
     """Return the value at which stability changes between two values, by bisection."""
-    # Bisection of a Boolean: near z = 1 a pole counts as an integrator, and its excess jumps.
+    # Bisection of a Boolean, because the excess of a pole jumps near z = 1, where it integrates.
     low, high = between
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
@@ -196,5 +196,5 @@ def _border(
             high = middle
         else:
             low = middle
-    rate, _ = _outermost(model(low if above else high))  # where it is unstable
+    rate, _ = _outermost(model(low if above else high))  # at the unstable end
     return Border(float(0.5 * (low + high)), rate, above)

@@ -29,7 +29,7 @@ from bywire.core.registry import Kind, instances
 from bywire.core.typing import Array, Complex
 from bywire.simulation.run import Run
 
-_ROUNDING = 1e-12  # of a limit: largest deviation of a clipped demand
+_ROUNDING = 1e-12  # of a limit: maximum deviation of a clipped demand
 
 
 @dataclass(frozen=True)
@@ -39,9 +39,9 @@ class Saturation:
     Parameters
     ----------
     name
-        Name of its share of the time, for example ``"sat_current"``.
+        Name of the fraction of time at the limit, for example ``"sat_current"``.
     signals
-        Limited outputs; one at its limit suffices.
+        Limited outputs; the limit is reached if one of them is at it.
     limits
         Dotted names of the parameters that limit the magnitude; the smallest one counts.
     """
@@ -51,7 +51,7 @@ class Saturation:
     limits: tuple[str, ...]
 
     def share(self, values: Array, matrix: Array, names: Sequence[str]) -> Array:
-        """Return the share of the time at the limit, shape (cases,).
+        """Return the fraction of time at the limit, shape (cases,).
 
         Parameters
         ----------
@@ -65,7 +65,7 @@ class Saturation:
         return np.asarray(at.any(axis=2).mean(axis=1))
 
 
-# --- Gain schedules: regions of the operating quantity, gains of each
+# --- Gain schedules: regions of the operating quantity with their gains
 
 
 @dataclass(frozen=True)
@@ -79,12 +79,12 @@ class LoopSchedule:
     borders
         Parameters at which regions meet, ascending.
     regions
-        Name of each region -> what a design may choose there: dotted name -> lowest and highest
-        value [SI]; by ascending operating point.
+        Name of each region -> parameters that a design may choose there: dotted name -> minimum
+        and maximum value [SI]; by ascending operating point.
     main
-        Region whose gains are also those without a schedule; it is designed first.
+        Region whose gains also apply without a schedule; it is designed first.
     points
-        Operating points for which regions are usually designed [SI].
+        Usual operating points for the design of regions [SI].
     """
 
     changes: Mapping[str, Any]
@@ -94,12 +94,12 @@ class LoopSchedule:
     points: tuple[float, ...]
 
     def is_on(self, par: ParameterSet) -> bool:
-        """Return whether parameters have the schedule switched on."""
+        """Return whether the parameters switch the schedule on."""
         values = par.flat()
         return all(values[name] == value for name, value in self.changes.items())
 
     def region(self, par: ParameterSet, value: float) -> str:
-        """Return the region of an operating point; a border belongs to the one above."""
+        """Return the region of an operating point; a boundary belongs to the region above it."""
         leaves = par.leaves()
         return tuple(self.regions)[bisect_right([leaves[name] for name in self.borders], value)]
 
@@ -114,7 +114,7 @@ class Point:
     Parameters
     ----------
     model, par
-        The system; the parameters close this loop and no outer one.
+        The system; the parameters close this loop, but no outer loop.
     state, memory, stimulus
         Equilibrium without dry friction.
     step
@@ -129,7 +129,7 @@ class Point:
     step: float = 20e-6
 
     def run(self, step: float | None = None) -> Run:
-        """Return a run that rests at the point, with the point's own substep [s] by default."""
+        """Return a run that rests at the point, by default with the point's own substep [s]."""
         row = [float(value) for value in self.stimulus]
         return Run(
             self.model,
@@ -163,13 +163,13 @@ class Quantity:
     def refused(self, value: float, why: object) -> ParameterError:
         """Return the error for a value that is not an operating point."""
         return ParameterError(
-            f"{self.name} = {value:g} {self.unit} is not an operating point: {why}",
+            f"{self.name} = {value:g} {self.unit} is not a valid operating point: {why}",
             name=self.name,
             value=f"{value:g} {self.unit}",
         )
 
     def require_positive(self, value: float, remark: str = "") -> None:
-        """Reject a value that is not positive; ``remark``: end of the error's text."""
+        """Reject a value that is not positive; ``remark``: end of the error message."""
         if not value > 0.0:
             raise self.refused(value, f"it must be > 0 {self.unit}{remark}")
 
@@ -207,36 +207,36 @@ class Loop:
     whole
         ``whole(par)``: other frequencies [Hz] of which a window must contain whole periods.
     tunables
-        Parameters that a design may choose: dotted name -> lowest and highest value [SI] to try.
+        Parameters that a design may choose: dotted name -> minimum and maximum value [SI] to try.
     realizable
-        ``realizable(par)``: ranges [SI] in place of those of ``tunables`` that a controller with
-        these sample times can implement as designed, by dotted name; both ends are equal for a
-        required value. A design observes them unless the user disables that.
+        ``realizable(par)``: by dotted name, ranges [SI] that replace those of ``tunables`` because
+        a controller with these sample times can implement only them as designed; both ends are
+        equal for a required value. A design observes them unless the user disables this.
     sustained
         Parameters that allow long excitation, for example a disc that does not slow down; a
         design's trial with sines applies them.
     proof
         Experiment that tests the loop in the whole brake.
     laws
-        ``laws(par, value, frequencies [Hz])``: responses of the controller, at an operating point,
-        to its set point and to a fall of the output, sensor and filters included, of shape (n,)
+        ``laws(par, value, frequencies [Hz])``: the controller's responses at an operating point to
+        its set point and to a decrease of the output, including sensor and filters, of shape (n,)
         each; None for more complex loops.
     schedule
         Its gain schedule, if there is one.
     saturations
-        Limits whose share of the time a frequency response reports, if the model records no mode
-        of that name.
+        Limits for which a frequency response reports the fraction of time, if the model records no
+        mode of that name.
     single
         Whether a single linear controller connects set point and output to the plant. The loop
         gain then follows from a measured closed-loop response, see ``large_signal``.
     analog
         Whether its controller is analog. ``cut`` is then a state within the plant, and the loop
-        gain a continuous model.
+        gain is a continuous model.
     locked
         States that its linear models hold, such as those of a clamped shaft.
     side
-        Side of its linear models if the operating point is on the kink of an operation, see
-        `corners.read_sides`; if empty, such a point raises an error.
+        Side of its linear models if the operating point is on the kink of an operation (see
+        `corners.read_sides`); if empty, such a point raises an error.
     """
 
     name: str
@@ -286,7 +286,7 @@ class Loop:
         par, value
             Parameters and operating point to keep.
         name
-            Dotted name of a parameter, or that of the operating quantity.
+            Dotted name of a parameter, or name of the operating quantity.
         values
             Its values [SI].
 
@@ -311,7 +311,7 @@ class Loop:
     def closed(self, par: ParameterSet, value: float, step: float = 0.0) -> LinearModel:
         """Return the exact linear model from the input to the output at an operating point.
 
-        With a step [s], it is the model of the simulation's midpoint rule, see ``stepped``.
+        With a step [s], it is the model of the simulation's midpoint rule (see ``stepped``).
         """
         p = self.point(self.smooth(par), value)
         with taking(self.side):
@@ -395,7 +395,7 @@ class PlantPoint:
 
     @contextmanager
     def named(self, unless: Quantity) -> Iterator[None]:
-        """Name the value in errors raised in this context, except by ``unless``."""
+        """Add the value to errors in this context, except for the quantity ``unless``."""
         try:
             yield
         except ParameterError as error:
@@ -444,7 +444,7 @@ class Plant:
             return self.model(par, point)
 
     def exact(self, par: ParameterSet, point: PlantPoint) -> LinearModel | None:
-        """Return the model that this one simplifies, likewise; None for the exact one."""
+        """Return the model that this one simplifies, likewise; None for the exact model."""
         with taking(self.side):
             return None if self.whole is None else self.whole(par, point)
 
@@ -455,4 +455,4 @@ class Plant:
 
 
 PLANTS = Kind("plant", ("plants",), instances(Plant), declared="a Plant")
-"""every plant and simplified model of one"""
+"""every plant, and every simplified model of a plant"""

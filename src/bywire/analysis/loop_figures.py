@@ -27,15 +27,15 @@ from bywire.core.typing import Array, Complex
 NO_LOOP = 1e-9
 """maximum loop gain of a loop without effective feedback"""
 _SLOWEST, _SLOW_POINTS = 1e-6, 40  # below the grid, where the loop gain is real, Hz
-_BEYOND = 100.0  # times the fastest pole: where a grid without sampling ends
-_LOWEST = 1e-2  # lower end of the frequencies looked at, Hz
+_BEYOND = 100.0  # times the fastest pole: end of a grid without sampling
+_LOWEST = 1e-2  # lower end of the frequency grid, Hz
 _NYQUIST = 0.998  # of half the sampling frequency, where the phase is ambiguous
-_REST = 1e-6  # Hz, below it a response counts as that at rest
+_REST = 1e-6  # Hz: frequency that represents rest
 _BAND = 0.02  # of the step: half the settling band
-_MOST = 2**15  # samples of a step response: 33 s of a loop of 1 kHz
+_MOST = 2**15  # samples of a step response: 33 s for a loop of 1 kHz
 _NOISE_POINTS = 1000  # frequencies, evenly spaced
-_LEFT_AFTER = 10.0  # periods of the bandwidth: when an error counts as steady
-_SETTLED = 1e-4  # largest remaining share of the slowest mode at the end of a step response
+_LEFT_AFTER = 10.0  # periods of the bandwidth after which an error counts as steady
+_SETTLED = 1e-4  # maximum remaining fraction of the slowest mode at the end of a step response
 
 
 @dataclass(frozen=True)
@@ -55,11 +55,11 @@ class LoopFigure:
     is_less_better
         Whether a smaller value is better.
     margin
-        Its name among `LoopMargins`; empty if it is not one of them.
+        Its name in `LoopMargins`; empty if it is not one of them.
     title
         Heading of tables; if empty, its name in words.
     in_decibel
-        Whether it is a factor that may also be given in dB.
+        Whether it is a factor that may also be specified in dB.
     """
 
     name: str
@@ -84,7 +84,7 @@ LOOP_FIGURES: Mapping[str, LoopFigure] = {
         LoopFigure(
             "bandwidth",
             "Hz",
-            "lowest frequency at which the closed loop is at -3 dB",
+            "lowest frequency at which the closed loop's gain has fallen by 3 dB",
             margin="bandwidth",
         ),
         LoopFigure(
@@ -96,7 +96,7 @@ LOOP_FIGURES: Mapping[str, LoopFigure] = {
         LoopFigure(
             "phase_margin",
             "deg",
-            "minimum phase margin of all gain crossovers",
+            "minimum phase margin at all gain crossovers",
             high=180.0,
             margin="phase",
         ),
@@ -141,24 +141,27 @@ LOOP_FIGURES: Mapping[str, LoopFigure] = {
         LoopFigure(
             "noise_gain",
             "1",
-            "rms of the output, relative to that of white noise in each measured sample",
+            "rms of the output relative to the rms of white noise in each measured sample",
             is_less_better=True,
         ),
         LoopFigure(
-            "overshoot", "%", "of the unit step at the sampling instants", is_less_better=True
+            "overshoot", "%", "overshoot of the unit step at the sample times", is_less_better=True
         ),
         LoopFigure(
-            "settling_time", "s", "of the unit step, to 2 % of its height", is_less_better=True
+            "settling_time",
+            "s",
+            "settling time of the unit step, to 2 % of its height",
+            is_less_better=True,
         ),
         LoopFigure(
             "steady_state_error",
             "%",
-            "residual of a unit step after ten periods of the bandwidth",
+            "remaining error of a unit step after ten periods of the bandwidth",
             is_less_better=True,
         ),
     )
 }
-"""every figure of a loop by its name; margins, requirements and documentation take it from here"""
+"""every figure of a loop by its name, for margins, requirements and documentation"""
 
 Figure = Callable[["LoopFigures"], float]
 
@@ -187,19 +190,19 @@ def _of_an_answer(figure: Figure) -> Figure:
 class LoopFigures:
     """Figures of a linear loop, each computed on demand.
 
-    Between the points of a logarithmic grid of frequencies the responses are interpolated:
-    400 points are good for 0.1 % of a frequency, 4000 for 0.001 %.
+    Responses are interpolated between the points of a logarithmic frequency grid: 400 points have
+    an error of 0.1 % of a frequency, 4000 points of 0.001 %.
 
     Parameters
     ----------
     gain
         Loop gain L, one input and one output; the closed loop has 1 + L.
     closed
-        From set point to output, of the same sample time.
+        Closed loop from set point to output, with the same sample time.
     points
         Points of the grid.
     exact
-        Whether to solve for crossovers and bandwidth between the points, too slow for a search.
+        Whether to solve for crossovers and bandwidth between the points (too slow for a search).
     lowest
         Lower end of the grid [Hz].
     """
@@ -212,7 +215,7 @@ class LoopFigures:
 
     @cached_property
     def frequencies(self) -> Array:
-        """The grid [Hz], up to half the sampling frequency; without one, beyond all poles."""
+        """The grid [Hz], up to half the sampling frequency; without sampling, beyond all poles."""
         highest = _NYQUIST * min(self.gain.nyquist, self.closed.nyquist)
         if math.isinf(highest):
             rates = np.abs(np.concatenate([self.gain.poles(), self.closed.poles()]))
@@ -226,7 +229,7 @@ class LoopFigures:
 
     @cached_property
     def has_loop(self) -> bool:
-        """Whether anything is fed back: gains of 0, or a closed valve, leave no loop."""
+        """Whether there is feedback: with gains of 0, or a closed valve, there is no loop."""
         return bool(np.max(np.abs(self.L)) > NO_LOOP)
 
     @cached_property
@@ -236,7 +239,7 @@ class LoopFigures:
 
     @cached_property
     def growth(self) -> float:
-        """Maximum magnitude of the closed loop's poles, integrators without effect left out."""
+        """Maximum magnitude of the closed loop's poles, without ineffective integrators."""
         kept = self.closed.effective()
         poles = np.linalg.eigvals(self.closed.A[np.ix_(kept, kept)])
         return float(np.max(np.abs(poles), initial=0.0))
@@ -251,7 +254,7 @@ class LoopFigures:
     def bandwidth(self) -> float:
         """Lowest frequency at which the closed loop has fallen to -3 dB of its gain at rest [Hz].
 
-        The end of the grid where it stays above.
+        The end of the grid if it stays above.
         """
         return min(self.fall, float(self.frequencies[-1]))
 
@@ -281,7 +284,7 @@ class LoopFigures:
     @_of_a_loop
     def delay_margin(self) -> float:
         """Additional dead time that the loop tolerates [s]; inf without a crossover."""
-        # Angle to -1 in the direction of a delay, which turns clockwise.
+        # Angle to -1 in the direction of a delay, which rotates clockwise.
         return min(
             (at.margin % 360.0 / 360.0 / at.frequency for at in self.crossings), default=math.inf
         )
@@ -293,7 +296,7 @@ class LoopFigures:
         slow = np.geomspace(_SLOWEST, self.lowest, _SLOW_POINTS, endpoint=False)
         f = np.concatenate([slow, self.frequencies])
         L = np.concatenate([self._gain_at(slow), self.L])
-        # At rest, and at half the sampling frequency, L is real beyond both ends of the grid.
+        # Beyond both ends of the grid, L is real: at rest, and at half the sampling frequency.
         at_rest = real_factor(self._real_at(0.0), 0.0)
         last = self.gain.nyquist
         at_last = real_factor(self._real_at(last), last) if self.gain.period else []
@@ -332,22 +335,22 @@ class LoopFigures:
     @cached_property
     @_of_a_loop
     def noise_gain(self) -> float:
-        """Rms of the output over that of white noise of each measured sample; NaN if analog.
+        """Ratio of the output's rms to that of white noise in each sample; NaN if analog.
 
-        The root mean square of L/(1 + L) up to half the sampling frequency.
+        It is the root mean square of L/(1 + L) up to half the sampling frequency.
         """
         if not self.gain.period:
             return math.nan
-        # White noise of samples has a flat spectrum: midpoints of even bands are its quadrature.
+        # Sampled white noise has a flat spectrum, so midpoints of equal bands integrate it.
         f = (np.arange(_NOISE_POINTS) + 0.5) / _NOISE_POINTS * self.gain.nyquist
         L = self._gain_at(f)
         return float(np.sqrt(np.mean(np.abs(L / (1.0 + L)) ** 2)))
 
     @cached_property
     def step(self) -> Array:
-        """Response to a unit step at the sampling instants, until it has come to rest.
+        """Response to a unit step at the sample times, until it is at rest.
 
-        By doubling, A^n B for n < 2m follows from those for n < m with one product of matrices.
+        By doubling, A^n B for n < 2m follows from A^n B for n < m with one product of matrices.
         """
         rate = max(1.0 - self.growth, 1e-12)  # of the slowest mode, per sample
         count = min(max(-math.log(_SETTLED) / rate, 64.0), _MOST)
@@ -362,7 +365,7 @@ class LoopFigures:
     @property
     @_of_an_answer
     def overshoot(self) -> float:
-        """Excess of the step's response over its end, at the sampling instants [%]."""
+        """Excess of the step response over its final value, at the sample times [%]."""
         return 100.0 * max(float(self.step.max()) - 1.0, 0.0)
 
     @property
@@ -382,14 +385,14 @@ class LoopFigures:
     @property
     @_of_an_answer
     def steady_state_error(self) -> float:
-        """Residual of a unit step after ten periods of the bandwidth [%].
+        """Remaining error of a unit step after ten periods of the bandwidth [%].
 
-        The time is finite, because the residual of any integrator finally vanishes, however slow.
+        The time is finite, because even a slow integrator finally eliminates the error.
         """
         last = math.ceil(_LEFT_AFTER / (self.bandwidth * self.closed.period))
         kept = self.closed.effective()
         n = len(kept)
-        whole = np.eye(n + 1)  # the step is a state of its own: its power sums the pulses
+        whole = np.eye(n + 1)  # the step is an additional state, so a power sums the pulses
         whole[:n, :n] = self.closed.A[np.ix_(kept, kept)]
         whole[:n, n] = self.closed.B[kept, 0]
         state = np.linalg.matrix_power(whole, last)[:n, n]
@@ -405,7 +408,7 @@ class LoopFigures:
         """Bandwidth [Hz]; infinite if the closed loop stays above -3 dB."""
         solved = self._closed_at if self.exact else None
         at = fall(np.abs(self.T), self.frequencies, self.rest, solved)
-        if at == 0.0:  # a slow integrator: it falls below the grid
+        if at == 0.0:  # a slow integrator, whose gain falls below the grid
             f = np.geomspace(_REST, self.lowest, self.points)
             size = np.abs(self._closed_at(f))
             size[-1] = min(size[-1], math.nextafter(DROP * self.rest, 0.0))
@@ -413,7 +416,7 @@ class LoopFigures:
         return at
 
     def _real_at(self, frequency: float) -> float:
-        """Return the loop gain where it is real [Hz]; NaN where it integrates."""
+        """Return the loop gain at a frequency [Hz] at which it is real; NaN if it integrates."""
         try:
             return float(self._gain_at(np.array([frequency]))[0].real)
         except np.linalg.LinAlgError:

@@ -38,33 +38,32 @@ _POINTS = 2000
 class LoopMargins(EqualWhereUndefined):
     """Margins of a sampled loop, including its delays and filters.
 
-    They are NaN if the loop is unstable, and without a loop.
+    They are NaN for an unstable loop, and without a loop.
 
     Parameters
     ----------
     gain
-        Smallest factor above 1 by which the loop gain may grow; inf if none makes it unstable.
+        Smallest factor above 1 that makes the loop unstable; inf if there is none.
     phase, crossover
-        Smallest phase margin of all gain crossovers [degree], and the highest of these [Hz].
+        Minimum phase margin at all gain crossovers [degree], and the highest crossover [Hz].
     delay
         Additional dead time that the loop tolerates [s].
     disk
-        Disk-based margin (symmetric, skew 0): S - T of this size stays away from -1 in gain and
-        phase at once; 0 to 2.
+        Disk-based margin (symmetric, skew 0) for simultaneous changes of gain and phase; 0 to 2.
     sensitivity, complementary
-        Largest magnitudes of S = 1/(1 + L) and T = L/(1 + L).
+        Maximum magnitudes of S = 1/(1 + L) and T = L/(1 + L).
     bandwidth
         Frequency at which the closed loop has fallen to -3 dB of its gain at rest [Hz].
     stable
         Whether the closed loop is stable.
     has_loop
-        Whether there is feedback: gains of 0, or a closed valve, leave no loop.
+        Whether there is feedback: with gains of 0, or a closed valve, there is no loop.
     lower_gain
-        Largest factor below 1 to which the loop gain may fall; 0 if none makes it unstable.
+        Largest factor below 1 that makes the loop unstable; 0 if there is none.
     phase_at
-        Gain crossover at which the phase margin is read [Hz].
+        Gain crossover of the phase margin [Hz].
     gain_at, lower_gain_at
-        Frequencies at which the two gain margins are read [Hz].
+        Frequencies of the two gain margins [Hz].
     corners
         As in `LinearModel`.
     """
@@ -94,12 +93,12 @@ class LoopMargins(EqualWhereUndefined):
 
     @property
     def is_sound(self) -> bool:
-        """Whether there is a loop, and it is stable: whether it has margins."""
+        """Whether there is a stable loop, which has margins."""
         return self.stable and self.has_loop
 
 
 NO_LOOP = "no loop: the loop gain is 0 at all frequencies"
-"""sentence on a loop whose gains are 0, or whose valve is closed"""
+"""note on a loop whose gains are 0, or whose valve is closed"""
 UNSTABLE = LoopMargins(
     gain=math.nan,
     phase=math.nan,
@@ -115,7 +114,7 @@ UNSTABLE = LoopMargins(
 
 
 def figures_at(loop: Loop, par: ParameterSet, value: float) -> LoopFigures:
-    """Return the figures of a loop at an operating point, dry friction removed.
+    """Return the figures of a loop at an operating point, without dry friction.
 
     Raises
     ------
@@ -126,7 +125,7 @@ def figures_at(loop: Loop, par: ParameterSet, value: float) -> LoopFigures:
 
 
 def margins_of(figures: LoopFigures) -> LoopMargins:
-    """Return the margins of a loop by its figures."""
+    """Return the margins of a loop from its figures."""
     corners = figures.gain.corners
     if not figures.has_loop:
         stable = figures.is_stable
@@ -134,7 +133,7 @@ def margins_of(figures: LoopFigures) -> LoopMargins:
     if not figures.is_stable:
         return replace(UNSTABLE, corners=corners) if corners else UNSTABLE
     upper, lower = upper_factor(figures.factors), lower_factor(figures.factors)
-    # Signed, although a design uses the distance from -1: below 0 the phase is beyond -180.
+    # Signed, although a design uses the distance from -1: below 0, the phase is beyond -180.
     margin = margin_of(figures.crossings)
     return LoopMargins(
         gain=upper.factor,
@@ -155,7 +154,7 @@ def margins_of(figures: LoopFigures) -> LoopMargins:
 
 
 def margins(loop: Loop, par: ParameterSet, value: float) -> LoopMargins:
-    """Return the margins of a loop at an operating point, see `figures_at`."""
+    """Return the margins of a loop at an operating point; see `figures_at`."""
     return margins_of(figures_at(loop, par, value))
 
 
@@ -164,10 +163,10 @@ def worst(
 ) -> Mapping[str, tuple[float, float]]:
     """Return the worst of each margin, and the value at which it occurs.
 
-    Nothing is worse than an unstable loop, or none, whose margins are NaN.
+    An unstable or missing loop, whose margins are NaN, is the worst.
     """
     if not margins:
-        raise ParameterError("margins need at least one value", name="margins")
+        raise ParameterError("margins is empty. It needs at least one value", name="margins")
     result: dict[str, tuple[float, float]] = {}
     for field, figure in MARGINS.items():
         if field == "crossover":  # neither a larger nor a smaller one is better
@@ -183,15 +182,15 @@ def _or_nan(figure: float) -> float:
     return figure if math.isfinite(figure) else math.nan
 
 
-# --- Loop gain over frequency, for Nyquist and Nichols charts
+# --- Loop gain versus frequency, for Nyquist and Nichols charts
 
-_BELOW = 30.0  # ratio of the loop's band to the lowest frequency of a chart
+_BELOW = 30.0  # ratio of the lower end of the loop's band to the lowest frequency of a chart
 _CHART_POINTS = 1500
 
 
 @dataclass(frozen=True, eq=False)
 class LoopCurve:
-    """Frequency response of a loop that is cut open, negative feedback not counted.
+    """Frequency response of a loop that is cut open, without the sign of negative feedback.
 
     Parameters
     ----------
@@ -245,7 +244,7 @@ class Family:
 
     @property
     def worst(self) -> int:
-        """Index of the least disk margin; an unstable or missing loop counts as the worst."""
+        """Index of the smallest disk margin; an unstable or missing loop counts as the worst."""
         disks = [c.margins.disk if c.margins.is_sound else -math.inf for c in self.curves]
         return int(np.argmin(disks))
 
@@ -257,7 +256,7 @@ class Disk:
     Parameters
     ----------
     middle, radius
-        Center and radius; both infinite for the largest margin, the left half plane.
+        Center and radius; both are infinite for the largest margin, the left half plane.
     """
 
     middle: float
@@ -265,7 +264,7 @@ class Disk:
 
 
 def disk(margin: float) -> Disk:
-    r"""Return the circle that a loop gain of a disk margin touches.
+    r"""Return the circle that a loop gain with a disk margin touches.
 
     .. math:: \left|\frac{1 - L}{1 + L}\right| = \frac{2}{\alpha} \;\Leftrightarrow\;
         \left|L + \frac{1 + a^2}{1 - a^2}\right| = \frac{2 a}{1 - a^2}, \quad a = \alpha/2
@@ -301,7 +300,7 @@ def loop_curve(loop: Loop, figures: LoopFigures, points: int = _CHART_POINTS) ->
     loop
         The loop, whose band a chart shows.
     figures
-        Its figures there, see `margins.figures_at`.
+        Its figures there; see `margins.figures_at`.
     points
         Number of frequencies n.
     """

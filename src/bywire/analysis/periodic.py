@@ -1,8 +1,8 @@
 """Periodic operating points, such as of a dithered brake, and exact linear models about them.
 
-They are fixed points of the stroboscopic map, which maps the system at one instant to that a period
+They are fixed points of the stroboscopic map, which maps the system's state to the state one period
 later. The system must have the same inputs in every period: a dither whose period is a multiple of
-the sample times, or a rotating disc. The map acts on all values that the engine carries from one
+the sample times, or a rotating disc. The map acts on all values that the engine passes from one
 substep to the next: states, their last increments, and the memory of the controllers.
 """
 
@@ -41,9 +41,9 @@ class Period:
     Parameters
     ----------
     end
-        Carried vector at the end, before its controllers run, shape (n,).
+        Carried vector at the end, before the controllers run there, shape (n,).
     rows
-        Recorded signals without the end, shape (rows, signals).
+        Recorded signals, without those at the end, shape (rows, signals).
     """
 
     end: Array
@@ -57,11 +57,12 @@ class Derivatives:
     Parameters
     ----------
     A
-        Carried vector at the end by that at the beginning, shape (n, n).
+        Of the carried vector at the end, with respect to that at the beginning, shape (n, n).
     B
-        Carried vector at the end by the input of every tick, shape (n, ticks).
+        Of the carried vector at the end, with respect to the input at every tick, shape (n, ticks).
     C, D
-        Recorded signals by both, shapes (rows, signals, n) and (rows, signals, ticks).
+        Of the recorded signals, with respect to both, shapes (rows, signals, n) and (rows,
+        signals, ticks).
     """
 
     A: Array
@@ -76,8 +77,8 @@ class Stroboscope:
     Parameters
     ----------
     run
-        Its duration is the period, a multiple of the sample times and of the recording interval.
-        Its stimulus at time zero is held throughout.
+        Run whose duration is the period, a multiple of the sample times and of the recording
+        interval. Its stimulus at time zero is held throughout.
     inputs
         Signals of the stimulus that change together, held from one tick of the fastest controller
         to the next.
@@ -93,7 +94,7 @@ class Stroboscope:
     UnknownNameError
         When a signal is unknown.
     ParameterError
-        When a controller rounds its samples: derivatives through it are zero.
+        When a controller rounds its samples, so that derivatives through it are zero.
     """
 
     def __init__(self, run: Run, inputs: Sequence[str], signals: Sequence[str]) -> None:
@@ -112,7 +113,7 @@ class Stroboscope:
         if self._kernel.rounds:
             raise ParameterError(
                 "the converter rounds sampled values to whole codes, so derivatives are zero. Use "
-                "the law without rounding (adc.law = 'ideal')",
+                "a converter without rounding (adc.law = 'ideal')",
                 name="adc.law",
                 valid="'ideal'",
             )
@@ -184,7 +185,7 @@ class Stroboscope:
         return found
 
     def _seeds(self, lanes: Sequence[int]) -> Array:
-        """Return the seeds of the kernel's one constant parameter and of all stimuli."""
+        """Return the seeds for the kernel's only parameter, which is constant, and all stimuli."""
         seeds = np.zeros((1 + self._u.shape[1], DIRECTIONS))
         for lane in lanes:
             seeds[1 + self._inputs, lane] = 1.0
@@ -198,19 +199,19 @@ class Stroboscope:
     def _segment(
         self, vector: Array, tangents: Array, seeds: Array, begin: int, end: int
     ) -> tuple[Array, Array]:
-        """Run frames begin..end, update vector and tangents in place; return the recorded rows."""
+        """Run frames begin..end, update vector and tangents in place, and return recorded rows."""
         schedule = self._schedule
         every, signals = schedule.record_frames, self._selection.size
         rows = -(-end // every) - -(-begin // every)
         values, rec_t = np.empty((rows, signals)), np.empty((rows, signals, DIRECTIONS))
-        # The end of a period is the beginning of the next, and controllers tick only there.
+        # The end of a period is the start of the next, and controllers run only at this start.
         request = Request(self._open, self._p, self._u, self._selection)
         self._kernel.advance(request, vector, begin, end, values, seeds, tangents, rec_t)
         return values, rec_t
 
 
 def _by_substeps(schedule: Schedule) -> Schedule:
-    """Return the same plan in frames of one substep, between which a run can be cut."""
+    """Return the same plan in frames of one substep, between which a run can be divided."""
     n = schedule.substeps
     return Schedule(
         schedule.step,
@@ -230,12 +231,12 @@ def _kernel(program: Program, compiler: Compiler) -> TangentKernel:
 # --- Periodic operating points
 
 TOLERANCE = 1e-5
-"""tolerance of the distance from the orbit, relative to the usual magnitude of each signal; with
-finite steps, motions with stick-slip vary slightly"""
+"""tolerance for the distance from the orbit, relative to the usual magnitude of each signal; with
+finite steps, stick-slip motions vary slightly"""
 DRIFT = 1e-5
-"""tolerance of the drift per period along directions without restoring action, same scale"""
+"""tolerance for the drift per period along directions without restoring action, same scale"""
 _SETTLE, _ROUNDS, _NEWTON = 50, 12, 8  # simulated periods between trials of Newton's iteration
-_NEUTRAL = 1e-7  # of the largest singular value: directions along which orbits are adjacent
+_NEUTRAL = 1e-7  # of the largest singular value: directions of neighboring orbits
 
 
 @dataclass(frozen=True, eq=False)
@@ -257,7 +258,7 @@ class PeriodicOrbit:
         Change over a period that no step can remove, on the same scale, along directions without
         restoring action, such as the amount of fluid enclosed.
     stuck
-        Share of the time during which every dry friction sticks; 0 without dry friction.
+        Fraction of time during which every dry friction sticks; 0 without dry friction.
     periods
         Number of simulated periods.
     """
@@ -310,9 +311,9 @@ def find_orbit(stroboscope: Stroboscope, run: Run) -> PeriodicOrbit:
 
     .. math:: (I - A) \Delta z = P(z) - z
 
-    and keeps a step that brings the motion closer to a repetition. A slow loop would need minutes
-    to settle; the iteration needs a few periods. Directions without restoring action (for example
-    the amount of fluid enclosed) keep their simulated values.
+    and accepts a step that brings the motion closer to a repetition. A slow loop would need minutes
+    to settle, but the iteration needs a few periods. Directions without restoring action (for
+    example the amount of fluid enclosed) keep their simulated values.
 
     Parameters
     ----------
@@ -343,10 +344,10 @@ def find_orbit(stroboscope: Stroboscope, run: Run) -> PeriodicOrbit:
             )
     apart = np.abs((stroboscope.advance(z).end - z) / scale)
     raise SolverError(
-        f"{run.model.name}: no motion repeats with the period {run.duration * 1e3:g} ms. After "
+        f"{run.model.name}: no motion repeats with the period of {run.duration * 1e3:g} ms. After "
         f"{periods} periods, {stroboscope.names[int(np.argmax(apart))]} still changes by "
         f"{apart.max():.2g} of its usual magnitude per period. The loop hunts or drifts, for "
-        "example because its dither is too weak. Increase the dither's gain, or move the "
+        "example because its dither is too weak. Increase the dither gain, or choose another "
         "operating point",
         name=stroboscope.names[int(np.argmax(apart))],
     )
@@ -363,7 +364,7 @@ class _Tried:
 
 
 def _polished(stroboscope: Stroboscope, z: Array, scale: Array) -> _Tried:
-    """Return the last point of Newton's iteration that comes closer to a repetition."""
+    """Return the last point of Newton's iteration that is closer to a repetition."""
     distance, drift, step = _judged(stroboscope, z, scale)
     for taken in range(_NEWTON):
         if distance <= 1e-2 * TOLERANCE:
@@ -377,7 +378,7 @@ def _polished(stroboscope: Stroboscope, z: Array, scale: Array) -> _Tried:
 
 
 def _judged(stroboscope: Stroboscope, z: Array, scale: Array) -> tuple[float, float, Array]:
-    """Return the distance from the orbit, the drift that no step can remove, and Newton's step."""
+    """Return the distance from the orbit, the drift that no step removes, and Newton's step."""
     residual = stroboscope.advance(z).end - z
     A = stroboscope.derivatives(z).A
     step = restored(A, residual, scale)
@@ -417,9 +418,9 @@ def magnitudes(run: Run) -> Array:
 # --- Linear models with active friction and dither
 
 STEPS = (10e-6, 5e-6, 2.5e-6)
-"""substeps [s], each tried if a motion does not repeat with the previous one. Longer steps disturb
-a piston that barely breaks away. With the first one, the gain of the dithered pressure loop is
-within 2 % of that with short steps"""
+"""substeps [s]; each is tried if no motion repeats with the previous one. Longer steps disturb a
+piston that barely breaks away. With the first one, the dithered pressure loop's gain is within 2 %
+of that with short steps"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -429,15 +430,15 @@ class PeriodicModel:
     .. math:: z_{k+1} = A z_k + \sum_j B_j u_{k,j}, \quad
         y_{k,r} = C_r z_k + \sum_j D_{r,j} u_{k,j}
 
-    with the state z at the beginning of period k, the input u at its ticks j, and the output y
-    at its instants r: the lifted form of a periodic system. The derivatives are those of the
-    simulation, including every decision between stick and slip. They hold for deviations that
-    change only the instants of these decisions.
+    with the state z at the beginning of period k, the input u at its ticks j, and the output y at
+    its times r: the lifted form of a periodic system. The derivatives are those of the simulation,
+    including every change between stick and slip. They are valid for deviations that change only
+    the times of these changes.
 
     Parameters
     ----------
     run
-        One period of the system: its duration.
+        Run of one period.
     inputs, output
         Signals.
     orbit
@@ -459,7 +460,7 @@ class PeriodicModel:
 
     @property
     def ripple(self) -> float:
-        """Output from peak to peak over a period, SI."""
+        """Peak-to-peak value of the output over a period, SI."""
         return float(np.ptp(self.orbit.rows[:, 0]))
 
     @cached_property
@@ -470,7 +471,7 @@ class PeriodicModel:
 
     @cached_property
     def sampled(self) -> LinearModel:
-        """Model from an input held over a period to the output at the period's beginning."""
+        """Model from an input held over a period to the output at the start of the period."""
         d = self.derivatives
         return self._model("sampled", d.C[0, 0], d.D[0, 0].sum())
 
@@ -496,7 +497,7 @@ class PeriodicModel:
 
     @property
     def steady_gain(self) -> float:
-        """Change of the output's mean divided by that of a constant input, SI."""
+        """Change of the output's mean divided by the change of a constant input, SI."""
         d = self.derivatives
         moved = restored(d.A, d.B.sum(axis=1), magnitudes(self.run))
         return float(d.C[:, 0].mean(axis=0) @ moved + d.D[:, 0].sum(axis=1).mean())
@@ -525,7 +526,7 @@ class PeriodicModel:
         rows, ticks = d.D.shape[0], d.D.shape[2]
         lines = []
         for f in np.asarray(frequencies, dtype=float):
-            # A zero-order hold at the ticks, not the sine: this is what a controller reads.
+            # A zero-order hold at the ticks, not the sine, since a controller reads samples.
             U = np.exp(2j * np.pi * f * T / ticks * np.arange(ticks))
             Z = np.linalg.solve(np.exp(2j * np.pi * f * T) * np.eye(len(d.A)) - d.A, d.B @ U)
             wave = np.exp(-2j * np.pi * f * T / rows * np.arange(rows))
@@ -549,12 +550,12 @@ def periodic_model(
     inputs
         Signals of the stimulus that change together.
     output
-        Responding signal; its mean is that of samples at the fastest controller's ticks.
+        Responding signal; its mean is taken over samples at the fastest controller's ticks.
     whole
         Frequencies [Hz] of periodic signals, such as a dither. If empty, the orbit is an
         equilibrium, and the period is the common sample time.
     step
-        Substep [s]; one of `STEPS` unless given.
+        Substep [s]; by default one of `STEPS`.
 
     Raises
     ------
@@ -600,7 +601,7 @@ def dithered_loop(
     Raises
     ------
     InputError, SolverError, CompilerError
-        As `periodic_model`, and when the operating point does not exist or every friction sticks.
+        As `periodic_model`, or when the operating point does not exist or every friction sticks.
     """
     ideal = unrounded(loop, par)
     model = periodic_model(
@@ -621,7 +622,7 @@ def require_moving(model: PeriodicModel) -> None:
     if model.orbit.stuck == 1.0:
         raise SolverError(
             f"{model.run.model.name} sticks during the whole period, so it does not respond to "
-            "small signals. Increase the dither's gain",
+            "small signals. Increase the dither gain",
             name=model.run.model.name,
         )
 

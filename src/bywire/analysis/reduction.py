@@ -16,14 +16,14 @@ from bywire.core.typing import Array
 Matrices = tuple[Array, Array, Array]
 Choice = Callable[[complex], bool]
 
-_BORDER = 1e-6  # of a pole's magnitude: distance at which it counts as on the border of stability
-_STILL = 1e-10  # of the largest pole: an integrator
+_BORDER = 1e-6  # of a pole's magnitude: maximum distance of a pole on the stability limit
+_STILL = 1e-10  # of the largest pole: maximum magnitude of an integrator
 _LEAST = 1e-13  # of the largest Hankel singular value: smaller ones are rounding
 
 
 @dataclass(frozen=True, eq=False)
 class Parts:
-    """Model split into two uncoupled parts, whose sum it is.
+    """Model as the sum of two uncoupled parts.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ class Balanced:
     Parameters
     ----------
     A, B, C
-        Matrices; states by falling singular value.
+        Matrices, with states in the order of decreasing singular value.
     hankel
         Hankel singular values of the scaled signals, shape (n,).
     """
@@ -59,7 +59,7 @@ def split(model: LinearModel, first: Choice) -> Parts:
     Parameters
     ----------
     model
-        Continuous or sampled.
+        Continuous or sampled model.
     first
         ``first(pole) -> bool``: whether a pole belongs to the first part.
 
@@ -72,11 +72,11 @@ def split(model: LinearModel, first: Choice) -> Parts:
 
     A, (scale, _) = matrix_balance(model.A, permute=False, separate=True)
     B, C = model.B / scale[:, None], model.C * scale
-    ordered: Any = schur  # its stubs know no function of real and imaginary part
+    ordered: Any = schur  # its stubs lack a function of real and imaginary part
     T, Q, count = ordered(A, output="real", sort=lambda x, y=0.0: first(complex(x, y)))
     B, C = Q.T @ B, C @ Q
     n = len(T)
-    X = np.zeros((count, n - count))  # T_11 X - X T_22 = -T_12: then both parts are apart
+    X = np.zeros((count, n - count))  # T_11 X - X T_22 = -T_12 separates both parts
     if 0 < count < n:
         X = solve_sylvester(T[:count, :count], -T[count:, count:], -T[:count, count:])
     return Parts(
@@ -86,7 +86,7 @@ def split(model: LinearModel, first: Choice) -> Parts:
 
 
 def lasting(model: LinearModel) -> Choice:
-    """Return a function that tests whether a pole is unstable or on the border of stability."""
+    """Return a function that tests whether a pole is unstable or on the stability limit."""
     largest = float(np.max(np.abs(model.poles()), initial=0.0))
 
     def test(pole: complex) -> bool:
@@ -105,11 +105,11 @@ def balanced(part: Matrices, period: float) -> Balanced:
     part
         (A, B, C), stable.
     period
-        Sample time [s]; 0 for a continuous one.
+        Sample time [s]; 0 for a continuous part.
 
     Notes
     -----
-    Square-root method: only factors of the Gramians are multiplied.
+    This is the square-root method, which multiplies only factors of the Gramians.
 
     References
     ----------
@@ -128,7 +128,7 @@ def balanced(part: Matrices, period: float) -> Balanced:
 
 
 def _factor(A: Array, B: Array, period: float) -> Array:
-    """Return L with L L^T the controllability Gramian."""
+    """Return L, where L L^T is the controllability Gramian."""
     from scipy.linalg import solve_continuous_lyapunov, solve_discrete_lyapunov
 
     Q = B @ B.T
@@ -137,11 +137,11 @@ def _factor(A: Array, B: Array, period: float) -> Array:
     return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))
 
 
-# --- Largest error of a reduced model over a band, channel by channel
+# --- Maximum error of a reduced model over a band, channel by channel
 
 _POINTS = 300
 _DECADES = 4.0  # below the band's end: start of the search
-_NOTHING = 1e-12  # of the largest response: a channel below it has no gain to compare
+_NOTHING = 1e-12  # of the largest response: maximum response of a channel without gain
 
 
 @dataclass(frozen=True)
@@ -153,18 +153,18 @@ class ReductionError:
     low, high
         The band [Hz].
     relative
-        Largest :math:`|\hat G - G| / |G|`.
+        Maximum :math:`|\hat G - G| / |G|`.
     gain
-        Largest difference of magnitude [dB].
+        Maximum difference of magnitude [dB].
     phase
-        Largest difference of phase [degree].
+        Maximum difference of phase [degree].
     at
-        Frequency of the largest relative error [Hz].
+        Frequency of the maximum relative error [Hz].
     channel
-        Output and input of the largest relative error.
+        Output and input of the maximum relative error.
     poles
-        Largest distance of a pole within the band from the nearest one of the full model, as a
-        share of its magnitude; NaN if there is no pole in the band.
+        Maximum distance of a pole within the band from the full model's nearest pole, relative to
+        its magnitude; NaN if there is no pole in the band.
     """
 
     low: float
@@ -183,7 +183,7 @@ def reduction_error(full: LinearModel, reduced: LinearModel, high: float) -> Red
     Parameters
     ----------
     full, reduced
-        Models of the same inputs, outputs and sample time.
+        Models with the same inputs, outputs and sample time.
     high
         End of the band [Hz].
 
@@ -194,14 +194,14 @@ def reduction_error(full: LinearModel, reduced: LinearModel, high: float) -> Red
 
     Notes
     -----
-    The frequencies are a logarithmic grid and those of all poles, where peaks are. Channels without
-    gain are left out.
+    The frequencies are a logarithmic grid and the frequencies of all poles, where peaks occur.
+    Channels without gain do not count.
     """
     f = frequencies(full, reduced, high)
     exact, other = full.response(f), reduced.response(f)
     size = np.abs(exact)
     peak = np.max(size, axis=0)
-    # A channel has its own unit: its inputs and outputs determine the scale of zero gain.
+    # Channels have different units: their inputs and outputs determine the scale of zero gain.
     seen = peak > _NOTHING * np.sqrt(np.outer(np.max(peak, axis=1), np.max(peak, axis=0)))
     if not seen.any():
         return ReductionError(
@@ -247,7 +247,7 @@ def frequencies(full: LinearModel, reduced: LinearModel, high: float) -> Array:
 
 
 def _pole_error(full: LinearModel, reduced: LinearModel, low: float, high: float) -> float:
-    """Return the largest relative distance of the poles in a band [Hz]."""
+    """Return the maximum relative distance of the poles in a band [Hz]."""
     known, kept = rates(full), rates(reduced)
     inside = kept[np.abs(kept) <= 2.0 * math.pi * high]
     if not inside.size or not known.size:
@@ -257,7 +257,7 @@ def _pole_error(full: LinearModel, reduced: LinearModel, low: float, high: float
 
 
 def natural(model: LinearModel) -> Array:
-    """Return the frequencies of a model's poles [Hz]; 0 for dead beats and integrators."""
+    """Return the frequencies of a model's poles [Hz]; 0 for deadbeat poles and integrators."""
     poles = model.poles()
     if not model.period:
         return np.asarray(np.abs(poles) / 2.0 / math.pi)
@@ -265,20 +265,20 @@ def natural(model: LinearModel) -> Array:
     return np.asarray(np.abs(np.log(live)) / 2.0 / math.pi / model.period)
 
 
-# --- Selected states, the others quasi-static
+# --- Selected states, with the others quasi-static
 
-_NO_REST = 1e14  # condition of the equation for the rest beyond which there is none
+_NO_REST = 1e14  # maximum condition number of the equation for the steady state
 
 
 def residualized(
     model: LinearModel, keep: Sequence[str], *, corrected: bool = False
 ) -> LinearModel:
-    r"""Return a model with some of its states, the others always at their rest (quasi-static).
+    r"""Return a model with some of its states; the others are always in quasi-static balance.
 
     .. math:: A_{11} - A_{12} A_{22}^{-1} A_{21}, \quad \text{and so on for } B, C, D
 
     The model is exact at rest, and accurate if the dropped states are faster than the response of
-    interest. Corrected,
+    interest. With the correction,
 
     .. math:: x_2 = -A_{22}^{-1} (A_{21} x_1 + B_2 u) - A_{22}^{-2} A_{21} \dot x_1
 
@@ -288,11 +288,11 @@ def residualized(
     Parameters
     ----------
     model
-        Continuous, or sampled (there :math:`I - A_{22}` takes the place of :math:`-A_{22}`).
+        Continuous, or sampled (where :math:`I - A_{22}` replaces :math:`-A_{22}`).
     keep
         Names of the states to keep.
     corrected
-        Whether the first lag behind the kept states counts; continuous models only.
+        Whether to include the first-order lag behind the kept states; continuous models only.
 
     Raises
     ------
@@ -304,7 +304,7 @@ def residualized(
     References
     ----------
     P. Kokotovic, H. K. Khalil, J. O'Reilly, "Singular Perturbation Methods in Control" (1986):
-    slow manifold, to the zeroth and the first order.
+    slow manifold, to zeroth and first order.
     """
     for name in keep:
         if name not in model.states:
@@ -323,7 +323,8 @@ def residualized(
         )
     if corrected and model.period:
         raise ParameterError(
-            f"{model.name} is a sampled model, but bywire can correct only continuous models",
+            f"{model.name} is a sampled model, but the correction is valid only for continuous "
+            "models. Use corrected=False",
             name=model.name,
         )
     A21, A12 = model.A[np.ix_(second, first)], model.A[np.ix_(first, second)]
@@ -355,31 +356,31 @@ def residualized(
 
 Method = Literal["balanced", "modal"]
 
-_DEAD = 1e-12  # poles of sampled models below it are dead beats
-_NEAR_REST = 1e-6  # frequency that stands for rest [Hz]
+_DEAD = 1e-12  # maximum magnitude of deadbeat poles of sampled models
+_NEAR_REST = 1e-6  # frequency that represents rest [Hz]
 
 TOLERANCE = 0.01
-"""default of the largest relative error over the band"""
-_FAR = 1e3  # of the fastest corner: a response so far beyond it is rounding
+"""default of the maximum relative error over the band"""
+_FAR = 1e3  # times the fastest corner frequency: beyond it, a response is rounding
 
 
 @dataclass(frozen=True, eq=False)
 class Reduced:
-    """Reduced model, and its error.
+    """Reduced model with its error.
 
     Parameters
     ----------
     model
-        Same signals, fewer states.
+        Model with the same signals and fewer states.
     error
-        Measured over a band.
+        Error over a band.
     kept
-        Number of its states that are unstable or on the border of stability, and always kept.
+        Number of its states that are unstable or on the stability limit, which are always kept.
     hankel
-        Hankel singular values of the rest of the full model, every signal in units of its
-        largest response; shape (n,). Empty where they were not needed.
+        Hankel singular values of the rest of the full model, with every signal relative to its
+        maximum response; shape (n,). Empty if they were not needed.
     bound
-        Bound of the error of each response at any frequency, in SI units, shape (outputs, inputs):
+        Bound of each response's error at any frequency, in SI units, shape (outputs, inputs):
         twice the sum of the dropped singular values. NaN if the method has no such bound.
     """
 
@@ -398,36 +399,37 @@ def reduce(
     tolerance: float = TOLERANCE,
     method: Method = "balanced",
 ) -> Reduced:
-    """Return a model with fewer states, of a given order or with a given error over a band.
+    """Return a model with fewer states, with a specified order or error over a band.
 
     Parameters
     ----------
     model
-        Continuous or sampled, stable or not: integrators, undamped swings and unstable poles
-        are split off first and kept.
+        Continuous or sampled model, stable or not: integrators, undamped oscillations and unstable
+        poles are separated first and kept.
     order
-        Number of states; by default the least that `tolerance` allows.
+        Number of states; by default the minimum that `tolerance` allows.
     band
         Frequency [Hz] up to which the error counts; by default that of the fastest pole, or 0.4
-        of the sampling frequency (at half of it many a sampled model has a zero).
+        of the sampling frequency (many sampled models have a zero at half of it).
     tolerance
-        Largest relative error over the band, if no order is given.
+        Maximum relative error over the band, if no order is specified.
     method
-        ``"balanced"``: the least observable and controllable states are always at rest (singular
-        perturbation of the balanced realization: exact at rest, with a bound at every frequency).
-        ``"modal"``: the fastest modes are always at rest; the kept poles are those of the model.
+        ``"balanced"``: the least observable and controllable states are always in steady state
+        (singular perturbation of the balanced realization: exact at rest, with a bound at every
+        frequency). ``"modal"``: the fastest modes are always in steady state; the kept poles are
+        those of the model.
 
     Raises
     ------
     ParameterError
-        When order, band or tolerance are out of range, or no order meets the tolerance.
+        When order, band or tolerance is out of range, or no order meets the tolerance.
 
     References
     ----------
     Y. Liu, B. D. O. Anderson, "Singular perturbation approximation of balanced systems",
     International Journal of Control 50 (1989): bound and exactness at rest.
     """
-    # States that no input moves stay at the operating point; unobservable states can be dropped.
+    # States that no input moves stay at the operating point; unobservable states have no effect.
     acting = [model.states[k] for k in model.effective()]
     full = model.reduced(acting, held=True)
     high, n = _band(full, band), len(acting)
@@ -464,7 +466,7 @@ def reduce(
 
 @dataclass(frozen=True, eq=False)
 class _Rung:
-    """Model of one order, with properties that do not need its response."""
+    """Model of one order, with properties that do not depend on its response."""
 
     model: LinearModel
     hankel: Array
@@ -491,7 +493,7 @@ def _balanced(full: LinearModel) -> Callable[[int], _Rung]:
 
 
 def _modal(full: LinearModel) -> Callable[[int], _Rung]:
-    """Return the reduction to the slowest modes, pairs whole, the others at rest."""
+    """Return the reduction to the slowest modes with complete pairs; the others are at rest."""
     lasts = lasting(full)
     sizes = np.sort([_rate(pole, full, lasts) for pole in full.poles()])
 
@@ -515,7 +517,7 @@ def _rate(pole: complex, full: LinearModel, lasts: Choice) -> float:
 
 
 def _peaks(part: Matrices, full: LinearModel) -> tuple[Array, Array]:
-    """Return units of outputs and inputs in which the largest response of each is about 1."""
+    """Return units of outputs and inputs in which the maximum response of each is about 1."""
     A, B, C = part
     n = len(A)
     labels = tuple(map(str, range(n)))
@@ -555,7 +557,7 @@ def _band(model: LinearModel, band: float | None) -> float:
     if band is not None:
         most = _FAR * float(natural(model).max(initial=0.0))
         if not model.period and band > most > 0.0:
-            far = f"{_FAR:g} times the fastest corner of {model.name}"
+            far = f"{_FAR:g} times the fastest corner frequency of {model.name}"
             raise not_valid("band", f"{band:g} Hz", f"<= {most:.3g} Hz", far)
         return band
     if model.period:

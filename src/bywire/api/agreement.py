@@ -1,4 +1,4 @@
-"""Differences between a loop's nonlinear and linear response, by cause."""
+"""Differences between a loop's nonlinear and linear responses, by cause."""
 
 from __future__ import annotations
 
@@ -38,12 +38,13 @@ LABELS = {NOTHING: "nothing, small amplitude", LIMITS: "limits", EVERYTHING: "ev
 STEP = "step (computed)"
 """label of the numerical error that comes from the simulation's step"""
 LEGEND = (
-    "Nonlinear response minus exact linear response, by active causes. The first row uses the "
-    "small "
-    "amplitude. All other rows use the large one, at which limits of currents, voltages and rates "
-    "also act. A dash (-) means that the output sticks or does not settle. 'Largest' lists the "
-    "cause with the largest effect, or the one without a number. The effect of limits counts by "
-    "itself, that of any other cause as its difference from the limits. 'Step' is the linear model "
+    "Nonlinear response minus exact linear response, by active cause. The first row uses the "
+    "small amplitude. All other rows use the large amplitude, where current, voltage and rate "
+    "limits also act. A dash (-) means that the output sticks or does not settle. 'Largest' lists "
+    "the "
+    "cause with the largest effect, or the cause without a number. The effect of the limits is "
+    "the full difference. The effect of any other cause is its difference from the limits. 'Step' "
+    "is the linear model "
     "of the simulation's midpoint rule minus the exact model."
 )
 """caption of the table"""
@@ -63,7 +64,7 @@ class LoopAgreement(Answer):
         Amplitudes [``unit``]: a small one, used without causes, and a large one, used with each
         cause.
     unit
-        SI unit of the input that is excited.
+        SI unit of the excited input.
     """
 
     case: LoopCase
@@ -74,7 +75,7 @@ class LoopAgreement(Answer):
 
     @property
     def notes(self) -> list[str]:
-        """Notes on the linear model's side of kinks."""
+        """Notes on the side of a kink that the linear model uses."""
         return corner_notes([self.case.loop.closed(self.case.par, self.case.value).corners])
 
     @property
@@ -159,7 +160,7 @@ def compared_responses(
     amplitudes: tuple[float, float],
     progress: Progress | None,
 ) -> LoopAgreement:
-    """Compare a loop's two responses, cause by cause.
+    """Compare a loop's two responses, one cause at a time.
 
     Parameters
     ----------
@@ -168,7 +169,7 @@ def compared_responses(
     frequencies, amplitudes
         Frequencies [Hz], and the small and the large amplitude [SI].
     progress
-        Called with a label and the finished share, 0 to 1.
+        Called with a label and the completed fraction, 0 to 1.
 
     Raises
     ------

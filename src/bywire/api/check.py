@@ -1,4 +1,4 @@
-"""Test of a brake, or of one of its parts, against every contract."""
+"""Check of a brake, or one of its parts, against every contract."""
 
 from __future__ import annotations
 

@@ -272,7 +272,7 @@ class Compared:
 
     @property
     def ratio(self) -> float:
-        """Spread of a key figure relative to its smallest magnitude; 0 if one is zero or none."""
+        """Spread of a key figure relative to its smallest magnitude. 0 if a value is 0."""
         known = [v for v in self.values if v is not None and math.isfinite(v)]
         least = min(map(abs, known), default=0.0)
         return (max(known) - min(known)) / least if least and len(known) > 1 else 0.0
@@ -414,7 +414,7 @@ class Comparison(Answer):
     runs
         Runs to compare.
     is_full
-        Whether to also show equal settings and key figures.
+        Whether to also show identical settings and key figures.
     """
 
     runs: tuple[ComparedRun, ...]
@@ -484,7 +484,7 @@ class Comparison(Answer):
         )
 
     def _conclusion(self) -> str:
-        """Return who meets the requirements, the worst run first, and what differs most."""
+        """Return which runs meet the requirements, worst first, and what differs most."""
         parts = []
         judged = [each for each in self.runs if each.verdicts]
         for each in sorted(judged, key=lambda run: -len(_not_met(run))):
@@ -568,8 +568,8 @@ class Comparison(Answer):
             return []
         times = ", ".join(f"{label} {low} to {high}" for label, (low, high) in spans.items())
         return [
-            f"the runs cover different times ({times}). Each curve ends with its run, and key "
-            "figures cover only the time of their run"
+            f"the runs cover different times ({times}). Each curve ends with its run, and each "
+            f"key figure covers only the time of its run"
         ]
 
     def _tables(self) -> tuple[list[Flat], list[Flat]]:
@@ -709,7 +709,7 @@ def require_comparable(runs: Sequence[Run], overrides: Mapping[str, str]) -> lis
     Raises
     ------
     ParameterError
-        For fewer than two runs, or changes without effect.
+        If there are fewer than two runs, or changes would have no effect.
     """
     if len(runs) < 2:
         raise ParameterError(

@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     from bywire.data.channel_quality import AlignedChannel, AlignmentReport, Stretch
 
 _LISTED = 20
-"""longest list of stretches of a kind in a channel in the JSON object, which counts all"""
+"""maximum number of stretches that the JSON object lists for a channel; it counts all"""
 
-_ROUNDING = 1e-9  # steps; smaller jitter is rounding and does not come from the clock
+_ROUNDING = 1e-9  # steps; smaller jitter comes from rounding, not from the clock
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class Conversion(Answer):
 
     @property
     def notes(self) -> list[str]:
-        """Notes on content of the file that bywire omitted, missed or guessed."""
+        """Notes on the file's content that bywire omitted, did not find, or guessed."""
         return list(self.remarks)
 
     def document(self) -> Document:
@@ -128,7 +128,7 @@ def aligned(
     Raises
     ------
     ParameterError
-        For an invalid rate.
+        If the rate is invalid.
     """
     from bywire.data.alignment import resample
 
@@ -160,7 +160,7 @@ def _channel(channel: AlignedChannel) -> dict[str, Any]:
 
 
 def _stretches(stretches: tuple[Stretch, ...]) -> dict[str, Any]:
-    """Return count, total length and the longest stretches in order of time."""
+    """Return count, total length and the longest stretches in time order."""
     longest = sorted(stretches, key=lambda stretch: -stretch.length)[:_LISTED]
     return {
         "count": len(stretches),

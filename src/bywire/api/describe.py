@@ -41,7 +41,7 @@ class Mentioned(Answer):
     words
         Words of the search.
     mentions
-        Things that mention the words. Those with the words in their name come first.
+        Things that mention the words, starting with those whose name contains the words.
     """
 
     words: str
@@ -73,7 +73,7 @@ class Mentioned(Answer):
 
 
 def mentions(words: str) -> list[Mention]:
-    """Return everything that mentions all given words, matches in the name first.
+    """Return everything that mentions all words, with name matches first.
 
     A word matches the beginning of a word in names and meanings (docstrings, labels, summaries).
     Units must match completely.
@@ -102,7 +102,7 @@ def _begins(text: str, word: str) -> bool:
 
 
 def _known() -> Iterator[Mention]:
-    """Yield everything that has a name, starting with groups of parameters for orientation."""
+    """Yield everything that has a name, starting with parameter groups for orientation."""
     assemblies = dict.fromkeys(each.assembly for each in PARAMETER_SETS.all().values())
     classes = [PARAMETER_SETS.find(main_set(name)).parameter_class for name in assemblies]
     for cls in classes:
@@ -143,7 +143,7 @@ def described(name: str) -> list[Object]:
     Raises
     ------
     UnknownNameError
-        If there is no such thing, with the closest matches.
+        If there is no such thing. The message lists the closest matches.
     """
     objects: list[Object] = [
         {"kind": kind.title, "name": name, **kind.describe(things[name])}
@@ -202,7 +202,7 @@ def describe(name: str) -> Description | Mentioned:
     Raises
     ------
     UnknownNameError
-        If nothing mentions the words, with the closest matches.
+        If nothing mentions the words. The message lists the closest matches.
     """
     if len(name) > _LONGEST:
         raise UnknownNameError(

@@ -71,13 +71,13 @@ if TYPE_CHECKING:
 
     from bywire.report.loop_curves import DesignCurve
 
-_JUDGES = 512  # additional models, which judge the gains
+_JUDGES = 512  # additional models for testing the gains
 _MOST = 1000
 
 
 @dataclass(frozen=True)
 class DrawnModels:
-    """Models drawn in the way a study draws its cases.
+    """Models drawn in the same way as a study draws its cases.
 
     Parameters
     ----------
@@ -86,9 +86,9 @@ class DrawnModels:
     cases
         Models for which bywire chooses the gains.
     lacking
-        Number of draws for the gains for which no model exists.
+        Number of draws for which no model exists, among those for choosing the gains.
     judges
-        Additional models that judge the gains. None where no model exists.
+        Additional models for testing the gains. None where no model exists.
     confidence
         Confidence level of intervals.
     """
@@ -111,9 +111,9 @@ class Probability:
     requirements
         The requirements.
     judged
-        Number of judging models that meet each requirement.
+        Number of test models that meet each requirement.
     wanted
-        Required probability of meeting all requirements together, or None.
+        Required probability that all requirements are met together, or None.
     """
 
     drawn: DrawnModels
@@ -149,7 +149,7 @@ class Probability:
             rows.append(("all together", *self._words(self.together), "-"))
         lines: list[Part] = [
             f"gains chosen for {len(self.drawn.cases)} models drawn from study "
-            f"{self.drawn.study!r}, and judged on {self.judged.models} other models",
+            f"{self.drawn.study!r}, and tested on {self.judged.models} other models",
             text_table(["of other models", "met by", "probability", interval, "worst"], rows),
         ]
         if self.judged.unstable:
@@ -236,7 +236,7 @@ def _drawn_models(case: LoopCase, file: str | Path, count: int) -> DrawnModels:
     designed = tuple(each for each in models[:count] if each is not None)
     if not designed:
         raise ParameterError(
-            f"{file}: for none of its {count} draws does a model exist. Narrow its [vary]",
+            f"{file}: no model exists for any of its {count} draws. Narrow its [vary] section",
             name=str(file),
             value=str(count),
         )
@@ -292,7 +292,7 @@ Spans = Mapping[str, tuple[float, float]]
 
 
 def requirements_of(file: str | Path | None, texts: Sequence[str]) -> tuple[Limit, ...]:
-    """Return the requirements of a file and of texts such as ``"bandwidth >= 10 Hz"``."""
+    """Return the requirements of a file and of strings such as ``"bandwidth >= 10 Hz"``."""
     return read([*_from_file(None if file is None else Path(file)), *texts])
 
 
@@ -354,7 +354,7 @@ def _tunables_of(case: LoopCase) -> Spans:
 
 
 def _trial_of(case: LoopCase, changes: Mapping[str, Any], amplitudes: str) -> Trial:
-    """Return the trial on the bench, with ``amplitudes`` of the sines as text with units."""
+    """Return the trial on the bench, with the sines' ``amplitudes`` as a string with units."""
     loop = case.loop
     sizes = spread(amplitudes, case.input_unit, "amplitudes") if amplitudes else loop.amplitudes[1:]
     bench = Bench(loop.proof, case.name, changes) if loop.proof else None
@@ -368,7 +368,7 @@ def _from_file(path: Path | None) -> list[str]:
     section = read_toml(path, "file of requirements").get("requirements")
     if not isinstance(section, dict) or not section:
         raise ParameterError(
-            f'{path} needs a section [requirements] with lines such as bandwidth = ">= 10 Hz"',
+            f'{path} needs a [requirements] section with lines such as bandwidth = ">= 10 Hz"',
             name="[requirements]",
         )
     wanted = []
@@ -379,7 +379,7 @@ def _from_file(path: Path | None) -> list[str]:
                     f'{path}: {figure} = {limit} is not a string such as ">= 10 Hz"',
                     name=figure,
                     value=str(limit),
-                    valid='a text such as ">= 10 Hz"',
+                    valid='a string such as ">= 10 Hz"',
                 )
             wanted.append(f"{figure} {limit}")
     return wanted
@@ -445,7 +445,7 @@ class DesignAnswer(Answer):
 
     @property
     def notes(self) -> list[str]:
-        """Notes on the linear models' side of kinks."""
+        """Notes on the side of a kink that the linear models use."""
         loop, par = self.case.loop, self.case.par.replace(self.gains)
         return corner_notes([loop.closed(par, self.case.value).corners])
 
@@ -485,7 +485,7 @@ class DesignAnswer(Answer):
         )
 
     def _brief(self, parts: Sequence[Part], verdict: str) -> list[str | Block]:
-        """Return verdict, requirements and gains; the rest is for ``--verbose``."""
+        """Return verdict, requirements and gains. The rest needs ``--verbose``."""
         table = design_parts.requirement_table(self.requirements, self.worst, self.tried)
         first = self.first_parts(parts)
         rest = [part for part in parts if not any(part is each for each in first)]
@@ -501,10 +501,10 @@ class DesignAnswer(Answer):
 
     @abstractmethod
     def worst(self, figure: str) -> float:
-        """Return the worst value of a figure on the linear model; NaN for none."""
+        """Return the worst value of a figure on the linear model, or NaN if there is none."""
 
     def first_parts(self, parts: Sequence[Part]) -> list[Part]:
-        """Return the gains, their limits, and what requirements that exclude each other reach."""
+        """Return the gains, their limits, and the best values of conflicting requirements."""
         return [part for part in parts if design_parts.is_brief(part)]
 
     def _remarks(self) -> list[str]:
@@ -578,7 +578,7 @@ class DesignAnswer(Answer):
 
 @dataclass(frozen=True)
 class LoopDesign(DesignAnswer):
-    """Gains of a loop, designed from requirements.
+    """Gains of a loop, designed to meet requirements.
 
     Parameters
     ----------
@@ -593,7 +593,7 @@ class LoopDesign(DesignAnswer):
 
     @property
     def holds(self) -> bool:
-        """Whether requirements are met, on the bench too and with the required probability."""
+        """Whether requirements are met, also on the bench and with the required probability."""
         is_probable = self.probability is None or self.probability.outcome in (None, "met")
         return super().holds and is_probable
 
@@ -622,7 +622,7 @@ class LoopDesign(DesignAnswer):
         return self.designed.worst[figure][0]
 
     def first_parts(self, parts: Sequence[Part]) -> list[Part]:
-        """Return also the probabilities over drawn models."""
+        """Also return the probabilities over drawn models."""
         first = super().first_parts(parts)
         count = 0 if self.probability is None else len(self.probability.parts())
         end = len(parts) - len(design_parts.limit_lines(self.case, self.limits))

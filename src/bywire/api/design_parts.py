@@ -75,7 +75,7 @@ def verification_parts(
 
 
 def judged_on(candidate: Candidate, text: str) -> str:
-    """Return a text on where a requirement was judged."""
+    """Return a text that states where a requirement was judged."""
     shown, possible = candidate.shown[text]
     if not shown:
         return "on the linear model"
@@ -321,7 +321,7 @@ def as_parts(
 
 
 def _kept_lines(design: Design) -> list[str]:
-    """Return a line on the figures that are enforced in addition to the requirements, if any."""
+    """Return a line about figures that are enforced in addition to the requirements, if any."""
     if not design.kept:
         return []
     texts = ", ".join(str(requirement) for requirement in design.kept)
@@ -338,7 +338,7 @@ def _unsound_lines(design: Design) -> list[str]:
 
 
 def limit_lines(case: LoopCase, limits: Mapping[str, tuple[float, float]]) -> list[str]:
-    """Return a line on the limits that an ECU needs, if any."""
+    """Return a line about the limits that an ECU needs, if any."""
     if not limits:
         return []
     texts = [
@@ -363,7 +363,7 @@ def _gain_text(case: LoopCase, name: str, value: float) -> str:
 def requirement_table(
     requirements: Sequence[Limit], worst: Callable[[str], float], tried: Verification | None
 ) -> Table:
-    """Return one row per requirement, and per figure enforced as well, with the verdict first.
+    """Return a row for each requirement and each figure also enforced, with the verdict first.
 
     ``worst(figure)``: worst value on the linear model, which decides if the bench was skipped.
     """
@@ -499,7 +499,7 @@ def schedule_as_parts(
         shown(leaves[border], at.unit) for border in scheduled(case.loop).borders
     )
     parts: list[Part] = [
-        f"gain schedule of loop {case.loop.name} of {case.name}, borders at {at.name} = "
+        f"gain schedule of loop {case.loop.name} of {case.name}, boundaries at {at.name} = "
         f"{borders}: linear design {design.status}",
         _gains(case, design, design.gains, "linear design"),
     ]

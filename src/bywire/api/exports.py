@@ -1,4 +1,4 @@
-"""Exports of a bench: C code of its ECU, functional mock-up units, WebAssembly, a page."""
+"""Exports of a bench: C code of its ECU, functional mock-up units, WebAssembly, web page."""
 
 from __future__ import annotations
 
@@ -114,9 +114,8 @@ class ControllerCheck:
         caption = (
             f"{self.vectors} vectors: values that differ from Python's, breaches of the contract "
             "in "
-            "README.txt, and bits compared with the first row. Instructions and stack belong to "
-            "the "
-            "most expensive task, including its calls."
+            "README.txt, and bits compared with the first row. Instructions and stack are those "
+            "of the most expensive task, including its calls."
         )
         return TableBlock(Table(tuple(columns), rows), caption)
 
@@ -327,10 +326,11 @@ _KINDS: dict[Causality, str] = {
 }
 _NO_START = (
     "this experiment's rest state is unknown for other parameters. With changed parameters, the "
-    "unit starts from the exported rest state and settles"
+    "FMU starts from the exported rest state and settles"
 )
 _EXCHANGED = (
-    "the client's solver integrates the states and locates the events. Between events, contacts "
+    "the importing tool's solver integrates the states and locates the events. Between events, "
+    "contacts "
     "and dry friction keep their modes"
 )
 
@@ -348,7 +348,7 @@ class ExportedFmu(Answer):
     targets
         Platforms of the binaries.
     compilers
-        Compiler of each binary.
+        Compiler that built each binary.
     """
 
     path: Path
@@ -358,7 +358,7 @@ class ExportedFmu(Answer):
 
     @property
     def notes(self) -> list[str]:
-        """Note on the unit's start."""
+        """Note on the FMU's start."""
         return [] if self.unit.begins_anywhere else [_NO_START]
 
     def document(self) -> Document:
@@ -418,7 +418,7 @@ class ExportedFmu(Answer):
 
 
 def _some(names: list[str], most: int = 6) -> str:
-    """Return a few of the names."""
+    """Return some of the names."""
     return ", ".join(names[:most]) + (" ..." if len(names) > most else "")
 
 

@@ -110,7 +110,7 @@ def response_warnings(
 
 
 def purity(response: xr.Dataset) -> str:
-    """Return a line on the lowest coherence at each amplitude, worded for the excitation.
+    """Return a line about the minimum coherence at each amplitude, worded for the excitation.
 
     Parameters
     ----------
@@ -121,10 +121,10 @@ def purity(response: xr.Dataset) -> str:
     shares = ", ".join("-" if np.isnan(share) else f"{share:.3f}" for share in lowest)
     if response.attrs["excitation"] == "sine":
         return (
-            f"minimum share of output power at the sine's frequency: {shares} (the rest is "
+            f"minimum fraction of output power at the sine's frequency: {shares} (the rest is "
             "harmonics, dither and ripple)"
         )
-    return f"lowest coherence of set point and output: {shares}"
+    return f"minimum coherence between set point and output: {shares}"
 
 
 def _cases(response: xr.Dataset, which: NDArray[np.bool_]) -> str:
@@ -145,8 +145,8 @@ class FrequencyResponse(Answer):
     case
         The loop, its parameters and its operating point.
     data
-        Gain and phase over variant, amplitude and frequency, with bandwidths and shares of time in
-        saturation. Its variables have ``units`` and ``long_name``.
+        Gain and phase over variant, amplitude and frequency, with bandwidths and fractions of time
+        in saturation. Its variables have ``units`` and ``long_name``.
     linear
         Complex linear response of the first variant, shape (frequencies,).
     variants
@@ -172,7 +172,7 @@ class FrequencyResponse(Answer):
 
     @property
     def notes(self) -> list[str]:
-        """Notes on the linear models' side of kinks."""
+        """Notes on the side of a kink that the linear models use."""
         models = (case.loop.closed(case.par, case.value) for case in self.variants)
         return corner_notes(model.corners for model in models)
 
@@ -238,7 +238,8 @@ class FrequencyResponse(Answer):
         if not self.range[0]:
             return blocks
         caption = (
-            "Bandwidth over the range. Rings mark worst cases. Other figures show the first case."
+            "Bandwidth versus the varied quantity. Rings mark worst cases. Other figures show the "
+            "first case."
         )
         over = TableBlock(
             _over_table(self.data, self.variants, self.range, self.unit), "Bandwidth by amplitude."
@@ -447,7 +448,7 @@ def _measured(
 ) -> xr.Dataset:
     """Measure the response of all cases, each around its operating point.
 
-    ``share`` is the step of the runs divided by the loop's step.
+    ``share`` is the ratio of the runs' step to the loop's step.
     """
     runs = [variant.point.run() for variant in variants]
     points = [replace(run, step=share * run.step) for run in runs]
@@ -461,9 +462,8 @@ def _measured(
 # --- Bandwidth by amplitude for one case or a range, as tables and as JSON
 
 _NOTE = (
-    "bandwidth is at -3 dB, crossover and margins come from the loop gain's describing function, "
-    "and "
-    "shares of time are the largest over all frequencies"
+    "bandwidth is at -3 dB. Crossover and margins come from the loop gain's describing function. "
+    "Fractions of time are maximum values over all frequencies"
 )
 
 
@@ -471,7 +471,7 @@ _WIDTHS = ("bandwidth", "crossover", "phase_margin", "gain_margin", "lower_gain_
 
 
 def shares(response: xr.Dataset) -> dict[str, str]:
-    """Return a response's shares of time, with their column headings."""
+    """Return a response's fractions of time, with their column headings."""
     names = [str(name) for name in response if str(name).startswith("share_")]
     return {name: _title(name.removeprefix("share_")) for name in names}
 
@@ -519,7 +519,7 @@ def _figures_table(response: xr.Dataset, unit: str) -> Table:
 def _worst_line(
     response: xr.Dataset, variants: Sequence[Variant], range_: tuple[str, str], unit: str
 ) -> str:
-    """Return a line on each amplitude's worst case over a range (see `_over_table`)."""
+    """Return a line about each amplitude's worst case over a range (see `_over_table`)."""
     texts = []
     for j, size in enumerate(response["amplitude"].values):
         k = narrowest(response, j)

@@ -67,10 +67,10 @@ class ChosenMethod:
     method, options
         Method and its options.
     name, par
-        Parameter set and values at which the search starts. Empty and None for a method of any
+        Parameter set and values from which the search starts. Empty and None for a method for any
         assembly.
     changes
-        Changes of the parameter set by dotted name [SI].
+        Changes to the parameter set by dotted name [SI].
     """
 
     method: Method
@@ -81,7 +81,7 @@ class ChosenMethod:
 
     @property
     def subject(self) -> Subject | None:
-        """The method's brake for reports, or None for a method of any assembly."""
+        """The method's brake for reports, or None for a method for any assembly."""
         method = self.method
         if method.bench is not None:
             return Subject.of_bench(
@@ -95,7 +95,7 @@ class ChosenMethod:
 
     @property
     def changed(self) -> tuple[Change, ...]:
-        """The user's changes of the bench or parameter set and of the method's options."""
+        """The user's changes to the bench or parameter set and to the method's options."""
         return self._option_changes if self.subject is None else self.subject.changes
 
     @property
@@ -123,13 +123,13 @@ def choose(
     name
         Method that ``bywire list`` shows.
     parameters, overrides, options
-        Parameter set, changes of it, and changes of the method's options.
+        Parameter set, changes to it, and changes to the method's options.
     question
         Inputs of methods for any bench.
     measurements, mapping, time
         Measurements, the meaning of their columns, and their time column. Empty for simulated data.
     progress
-        Called with a label and the finished share.
+        Called with a label and the completed fraction.
 
     Raises
     ------
@@ -169,7 +169,7 @@ def _require_columns_alone(method: Method, question: Question) -> None:
     Raises
     ------
     InputError
-        For any other input, and for signals that the method does not use.
+        If there is any other input, or a signal that the method does not use.
     """
     noisy = any(question.noise.values())
     beyond = [name for name in question.given if name not in ("inputs", "outputs")]
@@ -201,7 +201,7 @@ def _columns_of(method: Method, question: Question, time: str) -> NamedColumns:
     Raises
     ------
     ParameterError
-        If one name stands for two columns.
+        If one name refers to two columns.
     """
     outputs = question.columns
     units = {**method.optional, **method.signals}
@@ -246,7 +246,7 @@ def _options(method: Method, values: Mapping[str, Any]) -> ParameterSet:
 
 
 def _require_not_fitted(holdout: Source, measurements: Sequence[Source]) -> None:
-    """Reject a held-out measurement that is also fitted, or that has no fitted one beside it."""
+    """Reject a held-out measurement that is also fitted, or that comes without a fitted one."""
     if not measurements:
         raise ParameterError(
             f"{option('holdout')} applies only to measurement files. Remove it",
@@ -452,7 +452,7 @@ def _data_of(
 
 
 def _start_of(chosen: ChosenMethod, synthetic: int | None) -> ParameterSet | None:
-    """Return the parameters at which the search starts, perturbed for a simulated measurement."""
+    """Return the parameters from which the search starts, perturbed for simulated data."""
     if synthetic is None or chosen.par is None:
         return chosen.par
     return displaced(chosen.par, chosen.method.unknowns, Effort().spread, synthetic)
@@ -482,7 +482,7 @@ def _search(
 def _begun_at(
     chosen: ChosenMethod, start: ParameterSet | None, identified: Identified
 ) -> dict[str, float]:
-    """Return the values at which the search started, by label."""
+    """Return the values from which the search started, by label."""
     if start is None:
         return {}
     if chosen.method.bench is None:
@@ -546,7 +546,7 @@ def parameter_file(
 def _accepted(
     experiment: str, parameters: str, changes: Mapping[str, Any]
 ) -> tuple[dict[str, Any], list[str], str]:
-    """Return changes with effect, names of the others, and why the bench is invalid, if so."""
+    """Return effective changes, names of the others, and why the bench is invalid, if so."""
     wanted: dict[str, Any] = dict(changes)
     left_out: list[str] = []
     while True:
@@ -706,7 +706,7 @@ class Identification(Answer):
     source
         Description of the measurement in one line.
     start
-        Values [SI] at which the search started, by the estimates' labels.
+        Values [SI] from which the search started, by the estimates' labels.
     put_in
         True values of a simulated measurement by the same labels. Empty for a real measurement.
     data_notes
@@ -829,7 +829,7 @@ class Identification(Answer):
             if texts or estimate.notes:
                 yield Listing([*texts, *estimate.notes])
         if self.identified.figures:
-            yield TableBlock(figure_table(self.identified), "Further results.")
+            yield TableBlock(figure_table(self.identified), "Additional results.")
         if self.identified.checks:
             yield TableBlock(check_table(self.identified.checks), "Checks.")
         if self.identified.notes:
@@ -869,7 +869,7 @@ class Identification(Answer):
         method, options = self.chosen.method, self.chosen.options
         idle = () if self.is_simulated else method.simulated
         rows = [r for r in parameter_rows(options) if r.name.split(".")[0] not in idle]
-        chosen = Details("Options of the method", [TableBlock(parameter_table(rows))])
+        chosen = Details("Method options", [TableBlock(parameter_table(rows))])
         if subject is None:
             changed = changes_block(self.chosen.changed, "", method.name)
             return Section("Settings", [Paragraph(method.summary), changed, chosen])
@@ -935,7 +935,7 @@ class Identification(Answer):
         return write_measurement(self.data, path, overwrite=True)
 
     def _file_notes(self) -> list[str]:
-        """Return a note on the bench file, or on why there is none."""
+        """Return a note about the bench file, or the reason why there is none."""
         method = self.chosen.method
         if self.identified.parameters and self.chosen.par is not None:
             return [f"parameters.toml: {method.bench_note}"] if method.bench_note else []
@@ -958,7 +958,7 @@ def _residual_caption(name: str, estimate: Estimate) -> str:
         "Neighboring residuals are correlated. The model's errors last longer than a sample, and "
         "the intervals account for this"
         if estimate.colored
-        else "Neighboring residuals are independent, as for noise"
+        else "Neighboring residuals are independent, as expected for noise"
     )
     return (
         f"{name}: residuals of {estimate.residuals.size} measured values, root mean square "

@@ -1,4 +1,4 @@
-"""A brake's life: slow states over thousands of stops, and the end of life."""
+"""Life of a brake: slow states over thousands of stops, and the end of life."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from bywire.report.tables import KpiRow, Table, amount_cell, kpi_table, paramete
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_MOST = 100_000  # largest number of stops to simulate one by one
+_MOST = 100_000  # maximum number of stops to simulate individually
 _PROJECTION = ("stops", "seed", "share", "tolerance", "longest")
 
 
@@ -49,7 +49,7 @@ class LifeResult(Answer):
     projection
         Slow states and margins to the limits over stops [SI].
     checked
-        Slow states of stops simulated one by one, shape (stops + 1,) each. May be empty.
+        Slow states of individually simulated stops, shape (stops + 1,) each. May be empty.
     """
 
     projection: Projection
@@ -57,7 +57,7 @@ class LifeResult(Answer):
 
     @property
     def warnings(self) -> list[str]:
-        """Warnings of the runs, the first of those that differ only in numbers."""
+        """Warnings of the runs. Of those that differ only in numbers, the first."""
         kinds: dict[str, list[str]] = {}
         for text in self.projection.warnings:
             kinds.setdefault(re.sub(r"-?\d[\d.e+-]*", "#", text), []).append(text)
@@ -81,7 +81,7 @@ class LifeResult(Answer):
         )
 
     def deviation(self, name: str) -> float:
-        """Return the relative error of a state's projected change, from stops simulated one by one.
+        """Return the relative error of a state's projected change, from individual stops.
 
         The error is NaN without such stops, or if the state does not change.
         """
@@ -93,7 +93,7 @@ class LifeResult(Answer):
         return made / change - 1.0 if change else math.nan
 
     def document(self) -> Document:
-        """Return the stops until the end of life, its cause, slow states and settings."""
+        """Return the number of stops until end of life, its cause, slow states and settings."""
         plan = self.projection.plan
         subject = Subject.of_bench(
             plan.bench,
@@ -148,7 +148,7 @@ class LifeResult(Answer):
             "ended by: " + life.limits[made.ended_by].label if made.ended_by else "no limit reached"
         )
         rows = [
-            KpiRow("stops", float(made.stops), "1", f"Stops until the end of life; {end}."),
+            KpiRow("stops", float(made.stops), "1", f"Number of stops until end of life ({end})."),
             KpiRow(
                 "interval",
                 made.error,
@@ -166,7 +166,7 @@ class LifeResult(Answer):
                         100.0 * share,
                         "%",
                         f"Relative error of the {each.label}'s projected change, from "
-                        f"{len(self.checked[name]) - 1} stops simulated one by one.",
+                        f"{len(self.checked[name]) - 1} individually simulated stops.",
                     )
                 )
         return rows
@@ -239,13 +239,13 @@ class LifeResult(Answer):
 
 
 _CAPTION = (
-    "Slow states and margins to the limits over stops. Dots mark simulated stops. Life ends when "
+    "Slow states and margins to the limits versus stops. Dots mark simulated stops. Life ends when "
     "the first margin reaches zero."
 )
 
 
 def _wear_changes(plan: LifePlan) -> tuple[Change, ...]:
-    """Return a life file's settings of wear, stop conditions and projection."""
+    """Return a life file's settings for wear, stop conditions and projection."""
     life, wear = plan.life, plan.life.defaults()
     origins = {name: ", ".join(filter(None, (c.kind, c.where))) for name, c in life.values.items()}
     of = f"the life {life.name}"

@@ -55,7 +55,7 @@ def rate_table(model: LinearModel) -> Table:
 
 
 def left_out(model: LinearModel) -> list[str]:
-    """Return a line on the poles that `rate_table` omits, if any."""
+    """Return a line about the poles that `rate_table` omits, if any."""
     speeds = rates(model)
     still, dead = int(np.sum(np.abs(speeds) < STILL)), len(model.states) - len(speeds)
     parts = []
@@ -195,7 +195,7 @@ def corner_notes(corners: Iterable[Sequence[str]]) -> list[str]:
 
 
 def reduced_line(reduced: Reduced) -> str:
-    """Return a line on a reduced model's order and error."""
+    """Return a line about a reduced model's order and error."""
     kept = f" ({reduced.kept} of them unstable and unchanged)" if reduced.kept else ""
     return f"reduced to {len(reduced.model.states)} states{kept}, {error_line(reduced.error)}"
 
@@ -215,7 +215,7 @@ def error_object(error: ReductionError) -> dict[str, Any]:
 
 
 def error_line(error: ReductionError) -> str:
-    """Return a line on a reduction error over a band."""
+    """Return a line about a reduction error over a band."""
     return (
         f"maximum error up to {error.high:.4g} Hz: {_percent(error.relative)} "
         f"({error.gain:.2g} dB, {error.phase:.2g} degrees), at {error.at:.3g} Hz"
@@ -245,7 +245,7 @@ def locus_object(locus: Locus) -> dict[str, Any]:
 
 
 def locus_lines(locus: Locus) -> list[str]:
-    """Return a line on each stability limit over the range."""
+    """Return a line about each stability limit over the range."""
     from bywire.report.poles import border_text
 
     if not locus.borders:
@@ -292,7 +292,7 @@ def small_sines(model: PeriodicModel, band: tuple[float, float]) -> Array:
 def small_gains_line(model: PeriodicModel, band: tuple[float, float], error: float) -> str:
     """Return a line on the gain for small sines at five frequencies of a band [Hz].
 
-    ``error`` is the largest relative numerical error of these gains.
+    ``error`` is the maximum relative numerical error of these gains.
     """
     frequencies = small_sines(model, band)
     known = f"{100 * error:.1g} %" if math.isfinite(error) else "unknown, because not periodic"

@@ -104,7 +104,7 @@ class LinearizedPlant(Answer):
 
     @property
     def notes(self) -> list[str]:
-        """Notes on the linear model's side of kinks."""
+        """Notes on the side of a kink that the linear model uses."""
         return texts.corner_notes([self.model.corners])
 
     @cached_property
@@ -209,7 +209,7 @@ class PlantLocus(Answer):
         )
         data = {"plant": name, "parameters": case.name, "locus": texts.locus_object(self.locus)}
         figure = FigureBlock(
-            partial(_draw_locus, self.locus), f"Poles against {self.locus.name}.", f"{name}-locus"
+            partial(_draw_locus, self.locus), f"Poles versus {self.locus.name}.", f"{name}-locus"
         )
         return Document(
             f"Root locus of {name}",
@@ -260,20 +260,21 @@ def _plant_case(
     name
         Name of the plant.
     parameters
-        Parameter set. If empty, the main one of the plant's brake.
+        Parameter set. If empty, the main set of the plant's brake.
     at
         Operating point, whose unit selects the quantity. If empty, the plant's nominal point.
     overrides
         Parameters by dotted name, with units.
     friction, speed
-        State of dry friction, and motor speed. If empty, friction is removed and the motors rest.
+        State of dry friction, and motor speed. If empty, friction is removed and the motors are at
+        rest.
     side
         See `loop_case`.
 
     Raises
     ------
     InputError
-        For unknown names, values out of range, and parameter sets of another brake.
+        If a name is unknown, a value is out of range, or the parameter set is for another brake.
     """
     read_sides(side)
     plant = replace(PLANTS.find(name), side=side)
@@ -354,8 +355,8 @@ class LinearizedLoop(Answer):
         dithered
     Loop linearized about its motion under dither, or None if it was not requested.
     dithered_error
-        Largest relative numerical error of its gains for small sines. Infinite if the motion is
-        not periodic in half steps.
+        Maximum relative numerical error of its gains for small sines. Infinite if the motion is not
+        periodic in half steps.
     """
 
     case: LoopCase
@@ -367,7 +368,7 @@ class LinearizedLoop(Answer):
 
     @property
     def notes(self) -> list[str]:
-        """Notes on the linear model's side of kinks."""
+        """Notes on the side of a kink that the linear model uses."""
         return texts.corner_notes([self.model.corners])
 
     @cached_property
@@ -448,7 +449,7 @@ class LinearizedLoop(Answer):
             ),
         ]
         if self.locus is not None:
-            caption = f"Poles of the closed loop against {self.locus.name}."
+            caption = f"Poles of the closed loop versus {self.locus.name}."
             draw = partial(self._draw_locus, self.locus)
             blocks.append(FigureBlock(draw, caption, f"{name}-locus"))
         return blocks
@@ -542,7 +543,7 @@ def linearized(
         )
     if locus and reduce:
         raise ParameterError(
-            f"use either {option('reduce')} or {option('locus')}, not both",
+            f"{option('reduce')} and {option('locus')} cannot be combined. Use only one of them",
             name=option("reduce"),
             value=reduce,
         )
@@ -599,12 +600,12 @@ def linear_case(
 
 
 def locus_range(case: LoopCase | PlantCase, range_: str) -> tuple[str, str, list[float]]:
-    """Return name, unit and values of a root locus' range.
+    """Return name, unit and values of a root locus range.
 
     Raises
     ------
     InputError
-        For an invalid range.
+        If the range is invalid.
     """
     quantity = case.point.quantity if isinstance(case, PlantCase) else case.loop.at
     return range_of(range_, quantity, case.par, "locus")

@@ -53,12 +53,12 @@ class LoopCase:
 
     @property
     def input_unit(self) -> str:
-        """SI unit of the input that is excited."""
+        """SI unit of the excited input."""
         model = self.loop.point(self.par, self.value).model
         return signals_of(model.Stimulus)[self.loop.inputs[0]].unit
 
     def frequencies(self, text: str, points: int) -> list[float]:
-        """Return the frequencies [Hz] of a text. Default: ``points`` over the loop's band.
+        """Return the frequencies [Hz] in a string. Default: ``points`` over the loop's band.
 
         Raises
         ------
@@ -100,7 +100,7 @@ def loop_case(
     name
         Loop.
     parameters
-        Parameter set. If empty, the main one of the loop's brake.
+        Parameter set. If empty, the main set of the loop's brake.
     at
         Operating point with its unit. If empty, the loop's nominal point.
     changes
@@ -111,7 +111,7 @@ def loop_case(
     Raises
     ------
     InputError
-        For unknown names, values out of range, and parameter sets of another brake.
+        If a name is unknown, a value is out of range, or the parameter set is for another brake.
     """
     read_sides(side)
     loop = replace(LOOPS.find(name), side=side)
@@ -121,12 +121,12 @@ def loop_case(
 
 
 def spread(text: str, unit: str, name: str, *, logarithmic: bool = False) -> list[float]:
-    """Return the values of ``low:high:count`` or of a list with commas, each with its unit.
+    """Return the values of ``low:high:count`` or of a comma-separated list, each with its unit.
 
     Raises
     ------
     ParameterError
-        If the text has neither form.
+        If the string has neither form.
     UnitError
         If a value has no unit or a wrong one.
     """

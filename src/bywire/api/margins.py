@@ -41,8 +41,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 LEGEND = (
-    "Linear sampled loop without dry friction. The gain margins are the factors to which the loop "
-    "gain may rise and fall. The delay margin is the additional dead time that the loop tolerates. "
+    "Linear sampled loop without dry friction. The gain margins are the factors by which the loop "
+    "gain can be multiplied before the loop becomes unstable. The delay margin is the additional "
+    "dead time that the loop tolerates. "
     "The best disk margin is 2, and the worst is 0. S and T are the sensitivity and the "
     "complementary sensitivity. Unstable loops and loops without gain have no margins."
 )
@@ -65,9 +66,9 @@ class Margins(Answer):
     case
         The loop, its parameters and its operating point.
     margins
-        Margins for each value of the range; a single entry without a range.
+        Margins for each value of the range. Without a range, a single entry.
     name, unit, values
-        Varied parameter or operating quantity, its SI unit and its values; empty without a range.
+        Varied parameter or operating quantity, its SI unit and its values. Empty without a range.
     """
 
     case: LoopCase
@@ -78,12 +79,12 @@ class Margins(Answer):
 
     @property
     def notes(self) -> list[str]:
-        """Notes on the linear models' side of kinks."""
+        """Notes on the side of a kink that the linear models use."""
         return corner_notes(margins.corners for margins in self.margins)
 
     @cached_property
     def family(self) -> Family:
-        """The loop gains with their margins, for figures; loops without gain have none."""
+        """The loop gains with their margins, for figures. Loops without gain have none."""
         case, values = self.case, self.values or (math.nan,)
         cases = [(self.case.par, self.case.value)]
         if self.name:
@@ -97,7 +98,7 @@ class Margins(Answer):
         loop = self.case.loop
         table = TableBlock(margins_table(self.margins, self.name, self.unit, self.values))
         texts = worst_texts(self.margins, self.name, self.unit, self.values) if self.name else []
-        worst_of = [Listing(texts, "Worst of each:")] if self.name else []
+        worst_of = [Listing(texts, "Worst value of each margin:")] if self.name else []
         ranged = (
             " Bold curves have the smallest disk margin or are unstable. Unstable ones are dashed."
         )
@@ -179,7 +180,7 @@ def margins_over(
 
 
 def _margins_at(case: LoopCase, point: tuple[ParameterSet, float], label: str) -> LoopMargins:
-    """Return the margins at one value of a range; an error names the value."""
+    """Return the margins at one value of a range. An error message states the value."""
     try:
         return margins_of(figures_at(case.loop, *point))
     except CornerError as error:
@@ -196,7 +197,7 @@ def margins_table(
     margins_at
         Margins, one per row.
     name, unit, values
-        Varied parameter, its SI unit and its values; empty without a range.
+        Varied parameter, its SI unit and its values. Empty without a range.
     """
     heading = [*(figure.heading for figure in MARGINS.values()), "stable"]
     rows = [
@@ -221,7 +222,7 @@ def _state_cell(margins: LoopMargins) -> Cell:
 def worst_texts(
     margins_at: Sequence[LoopMargins], name: str, unit: str, values: Sequence[float]
 ) -> list[str]:
-    """Return the values without a stable loop, and the worst of each margin elsewhere."""
+    """Return the values without a stable loop, and the worst value of each margin elsewhere."""
     pairs = list(zip(values, margins_at, strict=True))
     kept = [(margins, value) for value, margins in pairs if margins.is_sound]
     texts = []

@@ -33,7 +33,7 @@ class NewBrake(Answer):
     name
         Name of the brake.
     folder
-        Its project: ``pyproject.toml``, ``README.md``, ``src`` and ``tests``.
+        Project folder with ``pyproject.toml``, ``README.md``, ``src`` and ``tests``.
     package
         Path of the package, for ``--system``.
     """
@@ -72,14 +72,14 @@ class NewBrake(Answer):
 
 
 def write_package(name: str, folder: Path) -> Path:
-    """Write a package that passes ``bywire check``, completely or not at all.
+    """Write a package that passes ``bywire check``. Write nothing if a file cannot be written.
 
     Parameters
     ----------
     name
-        Name of the brake: lowercase letters, digits and single dashes, such as ``my-brake``.
+        Name of the brake, of lowercase letters, digits and single dashes, such as ``my-brake``.
     folder
-        Parent of its folder.
+        Parent folder.
 
     Returns
     -------
@@ -124,7 +124,7 @@ def module_name(name: str) -> str:
     Raises
     ------
     ParameterError
-        If the name is not valid, with the reason.
+        If the name is not valid. The message states the reason.
 
     Examples
     --------

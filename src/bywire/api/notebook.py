@@ -1,4 +1,4 @@
-"""Sliders in a notebook: the bench runs again with each change, and figure and table follow."""
+"""Sliders in a notebook. Each change reruns the bench, and updates the figure and the table."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _DPI = 110
 
 
 class Shown(Protocol):
-    """A result of a bench, as the widget shows it."""
+    """Result of a bench that the widget shows."""
 
     @property
     def rows(self) -> list[KpiRow]:
@@ -50,7 +50,7 @@ def sliders(
     parameters, figure
         See `bywire.api.run.BenchResult.interact`.
     run
-        Returns the result with changed parameters.
+        Function that returns the result for changed parameters.
     """
     widgets = library("ipywidgets", "sliders in a notebook", "notebook")
     controls = {name: _slider(widgets, par, name) for name in parameters}
@@ -124,7 +124,7 @@ def _slider(widgets: Any, par: ParameterSet, name: str) -> tuple[Any, Any]:
 
 
 def ends_of(leaf: Leaf, start: float) -> tuple[float, float]:
-    """Return the ends of a parameter's slider [SI]: around its value, in its declared range.
+    """Return the ends of a parameter's slider [SI], around its value and within its range.
 
     Raises
     ------

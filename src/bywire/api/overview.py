@@ -22,7 +22,7 @@ _NAME = 21  # columns of a topic
 _HINT = (
     "'bywire list TOPIC' lists the names in a topic. 'bywire list NAME' shows details\n"
     "of a name, parameter (motor.R_m), group (motor) or signal (p_mc).\n"
-    "'bywire list WORD' searches for other words, such as battery."
+    "'bywire list WORD' searches for any other word, such as battery."
 )
 
 
@@ -33,8 +33,8 @@ class Overview(Answer):
     Parameters
     ----------
     things
-        Kind of thing -> name -> summary; a list of names without summaries, and the names of the
-        key figures of every experiment.
+        Kind of thing -> name -> summary, or a list of names without summaries. Also contains the
+        key figure names of every experiment.
     topic
         Topic to show. If empty, all topics.
     doubts
@@ -79,12 +79,12 @@ def overview(topic: str = "") -> Overview:
     """List everything that has a name, from an index that bywire rebuilds when a file changes.
 
     Building the index loads every brake with all its parts. bywire caches the index in the folder
-    of compiled kernels, so that a listing need not load the brakes.
+    of compiled kernels, so that a listing does not load the brakes.
 
     Parameters
     ----------
     topic
-        The kind of things to show, for example ``"experiments"``; all if empty.
+        Kind of things to show, for example ``"experiments"``. If empty, all kinds.
 
     Returns
     -------
@@ -94,7 +94,7 @@ def overview(topic: str = "") -> Overview:
     Raises
     ------
     UnknownNameError
-        If the topic is unknown, with the closest matches.
+        If the topic is unknown. The message lists the closest matches.
     """
     things, doubts = _things()
     chosen = _plain(topic)
@@ -104,7 +104,7 @@ def overview(topic: str = "") -> Overview:
 
 
 def is_topic(name: str) -> bool:
-    """Return whether a name is one of the kinds that `overview` opens."""
+    """Return whether a name is a topic of `overview`."""
     return _plain(name) in _things()[0]
 
 

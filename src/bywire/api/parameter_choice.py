@@ -23,7 +23,7 @@ def set_for(subject: str, assembly: str, name: str) -> CitedSet:
     Raises
     ------
     InputError
-        For unknown names, and parameter sets of another brake.
+        If the name is unknown, or the parameter set is for another brake.
     """
     cited = PARAMETER_SETS.find(name or main_set(assembly))
     if cited.assembly != assembly:
@@ -49,7 +49,7 @@ def parameters_for(
     assembly
         Brake to which the subject belongs.
     name
-        Parameter set. If empty, the main one of this brake.
+        Parameter set. If empty, the brake's main set.
     changes
         Parameters by dotted name or pattern, with units or relative to their values (see
         `settled`).
@@ -57,7 +57,7 @@ def parameters_for(
     Raises
     ------
     InputError
-        For unknown names, values out of range, and parameter sets of another brake.
+        If a name is unknown, a value is out of range, or the parameter set is for another brake.
     """
     cited = set_for(subject, assembly, name)
     base = cited.parameters()

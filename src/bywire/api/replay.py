@@ -1,4 +1,4 @@
-"""Replay: a measured demand drives a bench's model, compared with the measured response."""
+"""Replay of a measured demand, which compares a model's response with the measurement."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class Replay(Answer):
     bench, source
         The model, and the measurement in one line.
     replayed
-        Inputs, and each output measured and modeled.
+        Inputs, and each output as measured and modeled.
     fits
         Figures of every signal and segment, with the tolerances.
     tracks
@@ -101,7 +101,7 @@ class Replay(Answer):
         subject = Subject.of_bench(bench)
         table = TableBlock(_fit_table(self.fits))
         definitions = [f"{k.name}: {k.definition}" for k in self.fits[0].kpis] if self.fits else []
-        head = f"{self.source} drives {bench.experiment} of {bench.parameters} by {inputs}"
+        head = f"{self.source} drives {bench.experiment} of {bench.parameters} through {inputs}"
         return Document(
             f"Replay of {self.source}",
             subject.line,
@@ -134,8 +134,8 @@ class Replay(Answer):
                     self.replayed.inputs,
                     [fit for fit in self.fits if fit.signal == name],
                 ),
-                f"{name}: measured (solid), simulated (dashed), and their difference; the demand "
-                "above.",
+                f"{name}: measured (solid), simulated (dashed), and their difference. The demand "
+                f"is at the top.",
                 name,
             )
             for name, pair in self.replayed.outputs.items()
@@ -166,18 +166,18 @@ class Replay(Answer):
                     f"to {amount(float(updated['high'][k]), unit)})"
                     for k in (0, -1)
                 )
-                yield f"{each.relation.parameter} tracked: at first {first}, at last {last}"
+                yield f"{each.relation.parameter} tracked: {first} at the start, {last} at the end"
 
     def _banner(self) -> Banner:
         is_judged = any(fit.verdicts for fit in self.fits)
         return Banner(self._verdict(), ("good" if self.holds else "bad") if is_judged else "none")
 
     def _verdict(self) -> str:
-        """Return the verdict in words, with the largest difference and its time."""
+        """Return the verdict as text, with the largest difference and its time."""
         outcomes = [v.outcome for fit in self.fits for v in fit.verdicts]
         if not outcomes:
             worst = self._worst(self.fits)
-            return f"No tolerance is set{worst and f'; the largest difference: {worst}'}"
+            return f"No tolerance is set{worst and f'. The largest difference: {worst}'}"
         if self.holds:
             return (
                 "The model reproduces the record within the tolerance"
@@ -314,7 +314,7 @@ def columns_of_bench(
 ) -> NamedColumns:
     """Return the named columns of a bench's inputs and outputs.
 
-    An input keeps the name of its column; an output gets the model's name.
+    An input keeps its column's name. An output gets the model's name.
 
     Parameters
     ----------
@@ -328,7 +328,7 @@ def columns_of_bench(
     Raises
     ------
     ParameterError
-        If one name means two columns.
+        If one name refers to two columns.
     """
     driving = {column: stimulus for stimulus, column in inputs.items()}
     for name, column in columns.items():
@@ -353,14 +353,14 @@ def units_of(model: Model, inputs: Mapping[str, str], outputs: Iterable[str]) ->
 
 
 def driven_bench(bench: Bench | str | Path, changes: Mapping[str, Any]) -> Bench:
-    """Return a bench; a missing stimulus becomes zero, because the measurement replaces it.
+    """Return a bench with zero for missing stimuli, because the measurement replaces them.
 
     Parameters
     ----------
     bench
         A `Bench`, the path of a bench file, or an experiment's name.
     changes
-        Changes as ``--set`` takes them.
+        Changes in the same form as ``--set``.
 
     Raises
     ------
@@ -381,7 +381,7 @@ def driven_bench(bench: Bench | str | Path, changes: Mapping[str, Any]) -> Bench
 def stretches_of(
     wanted: str | Path, inputs: xr.Dataset, limits: Mapping[str, str]
 ) -> list[Segment]:
-    """Return the segments to judge: those of a file, those detected, or the whole record."""
+    """Return the segments to evaluate: from a file, detected, or the whole record."""
     if not wanted:
         return whole_record(inputs["time"].values, limits)
     if wanted == "auto":

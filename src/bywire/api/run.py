@@ -1,4 +1,4 @@
-"""A bench, run and judged: recordings, key figures, verdicts, energy balances."""
+"""Results of a bench: recordings, key figures, verdicts, energy balances."""
 
 from __future__ import annotations
 
@@ -63,14 +63,16 @@ def require_scene(bench: Bench, over: str = "") -> None:
     if assembly not in known:
         raise ParameterError(
             f"{bench.experiment}: {assembly} has no animation (available for {', '.join(known)}). "
-            "Remove animate, or declare a SceneKind in a module 'animations' of the brake",
+            "Remove animate, or declare a SceneKind in the brake's module 'animations'",
             name="animate",
             value=assembly,
             valid=", ".join(known),
         )
     if over:
         raise ParameterError(
-            "an animation shows single runs. Remove animate or over", name="animate", value=over
+            "an animation shows a single run, not a range. Remove animate or over",
+            name="animate",
+            value=over,
         )
 
 
@@ -81,7 +83,7 @@ def _playable(result: Result) -> list[str]:
 
 
 def animations(result: Result) -> list[Attachment]:
-    """Return a page for each run of a result, as files of its folder."""
+    """Return an animation page for each run of a result, as files for its folder."""
     from bywire.report.animation.scene import scene_page
     from bywire.report.drawing import write_bytes
 
@@ -101,17 +103,18 @@ def animations(result: Result) -> list[Attachment]:
 
 
 _SAID = (
-    "Sliding tires mark the road. Marks of locked wheels are black. Arrows are braking forces. An "
-    "arrow of 1 m equals the weight."
+    "Sliding tires leave marks on the road. Locked wheels leave black marks. Arrows show braking "
+    "forces. An arrow of 1 m equals the weight."
 )
 
 
 # --- The result
 
 _SCATTERED = (
-    'Errors marked "up to" belong to figures that do not converge. Over double, single and half '
-    "steps, their differences do not shrink as a scheme of order 2 requires, so their errors are "
-    "unknown. The value is a 95 % bound from the figure's scatter over all steps."
+    'Errors marked "up to" belong to figures that do not converge. Between runs with twice, '
+    "once and half the step size, their differences do not shrink as a second-order scheme "
+    "requires, so their errors are unknown. The value is a 95 % bound from the figure's scatter "
+    "over all steps."
 )
 
 
@@ -119,7 +122,7 @@ _SCATTERED = (
 class BenchResult(Result, Answer):
     """Result of a bench, with recordings as xarray and key figures with their verdicts.
 
-    ``animated``: whether its folder gets a page that plays each run.
+    ``animated`` states whether the folder gets an animation page for each run.
     """
 
     animated: bool = False
@@ -131,7 +134,7 @@ class BenchResult(Result, Answer):
 
     @property
     def warnings(self) -> list[str]:
-        """Warnings on the bench and its runs."""
+        """Warnings about the bench and its runs."""
         return [*self.bench.outdated, *super().warnings]
 
     @property
@@ -155,31 +158,32 @@ class BenchResult(Result, Answer):
         ]
 
     def interact(self, *parameters: str, figure: str = "") -> Any:
-        """Return sliders for a notebook; each change runs the bench again and redraws it.
+        """Return sliders for a notebook. Each change reruns the bench and redraws the result.
 
-        Key figures are shown without their numerical errors, which would need further runs.
+        The notebook shows no numerical errors of key figures, because these need additional runs.
 
         Parameters
         ----------
         *parameters
-            Parameters by dotted name, such as ``"motor.R_m"``. A slider ranges from a quarter to
-            four times a positive value, within the parameter's valid range.
+            Parameters by dotted name, such as ``"motor.R_m"``. For a positive value, the slider
+            ranges from a quarter of the value to four times the value, within the parameter's valid
+            range.
         figure
-            Name of the figure, see `plot`; the first one by default.
+            Name of the figure (see `plot`). Default: the first figure.
 
         Returns
         -------
         ipywidgets.VBox
-            Sliders, figure and key figures, which a notebook shows.
+            Sliders, figure and key figures for display in a notebook.
 
         Raises
         ------
         FileError
             If ipywidgets is not installed (extra ``notebook``).
         UnknownNameError
-            For an unknown parameter or figure.
+            If a parameter or the figure is unknown.
         ParameterError
-            Without parameters, or if a parameter has no range around its value.
+            If no parameter is specified, or a parameter has no range around its value.
         """
         from bywire.api.notebook import sliders
 
@@ -248,7 +252,7 @@ class BenchResult(Result, Answer):
         )
 
     def _undefined(self) -> list[Listing]:
-        """Return why key figures are not defined, each reason once."""
+        """Return the reasons why key figures are not defined, each reason once."""
         named: dict[str, list[str]] = {}
         for kpi in self.kpis:
             if not math.isfinite(kpi.value) and kpi.note:
@@ -268,7 +272,7 @@ class BenchResult(Result, Answer):
         return animations(self)
 
     def _unplayed(self) -> list[str]:
-        """Return a remark if an animation was requested and no recording allows one."""
+        """Return a remark if an animation was requested but no recording allows one."""
         if not self.animated or self._animations():
             return []
         return ["no animation: no recording of this experiment contains the vehicle's position"]
@@ -332,7 +336,7 @@ class BenchResult(Result, Answer):
 def run_once(
     bench: Bench, progress: Progress | None, engine: str, estimate_error: bool, animated: bool
 ) -> BenchResult:
-    """Return the result of a bench; see `bywire.run`."""
+    """Return the result of a bench (see `bywire.run`)."""
     result = running.run(bench, progress, engine, estimate_error)
     return BenchResult(
         **{each.name: getattr(result, each.name) for each in fields(result)}, animated=animated
@@ -340,7 +344,7 @@ def run_once(
 
 
 def bench_of(bench: Bench | str | Path, overrides: Mapping[str, str]) -> Bench:
-    """Return the bench of a file or an experiment, with changes as ``--set`` takes them.
+    """Return the bench of a file or an experiment, with changes in the form of ``--set``.
 
     Raises
     ------
@@ -353,12 +357,12 @@ def bench_of(bench: Bench | str | Path, overrides: Mapping[str, str]) -> Bench:
 
 
 def faulty(bench: Bench, faults: Sequence[str]) -> Bench:
-    """Return a bench with further faults, as ``--fault`` takes them.
+    """Return a bench with additional faults, in the form of ``--fault``.
 
     Raises
     ------
     InputError
-        If a text is not a valid fault.
+        If a string is not a valid fault.
     """
     if not faults:
         return bench
@@ -366,7 +370,7 @@ def faulty(bench: Bench, faults: Sequence[str]) -> Bench:
 
 
 def _remark(verdict: Verdict) -> str:
-    """Return a remark on a requirement that is missed or undecided."""
+    """Return a remark about a requirement that is missed or undecided."""
     limit = f", limit {verdict.limit}"
     value, error, unit = beside_limit(verdict.value, verdict.error, verdict.unit, verdict.limit)
     if not verdict.is_decided and math.isfinite(verdict.error):

@@ -47,15 +47,15 @@ class Quantity(Generic[R]):
     Parameters
     ----------
     value
-        Its value for a row, as in JSON.
+        Value for a row, as in JSON.
     key
-        Its name in JSON; empty if JSON does not have it.
+        Name in JSON. Empty if JSON does not contain it.
     heading
-        Heading of its column; empty if tables do not show it.
+        Heading of its column. Empty if tables do not show it.
     unit
-        SI unit of a number, ``"1"`` for a pure number; empty for anything else.
+        SI unit of a number, ``"1"`` for a pure number. Empty for anything else.
     text
-        Its text in a row; by default a number with its unit, or the text itself.
+        Text in a row. Default: a number with its unit, or the text itself.
     number
         Number in frames if it is neither the value nor the text, in the same unit.
     """
@@ -111,7 +111,7 @@ _SHORT = ("fault", "class", "severity", "violates", "within", "seen within", "wi
 _RANK = ("undetected", "too late", "covered", "latent", "harmless, seen")
 """classes of faults, the most dangerous first"""
 _MOST = 12
-_NOTHING = 1e-4  # share of the largest deviation, below which a deviation is not worth a number
+_NOTHING = 1e-4  # fraction of the maximum deviation below which a table shows no number
 
 
 @dataclass(frozen=True, repr=False)
@@ -123,7 +123,7 @@ class FaultCampaign(Answer):
     findings
         Effect, fault tolerant time and time to detection of every fault; times in s.
     folder
-        Folder of its outcomes; None if they are not kept.
+        Folder of the outcomes. None if they are not saved.
     nominal
         Result of the bench without faults, or None.
     """
@@ -138,7 +138,7 @@ class FaultCampaign(Answer):
 
     @property
     def warnings(self) -> list[str]:
-        """Harm of the reaction, and warnings of the healthy run and of the solver."""
+        """Harm done by the reaction, and warnings of the healthy run and the solver."""
         healthy = [] if self.nominal is None else self.nominal.warnings
         return [
             *self.findings.harm_of_reaction(),
@@ -154,15 +154,18 @@ class FaultCampaign(Answer):
         alarms, cases = findings.false_alarms, findings.coverage_of_cases
         weight = "failure rates of [rates]" if findings.is_weighted else "unweighted"
         notes = [
-            f"thresholds were tuned on {plan.tuning} healthy runs. Alarms and faults were judged "
-            f"on {plan.healthy - plan.tuning} other healthy runs, of which {alarms.count} raise an "
+            f"thresholds were tuned on {plan.tuning} healthy runs. Alarms and faults were "
+            f"evaluated on {plan.healthy - plan.tuning} other healthy runs, of which "
+            f"{alarms.count} raise an "
             f"alarm ({100 * alarms.low:.2g} to {100 * alarms.high:.2g} %)",
-            f"coverage is the share of dangerous runs that detect the fault within the fault "
-            f"tolerant time of its worst run ({weight}). This applies to {cases.count} of "
+            f"coverage is the fraction of dangerous runs that detect the fault within the fault "
+            f"tolerant time of its worst run ({weight}). This is the case in {cases.count} of "
             f"{cases.cases} runs ({100 * cases.low:.3g} to {100 * cases.high:.3g} %)",
         ]
         if not plan.varied:
-            notes.append("nothing varies, so thresholds come from a single healthy run. Add [vary]")
+            notes.append(
+                "nothing varies, so thresholds come from a single healthy run. Add a [vary] section"
+            )
         if plan.reaction is not None:
             notes.append(
                 f"the reaction, {plan.reaction.failing.name} {amount(plan.reaction.delay, 's', 3)} "
@@ -272,18 +275,18 @@ class FaultCampaign(Answer):
 
     @cached_property
     def _ranked(self) -> list[FaultFinding]:
-        """The faults, the most dangerous first."""
+        """Faults, the most dangerous first."""
         return sorted(
             self.findings.faults,
             key=lambda f: (_RANK.index(f.kind), f.tolerance if f.dangerous else math.inf),
         )
 
     def _worst_fault(self) -> str:
-        """Return the most dangerous fault that no monitor detects in time; empty for none."""
+        """Return the most dangerous fault that no monitor detects in time, if there is one."""
         worst = self._ranked[0] if self._ranked else None
         if worst is None or worst.kind not in _RANK[:2]:
             return ""
-        return f"; the worst: {_name(worst)}, {worst.kind}, {_violated(worst)}"
+        return f". The worst is {_name(worst)}, {worst.kind}, {_violated(worst)}"
 
     def _worst_first(self) -> Table:
         """Return the table for a terminal."""
@@ -359,8 +362,8 @@ class FaultCampaign(Answer):
             ),
             FigureBlock(
                 curves,
-                "Median detection delay in dangerous runs over the number of healthy runs with an "
-                "alarm, for multiples of each threshold. Rings mark the thresholds in use.",
+                "Median detection delay in dangerous runs versus the number of healthy runs with "
+                "an alarm, for multiples of each threshold. Rings mark the thresholds in use.",
                 "alarm-curves",
             ),
         ]
@@ -410,7 +413,7 @@ def _name(each: FaultFinding) -> str:
     mode, value = each.failing.mode, each.failing.value
     size = f" {amount(value, mode.unit)}" if mode.unit else ""
     beside = f" after {each.failing.latent.mode.name}" if each.failing.latent else ""
-    start = " (there from the start)" if each.failing.is_present else ""
+    start = " (present from the start)" if each.failing.is_present else ""
     return f"{mode.name}{size}{beside}{start}"
 
 
@@ -437,7 +440,7 @@ def _with_reaction(each: FaultFinding) -> dict[str, Any] | None:
 
 
 def _reacted(each: FaultFinding) -> str:
-    """Return the criteria that are violated in spite of the reaction."""
+    """Return the criteria that are violated despite the reaction."""
     if not each.reacted:
         return "-"
     counts = {name: (int(np.sum(~np.isnan(t))), t.size) for name, t in each.reacted.items()}
@@ -467,7 +470,7 @@ def _time(time: float) -> str:
 
 
 def _latest(times: Array) -> float:
-    """Return the latest time [s]; NaN if there is none."""
+    """Return the latest time [s], or NaN if there is none."""
     return float(np.nanmax(times, initial=-math.inf)) if not np.isnan(times).all() else math.nan
 
 

@@ -1,4 +1,4 @@
-"""A bench over a range of one number: key figures by value, verdicts, overlaid curves."""
+"""Results of a bench over a range of one number: key figures, verdicts, overlaid curves."""
 
 from __future__ import annotations
 
@@ -80,18 +80,18 @@ class BenchRange(Answer):
         return [f"{text} ({self._at(values)})" for text, values in warned.items()]
 
     def kpi(self, name: str) -> Array:
-        """Return a key figure for every value, shape (values,); NaN where it is not defined.
+        """Return a key figure for every value, shape (values,), NaN where it is not defined.
 
         Raises
         ------
         UnknownNameError
-            If the name is unknown, with the closest matches.
+            If the name is unknown. The message lists the closest matches.
         """
         return np.array([result.kpi(name).value for result in self.results])
 
     @property
     def recordings(self) -> dict[str, xr.Dataset]:
-        """The recordings by label, dimensions case and time, with the value of each case."""
+        """Recordings by label, over dimensions case and time, with the value of each case."""
         labels = dict.fromkeys(label for result in self.results for label in result.recordings)
         return {
             label: xr.concat(
@@ -104,7 +104,7 @@ class BenchRange(Answer):
         }
 
     def document(self) -> Document:
-        """Return key figures by value, verdicts, curves."""
+        """Return key figures by value, verdicts and curves."""
         bench = self.bench
         kpis = self._kpis()
         title = bench.name or bench.experiment
@@ -170,7 +170,7 @@ class BenchRange(Answer):
         }
 
     def _indistinct(self) -> list[str]:
-        """Return a sentence on figures whose changes may be numerical errors, or none."""
+        """Return a sentence on figures whose changes may be numerical errors, if there are any."""
         names = [
             kpi.name
             for kpi in self._kpis()
@@ -238,9 +238,10 @@ class BenchRange(Answer):
         from bywire.report.time_traces import can_overlay
 
         captions = {
-            "curves": "Curves for all values. The scale shows their colors.",
-            "kpis": "Key figures over the value, with their numerical error where it is visible. "
-            "Dotted: the limit; crosses miss it. Figures that are constant or undefined are "
+            "curves": "Curves for all values. The color scale shows the values.",
+            "kpis": "Key figures versus the value, with their numerical error where it is "
+            "visible. Dotted lines show the limit. Crosses miss it. Figures that are constant "
+            "or undefined are "
             "omitted.",
         }
         blocks: list[Block] = [
@@ -295,13 +296,13 @@ class BenchRange(Answer):
 def run_over(
     bench: Bench, over: str, progress: Progress | None, engine: str, estimate_error: bool
 ) -> BenchRange:
-    """Return a bench's results for every value of ``NAME=LOW:HIGH:COUNT``; see `bywire.run`.
+    """Return a bench's results for every value of ``NAME=LOW:HIGH:COUNT`` (see `bywire.run`).
 
     Raises
     ------
     InputError
-        For an invalid range, a name that is not a number of the bench or of its options, and
-        values that the bench rejects.
+        If the range is invalid, the name is not a number of the bench or its options, or the bench
+        rejects a value.
     RunError
         If a run fails.
     KeyboardInterrupt

@@ -39,18 +39,18 @@ _MISSED = 0.05  # of the step's height
 def remarks(result: Result) -> list[str]:
     """Return remarks on unexpected behavior of a run.
 
-    There is a remark on a run that sticks for more than half of its time, is at a limit for more
-    than a tenth, or misses its set point by more than a twentieth of the step. Faults and remarks
-    of the model are included.
+    A run gets a remark if it sticks for more than half of its time, is at a limit for more than a
+    tenth, or misses its set point by more than a twentieth of the step. Faults and the model's own
+    remarks are included.
     """
     faults = fault_texts(result.bench, result.recordings)
     return [*faults, *_shares(result), *_set_point(result), *_of_models(result)]
 
 
 def fault_texts(bench: Bench, recordings: Recordings | None = None) -> list[str]:
-    """Return a sentence on each fault of a bench: size, time, description.
+    """Return a sentence about each fault of a bench, with size, time and description.
 
-    ``recordings``: its runs, to report a fault that none of them reaches; None to skip this.
+    ``recordings`` are the bench's runs, to report a fault that no run reaches. None skips this.
     """
     texts = []
     for fault in bench.injections:
@@ -113,7 +113,7 @@ def _set_point(result: Result) -> list[str]:
         return []
     return [
         f"misses its set point: {step.signal} ends {amount(error.value, error.unit)} away from "
-        f"{amount(step.end, error.unit)}, which is {100 * share:.3g} % of the step"
+        f"{amount(step.end, error.unit)} ({100 * share:.3g} % of the step)"
     ]
 
 
@@ -126,7 +126,7 @@ _RECORDED = ("bywire_version", "parameter_hash", "step", "engine", "status", "se
 def outcome(result: Result, rows: Sequence[KpiRow], notes: Sequence[Block]) -> Section:
     """Return requirements, changes and notes, the first section of a report.
 
-    ``rows``: key figures with their requirements; ``notes``: warnings and remarks.
+    ``rows`` are key figures with their requirements. ``notes`` are warnings and remarks.
     """
     blocks: list[Block] = []
     if judged := [row for row in rows if row.limit]:
@@ -135,9 +135,9 @@ def outcome(result: Result, rows: Sequence[KpiRow], notes: Sequence[Block]) -> S
 
 
 def _options_in_use(bench: Bench) -> Details:
-    """Return all options of a bench's experiment, folded."""
+    """Return all options of a bench's experiment, collapsed."""
     table = parameter_table(parameter_rows(bench.chosen_options))
-    return Details("Options of the experiment", [TableBlock(table)])
+    return Details("Experiment options", [TableBlock(table)])
 
 
 def source_says(result: Result) -> list[Block]:
@@ -167,7 +167,7 @@ def energy(ledgers: Mapping[str, Ledger]) -> list[Section]:
 
 
 def schematic_section(bench: Bench) -> list[Section]:
-    """Return the brake as parts and wires, if its model is made of them."""
+    """Return the brake's parts and wires, if its model consists of them."""
     case = next(iter(replace(bench, faults=()).cases()), None)  # without faults of signals
     model, par = (
         (ASSEMBLIES.find(bench.system)(), bench.par) if case is None else (case.model, case.par)
@@ -181,7 +181,7 @@ def how_it_was_made(
 ) -> Section:
     """Return source, program and all values.
 
-    ``errors``: numerical error of every recorded signal, by run and name.
+    ``errors`` are the numerical errors of all recorded signals, by run and name.
     """
     bench, cited = result.bench, PARAMETER_SETS.find(result.bench.parameters)
     attrs = next(iter(result.recordings.values())).attrs if result.recordings else {}
@@ -200,7 +200,7 @@ def how_it_was_made(
 
 
 def energy_table(books: Ledger) -> Table:
-    """Return an energy balance as a table: place, energy, share of the supplied energy."""
+    """Return an energy balance as a table: place, energy, fraction of the supplied energy."""
     total = books.turnover
 
     def row(side: str, label: str, energy: float) -> tuple[str | Cell, ...]:
@@ -212,7 +212,7 @@ def energy_table(books: Ledger) -> Table:
     rows = [row("from", posting.label, posting.energy) for posting in books.sources]
     rows += [row("to", posting.label, posting.energy) for posting in books.sinks]
     rows.append(row("", "closing error", books.closing_error))
-    return text_table(["", "place", "energy", "fraction of what was given"], rows)
+    return text_table(["", "place", "energy", "fraction of the supplied energy"], rows)
 
 
 def _signal_errors(errors: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> list[Details]:
@@ -233,7 +233,7 @@ def _signal_errors(errors: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> lis
 
 
 def tested_line(plan: StudyPlan) -> str:
-    """Return one line on the bench of a study, with its faults."""
+    """Return a line about the bench of a study, with its faults."""
     line = plan.bench.summary([each.name for each in plan.varied])
     names = [fault.mode.name for fault in plan.bench.injections]
     if not names:
@@ -250,7 +250,7 @@ def tested_brief(nominal: Result, plan: StudyPlan) -> list[Block]:
 
 
 def varied_texts(varied: Sequence[Varied]) -> list[str]:
-    """Return a sentence on each varied quantity."""
+    """Return a sentence about each varied quantity."""
     return [clean(f"{each.name} varies: {each.distribution.text}") for each in varied]
 
 
@@ -262,7 +262,7 @@ def tested_section(nominal: Result, source: StudiedBench | None, subject: Subjec
     nominal
         Result of the nominal bench.
     source
-        Origin of the bench; None if unknown.
+        Origin of the bench, or None if unknown.
     subject
         The bench with its changes.
     """
@@ -276,7 +276,7 @@ def tested_section(nominal: Result, source: StudiedBench | None, subject: Subjec
 def tested_data(bench: Bench, source: StudiedBench | None) -> dict[str, Any]:
     """Return the bench for JSON.
 
-    Values are SI numbers; changes and settings of the study are texts with units. The end of a
+    Values are SI numbers. The study's changes and settings are strings with units. The end of a
     permanent fault is None.
     """
     return {
@@ -304,6 +304,6 @@ def tested_data(bench: Bench, source: StudiedBench | None) -> dict[str, Any]:
 
 
 def _source_text(source: StudiedBench) -> str:
-    """Return the bench that the study file names, and the study's settings of it."""
+    """Return the bench that the study file specifies, and the study's settings for it."""
     changes = ", ".join(f"{name} = {value}" for name, value in source.changes.items())
     return clean(f"Bench: {source.bench}" + (f"; the study sets {changes}" if changes else ""))

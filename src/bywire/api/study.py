@@ -1,4 +1,4 @@
-"""Sizing study: designs of a brake compared at equal demands, the best and its limits."""
+"""Sizing study: brake designs compared under the same demands, the best design and its limits."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ class StudyResult(Answer):
 
     @property
     def warnings(self) -> list[str]:
-        """Warnings on the designs."""
+        """Warnings about the designs."""
         return list(self.findings.warnings)
 
     def document(self) -> Document:
@@ -87,7 +87,7 @@ class StudyResult(Answer):
         warned = [Listing([f"Warning: {text}." for text in findings.warnings])]
         limits = Listing(findings.limits)
         options = TableBlock(parameter_table(parameter_rows(self.options)))
-        chosen = Details("Options of the study", [options])
+        chosen = Details("Study options", [options])
         brief_limits: list[str | Flat] = (
             ["limits of the best design", limits, ""] if findings.limits else []
         )
@@ -121,7 +121,7 @@ class StudyResult(Answer):
         )
 
     def _banner(self) -> Banner:
-        """Return the warnings, and the first key figures in words."""
+        """Return the warnings and the first key figures as text."""
         texts = [f"{text[:1].upper()}{text[1:]}" for text in self.findings.warnings]
         texts += [
             f"{row.definition.rstrip('.')}: {measured_amount(row.value, row.unit, row.error)}"
@@ -175,7 +175,7 @@ AskedStudy = tuple[Study, str, ParameterSet, ParameterSet]
 
 
 def asked_study(name: str, parameters: str, overrides: Mapping[str, Any]) -> AskedStudy:
-    """Return a study, the name of its parameter set, and parameters and options as changed.
+    """Return a study, the name of its parameter set, and its changed parameters and options.
 
     Raises
     ------
@@ -190,7 +190,7 @@ def asked_study(name: str, parameters: str, overrides: Mapping[str, Any]) -> Ask
 def _changed(
     definition: Study, par: ParameterSet, overrides: Mapping[str, Any]
 ) -> tuple[ParameterSet, ParameterSet]:
-    """Return parameters and options: names with a dot are the brake's, others the study's."""
+    """Return parameters and options. Names with a dot are the brake's, others the study's."""
     of_study = {name: value for name, value in overrides.items() if "." not in name}
     options = definition.defaults.flat()
     for name in of_study:

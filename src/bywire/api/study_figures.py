@@ -28,7 +28,7 @@ _AXES = 9  # of parallel coordinates
 
 
 def scatters(findings: Findings) -> list[Block]:
-    """Return the scatter of each requirement's key figure over its main influences."""
+    """Return scatter plots of each requirement's key figure versus its main influences."""
     return [
         _scatter_block(findings, judgment)
         for judgment in findings.judgments
@@ -50,13 +50,12 @@ def _scatter_block(findings: Findings, judgment: Judgment) -> Block:
         else f"{every} miss the limit"
     )
     sentences = [
-        f"{name.replace('_', ' ')} over its main influences; {crosses}.",
+        f"{name.replace('_', ' ')} versus its main influences. {crosses.capitalize()}.",
         cases.caption("meet the limit", "miss it"),
-        f"Triangles at the upper edge mark cases without the figure ({lacking}), which miss the "
-        "limit."
+        f"Triangles at the top mark cases without the figure ({lacking}), which miss the limit."
         if lacking
         else "",
-        "Cases concentrate near failures, so the share of cases is not a probability."
+        "Cases concentrate near failures, so the fraction of cases is not a probability."
         if findings.rare
         else "",
     ]
@@ -65,7 +64,7 @@ def _scatter_block(findings: Findings, judgment: Judgment) -> Block:
 
 
 def parallel(findings: Findings) -> Block:
-    """Return every case as a line over varied quantities and required figures."""
+    """Return parallel coordinates, with a line for each case over quantities and figures."""
     met = np.all([j.met for j in findings.judgments], axis=0)
     cases = drawn_cases(met, LINES, LINES)
     thinned = cases.caption("meet all requirements", "miss one")
@@ -88,7 +87,7 @@ def parallel(findings: Findings) -> Block:
 
 
 def _required(findings: Findings) -> list[str]:
-    """Return the required key figures that some case has."""
+    """Return the required key figures that at least one case has."""
     known = {each.name for each in findings.spreads}
     return [j.demand.figure for j in findings.judgments if j.demand.figure in known]
 
@@ -128,7 +127,7 @@ def _parallel(findings: Findings, cases: DrawnCases) -> Figure:
 
 
 def _bound_of(findings: Findings, name: str) -> float | None:
-    """Return the limit of a key figure in its unit; None without a requirement."""
+    """Return the limit of a key figure in its unit, or None without a requirement."""
     return next((each.bound for each in findings.plan.demands if each.figure == name), None)
 
 
@@ -141,20 +140,21 @@ _Recordings = Callable[[], Mapping[str, Mapping[str, "xr.Dataset"]]]
 
 
 def load_drawing() -> None:
-    """Import the modules for a study's figures and report, ahead of its findings."""
+    """Import the modules for a study's figures and report before its findings are ready."""
     from bywire.data import netcdf  # noqa: F401
     from bywire.report import page, time_traces  # noqa: F401
 
 
 def study_figures(findings: Findings, recordings: _Recordings) -> list[Block]:
-    """Return the figures of a study; none if no case has a result.
+    """Return the figures of a study, or none if no case has a result.
 
     Parameters
     ----------
     findings
-        The study's cases, judged.
+        The study's cases with their verdicts.
     recordings
-        Returns the recordings of the bench itself and of worst cases, by run and label.
+        Function that returns the recordings of the bench itself and of worst cases, by run and
+        label.
     """
     if not findings.spreads:
         return []
@@ -168,8 +168,8 @@ def study_figures(findings: Findings, recordings: _Recordings) -> list[Block]:
     blocks: list[Block] = [
         FigureBlock(
             partial(_histograms, findings),
-            f"Spread of the key figures over the cases{band} Dashed lines show the bench itself, "
-            "dotted lines the limit.",
+            f"Spread of the key figures over the cases{band} Dashed lines show the bench itself. "
+            f"Dotted lines show the limit.",
             "histograms",
             is_long=True,
         )
@@ -181,7 +181,7 @@ def study_figures(findings: Findings, recordings: _Recordings) -> list[Block]:
                 partial(_influences, findings),
                 f"Influences on the key figures: "
                 f"{'partial ' * bool(findings.plan.correlations)}rank "
-                "correlations with their intervals. Pale bars are not distinct from zero."
+                "correlations with their intervals. Pale bars cannot be distinguished from zero."
                 f"{_on_choices(findings)}"
                 f"{strongest(map(findings.influences, figures))}",
                 "influences",
@@ -192,20 +192,21 @@ def study_figures(findings: Findings, recordings: _Recordings) -> list[Block]:
             FigureBlock(
                 partial(_tornado, findings, effects),
                 "Effect of each quantity alone on the key figures, starting from the bench itself. "
-                "Marks show its levels, dotted lines the limit."
+                "Marks show the quantity's levels. Dotted lines show the limit."
                 f"{_on_gray(findings)}{_on_edge(effects)}{strongest(effects.values())}",
                 "tornado",
             )
         )
     if findings.plan.sensitivity is not None:
         blocks += _sensitivity_figures(findings)
-    # Trajectories use only a few levels: their points would form stripes.
+    # Trajectories use only a few levels, so their points would form stripes.
     blocks += scatters(findings) if findings.plan.design != "morris" else []
     if findings.judgments and findings.plan.is_sampled:
         blocks.append(
             FigureBlock(
                 partial(_convergence, findings),
-                "Probability of meeting a requirement, over the number of cases. Dotted lines show "
+                "Probability of meeting a requirement versus the number of cases. Dotted lines "
+                "show "
                 f"the required probability.{_on_others(findings)}",
                 "convergence",
             )
@@ -284,7 +285,7 @@ def _convergence(findings: Findings) -> Figure:
 
 
 def _converging(findings: Findings) -> list[Judgment]:
-    """Return requirements, first those with a probability that are not met."""
+    """Return requirements, starting with those that have a probability and are not met."""
     return sorted(
         findings.judgments, key=lambda j: (j.demand.probability is None, j.outcome == "met")
     )
@@ -316,7 +317,7 @@ def _overlaid(each: Mapping[str, xr.Dataset]) -> Figure:
 
 
 def _alike_once(each: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
-    """Return recordings by label, with equal ones merged: a case may be worst twice."""
+    """Return recordings by label, with identical ones merged. A case may be worst twice."""
     once: dict[str, xr.Dataset] = {}
     for label, recording in each.items():
         same = next((known for known, other in once.items() if other.equals(recording)), None)
@@ -331,15 +332,15 @@ def _alike_once(each: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
 
 _POINTS = 200  # of a curve
 _CAPTIONS = {
-    "sobol-indices": "Fraction of each quantity in each key figure's variance, alone and with all "
-    "others, with intervals. Pale bars are not distinct from zero.",
+    "sobol-indices": "Contribution of each quantity to each key figure's variance, alone and "
+    "together with all others, with intervals. Pale bars cannot be distinguished from zero.",
     "morris": "Mean size (with its interval) and standard deviation of each quantity's elementary "
-    "effects. Pale bars are not distinct from zero.",
+    "effects. Pale bars cannot be distinguished from zero.",
 }
 
 
 def _rare_figures(findings: Findings) -> list[FigureBlock]:
-    """Return the figure of probabilities over the limit, if there are any."""
+    """Return the figure of probabilities versus the limit, if there are any."""
     if not any(each.failure.span for each in findings.rare):
         return []
     return [

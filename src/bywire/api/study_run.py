@@ -1,6 +1,6 @@
-"""A study of many cases: its results, verdicts and worst cases.
+"""Results, verdicts and worst cases of a study with many cases.
 
-A study of rare failures has its most probable failing cases instead.
+A study of rare failures has most probable failing cases instead of worst cases.
 """
 
 from __future__ import annotations
@@ -78,12 +78,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ShownCases:
-    """One case of each requirement.
+    """Worst case, or most probable failing case, of each requirement.
 
     Parameters
     ----------
     findings
-        The study's cases, judged.
+        The study's cases with their verdicts.
     nominal
         Result of the nominal bench.
     """
@@ -93,7 +93,7 @@ class ShownCases:
 
     @property
     def kind(self) -> str:
-        """Word for each case, also in file names."""
+        """Word for each case, which is also part of file names."""
         return "failing" if self.findings.rare else "worst"
 
     @property
@@ -112,11 +112,11 @@ class ShownCases:
 
     @cached_property
     def results(self) -> Mapping[str, Result]:
-        """Result of each case, run again, by its key figure."""
+        """Result of each case when rerun, by its key figure."""
         return {kpi: running.run(bench) for kpi, bench in self.benches.items()}
 
     def texts(self) -> list[str]:
-        """Return a text on each case."""
+        """Return a line about each case."""
         return [
             self._text(each, each.worst)
             for each in self.findings.judgments
@@ -139,7 +139,7 @@ class ShownCases:
         )
 
     def named(self, row: int) -> str:
-        """Return a case by its row: number and values."""
+        """Return a case's number and values, by its row."""
         units = self.findings.plan.units
         values = ", ".join(
             f"{name} = {value if isinstance(value, str) else amount(value, units[name])}"
@@ -181,7 +181,7 @@ class ShownCases:
         return replace(made, name=f"{self.kind} {judgment.demand.figure}")
 
     def _doubt(self, judgment: Judgment, row: int) -> str:
-        """Return a remark on a case that is too close to the limit to be decided."""
+        """Return a remark if a case is too close to the limit to decide it."""
         is_close = self.findings.is_close(judgment.demand)[row]
         return " (closer to the limit than its numerical error)" if is_close else ""
 
@@ -202,7 +202,7 @@ class ShownCases:
 
 
 def findings_data(findings: Findings) -> dict[str, Any]:
-    """Return design, cases, requirements and key figures; values in the figures' units."""
+    """Return design, cases, requirements and key figures, with values in the figures' units."""
     plan = findings.plan
     count = len(findings.cases)
     return {
@@ -235,7 +235,7 @@ def findings_data(findings: Findings) -> dict[str, Any]:
 
 
 def _judgment_data(findings: Findings, judgment: Judgment) -> dict[str, Any]:
-    """Return a requirement; without a probability if the cases are not random."""
+    """Return a requirement, without a probability if the cases are not random."""
     demand, share = judgment.demand, judgment.share
     probability = {"probability": share.value, "low": share.low, "high": share.high}
     rare = {}
@@ -268,12 +268,12 @@ def _spread_data(spread: Spread) -> dict[str, Any]:
 
 # --- Warnings and notes
 
-_REASONS = 10  # largest number of listed reasons
-_WIDE = 0.15  # half width above which an interval of a share of the variance is too wide
+_REASONS = 10  # maximum number of listed reasons
+_WIDE = 0.15  # half width above which the interval of a variance share is too wide
 
 
 def warned(findings: Findings, of_the_bench: list[str]) -> list[str]:
-    """Return warnings of runs, undecided rare failures, and cases without a result."""
+    """Return warnings about runs, undecided rare failures, and cases without a result."""
     count = len(findings.cases)
     texts = [f"{text} ({cases} of {count} cases)" for text, cases in findings.warnings.items()]
     texts += of_the_bench if not texts else []
@@ -358,8 +358,8 @@ def _on_choices(plan: StudyPlan) -> list[str]:
         return []
     return [
         f"{', '.join(choices)}: a choice has no rank correlation. Its correlation ratio, without "
-        "sign or interval, ranks it among the quantities. Use 'sobol-indices' to find its share of "
-        "the variance"
+        "sign or interval, ranks it among the quantities. Use 'sobol-indices' to find its "
+        "contribution to the variance"
     ]
 
 
@@ -371,7 +371,7 @@ def _on_intervals(findings: Findings) -> list[str]:
         return rare_notes(findings)
     if plan.sensitivity is not None:
         return [
-            f"{plan.design}: cases share values, so the share of cases is not a probability",
+            f"{plan.design}: cases share values, so the fraction of cases is not a probability",
             *((missing_indices(findings) + _wide_shares(findings)) if len(findings.cases) else []),
         ]
     if not plan.is_sampled:
@@ -396,8 +396,8 @@ def _wide_shares(findings: Findings) -> list[str]:
     if not wide:
         return []
     return [
-        f"{', '.join(wide)}: {design.base} groups are too few to determine shares within "
-        f"+-{_WIDE:g}. Request more cases in the study file, and run it in another folder"
+        f"{', '.join(wide)}: {design.base} groups are too few to determine variance shares to "
+        f"within +-{_WIDE:g}. Request more cases in the study file, and run it in another folder"
     ]
 
 
@@ -416,16 +416,17 @@ class StudyRun(Answer):
     plan
         The study.
     folder
-        Folder of its chunks.
+        Folder of the study's chunks.
     findings
-        Its cases, judged.
+        The cases with their verdicts.
     nominal
         Result of the nominal bench.
     status
-        ``passed``, ``failed`` or ``undecided`` by the requirements, ``done`` without requirements.
-        Also ``failed`` if no case has a key figure, and ``unfinished`` if cases are missing.
+        ``passed``, ``failed`` or ``undecided`` according to the requirements, or ``done`` without
+        requirements. Also ``failed`` if no case has a key figure, and ``unfinished`` if cases are
+        missing.
     damaged
-        Chunks with unreadable files, which were computed again.
+        Number of chunks that bywire recomputed because their files were unreadable.
     """
 
     plan: StudyPlan
@@ -441,9 +442,9 @@ class StudyRun(Answer):
 
     @property
     def cases(self) -> pd.DataFrame:
-        """All cases: varied quantities [SI], key figures, reasons for none, and warnings.
+        """All cases: varied quantities [SI], key figures, reasons for missing results, warnings.
 
-        ``.attrs["units"]`` has the unit of each column.
+        ``.attrs["units"]`` contains the unit of each column.
         """
         cases = self.findings.cases
         cases.attrs["units"] = dict(self.plan.column_units)
@@ -451,7 +452,7 @@ class StudyRun(Answer):
 
     @property
     def data(self) -> xr.Dataset:
-        """The cases with their units, dimension ``case``."""
+        """The cases with their units, over dimension ``case``."""
         import xarray as xr
 
         units = {**self.plan.units, **self.findings.units}
@@ -478,7 +479,7 @@ class StudyRun(Answer):
 
     @cached_property
     def _warnings(self) -> list[str]:
-        """The warnings, cached because they need a pass over all cases."""
+        """The warnings, cached because computing them takes a pass over all cases."""
         texts = [*self.nominal.bench.outdated, *warned(self.findings, self.nominal.warnings)]
         if self.status == "unfinished":
             resume = StudyStore(self.folder).resume_command
@@ -493,7 +494,7 @@ class StudyRun(Answer):
     def worst(self, kpi: str) -> Bench:
         """Return the bench of the worst case for a requirement.
 
-        For a rare failure, return that of the most probable failing case.
+        For a rare failure, return the bench of the most probable failing case.
 
         Raises
         ------
@@ -517,7 +518,7 @@ class StudyRun(Answer):
         return f"<StudyRun {self.plan.name}: {len(self.cases)} cases, {self.status}>"
 
     def document(self) -> Document:
-        """Return verdicts, the spread of key figures, influences, worst cases, figures."""
+        """Return verdicts, the spread of key figures, influences, worst cases and figures."""
         plan, findings = self.plan, self.findings
         if not len(self.cases):
             return self._empty()
@@ -573,7 +574,7 @@ class StudyRun(Answer):
                     *figures,
                     *[replace(each, most=_DRIVERS) for each in drivers[:_BRIEF]],
                     *(unexplained if findings.plan.sensitivity is None else []),
-                    *([f"{more} more such tables are in the report"] if more > 0 else []),
+                    *([f"{more} more of these tables are in the report"] if more > 0 else []),
                     *([Listing(missing, "Cases without a result")] if missing else []),
                 ]
             ),
@@ -635,10 +636,10 @@ def completed(
     cluster: str,
     progress: Progress | None,
 ) -> StudyRun:
-    """Return a study with all of its cases, after computing those that were missing."""
+    """Compute a study's missing cases, and return the study with all cases."""
 
     def ready() -> None:
-        if is_command_line():  # the report needs it next; a program may not
+        if is_command_line():  # the report needs these next, but a program may not
             load_drawing()
             field_notes(type(plan.bench.par))
 
@@ -662,7 +663,7 @@ def completed(
 
 
 def kept_study(folder: str | Path) -> StudyRun:
-    """Return the results of a study's folder, as `study_report` but without warnings."""
+    """Return the results in a study folder, like `study_report` but without emitting warnings."""
     store = StudyStore(Path(folder))
     plan, _ = kept_plan(store)
     store.require(plan)
@@ -675,7 +676,7 @@ def kept_plan(store: StudyStore) -> tuple[StudyPlan, Origin]:
     origin = Origin(Path(record["source"]), record["set"])
     if not origin.file.is_file():
         raise FileError(
-            f"the study file {origin.file} of {store.folder} no longer exists. If you moved it, "
+            f"the study file {origin.file} for {store.folder} no longer exists. If you moved it, "
             f"type 'bywire study run FILE --out {store.folder}'",
             name=str(origin.file),
         )
@@ -693,7 +694,7 @@ def kept_plan(store: StudyStore) -> tuple[StudyPlan, Origin]:
 
 
 def with_engine(engine: str, plan: StudyPlan) -> StudyPlan:
-    """Return the plan with an engine; the cases do not depend on the engine."""
+    """Return the plan with an engine. The cases do not depend on the engine."""
     return plan if engine == "auto" else replace(plan, bench=replace(plan.bench, engine=engine))
 
 
@@ -715,5 +716,5 @@ def _run_of(plan: StudyPlan, store: StudyStore, nominal: Result) -> StudyRun:
 
 
 def _loaded_by(path: str) -> str:
-    """Return the text with which a user loads a brake from a file."""
+    """Return the flag or call with which a user loads a brake from a file."""
     return f"--system {path}" if is_command_line() else f'bywire.load_system("{path}")'

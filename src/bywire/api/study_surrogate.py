@@ -15,7 +15,7 @@ from bywire.report.tables import Cell, Column, Table
 from bywire.report.wording import amount, clean
 from bywire.studies.surrogate import Surrogate
 
-_POOR = 0.5  # explained share of the variance below which a surrogate is useless
+_POOR = 0.5  # explained fraction of the variance below which a surrogate is useless
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class StudySurrogates(Answer):
     surrogates
         Surrogates by key figure, functions of the varied quantities [SI].
     at
-        Values at which to estimate [SI]; may be empty.
+        Values at which to estimate [SI]. May be empty.
     refused
         Key figures without a surrogate, with the reason.
     """
@@ -41,10 +41,10 @@ class StudySurrogates(Answer):
 
     @property
     def warnings(self) -> list[str]:
-        """Warnings on poor surrogates, and the study's warnings."""
+        """Warnings about poor surrogates, and the study's warnings."""
         poor = [
             f"the surrogate of {each.kpi} explains {100.0 * each.explained:.0f} % of the variance "
-            "of cases outside its fit. The rest is noise or is not polynomial"
+            f"in cases not used for its fit. The rest is noise or not polynomial"
             for each in self.surrogates.values()
             if each.explained < _POOR
         ]
@@ -53,7 +53,7 @@ class StudySurrogates(Answer):
 
     @property
     def notes(self) -> list[str]:
-        """Notes on values of quantities that the user did not specify."""
+        """Notes on the values of quantities that the user did not specify."""
         varied, first = self.study.plan.varied, next(iter(self.surrogates.values()))
         moved = [
             f"no case has the bench's {v.name} = {amount(v.nominal, v.unit)}. bywire uses the "
@@ -89,7 +89,7 @@ class StudySurrogates(Answer):
         )
 
     def _table(self) -> Table:
-        heads = ["variance told", "rms error", "maximum error", "degree", "terms", "cases"]
+        heads = ["variance explained", "rms error", "maximum error", "degree", "terms", "cases"]
         at = ["at these values"] if self.at else []
         rows = []
         for s in self.surrogates.values():

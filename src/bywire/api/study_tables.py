@@ -33,7 +33,7 @@ def demand_table(findings: Findings) -> Table:
     """Return the requirements: cases that meet them, probability, and verdict."""
     confidence = f"{100.0 * findings.plan.confidence:g} %"
     is_sampled = findings.plan.is_sampled
-    is_search = findings.plan.design == WORST  # its share of cases means nothing
+    is_search = findings.plan.design == WORST  # its fraction of cases means nothing
     counted = "worst found" if is_search else "cases that meet it"
     columns = [Column("requirement"), Column(counted, numeric=True)]
     columns += [Column("probability", numeric=True), Column(f"{confidence} interval")] * is_sampled
@@ -60,7 +60,7 @@ def demand_table(findings: Findings) -> Table:
 
 
 def _worst(findings: Findings, judgment: Judgment) -> Cell:
-    """Return the worst figure, or the common one if all cases are equal."""
+    """Return the worst figure, or the common figure if all cases are equal."""
     kpi = judgment.demand.figure
     figures = findings.figure(kpi)
     known = np.flatnonzero(np.isfinite(figures))
@@ -73,7 +73,7 @@ def _worst(findings: Findings, judgment: Judgment) -> Cell:
 def _figure_cell(
     findings: Findings, name: str, value: float, *, is_difference: bool = False
 ) -> Cell:
-    """Return the cell of a value of a key figure; see `figure_text`."""
+    """Return the cell of a key figure's value (see `figure_text`)."""
     unit = findings.units[name]
     text = figure_text(findings, name, value, is_difference=is_difference)
     return Cell(text, value=value, unit=difference_unit(unit) if is_difference else unit)
@@ -82,18 +82,18 @@ def _figure_cell(
 def figure_text(
     findings: Findings, name: str, value: float, digits: int = 4, *, is_difference: bool = False
 ) -> str:
-    """Return a value of a key figure in the unit of its cases and axes.
+    """Return a key figure's value in the unit of its cases and axes.
 
     Parameters
     ----------
     name
         The figure.
     value
-        The value, or a difference of two, in the figure's SI unit; NaN if it is not defined.
+        The value, or a difference of two values, in the figure's SI unit. NaN if it is not defined.
     digits
         Significant digits.
     is_difference
-        Whether the value is a difference; those of temperatures are in K.
+        Whether the value is a difference. Temperature differences are in K.
     """
     unit = findings.units[name]
     return amount(
@@ -102,7 +102,7 @@ def figure_text(
 
 
 def strongest(drivers: Iterable[Sequence[object]]) -> str:
-    """Return a sentence on the number of bars; empty if all quantities have one."""
+    """Return a sentence on the number of bars, or an empty text if all quantities have one."""
     count = max(map(len, drivers), default=0)
     return f" Only the {BARS} strongest of {count} quantities are shown." if count > BARS else ""
 
@@ -123,7 +123,7 @@ def percent(value: float, of: Share) -> str:
 
 
 def spread_blocks(findings: Findings) -> list[TableBlock | Listing]:
-    """Return the table of key figures, and the figures that no case has."""
+    """Return the table of key figures, and a list of figures that no case has."""
     if not findings.spreads:
         return []
     absent = [name for name in findings.units if name not in {s.name for s in findings.spreads}]
@@ -172,7 +172,7 @@ def correlated(plan: StudyPlan) -> list[Listing]:
 
 
 def influence_tables(findings: Findings) -> list[TableBlock]:
-    """Return the influences on each key figure of a requirement, or on all."""
+    """Return the influences on each key figure with a requirement, or on all key figures."""
     if not findings.plan.is_sampled:
         return []
     each = {name: findings.influences(name) for name in shown_figures(findings)}
@@ -189,7 +189,7 @@ def influence_tables(findings: Findings) -> list[TableBlock]:
 
 
 def effect_tables(findings: Findings) -> list[TableBlock]:
-    """Return the effect of each quantity alone on key figures of requirements, or on all."""
+    """Return the effect of each quantity alone on key figures with requirements, or on all."""
     return [
         TableBlock(
             _effect_table(findings, name, found),
@@ -242,7 +242,7 @@ def shown_figures(findings: Findings) -> list[str]:
 def unmoved(findings: Findings) -> list[str]:
     """Return a sentence on relevant key figures that are the same in every case.
 
-    Designs for indices report this themselves; for rare failures there is none.
+    Designs for indices report this themselves. Studies of rare failures have no such sentence.
     """
     if not (findings.plan.is_sampled or findings.plan.design == ONE):
         return []
@@ -254,13 +254,13 @@ def unmoved(findings: Findings) -> list[str]:
 
 
 def _more(influences: Sequence[object]) -> str:
-    """Return the number of quantities that a table omits, and their place."""
+    """Return the number of quantities that a table omits, and where they are."""
     rest = len(influences) - _SHOWN
-    return f", the {_SHOWN} strongest; {rest} more are in report.json" if rest > 0 else ""
+    return f" (the {_SHOWN} strongest; report.json contains {rest} more)" if rest > 0 else ""
 
 
 def _influence_table(influences: Sequence[Influence | ChoiceInfluence], is_partial: bool) -> Table:
-    """Return rank correlations, and in another column the correlation ratios of choices."""
+    """Return rank correlations, with the correlation ratios of choices in another column."""
     heads = [f"{'partial ' * is_partial}rank correlation", "interval"]
     has_choices = any(isinstance(i, ChoiceInfluence) for i in influences)
     if has_choices:
@@ -280,8 +280,8 @@ def _influence_table(influences: Sequence[Influence | ChoiceInfluence], is_parti
 
 # --- Rare failures and sensitivities
 
-_VALUES = 3  # largest number of discrete values of a quantity to show
-_SEEN = 0.005  # least share of failing cases to show a value
+_VALUES = 3  # maximum number of discrete values of a quantity to show
+_SEEN = 0.005  # minimum fraction of failing cases for which a value is shown
 
 
 def failure_table(findings: Findings) -> Table:
@@ -313,7 +313,7 @@ def failure_table(findings: Findings) -> Table:
 
 
 def importance_tables(findings: Findings) -> list[TableBlock]:
-    """Return the location of each requirement's failures, by quantity."""
+    """Return where each requirement fails, by quantity."""
     return [
         TableBlock(
             _importance_table(findings, each),
@@ -326,7 +326,7 @@ def importance_tables(findings: Findings) -> list[TableBlock]:
 
 
 def rare_data(failure: FailureProbability, findings: RareFailure) -> dict[str, Any]:
-    """Return a failure for JSON; margins are in the unit of the key figure."""
+    """Return a failure for JSON, with margins in the key figure's unit."""
     probable = failure.estimate
     return {
         "state": failure.state,
@@ -352,7 +352,7 @@ def rare_data(failure: FailureProbability, findings: RareFailure) -> dict[str, A
 
 
 def state_texts(findings: Findings) -> list[str]:
-    """Return a text on each requirement without an estimate: the reason and the next step."""
+    """Return the reason and the next step for each requirement without an estimate."""
     outcomes = {each.demand: each.outcome for each in findings.judgments}
     return [
         f"{each.demand.figure}: {text}"
@@ -386,7 +386,7 @@ def rare_notes(findings: Findings) -> list[str]:
     for each in findings.judgments if len(findings.cases) else ():
         if each.outcome == "undecided" and each.failure and each.failure.state == "done":
             more = (
-                "Use more cases_per_level, in another folder, to narrow it"
+                "To narrow it, use more cases_per_level and another folder"
                 if design.kind == SUBSET
                 else "Extend the study"
             )
@@ -403,14 +403,14 @@ def _state_text(each: RareFailure, plan: StudyPlan, outcome: Outcome) -> str:
     failure = each.failure
     if failure.state == "budget spent":
         so_far = f"the probability is at most {failure.estimate.high:.2g}"
-        seen = f"{failure.failed} failing cases, too few for an estimate; "
+        seen = f"{failure.failed} failing cases are too few for an estimate, and "
         so_far = seen * bool(failure.failed) + so_far
         where = (
             "before the last level"
             if plan.design == SUBSET
-            else "by the search for the design point"
+            else "during the search for the design point"
         )
-        return f"the budget of {plan.cases} cases is spent {where} ({so_far})" + (
+        return f"the budget of {plan.cases} cases was spent {where} ({so_far})" + (
             ". Extend the study" if outcome == "undecided" else ""
         )
     if failure.state == "level":
@@ -456,7 +456,7 @@ def _importance_table(findings: Findings, each: RareFailure) -> Table:
 
 
 def _place(importance: Importance, failure: RareFailure, unit: str) -> str:
-    """Return the location of failures in a quantity: its value, or shares of discrete values."""
+    """Return a quantity's value at failures, or the shares of its discrete values."""
     if importance.quantity not in failure.point:
         return "-"
     if not importance.shares:
@@ -478,7 +478,7 @@ def search_notes(findings: Findings) -> list[str]:
         for demand, each in zip(plan.judged_demands, findings.searches, strict=False)
         if each.state == "budget spent"
     ]
-    notes = [f"{plan.design}: a search does not prove that there are no worse cases"]
+    notes = [f"{plan.design}: a search does not prove that no worse cases exist"]
     if spent:
         notes.append(
             f"{', '.join(spent)}: the budget of {plan.cases} cases was spent before the search "
@@ -491,7 +491,7 @@ def search_notes(findings: Findings) -> list[str]:
 
 
 def sensitivity_tables(findings: Findings) -> list[TableBlock]:
-    """Return the indices of each key figure of a requirement, or of all."""
+    """Return the indices of each key figure with a requirement, or of all key figures."""
     return [
         TableBlock(
             _table(findings, name, found),
@@ -506,7 +506,7 @@ def sensitivity_tables(findings: Findings) -> list[TableBlock]:
 def drivers_data(findings: Findings, name: str) -> dict[str, Any]:
     """Return the influences, effects, or indices of a key figure for JSON.
 
-    Figures and effects are in the unit of the figure, values of quantities in SI.
+    Figures and effects are in the figure's unit, and values of quantities in SI.
     """
     if findings.plan.sensitivity is None and not findings.plan.is_sampled:
         found = findings.effects(name)
@@ -549,7 +549,7 @@ def missing_indices(findings: Findings) -> list[str]:
     for name in shown_figures(findings):
         if reason := findings.sensitivity(name).missing:
             reasons.setdefault(reason, []).append(name)
-    texts = [f"of {', '.join(names)}: {reason}" for reason, names in reasons.items()]
+    texts = [f"for {', '.join(names)}: {reason}" for reason, names in reasons.items()]
     return [f"no indices {'; '.join(texts)}"] if texts else []
 
 
@@ -573,7 +573,7 @@ def _table(
 
 
 def _cells(of: Estimate, written: Callable[[float], str]) -> list[Cell]:
-    """Return estimate and interval."""
+    """Return an estimate and its interval."""
     value, low, high = map(written, (of.value, of.low, of.high))
     return [Cell(value, value=of.value), Cell(f"{low} to {high}")]
 

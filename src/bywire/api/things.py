@@ -51,21 +51,22 @@ class ThingKind(NamedTuple):
     Parameters
     ----------
     title
-        Word for one of them.
+        Noun for a thing of this kind.
     things
-        All of them by name.
+        All things of this kind by name.
     describe
-        Function that describes one as plain data, with a ``summary``; None if the line suffices.
+        Function that describes a thing as plain data with a ``summary``. None if its line is
+        enough.
     topic
-        Topic of the index that lists them; empty if there are too many to list.
+        Topic under which the index lists the things. Empty if there are too many to list.
     line
         Function that returns a thing's line in the index.
     listed
-        Things that the index lists; default: all.
+        Things that the index lists. Default: all.
     meaning
-        Function that returns the searched text; None if they are not searched.
+        Function that returns the text to search. None if the search skips this kind.
     has_assembly
-        Whether each belongs to an assembly, whose description names it.
+        Whether each thing belongs to an assembly whose description lists it.
     """
 
     title: str
@@ -79,7 +80,7 @@ class ThingKind(NamedTuple):
 
 
 def thing_kinds() -> tuple[ThingKind, ...]:
-    """Return all kinds, in the order of the index; parameters, their groups and signals last."""
+    """Return all kinds in the index's order, with parameters, their groups and signals last."""
     return (
         ThingKind("brake", _brakes, None, "brakes"),
         ThingKind(
@@ -181,9 +182,9 @@ def thing_kinds() -> tuple[ThingKind, ...]:
 
 
 def all_things() -> dict[str, Any]:
-    """Return topic -> name -> line, as plain data; things of brakes loaded by path first.
+    """Return topic -> name -> line as plain data, with things of brakes loaded by path first.
 
-    Assemblies have no lines. The names of the key figures of every experiment are at the end.
+    Assemblies have no lines. The key figure names of every experiment are at the end.
     """
     topics: dict[str, Any] = {}
     for kind in thing_kinds():
@@ -212,7 +213,7 @@ def doubts() -> list[str]:
 
 
 def _in_order(kind: Kind[Any]) -> Mapping[str, Any]:
-    """Return all things of a kind, those of brakes loaded by path first."""
+    """Return all things of a kind, with those of brakes loaded by path first."""
     files = loaded_files()
     loaded = [brake for brake in brakes().values() if brake.file in files]
     first = {name: thing for brake in loaded for name, thing in kind.of(brake.module).items()}
@@ -226,7 +227,7 @@ def _brakes() -> Mapping[str, Any]:
 
 
 def _assemblies_with_numbers() -> Mapping[str, Any]:
-    """Return the assemblies with a parameter set, and all of a brake that has no such assembly."""
+    """Return the assemblies with a parameter set, and all assemblies of a brake without one."""
     known = ASSEMBLIES.all()
     named = {cited.assembly for cited in PARAMETER_SETS.all().values()}
     names = named & known.keys()
@@ -258,7 +259,7 @@ def _fault_line(places: list[tuple[str, Mode]]) -> str:
 
 
 def _fault(places: list[tuple[str, Mode]]) -> dict[str, Any]:
-    """Return all about a mode: its value's unit and default in every assembly."""
+    """Return a mode's details, with its value's unit and default in every assembly."""
     rows = [
         {
             "assembly": assembly,
@@ -358,7 +359,7 @@ def _group(name: str) -> Object:
         rows += new
     about = " or ".join(dict.fromkeys(filter(None, meanings)))
     return {
-        "summary": f"{about}; parameters with the values of {' and '.join(sets)}",
+        "summary": f"{about} (values from {' and '.join(sets)})",
         "assembly": ", ".join(assemblies),
         "parameters": rows,
         "changed_with": "--set NAME=VALUE",
@@ -366,7 +367,7 @@ def _group(name: str) -> Object:
 
 
 def group_meaning(cls: type[ParameterSet]) -> str:
-    """Return the meaning of a parameter group, from its element's module or from its class."""
+    """Return the meaning of a parameter group, from its element's module or its class."""
     about = inspect.getdoc(cls) or ""
     if cls.__name__ == "Parameters":
         about = getattr(inspect.getmodule(cls), "__doc__", None) or about
@@ -384,16 +385,16 @@ def _option_rows(
     values: ParameterSet | Mapping[str, Any] | None,
     simulated: Collection[str] = (),
 ) -> list[dict[str, Any]]:
-    """Return a row for every number and choice of a parameter class, in their order.
+    """Return a row for every number and choice of a parameter class, in declared order.
 
     Parameters
     ----------
     cls
         The class.
     values
-        Default values; None to take those of the class.
+        Default values. If None, those of the class.
     simulated
-        First parts of the names of options that affect only simulated experiments.
+        Prefixes of the names of options that affect only simulated experiments.
     """
     leaves, notes = leaf_fields(cls), field_notes(cls)
     known = _given_by(cls) if values is None else values
@@ -516,7 +517,7 @@ def _system(model: type[Any]) -> Object:
         for kind in thing_kinds()
         if kind.has_assembly
     }
-    parameters = "'bywire list NAME' with a parameter set's name shows its parameters"
+    parameters = "'bywire list NAME' also shows the parameters of a parameter set"
     return {
         "summary": system_summary(model),
         **there,
@@ -526,8 +527,8 @@ def _system(model: type[Any]) -> Object:
 
 
 def system_summary(model: type[Any]) -> str:
-    """Return one line on a model."""
-    # The docstring of the class gives its purpose; that of its file describes the model.
+    """Return a one-line summary of a model."""
+    # The class's docstring states its purpose. The file's docstring describes the model.
     about = inspect.getmodule(model).__doc__ or ""
     return " ".join(about.strip().partition("\n\n")[0].split()).rstrip(".")
 
@@ -556,7 +557,7 @@ def _drive(experiment: Experiment) -> Object:
 def _recorded(ran: Sequence[str]) -> str:
     """Return the commands that list the recorded signals."""
     commands = " and ".join(f"'bywire list {name}'" for name in ran)
-    return f"{commands}: the signals in a recording" if ran else ""
+    return f"{commands} {'shows' if len(ran) == 1 else 'show'} the recorded signals" if ran else ""
 
 
 def _driven(case: Case) -> list[tuple[str, str, str]]:
@@ -592,7 +593,7 @@ def _generic_experiment(experiment: GenericExperiment) -> Object:
         "assembly": "any",
         "options": rows,
         "changed_with": "--set options.NAME=VALUE",
-        "see": "'bywire list NAME' with an assembly's name shows its stimuli and recorded signals. "
+        "see": "'bywire list NAME' also shows the stimuli and recorded signals of an assembly. "
         f"'x nominal' multiplies the nominal value of the signal that {_named(experiment)} selects",
     }
 
@@ -661,7 +662,7 @@ def _loop(loop: Loop) -> Object:
 def _plant(plant: Plant) -> Object:
     """Return a plant with its inputs, outputs and states."""
     par = PARAMETER_SETS.find(main_set(plant.assembly)).parameters()
-    with taking(ABOVE):  # the names of signals do not depend on the side
+    with taking(ABOVE):  # signal names do not depend on the side
         model = plant.model(par, plant.usual)
     places = places_of(ASSEMBLIES.all()[plant.assembly]).items()
     meaning = {name: signal.label for name, signal, _ in merged_signals(places)}
@@ -707,7 +708,7 @@ def _method(method: Method) -> Object:
         "summary": method.summary,
         "assembly": method.assembly or "any",
         "experiment": method.experiment,
-        "records": "one or several" if method.several else "one",
+        "records": "one or more" if method.several else "one",
         "signals": [*needed, *more],
         "estimates": _estimates(method),
         "options": _option_rows(method.options, method.defaults, method.simulated),
@@ -718,18 +719,18 @@ def _method(method: Method) -> Object:
 def _bench_method(method: BenchMethod) -> Object:
     return {
         "summary": method.summary,
-        "assembly": "any, that of --bench",
-        "records": "one or several",
+        "assembly": "any, from --bench",
+        "records": "one or more",
         "options": _option_rows(method.options, method.defaults, method.simulated),
         "changed_with": "--option NAME=VALUE",
-        "see": "'bywire list NAME' with the name of the bench's assembly shows names for --input "
-        "(stimulus), --output (recording) and --estimate-start (state). With a parameter set's "
-        "name, it shows names for --unknown",
+        "see": "'bywire list NAME' shows names for --input (stimulus), --output (recording) and "
+        "--estimate-start (state), where NAME is the bench's assembly. For a parameter set, "
+        "it shows names for --unknown",
     }
 
 
 def _estimates(method: Method) -> list[Object]:
-    """Return the names that a method estimates, parameters of the assembly first."""
+    """Return the names that a method estimates, with parameters of the assembly first."""
     rows = []
     if method.assembly and method.unknowns:
         cls = PARAMETER_SETS.find(main_set(method.assembly)).parameter_class

@@ -24,11 +24,11 @@ from bywire.report.document import Document, Flat, Listing, Section, TableBlock
 from bywire.report.estimate_tables import trust_table
 
 STORE = "experiments.jsonl"
-"""file of the output folder that keeps finished experiments"""
+"""file in the output folder that stores finished experiments"""
 
 _NONE: Mapping[str, Any] = MappingProxyType({})
 _NOTHING = Question()
-_MOST = 5  # largest number of listed experiments without a result
+_MOST = 5  # maximum number of listed experiments without a result
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class TrustStudy(Answer):
 
     @property
     def holds(self) -> bool:
-        """Whether the method recovers every unknown, from every experiment."""
+        """Whether the method recovers every unknown in every experiment."""
         return self.trust.holds
 
     @cached_property
@@ -61,9 +61,13 @@ class TrustStudy(Answer):
         kept = Counter(label for o in outcomes for label in o.kept)
         checks = Counter(name for o in outcomes for name in o.failed_checks)
         texts += [
-            f"{label} was not determined in {n} of {len(outcomes)}" for label, n in kept.items()
+            f"{label} was not determined in {n} of {len(outcomes)} experiments"
+            for label, n in kept.items()
         ]
-        texts += [f"check {name} failed in {n} of {len(outcomes)}" for name, n in checks.items()]
+        texts += [
+            f"check {name} failed in {n} of {len(outcomes)} experiments"
+            for name, n in checks.items()
+        ]
         return texts
 
     def document(self) -> Document:
@@ -121,7 +125,7 @@ def trust(
     processes: int | None = None,
     progress: Progress | None = None,
 ) -> TrustStudy:
-    """Identify many simulated experiments, each with its own noise and a perturbed start.
+    """Test a method on many simulated experiments, each with its own noise and perturbed start.
 
     Parameters
     ----------
@@ -130,20 +134,20 @@ def trust(
     count
         Number of experiments.
     starts, seed
-        Starts of each search, and the first experiment's seed; the others follow it.
+        Number of starting points of each search, and the first experiment's seed. The other seeds
+        follow it.
     folder
-        Folder of the result. A folder with the result of another method is rejected, an earlier
-        study is removed. Finished experiments stay there, so that an interrupted study can
-        continue.
+        Folder of the result. bywire rejects a folder with another method's result, and removes an
+        earlier study. Finished experiments stay there, so that an interrupted study can continue.
     processes
-        Experiments at a time; all cores by default.
+        Number of experiments to run in parallel. Default: one per core.
     progress
-        Called with a label and the finished share, 0 to 1.
+        Called with a label and the completed fraction, 0 to 1.
 
     Returns
     -------
     TrustStudy
-        Recovery of the known values: errors and intervals of each parameter, in SI units.
+        Recovery of the known values, with errors and intervals of each parameter in SI units.
 
     Raises
     ------

@@ -1,9 +1,9 @@
-"""Names for writing your own brake: one place to import from, two levels deep.
+"""Names for your own brake, all importable from one place, two levels deep.
 
-Models, experiments, loops, methods, studies and sources of a user's package or file take their
-names from here, wherever those stand inside bywire; elements come from ``bywire.plant`` and
-``bywire.control``, functions of symbols from ``bywire.core.ops``. Everything is loaded on first
-use, so that a listing loads no figures.
+Models, experiments, loops, methods, studies and sources in a user's package or file import their
+names from here, independent of where bywire defines the names. Elements come from ``bywire.plant``
+and ``bywire.control``, and functions of symbols from ``bywire.core.ops``. bywire loads each name on
+first use, so that a listing loads no figures.
 
 >>> from bywire.authoring import Brake, Part, chosen
 >>> chosen(0.3, "a motor of this size").kind

@@ -1,4 +1,4 @@
-"""Names for brakes of one's own with their homes: for type checkers, and for `__getattr__`."""
+"""Names for your own brake with the modules that define them, also used by `__getattr__`."""
 
 from bywire.analysis.linear.linear_model import LinearModel as LinearModel
 from bywire.analysis.linear.linearize import linearize as linearize

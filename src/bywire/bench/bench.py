@@ -47,7 +47,7 @@ from bywire.core.values import parsed
 from bywire.simulation.engine import engine_names, structure_of
 from bywire.simulation.run import Run
 
-_SHARE = 1e-3  # of a value: change that tests whether the value has an effect
+_SHARE = 1e-3  # relative change that tests whether a value has an effect
 
 
 @dataclass(frozen=True)
@@ -73,9 +73,9 @@ class Bench:
     step
         Substep [s].
     record
-        Recording interval [s]; None for the experiment's own.
+        Recording interval [s]. None for the experiment's own interval.
     seed
-        Seed of the sensors' noise.
+        Seed of the sensor noise.
     requirements
         Limit by KPI name, such as ``{"overshoot": "<= 15 %"}``.
     name
@@ -84,8 +84,8 @@ class Bench:
         Faults and their times: tables like those of ``[[faults]]`` in a bench file (see
         ``docs/faults.md``).
     assembly
-        Tested model of the parameters' brake, for experiments that leave the choice; if empty, the
-        model of the parameter set.
+        Tested model of the parameters' brake, for experiments that allow a choice. Default: the
+        parameter set's model.
     engine
         Engine of the runs: ``auto``, ``compiled``, ``virtual-machine``, ``cuda`` (a graphics
         processor), or the compiled C of the ECU in the loop, ``sil`` (double precision) or
@@ -115,7 +115,7 @@ class Bench:
     def __post_init__(self) -> None:
         for key in ("experiment", "parameters", "name", "assembly"):
             if not isinstance(getattr(self, key), str):
-                raise not_valid(key, quoted(getattr(self, key)), "a text")
+                raise not_valid(key, quoted(getattr(self, key)), "a string")
         for key in ("overrides", "options", "stimulus", "requirements"):
             object.__setattr__(self, key, dict(getattr(self, key)))  # a copy
         object.__setattr__(self, "faults", tuple(checked_sections(self.faults)))
@@ -131,7 +131,7 @@ class Bench:
         if self.assembly == known.assembly:
             object.__setattr__(self, "assembly", "")
         chosen = self.definition
-        object.__setattr__(self, "experiment", chosen.name)  # also where an earlier name was given
+        object.__setattr__(self, "experiment", chosen.name)  # also for an earlier name
         if chosen.assembly != self.system:
             by_name = f"assembly = {self.assembly!r}"
             by_set = f"parameter set {known.name!r} is for a {known.assembly}"
@@ -167,10 +167,10 @@ class Bench:
         known = {} if chosen.beside is None else chosen.beside(self.chosen_options)
         for name in further:
             if name not in known:
-                raise unknown_name(f"stimulus beside {chosen.name}", name, known)
+                raise unknown_name(f"additional stimulus of {chosen.name}", name, known)
 
     def _require_effects(self, names: Sequence[str], cases: Sequence[Case], make: Cases) -> None:
-        """Reject changed parameters that a choice switches off, as they would have no effect.
+        """Reject changed parameters that would have no effect because a choice switches them off.
 
         ``names``: names without patterns; a pattern may match parameters that have no effect.
         """
@@ -184,7 +184,7 @@ class Bench:
                 refuse_without_effect(name, value, switches, self.par)
 
     def _is_used(self, name: str, other: Any, cases: Sequence[Case], make: Cases) -> bool:
-        """Return whether the experiment depends on a parameter, by setting it to another value."""
+        """Test whether the experiment depends on a parameter by setting another value."""
         try:
             par, following = self.par.replace({name: other}), self.definition.following
             if following is not None and following(par) != following(self.par):
@@ -229,14 +229,14 @@ class Bench:
 
     @cached_property
     def par(self) -> ParameterSet:
-        """Validated parameters, overrides applied."""
+        """Validated parameters, including the overrides."""
         base = PARAMETER_SETS.find(self.parameters).parameters()
         listed = f"bywire list {self.parameters}"
         return base.replace(parsed(type(base), self.overrides, "parameter", listed))
 
     @cached_property
     def outdated(self) -> list[str]:
-        """Derived values of the set that no longer match the values they were derived from."""
+        """Derived values of the set that no longer match the values behind them."""
         cited = PARAMETER_SETS.find(self.parameters).values
         leaves = leaf_fields(type(self.par))
         texts = []
@@ -345,12 +345,12 @@ class Bench:
         overrides, options
             Parameters, choices and numbers of the options by dotted name [SI].
         seed
-            Seed of the sensors' noise; unchanged by default.
+            Seed of the sensor noise. Default: unchanged.
 
         Raises
         ------
         InputError
-            For values out of range, or with which the experiment cannot be set up.
+            For values out of range, or values with which the experiment cannot be set up.
         """
         made = object.__new__(type(self))
         known = made.__dict__
@@ -380,7 +380,7 @@ class Bench:
         return None if following is None else following(self.par)
 
     def with_overrides(self, overrides: Mapping[str, Any]) -> Bench:
-        """Return this bench with further changes; percentages refer to its present values."""
+        """Return this bench with additional changes; percentages refer to its current values."""
         changes = settled(self.par, overrides)
         matched = changes.keys() - overrides.keys()
         silent = {name for name in matched if switches_of(name, self._previewed)}
@@ -471,7 +471,7 @@ def switches_of(name: str, cases: Sequence[Case]) -> list[Switch]:
 def refuse_without_effect(
     name: str, value: Any, switches: Sequence[Switch], par: ParameterSet
 ) -> None:
-    """Raise ParameterError for a parameter that choices switch off, if any do."""
+    """Raise ParameterError for a parameter if any choices switch it off."""
     if not switches:
         return
     leaf = leaf_fields(type(par)).get(name)

@@ -26,7 +26,7 @@ from bywire.core.values import parsed, require_unit, require_units
 from bywire.data.toml_file import BENCH, first_there, near_files, read_toml, require_kind
 
 PATHS = ("trace", "trace_map", "file")
-"""keys of options and stimuli that name files: bench files contain them as absolute paths"""
+"""keys of options and stimuli that specify files: bench files contain them as absolute paths"""
 
 
 def bench_text(bench: Bench, comment: str = "") -> str:
@@ -35,7 +35,7 @@ def bench_text(bench: Bench, comment: str = "") -> str:
     Parameters
     ----------
     bench
-        Bench to write; numbers get their SI units, texts stay as typed.
+        Bench to write; numbers get their SI units, and texts remain as typed.
     comment
         Text of the first lines, as a comment.
 
@@ -114,7 +114,7 @@ def _text(name: str, value: Any, symbol: str) -> str:
         return str(value).lower()
     if isinstance(value, Sequence):
         return f"[{', '.join(_text(name, node, symbol) for node in value)}]"
-    number = value if isinstance(value, int) else float(value)  # all digits, for the same run
+    number = value if isinstance(value, int) else float(value)  # all digits, to reproduce the run
     return json.dumps(f"{number} {symbol}") if symbol != "1" else f"{number}"
 
 
@@ -188,13 +188,13 @@ def load(path: str | Path) -> Bench:
 
 
 def read(path: str | Path, changes: Mapping[str, str]) -> Bench:
-    """Read a bench file and change it as ``--set key=value`` does.
+    """Read a bench file and change it like ``--set key=value``.
 
     Parameters
     ----------
     path
-        Bench file; or the bare name of an experiment, for its defaults and the main parameter set
-        of its brake.
+        Bench file, or the bare name of an experiment for its defaults and the main parameter set of
+        its brake.
     changes
         ``options.NAME``, ``stimulus.NAME``, ``simulation.NAME``, ``requirements.NAME``,
         ``experiment``, ``parameters``, or the dotted name of a parameter, which may be a pattern.
@@ -219,7 +219,7 @@ def read(path: str | Path, changes: Mapping[str, str]) -> Bench:
 
 
 def from_mapping(content: Mapping[str, Any], folder: Path, name: str) -> Bench:
-    """Return the bench of a bench file's content; relative paths start at ``folder``."""
+    """Return the bench for a bench file's content; relative paths start at ``folder``."""
     sets = sets_of_loaded()
     only = {"parameters": sets[0]} if len(sets) == 1 else {}
     content = {"name": name, **only, **content}
@@ -377,7 +377,7 @@ _NAME = re.compile(r"[a-z][a-z0-9-]*")
 
 
 _FOLDER = "benches"  # usual folder of bench files
-_NEAR, _NEAR_EXPERIMENT = 0.5, 0.7  # least similarity of a suggested name
+_NEAR, _NEAR_EXPERIMENT = 0.5, 0.7  # minimum similarity of a suggested name
 
 
 def names_experiment(source: str | Path) -> bool:
@@ -389,7 +389,7 @@ def names_experiment(source: str | Path) -> bool:
 
 
 def content_of_experiment(file: Path, changes: Mapping[str, str]) -> dict[str, str]:
-    """Return the shortest bench file of an experiment; nothing if the name is that of a file.
+    """Return an experiment's shortest bench file; empty if the name belongs to a file.
 
     Raises
     ------
@@ -429,7 +429,7 @@ def _near(file: Path) -> Iterator[tuple[float, str]]:
     kinds = ("", BENCH)
     files = near_files(file, kinds, [file.parent], _NEAR, with_ending=True)
     yield from ((likeness, str(path)) for likeness, path in files)
-    written = file.name.replace("_", "-")  # a file's name for an experiment's
+    written = file.name.replace("_", "-")  # a file name instead of an experiment's name
     if _NAME.fullmatch(written):
         for name in {**EXPERIMENTS.all(), **GENERIC_EXPERIMENTS.all()}:
             likeness = SequenceMatcher(None, name, written).ratio()

@@ -1,4 +1,4 @@
-"""Changes of a bench by name: parameters, options, shares of values, and patterns of names."""
+"""Changes of a bench by name: parameters, options, percentages, and patterns of names."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ def settled(base: ParameterSet, changes: Mapping[str, Any]) -> dict[str, Any]:
         Parameters before the changes.
     changes
         Values by dotted name. A text with a sign and a percentage, ``"+50%"``, changes a quantity
-        by that share of its value; ``*``, ``?`` and ``[...]`` in a name match any characters. A
+        by that fraction of its value. ``*``, ``?`` and ``[...]`` in a name match any characters. A
         name without a pattern takes precedence.
 
     Raises
     ------
     UnknownNameError
-        When a pattern matches nothing.
+        When a pattern matches no name.
     ParameterError
         For a percentage of a choice, of zero, or of a temperature.
     """
@@ -47,7 +47,7 @@ def settled(base: ParameterSet, changes: Mapping[str, Any]) -> dict[str, Any]:
         names = [name for name in values if fnmatchcase(name, pattern)]
         if not names:
             groups = {f"{name.rpartition('.')[0]}.*" for name in values if "." in name}
-            raise unknown_name("parameter (none is matched)", pattern, {*values, *groups})
+            raise unknown_name("parameter pattern", pattern, {*values, *groups})
         share = share_of(changes[pattern])
         if share is not None:
             names = [name for name in names if name in leaves and any(_nodes(values[name]))]
@@ -73,7 +73,7 @@ def settled(base: ParameterSet, changes: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def share_of(value: object) -> float | None:
-    """Return the share of a percentage with a sign; None for a plain value.
+    """Return the fraction of a signed percentage; None for a plain value.
 
     Examples
     --------
@@ -85,7 +85,7 @@ def share_of(value: object) -> float | None:
 
 
 def refuse_share_of_temperature(name: str, text: str, symbol: str) -> None:
-    """Reject a percentage of a temperature: 5 % of 20 degC are 1 K in degC, but 15 K in kelvin.
+    """Reject a percentage of a temperature: 5 % of 20 degC is 1 K in degC, but 15 K in kelvin.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ OPTION = "options."
 
 
 def split_options(named: Mapping[str, T]) -> tuple[dict[str, T], dict[str, T]]:
-    """Return the values of parameters, and those of options by their names without the prefix.
+    """Return the values of parameters, and of options by their names without the prefix.
 
     Examples
     --------

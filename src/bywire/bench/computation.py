@@ -1,4 +1,4 @@
-"""Digests of a bench's computation, from which saved studies are recognized."""
+"""Digests of a bench's computation, which identify saved studies."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ def _functions(bench: Bench) -> Iterator[Any]:
 
 
 def _family(text: str) -> Iterator[Any]:
-    """Yield the functions of a family of key figures, if a text is the name of a family."""
+    """Yield the functions of a family of key figures, if a text is a family's name."""
     family = FAMILIES.guess(text) if text.isidentifier() and text.islower() else None
     if isinstance(family, Family):
         yield family.setting_class

@@ -32,7 +32,7 @@ class Posting:
         Variable, and its label.
     energy
         Energy in J, signed: negative for a source that absorbs energy, and for a loss that returns
-        energy. For rows of several runs an array of shape (runs,), as are all derived values.
+        energy. For the rows of several runs, an array of shape (runs,), like all derived values.
     """
 
     name: str
@@ -87,7 +87,7 @@ class Delivery:
     name, label, book
         Variable, its label, and its balance, empty for the actuator's own balance.
     energy
-        Largest returned energy in J, >= 0. For the rows of several runs an array of shape (runs,).
+        Maximum returned energy in J, >= 0. For the rows of several runs, an array of shape (runs,).
     turnover
         Energy turnover of the balance in J.
     """
@@ -102,7 +102,7 @@ class Delivery:
 def deliveries(recording: xr.Dataset, among: Collection[str] | None = None) -> list[Delivery]:
     """Return the energy that every loss of a recording returned, in all balances.
 
-    Work, ``W_...``, is not a loss and may have either sign. Recordings of both ends alone determine
+    Work, ``W_...``, is not a loss and may have either sign. Recordings of only both ends determine
     the total. ``among``: names of the losses to check (default: all).
     """
     roles = _roles(recording, _energies(recording))
@@ -121,7 +121,7 @@ def deliveries(recording: xr.Dataset, among: Collection[str] | None = None) -> l
     returned = []
     for name, role in losses.items():
         values = recording.variables[name].values
-        # A loss that may return energy temporarily counts at the end only.
+        # A loss that may return energy temporarily counts only at the end.
         fallen = -values[..., -1:] if role.returns else np.maximum.accumulate(values, -1) - values
         most = _plain(np.max(fallen, axis=-1))
         returned.append(
@@ -144,9 +144,9 @@ def further_ledgers(recording: xr.Dataset) -> dict[str, Ledger]:
     """Return the energy balances beyond the actuator's own, by name.
 
     A balance in which a source replaces one of the actuator's sources includes the actuator's
-    energies. The additional energy of that source flows to a sink, for a braked disc the heat of
-    the pads. Other balances are separate. A balance without any energy, whose part is switched off,
-    is left out.
+    energies. The additional energy of that source flows to a sink, such as the heat of the pads for
+    a braked disc. Other balances are separate. A balance without any energy, whose part is switched
+    off, is left out.
     """
     main = _main_book(recording)
     names = [name for name in _books(recording) if name not in ("", main)]
@@ -283,7 +283,7 @@ def _split(recording: xr.Dataset) -> dict[str, float]:
     return changes
 
 
-_OPEN = 1e-5  # of the turnover: largest closing error, and largest energy that a loss may return
+_OPEN = 1e-5  # of the turnover: maximum closing error, and maximum energy that a loss may return
 _NOTHING = 1e-9  # J: rounding error of the stored energy while nothing moves
 
 
@@ -292,7 +292,7 @@ def energy_doubts(recording: xr.Dataset, runs: Sequence[Run] = ()) -> list[str]:
 
     One warning concerns an energy balance whose closing error is larger than the step can explain,
     the other a loss that delivers energy. The scheme closes the balance to a few parts in 1e8,
-    except for nonlinear elements, and a loss grows in every substep. Both fail if extreme
+    except for nonlinear elements. A loss increases in every substep. Both fail if extreme
     parameters make numbers cancel, or if an element's equations leave their range.
 
     ``runs``: the run of the recording, if known.
@@ -332,7 +332,7 @@ def energy_doubts_of_cases(
 
 
 def _losses(runs: Sequence[Run]) -> Collection[str] | None:
-    """Return the losses that must grow in every substep; None for all.
+    """Return the losses that must increase in every substep; None for all.
 
     A contact's loss includes the energy of a change in its parameters (see
     `bywire.simulation.advance`).
@@ -371,9 +371,9 @@ def energy_signals(run: Run) -> tuple[str, ...]:
 
 
 def energy_residual(recording: xr.Dataset) -> xr.DataArray:
-    """Return the energy input minus losses minus the change of stored energy [J].
+    """Return the energy input minus the losses and the change of stored energy [J].
 
-    The residual is zero except for the numerical error. It covers the actuator's own balance only.
+    The residual is zero except for the numerical error. It covers only the actuator's own balance.
     """
     losses = sum(
         values

@@ -1,4 +1,4 @@
-"""Many benches of one experiment, run side by side if they differ in numbers alone."""
+"""Many benches of one experiment, run side by side if they differ only in numbers."""
 
 from __future__ import annotations
 
@@ -272,7 +272,7 @@ def run_benches(
 ) -> tuple[Result, ...]:
     """Make all runs of several benches of one experiment, and judge each bench.
 
-    Cases that differ in numbers alone (parameters, initial values, stimuli) run side by side in
+    Cases that differ only in numbers (parameters, initial values, stimuli) run side by side in
     lanes. Other cases, and all cases without a compiler, run one after the other.
 
     Parameters
@@ -280,7 +280,7 @@ def run_benches(
     benches
         Benches of one experiment.
     progress
-        Called with a run's label and the completed share, 0 to 1.
+        Called with a run's label and the completed fraction, 0 to 1.
     engine
         ``auto``, ``compiled``, ``cuda``, or ``virtual-machine``, which has no lanes.
     threads
@@ -357,7 +357,7 @@ class Wanted:
     signals
         Outputs in all rows.
     ends
-        Outputs in the first and last rows alone. Runs with changes, and graphics processors, record
+        Outputs in only the first and last rows. Runs with changes, and graphics processors, record
         them in all rows.
     """
 
@@ -391,7 +391,7 @@ def rounds(
     signals: Callable[[Run], Wanted | None] = lambda _: None,
     limits: Sequence[Mapping[str, float]] = (),
 ) -> Iterator[Round]:
-    """Yield the first run of all benches, the second one, and so on.
+    """Yield the first run of all benches, then the second run, and so on.
 
     Runs that fit into lanes form a `RunGroup`, which records only rows that a recording keeps.
     Other runs, and all runs without a compiler, are computed one after the other.
@@ -405,7 +405,7 @@ def rounds(
     signals
         ``signals(run)``: outputs to record of runs side by side; None for all.
     limits
-        Largest work of each bench's runs, by label (default: unlimited).
+        Maximum work of each bench's runs, by label (default: unlimited).
 
     Raises
     ------
@@ -486,7 +486,7 @@ class KeyFigures:
 
 
 def key_figures_of(benches: Sequence[Bench], threads: int | None = None) -> KeyFigures:
-    """Return the key figures of several benches of one experiment, equal to `run_benches`.
+    """Return the key figures of several benches of one experiment, equal to those of `run_benches`.
 
     Parameters
     ----------
@@ -555,7 +555,7 @@ def needed(wanted: set[str], run: Run) -> Wanted | None:
 def _books(made: Round, group: RunGroup, rows: Rows, threads: int | None) -> list[list[str]]:
     """Return every run's warnings on impossible energies.
 
-    For most runs the two ends rule out such warnings. Otherwise all rows are computed.
+    For most runs, the two ends rule out such warnings. Otherwise, all rows are computed.
     """
     if group.end_names:
         if are_surely_sound(cast(xr.Dataset, ends_of_group(group)), made.runs):

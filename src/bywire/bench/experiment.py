@@ -1,4 +1,4 @@
-"""An experiment: the runs that it makes of a brake, and how their recordings are judged."""
+"""An experiment: its runs of a brake, and the judgment of their recordings."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from bywire.simulation.run import Run
 from bywire.simulation.schedule import plan
 
 _WORD = 32  # bits
-_POOL = 4  # least number of words of a seed before those of its child
+_POOL = 4  # minimum number of words of a seed before those of its child
 
 
 def put_noise(samples: NDArray[np.float64], seed: Sequence[int], child: int) -> None:
@@ -57,7 +57,7 @@ def put_noise(samples: NDArray[np.float64], seed: Sequence[int], child: int) -> 
 
 
 def _words(number: int) -> Iterator[int]:
-    """Yield the 32-bit words of an integer, the lowest first; one word for zero."""
+    """Yield the 32-bit words of an integer, lowest first; one word for zero."""
     yield number & 0xFFFFFFFF
     while number := number >> _WORD:
         yield number & 0xFFFFFFFF
@@ -146,7 +146,7 @@ def _value_text(value: Any, symbol: str, unit: str) -> str:
 # --- Experiments
 
 Recordings = Mapping[str, xr.Dataset]
-_LENGTHENED = 100.0  # longest settling until all sample times coincide, relative to the run
+_LENGTHENED = 100.0  # maximum settling until all sample times coincide, relative to the run
 
 
 @dataclass(frozen=True)
@@ -165,7 +165,7 @@ class Case:
         ``stimulus(t) -> dict``: signals of the model's Stimulus at the times t [s] of the
         recording's axis, each of shape (len(t),); missing signals are zero.
     duration
-        Length of the recording after time zero [s].
+        Duration of the recording after time zero [s].
     settle
         Time before zero in which the run settles [s], for example into a periodic orbit.
     keep
@@ -174,7 +174,7 @@ class Case:
         Recording interval [s].
     start
         ``start(par) -> (state, memory)``: initial values for other parameters of this structure.
-        It uses ``core.ops`` alone, so that exported models also begin at rest with changed
+        It uses only ``core.ops``, so that exported models also begin at rest with changed
         parameters. None if there is no such function.
     """
 
@@ -201,7 +201,7 @@ class Case:
         step
             Substep [s].
         interval
-            Recording interval [s]; None for the case's own.
+            Recording interval [s]. None for the case's own interval.
 
         Raises
         ------
@@ -305,7 +305,7 @@ class Experiment:
     following
         ``following(par)``: defaults of options that depend on the parameters.
     preview
-        ``cases`` with any start, for checks, if ``cases`` itself has to compute runs first.
+        ``cases`` with any start, for checks, if ``cases`` itself must compute runs first.
     without
         ``without(options)``: key figures that the options leave out.
     begins_at
@@ -392,7 +392,7 @@ def as_run(
 
     The run begins at -settle on the recording's axis, with the settling time rounded up by
     `Case.aligned`. Signals of the stimulus named ``noise_*`` are standard normal. Each has its own
-    generator, so that a longer run begins with the same samples.
+    generator, so a longer run begins with the same samples.
     """
     begun = case.aligned(step, interval)
     return Run(
@@ -525,7 +525,7 @@ def check_memory(run: Run, signals: int) -> None:
     schedule = run.schedule()
     numbers = schedule.rows * signals * _COPIES
     numbers += schedule.stimulus_rows * len(run.model.Stimulus._fields)
-    needed, memory = 8 * numbers, _memory()  # integers, as a float cannot represent every size
+    needed, memory = 8 * numbers, _memory()  # integers, because a float cannot represent every size
     if needed > memory:
         raise StepError(
             f"a run of {run.duration:g} s, recorded every {run.record:g} s, needs about "

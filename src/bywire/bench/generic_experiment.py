@@ -48,7 +48,7 @@ class TestedModel:
     model
         Model under test.
     names
-        Signal by the option that names it.
+        Signal by the option that specifies it.
     units
         SI unit of each signal, by option.
     options, defaults
@@ -170,14 +170,14 @@ class GenericExperiment:
     summary
         One line for listings.
     options
-        Class of its options. The unit ``input`` stands for the unit of the signal in the option
-        ``input``, and likewise for other options.
+        Class of its options. The unit ``input`` represents the unit of the signal in the option
+        ``input``, and other options work the same way.
     signals
         Kind of signal by option: a ``stimulus``, a ``recording``, either of them (``input or
         recording``), a ``friction`` or a ``state``. The default of ``input or recording`` and
         ``state`` is the signal of the first option.
     defaults
-        Default options; a level is a multiple of its signal's nominal magnitude.
+        Default options. A level is a multiple of its signal's nominal magnitude.
     build
         ``build(tested)``: the experiment for a model. Its cases receive the stimuli by name.
     """
@@ -222,7 +222,7 @@ class GenericExperiment:
         return self.build(TestedModel(self, model, names, units, options, options.create(defaults)))
 
     def _levels(self, options: type[ParameterSet]) -> dict[str, Any]:
-        """Return the defaults, levels in SI."""
+        """Return the defaults, with levels in SI."""
         templates, leaves = leaf_fields(self.options), leaf_fields(options)
         levels = dict(self.defaults)
         for name, leaf in leaves.items():
@@ -248,7 +248,7 @@ def with_units(
     Parameters
     ----------
     template
-        Class of options in which the names of options stand for units.
+        Class of options in which the names of options represent units.
     places
         Option for a signal; SI unit and nominal magnitude of that signal.
     """
@@ -332,7 +332,7 @@ def _known(model: Model, place: str) -> dict[str, Signal]:
 def at_rest(model: Model, par: Any) -> tuple[Any, Any]:
     """Return state and memory of a model at rest without any stimulus.
 
-    These are the result of the model's ``rest(par)``, or zeros if it has no such function.
+    They are the result of the model's ``rest(par)``, or zeros if the model has no such function.
 
     Raises
     ------
@@ -359,7 +359,7 @@ def at_rest(model: Model, par: Any) -> tuple[Any, Any]:
 def experiment_of(
     name: str, parameters: str, assembly: str = "", options: Mapping[str, Any] | None = None
 ) -> Experiment:
-    """Return the experiment of a name for a parameter set.
+    """Return the experiment with a name for a parameter set.
 
     Parameters
     ----------
@@ -368,7 +368,7 @@ def experiment_of(
     parameters
         Name of the parameter set.
     assembly
-        Model of the set's brake; if empty, the set's model.
+        Model of the set's brake. Default: the set's model.
     options
         The user's options, which may be names of signals.
 
@@ -429,7 +429,7 @@ def _former(
     example = next(iter(generic.signals))
     raise ParameterError(
         f"experiment {name!r} is for any brake, and the experiment of the {system} is now called "
-        f"{former.name!r}. Write {former.name}, or specify the signal for {name}, for example "
+        f"{former.name!r}. Use {former.name}, or specify the signal for {name}, for example "
         f"{option('overrides', {f'options.{example}': 'NAME'})}",
         name="experiment",
         value=name,

@@ -36,8 +36,8 @@ def record(
 ) -> xr.Dataset:
     """Return the recording of a run.
 
-    ``settle``: time of the run [s] before the recording's zero; ``keep``: part of it that the
-    recording includes, at negative times; ``notes``: additional attributes, such as the
+    ``settle``: time of the run [s] before the recording's zero; ``keep``: part of the settling time
+    that the recording includes, at negative times; ``notes``: additional attributes, such as the
     experiment's name.
 
     Returns
@@ -172,7 +172,7 @@ def energy_doubts_of(run: Run, trajectory: Trajectory) -> list[str]:
 
 
 # --- Rows in place of a recording, for many runs without plots
-# Building a Dataset of thirty signals takes longer than simulating them. Key figures, warnings and
+# Building a Dataset of thirty signals takes longer than the simulation. Key figures, warnings and
 # energy balances need only signals, time windows, sums and products of signals, and their extremes
 # and means. Any other operation in a brake's code builds the Dataset, or a signal's DataArray, on
 # demand.
@@ -227,11 +227,11 @@ class Row(NDArrayOperatorsMixin):
         return isinstance(other, Number)
 
     def max(self, *asked: Any, **given: Any) -> Any:
-        """Return the largest value, like a DataArray."""
+        """Return the maximum, like a DataArray."""
         return self._reduced("max", *asked, **given)
 
     def min(self, *asked: Any, **given: Any) -> Any:
-        """Return the smallest value, like a DataArray."""
+        """Return the minimum, like a DataArray."""
         return self._reduced("min", *asked, **given)
 
     def mean(self, *asked: Any, **given: Any) -> Any:
@@ -284,8 +284,8 @@ def _window(time: Array, asked: tuple[Any, ...], given: Mapping[str, Any]) -> sl
 class Rows:
     """Recorded rows of a run, or of several runs side by side.
 
-    Only families of key figures and energy balances accept rows of several runs. Use `case` for
-    anything else.
+    Only families of key figures and energy balances accept rows of several runs. Use `case` for all
+    other purposes.
 
     Parameters
     ----------

@@ -42,7 +42,7 @@ class Limit:
     text
         The user's text, for example ``"<= 15 %"``.
     probability
-        Required probability of meeting the limit; None if every case has to meet it.
+        Required probability of meeting the limit; None if every case must meet it.
     of_magnitude
         Whether the limit bounds the figure's magnitude.
     """
@@ -85,13 +85,13 @@ class Verdict(EqualWhereUndefined):
     required
         The requirement.
     value
-        Value of the KPI in its unit; NaN where it is not defined.
+        Value of the KPI in its unit; NaN if it is undefined.
     met
         Whether the value certainly meets the requirement; an undefined KPI does not.
     note
-        Reason why the KPI is not defined.
+        Reason why the KPI is undefined.
     error
-        Numerical error of the value, in its unit; NaN where it was not estimated.
+        Numerical error of the value, in its unit; NaN if it was not estimated.
     is_decided
         Whether the recording determines the value, and the value's distance to the limit exceeds
         its error.
@@ -240,7 +240,7 @@ _DEMAND = "99 %"
 
 def _probability(kpi: str, text: str, given: str) -> float:
     """Return the probability after "with" in the text of a requirement."""
-    if not _PERCENT.fullmatch(given):  # 0.9 may mean a share, or 0.9 %
+    if not _PERCENT.fullmatch(given):  # 0.9 may mean a fraction, or 0.9 %
         example = f"{100.0 * float(given):.10g} %" if _SHARE.fullmatch(given) else _DEMAND
         raise ParameterError(
             f"requirement {kpi} = {quoted(text)}: the probability after 'with' must be in percent, "

@@ -187,9 +187,9 @@ def _verdict(record: Mapping[str, Any]) -> Verdict:
 
 
 def _number(value: Any) -> float:
-    """Return a number of a JSON object; NaN for null."""
+    """Return a number from a JSON object; NaN for null."""
     return math.nan if value is None else float(value)
 
 
 def _again() -> str:
-    return f"Run the bench again with {option('out')}, or specify another folder"
+    return f"Rerun the bench with {option('out')}, or specify another folder"

@@ -111,16 +111,16 @@ def run(
     bench
         Bench to run; `bywire.load` reads a bench file.
     progress
-        Called with the run's label and its completed share, 0 to 1.
+        Called with the run's label and its completed fraction, 0 to 1.
     engine
         As in `Bench`; ``auto`` uses the bench's engine.
     estimate_error
         Whether to repeat all runs with half the step, a slightly shorter step, and double the step
         if that divides the sample times. Key figures and recorded signals then have an estimate of
-        their numerical error. A figure that is closer to a limit than its error is undecided. The
-        repeated runs need 3.6 times as many substeps as the run. Steps with which a run fails are
-        left out. The result has a warning if no step remains, or if a run takes five times the
-        work of the original run.
+        their numerical error. A figure whose distance to a limit is less than its error is
+        undecided. The repeated runs need 3.6 times as many substeps as the run. Steps with which a
+        run fails are left out. The result has a warning if no step remains, or if a run requires
+        five times the work of the original run.
 
     Raises
     ------

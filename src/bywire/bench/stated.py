@@ -33,7 +33,7 @@ class StatedLevel:
         Place in the source, and how the value was read; the reason for a tolerance that the source
         does not state.
     options
-        Names of options that must have their default values, or the statement does not apply.
+        Names of options that must have their default values for the statement to apply.
     tolerance
         Tolerance of the statement in the signal's SI unit; 0 if none is stated.
     """
@@ -94,7 +94,7 @@ class StatedRange:
 @checked
 @dataclass(frozen=True)
 class StatedFigure:
-    """Key figure that a source states, shown with the computed one.
+    """Key figure that a source states, shown next to the computed figure.
 
     Parameters
     ----------

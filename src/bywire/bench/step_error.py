@@ -32,13 +32,13 @@ MOST_WORK = 5.0
 NO_ESTIMATE = (StepError, RunError)
 """errors of runs with other steps: the step does not divide a sample time, or is too coarse"""
 ROUNDING = 1e-11
-"""accumulated rounding error, relative to the largest value of a signal"""
+"""accumulated rounding error, relative to the maximum of a signal"""
 _STEPS = {0.5: "half the step", 2.0: "twice the step"}
-_ORDER, _OFF = 2.0, 0.3  # order of the scheme, and largest deviation of an observed order
+_ORDER, _OFF = 2.0, 0.3  # order of the scheme, and maximum deviation of an observed order
 SPREAD = {3: 1.72, 4: 1.29}
 """number of samples n -> a third of the 0.95 quantile of |x_1 - x| / s, where x_1 ... x_n and x are
 independent samples of one normal distribution, and s is the standard deviation of x_1 ... x_n"""
-_SAME = 1e-10  # s, largest difference between a time and that of its row
+_SAME = 1e-10  # s, maximum difference between a time and that of its row
 
 
 def of_difference(factor: float, order: int = 2) -> float:
@@ -53,7 +53,7 @@ def of_difference(factor: float, order: int = 2) -> float:
 
 
 def unestimated(failures: Mapping[float, Exception]) -> str:
-    """Return the warning that the bench runs with no other step, and why for each ratio."""
+    """Return the warning that the bench runs with no other step, and the reason for each ratio."""
     reasons = ", ".join(f"{_share(factor)}: {error}" for factor, error in failures.items())
     return (
         "the numerical error of the figures is unknown because the bench runs neither with half "
@@ -176,7 +176,7 @@ def note_step_errors(
 def _estimate(value: float, others: Mapping[float, float], rounding: float) -> tuple[float, bool]:
     """Return the error of a figure, and whether it converges.
 
-    ``others``: the figure with other steps, by the ratio of the steps; ``rounding``: largest
+    ``others``: the figure with other steps, by the ratio of the steps; ``rounding``: maximum
     difference that rounding alone explains.
     """
     apart = {factor: _apart(value, other) for factor, other in others.items()}
@@ -204,7 +204,7 @@ def _rms(error: Array) -> float:
 
 
 def _peaks(recordings: Mapping[str, xr.Dataset]) -> dict[str, float]:
-    """Return the largest magnitude of all signals of each unit, without pure numbers."""
+    """Return the maximum magnitude of all signals of each unit, without pure numbers."""
     peaks: dict[str, float] = {}
     for recording in recordings.values():
         for signal in recording.values():

@@ -31,9 +31,9 @@ TOLERANCE = 1e-9  # s: far above the rounding errors of ticks at k * T
 
 
 def reached(t: NDArray[np.float64], instant: float) -> NDArray[np.bool_]:
-    """Return whether each time has reached an instant, within the rounding errors of a tick.
+    """Return whether each time has reached another time, within the rounding errors of a tick.
 
-    ``t``: times [s], any shape; ``instant``: instant [s].
+    ``t``: times [s], any shape; ``instant``: the time to reach [s].
     """
     return t >= instant - TOLERANCE
 
@@ -154,7 +154,7 @@ def required_stimulus(stimulus: Stimulus | None, experiment: str) -> Stimulus:
     Raises
     ------
     ParameterError
-        When the bench has none.
+        When the bench has no stimulus.
     """
     if stimulus is None:
         raise ParameterError(
@@ -185,8 +185,8 @@ def with_nodes(values: Mapping[str, Any], level_unit: str) -> dict[str, Any]:
         required if there is more than one in addition to time. ``unit``, ``scale``, ``sign``,
         ``offset``, ``delay``, ``rate``, ``start``, ``format``, ``decimal`` and ``skip_lines`` are
         the same as in a mapping, as are ``time`` and ``time_unit`` for the time column.
-        ``max_gap``: longest gap that is bridged. Time starts at the first row; ``between`` is
-        ``"linear"`` by default.
+        ``max_gap``: maximum gap that is interpolated. Time starts at the first row. Default of
+        ``between``: ``"linear"``.
     level_unit
         SI unit of the driven signal.
 
@@ -210,7 +210,7 @@ def with_nodes(values: Mapping[str, Any], level_unit: str) -> dict[str, Any]:
         )
     path = values["file"]
     if not isinstance(path, str):
-        raise not_valid("stimulus.file", quoted(path), "a text")
+        raise not_valid("stimulus.file", quoted(path), "a string")
     whole = {key: values[key] for key in _FILE if key in values}
     clock = {inner: values[key] for key, inner in _CLOCK.items() if key in values}
     whole |= {"time": clock} if clock else {}

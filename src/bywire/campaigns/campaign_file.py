@@ -1,4 +1,4 @@
-"""Reader of campaign files (TOML), which executes nothing in them."""
+"""Reader of campaign files (TOML), which does not execute any of their content."""
 
 from __future__ import annotations
 
@@ -85,9 +85,9 @@ def read_campaign(
     Parameters
     ----------
     source
-        Campaign file (see ``docs/faults.md``), or the name of a campaign that comes with a brake.
+        Campaign file (see ``docs/faults.md``), or the name of a campaign that belongs to a brake.
     overrides
-        Additional changes to the bench, in the form of ``--set``.
+        Additional changes to the bench, as for ``--set``.
 
     Raises
     ------
@@ -119,7 +119,7 @@ def _plan(content: Mapping[str, Any], folder: Path, overrides: Mapping[str, str]
     chosen = [v.name for v in varied if not v.unit]
     if chosen:
         raise ParameterError(
-            f"[vary] {chosen[0]} is a choice. In a campaign, only numbers can vary",
+            f"[vary] {chosen[0]} is a choice, but in a campaign only numbers can vary",
             name=chosen[0],
         )
     known = modes_of(case.model, case.par)
@@ -128,7 +128,7 @@ def _plan(content: Mapping[str, Any], folder: Path, overrides: Mapping[str, str]
     singles = tuple(_failing(modes, section, file.values))
     if not singles:
         raise ParameterError(
-            "[campaign] contains no faults, because only and leave_out contradict each other. "
+            "[campaign] contains no faults, because 'only' and 'leave_out' contradict each other. "
             "Change one of them",
             name="[campaign]",
         )
@@ -142,7 +142,7 @@ def _plan(content: Mapping[str, Any], folder: Path, overrides: Mapping[str, str]
     criteria = criteria_of(file.criteria, signals_of(case.model.Output))
     if not criteria:
         raise ParameterError(
-            "[[criteria]] is missing. Define the effects that a fault must not have",
+            "[[criteria]] is missing. Add a criterion for each effect that a fault must not have",
             name="criteria",
         )
     plan = CampaignPlan(
@@ -200,18 +200,18 @@ def _require_known_values(values: Mapping[str, Any], modes: Mapping[str, Mode]) 
             raise unknown_name("fault in [values]", name, modes)
         if not modes[name].unit:
             raise ParameterError(
-                f"[values] {name}: this fault has no value. Remove the key", name=name
+                f"[values] {name}: this fault has no value. Remove this key", name=name
             )
         if given == []:
             raise ParameterError(
-                f"[values] {name} = [] is empty. List a value, or use leave_out",
+                f"[values] {name} = [] is empty. Specify at least one value, or use leave_out",
                 name=name,
                 value="[]",
             )
 
 
 def _sizes(mode: Mode, values: Mapping[str, Any]) -> Iterator[float]:
-    """Yield the values that a mode has in the campaign [SI]."""
+    """Yield the values of a mode in the campaign [SI]."""
     given = values.get(mode.name, mode.value)
     for value in given if isinstance(given, list) else [given]:
         yield _size(mode, value, f"[values] {mode.name}")
@@ -250,8 +250,7 @@ def _onsets(section: CampaignSection, case: Case) -> tuple[float, ...]:
     if not (-case.keep <= first and onsets[-1] < case.duration):
         raise ParameterError(
             f"[campaign] onsets from {first:g} s to {onsets[-1]:g} s are not valid: they must be "
-            "in "
-            f"the range {-case.keep:g} s to {case.duration:g} s of the run",
+            f"in the range {-case.keep:g} s to {case.duration:g} s of the run",
             name="[campaign] onsets",
             value=f"{first:g} s to {onsets[-1]:g} s",
             valid=f"{-case.keep:g} s to {case.duration:g} s",

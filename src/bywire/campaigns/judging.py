@@ -1,4 +1,4 @@
-"""Simulation of healthy and faulty runs, and comparison of their effects and times."""
+"""Simulation of fault-free and faulty runs, and comparison of their effects and times."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from bywire.simulation.tapped import rests
 
 LANES = 64
 """maximum number of runs in one batch, to limit the size of their recordings"""
-_MOST = 250e6  # largest number of values in memory: 2 GB
+_MOST = 250e6  # maximum number of values in memory: 2 GB
 
 
 @dataclass(frozen=True)
@@ -36,9 +36,9 @@ class Traces:
     time
         Times of the rows [s], shape (rows,).
     signals
-        By name, shape (cases, rows) each.
+        Signals by name, shape (cases, rows) each.
     doubts
-        Warnings of the solver, without repetitions.
+        Warnings from the solver, without repetitions.
     """
 
     time: Array
@@ -64,8 +64,9 @@ def require_small(plan: CampaignPlan) -> None:
     runs = max(plan.healthy, len(plan.onsets))
     if runs * rows * signals > _MOST:
         raise ParameterError(
-            f"{runs} runs with {rows:.3g} rows of {signals} signals exceed {_MOST:.3g} numbers. "
-            "Use fewer healthy runs or onsets, a shorter maneuver, or a longer simulation.record",
+            f"{runs} runs with {rows:.3g} rows of {signals} signals exceed the limit of "
+            f"{_MOST:.3g} numbers. Use fewer healthy runs or onsets, a shorter maneuver, or a "
+            "longer simulation.record",
             name="simulation.record",
             valid=f"{_MOST:.3g}",
         )
@@ -93,7 +94,7 @@ def faulty_traces(
     onsets
         Onset in each run [s].
     samples
-        Healthy runs whose scatter and noise are used.
+        Healthy runs that provide scatter and noise.
     reactions
         Time of the campaign's reaction in each run [s], or None for no reaction.
     """
@@ -149,7 +150,7 @@ def _missed(case: Case, task: str, time: Array) -> Array:
 # --- Judging
 
 FACTORS = (0.5, 0.7, 1.0, 1.4, 2.0, 3.0, 5.0)
-"""multiples of each threshold, for curves of delay over false alarms"""
+"""multiples of each threshold, for curves of delay versus false alarms"""
 
 Outcome = dict[str, Any]
 
@@ -199,7 +200,7 @@ def judge_healthy(plan: CampaignPlan, traces: Traces) -> Healthy:
 
 def _scaled(limit: float, factor: float) -> float:
     """Return a threshold of either sign that is less sensitive by a factor."""
-    if limit <= NEVER:  # there is none to scale
+    if limit <= NEVER:  # no threshold to scale
         return limit
     return limit * factor if limit >= 0 else limit / factor
 
@@ -207,7 +208,7 @@ def _scaled(limit: float, factor: float) -> float:
 def judge_fault(plan: CampaignPlan, failing: Failing, healthy: Healthy) -> Outcome:
     """Return the outcomes of all runs with a fault, as plain numbers."""
     onsets = np.array(plan.onsets_of(failing))
-    # By its name, so that other faults in the catalog do not change its scatter.
+    # The name selects the runs, so that other faults in the catalog do not change the scatter.
     first = crc32(failing.name.encode())
     samples = [plan.sample_of(first + k) for k in range(onsets.size)]
     traces = faulty_traces(plan, failing, onsets.tolist(), samples)
@@ -228,7 +229,7 @@ def judge_fault(plan: CampaignPlan, failing: Failing, healthy: Healthy) -> Outco
 def _reached(
     plan: CampaignPlan, traces: Traces, beside: Traces, onsets: Array
 ) -> dict[str, list[Any]]:
-    """Return the time from the onset of a fault until each criterion is violated [s]."""
+    """Return the time from a fault's onset to the violation of each criterion [s]."""
     return {
         c.name: _plain(
             c.reached(traces.signals[c.signal], beside.signals[c.signal], traces.time, onsets)
@@ -241,7 +242,7 @@ def _reached(
 def _extremes(
     plan: CampaignPlan, traces: Traces, beside: Traces, onsets: Array
 ) -> dict[str, list[Any]]:
-    """Return every judged signal's deviation from its healthy run: least, largest, at the end."""
+    """Return each judged signal's deviation from its healthy run: minimum, maximum, at the end."""
     later = traces.time >= onsets[:, None] - 1e-9
     extremes = {}
     for name in dict.fromkeys(c.signal for c in plan.criteria):
@@ -258,7 +259,7 @@ def _extremes(
 def _detections(
     plan: CampaignPlan, traces: Traces, onsets: Array, thresholds: Mapping[str, float]
 ) -> dict[str, list[Array]]:
-    """Return the time from the onset of a fault until its detection [s], by residual and factor."""
+    """Return the time from a fault's onset to its detection [s], by residual and factor."""
     seen = {}
     for residual in plan.watched:
         lasted = residual.lasted(traces.signals, plan.bench.par, traces.time)
@@ -290,7 +291,7 @@ def _with_reaction(
 
 
 def _is_the_same(plan: CampaignPlan, failing: Failing) -> bool:
-    """Return whether fault and reaction change the same value, which excludes a reaction."""
+    """Return whether fault and reaction change the same value, which prevents the reaction."""
     assert plan.reaction is not None
     par = plan.case(0).par
     return touch_alike(failing, plan.reaction.failing, par) or (
@@ -299,7 +300,7 @@ def _is_the_same(plan: CampaignPlan, failing: Failing) -> bool:
 
 
 def _earliest(columns: Sequence[Array], count: int) -> Array:
-    """Return the earliest of several times in each case; NaN if there is none."""
+    """Return the earliest of several times in each case; NaN without a time."""
     times = np.array([np.full(count, np.nan), *columns])
     missing = np.isnan(times).all(axis=0)
     return np.where(missing, np.nan, np.nanmin(np.where(np.isnan(times), np.inf, times), axis=0))

@@ -34,7 +34,7 @@ SENSES: tuple[Sense, ...] = ("above", "below", "above_healthy", "below_healthy",
 
 
 class CriterionSection(Section):
-    """Section ``[[criteria]]``, whose level has its signal's unit."""
+    """Section ``[[criteria]]``, whose level is in its signal's unit."""
 
     name: Name
     signal: Any = ""
@@ -49,7 +49,7 @@ class CriterionSection(Section):
 
 @dataclass(frozen=True)
 class Criterion:
-    """Criterion of a campaign, an effect that a fault must not have.
+    """Criterion of a campaign: an effect that a fault must not have.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ class Criterion:
     signal
         Recorded signal that is judged.
     sense, level
-        Forbidden side of a level [SI], of a distance from the healthy run, or of a share of it.
+        Forbidden side of a level [SI], of a distance from the healthy run, or of a fraction of it.
     lasting
         Uninterrupted duration [s] of a violation.
     severity
@@ -85,7 +85,7 @@ class Criterion:
         return np.asarray(self.level * healthy - values)
 
     def reached(self, values: Array, healthy: Array, time: Array, onset: Array) -> Array:
-        """Return when the violation has lasted long enough [s], NaN for never, shape (cases,)."""
+        """Return the time at which a violation has lasted long enough [s]; NaN if never."""
         dt = float(time[1] - time[0])
         rows = round(min(self.lasting, dt * time.size) / dt) + 1
         lasted = least_of_the_last(self.excess(values, healthy), rows)
@@ -103,12 +103,12 @@ def criteria_of(
     sections
         Sections of the file.
     signals
-        Signals recorded by the model.
+        Signals that the model records.
 
     Raises
     ------
     InputError
-        If one of them is not valid.
+        If a criterion is not valid.
     """
     criteria = tuple(_criterion(each, signals) for each in sections)
     names = [criterion.name for criterion in criteria]
@@ -171,7 +171,7 @@ class Failing:
 
     def at(self, onset: float, seed: int) -> list[Injection]:
         """Return the fault from an onset [s] on, or from the start, with the latent one."""
-        start = 0.0 if self.mode.falsified == "drift" else _LONG_AGO  # a drift grows from then on
+        start = 0.0 if self.mode.falsified == "drift" else _LONG_AGO  # a drift grows from its start
         begin = start if self.is_present else onset
         fault = Injection(self.mode, self.value, AT_ZERO.replace({"onset": begin}), seed)
         return [fault, *([] if self.latent is None else self.latent.at(onset, seed))]
@@ -215,7 +215,7 @@ class CampaignPlan:
     healthy
         Number of healthy runs: one half tunes thresholds, the other half judges them.
     false_alarms
-        Share of healthy runs in which a residual may exceed its threshold.
+        Fraction of healthy runs in which a residual may exceed its threshold.
     seed
         Seed of scatter and noise.
     rates
@@ -240,7 +240,7 @@ class CampaignPlan:
 
     @property
     def tuning(self) -> int:
-        """Healthy runs on which thresholds are tuned: the first ones."""
+        """Number of healthy runs that tune thresholds: the first ones."""
         return self.healthy // 2
 
     @property
@@ -249,11 +249,11 @@ class CampaignPlan:
         return len(self.faults) * len(self.onsets)
 
     def onsets_of(self, failing: Failing) -> tuple[float, ...]:
-        """Return the time from which the times of a fault count [s]."""
+        """Return the start times for measuring a fault's times [s]."""
         return (0.0,) * len(self.onsets) if failing.is_present else self.onsets
 
     def sample_of(self, number: int) -> int:
-        """Return healthy runs whose scatter a fault's runs use: not those for thresholds."""
+        """Return the healthy run that provides the scatter, excluding those for thresholds."""
         return self.tuning + number % (self.healthy - self.tuning)
 
     @cached_property
@@ -289,7 +289,7 @@ class CampaignPlan:
         return self.case(0).par.choices()
 
     def is_apart(self, failing: Failing) -> bool:
-        """Return whether a fault needs a separate model: laws change, or a drive is delayed."""
+        """Return whether a fault needs a separate model, because laws change or a drive is late."""
         if failing.latent is not None and self.is_apart(failing.latent):
             return True
         mode = failing.mode
@@ -362,7 +362,7 @@ class CampaignPlan:
 
 
 def evenly(first: float, spread: float, count: int) -> tuple[float, ...]:
-    """Return onsets evenly over a span [s], without its end: the span may be a period."""
+    """Return evenly spaced onsets over a span [s], without its end, since it may be a period."""
     return tuple(float(f"{first + k * spread / count:.12g}") for k in range(count))
 
 

@@ -33,7 +33,7 @@ def mean_of_the_last(values: Array, rows: int) -> Array:
 
 
 def first_time(holds: Array, time: Array, since: Array) -> Array:
-    """Return the first time [s] since a given time at which a condition is true, otherwise NaN.
+    """Return the first time [s] after a start at which a condition is true, otherwise NaN.
 
     Parameters
     ----------
@@ -52,12 +52,12 @@ def first_time(holds: Array, time: Array, since: Array) -> Array:
 # --- Residuals
 
 NEVER = -1e9
-"""value of a residual while it is inactive; one that is always inactive has no threshold"""
+"""value of an inactive residual; a residual that is always inactive has no threshold"""
 
 
 @dataclass(frozen=True)
 class Residual:
-    """Residual, a quantity that is small without faults.
+    """Residual: a quantity that is small without faults.
 
     Parameters
     ----------
@@ -66,17 +66,17 @@ class Residual:
     summary
         The compared quantities.
     assembly
-        Name of the assembly whose controller computes it, or of several.
+        Name of the assembly, or names of the assemblies, whose controller computes it.
     unit
         SI unit.
     signals
-        Recorded signals that it uses, which the controller must know.
+        Recorded signals that it uses, which must be available to the controller.
     compute
         ``compute(signals, par, dt)``: its magnitude in every row, shape (cases, rows), `NEVER`
         while it is inactive; ``signals`` by name, of that shape; ``par``: the controller's
         parameters; ``dt``: time between rows [s].
     hold
-        Time above the threshold without a break until detection [s].
+        Uninterrupted time above the threshold until detection [s].
     """
 
     name: str
@@ -93,7 +93,7 @@ class Residual:
         return (self.assembly,) if isinstance(self.assembly, str) else self.assembly
 
     def lasted(self, signals: Mapping[str, Array], par: Any, time: Array) -> Array:
-        """Return the value exceeded throughout the hold time, shape (cases, rows)."""
+        """Return the minimum over the hold time, shape (cases, rows)."""
         dt = float(time[1] - time[0])
         return least_of_the_last(self.compute(signals, par, dt), round(self.hold / dt) + 1)
 
@@ -105,7 +105,7 @@ RESIDUALS = Kind("residual", ("residuals",), instances(Residual), declared="a Re
 def residuals_of(model: Any) -> dict[str, Residual]:
     """Return the residuals of a model and of the assemblies within it.
 
-    These are named by the path of the parameters there, and use signals recorded under a prefix.
+    The names of the latter begin with their parameters' path, and their signals have a prefix.
     """
     every = RESIDUALS.of(ASSEMBLIES.owner(model.name)).values()
     mine = (each for each in every if model.name in each.assemblies)
@@ -139,7 +139,7 @@ def _within(
 def missed_ticks(task: str, assembly: str, period: float) -> Residual:
     """Return the watchdog of a task: number of missed ticks among the last five.
 
-    It uses a signal ``missed_TASK`` that is 1 where a tick is missed.
+    It uses a signal ``missed_TASK``, which is 1 at a missed tick.
     """
     signal = f"missed_{task}"
 
@@ -152,15 +152,14 @@ def missed_ticks(task: str, assembly: str, period: float) -> Residual:
 
 
 def threshold(largest: Array, share: float) -> float:
-    """Return the threshold that at most a given share of healthy runs exceeds.
+    """Return the threshold that at most a given fraction of healthy runs exceeds.
 
     Parameters
     ----------
     largest
-        Largest value of each healthy run, shape (cases,).
+        Maximum of each healthy run, shape (cases,).
     share
-        Admissible share of false alarms; if it is less than one run, none of them exceeds the
-        threshold.
+        Allowed fraction of false alarms; if it is less than one run, no run exceeds the threshold.
     """
     ordered = np.sort(largest)
     admitted = int(np.floor(share * ordered.size))
@@ -168,9 +167,9 @@ def threshold(largest: Array, share: float) -> float:
 
 
 def detected(lasted: Array, limit: float, time: Array, since: Array) -> Array:
-    """Return when a residual first exceeds its threshold [s]; NaN for never; shape (cases,).
+    """Return the time at which a residual first exceeds its threshold [s]; NaN if never.
 
-    A residual that was always inactive in healthy runs has no threshold, and detects nothing.
+    A residual that was always inactive in healthy runs has no threshold and detects nothing.
     """
     if limit <= NEVER:
         return np.full(len(lasted), np.nan)
@@ -183,7 +182,7 @@ def detected(lasted: Array, limit: float, time: Array, since: Array) -> Array:
 
 @dataclass(frozen=True)
 class DeclaredCampaign:
-    """A campaign that comes with a brake.
+    """A campaign that belongs to a brake.
 
     Parameters
     ----------
@@ -192,7 +191,7 @@ class DeclaredCampaign:
     summary
         One line for listings.
     content
-        Content of a campaign file; its ``bench`` names an experiment.
+        Content of a campaign file, in which ``bench`` is the name of an experiment.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""Execution of a campaign, which judges and stores each fault and computes the coverage."""
+"""Execution of a campaign: runs, stored results of each fault, and coverage."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from bywire.studies.statistics import Share, share
 
 CONFIDENCE = 0.95
 _AT = FACTORS.index(1.0)
-_SAME = 1e-9  # s, tolerance of times of rows
+_SAME = 1e-9  # s: tolerance for times of rows
 Class = Literal["covered", "too late", "undetected", "harmless, seen", "latent"]
 
 
@@ -40,15 +40,15 @@ class FaultFinding:
     detected
         Time from onset until each residual detects it [s], by name; shape (factors, cases).
     extremes
-        By signal: deviation from the healthy run, least, largest and at the end.
+        By signal: minimum, maximum and final deviation from the healthy run.
     reacted
-        Times of violation with the reaction, by criterion, for the runs in which it was possible.
+        Times of violation with the reaction, by criterion, for runs in which it was possible.
     answered
         Indices of these runs.
     delay
         Delay from detection to the reaction [s]; 0 without reaction.
     doubts
-        Warnings of the solver in these runs.
+        Warnings from the solver in these runs.
     """
 
     failing: Failing
@@ -67,7 +67,7 @@ class FaultFinding:
 
     @cached_property
     def violated(self) -> Array:
-        """Time until the first criterion is violated [s], NaN if none is, shape (cases,)."""
+        """Time until the first violation of a criterion [s]; NaN if none; shape (cases,)."""
         return _first([*self.reached.values()])
 
     @cached_property
@@ -78,17 +78,17 @@ class FaultFinding:
 
     @property
     def dangerous(self) -> int:
-        """Runs in which a criterion is violated."""
+        """Number of runs that violate a criterion."""
         return int(np.sum(~np.isnan(self.violated)))
 
     @property
     def tolerance(self) -> float:
-        """Fault tolerant time: that of its worst run [s]; NaN without violation."""
+        """Fault tolerant time, from the worst run [s]; NaN without violation."""
         return float(np.nanmin(self.violated)) if self.dangerous else math.nan
 
     @property
     def in_time(self) -> int:
-        """Dangerous runs in which detection and reaction come within the tolerant time."""
+        """Number of dangerous runs with detection and reaction within the tolerant time."""
         there = ~np.isnan(self.violated)
         if not self.dangerous:
             return 0
@@ -136,12 +136,12 @@ class FaultFinding:
         return all(np.isnan(times).all() for times in self.reacted.values())
 
     def _unanswered(self, criterion: str) -> Array:
-        """Return when runs with a reaction would violate a criterion without it [s]."""
+        """Return the time of violation without the reaction, for runs with a reaction [s]."""
         return np.asarray(self.reached[criterion])[list(self.answered)]
 
     @property
     def first_seen_by(self) -> str:
-        """Residual that detects the fault first in most runs. Empty without detection."""
+        """Residual that detects the fault first in most runs; empty without detection."""
         names = [*self.detected]
         times = np.array([self.detected[name][_AT] for name in names])
         if not times.size:
@@ -171,7 +171,7 @@ class FaultFinding:
 
 @dataclass(frozen=True)
 class CampaignFindings:
-    """Findings of a campaign that are computed so far."""
+    """Findings of a campaign so far."""
 
     plan: CampaignPlan
     healthy: Healthy
@@ -179,31 +179,31 @@ class CampaignFindings:
 
     @property
     def is_weighted(self) -> bool:
-        """Whether failure rates weigh the faults."""
+        """Whether failure rates weight the faults."""
         return bool(self.plan.rates)
 
     @property
     def coverage(self) -> float:
-        """Fraction of dangerous runs detected in time, weighted by rates; NaN without any."""
+        """Fraction of dangerous runs detected in time, weighted by rates; NaN if there are none."""
         rows = [(self.plan.rate(f.failing) / f.cases, f.in_time, f.dangerous) for f in self.faults]
         total = sum(weight * dangerous for weight, _, dangerous in rows)
         return sum(weight * seen for weight, seen, _ in rows) / total if total else math.nan
 
     @property
     def coverage_of_cases(self) -> Share:
-        """The share of runs, with its interval."""
+        """Unweighted fraction of dangerous runs detected in time, with its interval."""
         seen = sum(each.in_time for each in self.faults)
         return share(seen, sum(each.dangerous for each in self.faults), CONFIDENCE)
 
     @property
     def false_alarms(self) -> Share:
-        """Healthy runs outside the tuning in which any residual exceeds its threshold."""
+        """Fraction of healthy runs, not used for tuning, in which a residual raises an alarm."""
         plan = self.plan
         return share(self.healthy.any_alarm, plan.healthy - plan.tuning, CONFIDENCE)
 
     @property
     def doubts(self) -> tuple[str, ...]:
-        """Warnings of the solver, with the number of faults in whose runs they occurred."""
+        """Warnings from the solver, with the number of faults that caused them."""
         counts = Counter(text for each in self.faults for text in dict.fromkeys(each.doubts))
         return (
             *(f"healthy runs: {text}" for text in self.healthy.traces.doubts),
@@ -215,7 +215,7 @@ class CampaignFindings:
         return Counter(each.kind for each in self.faults)
 
     def harm_of_reaction(self) -> tuple[str, ...]:
-        """Return the harmful effects of the reaction, a sentence each."""
+        """Return the harmful effects of the reaction, one sentence each."""
         if self.plan.reaction is None:
             return ()
         groups = {
@@ -243,9 +243,9 @@ class CampaignFindings:
         )
 
     def curve(self, residual: str) -> list[tuple[float, int, float, int]]:
-        """Return factor of the threshold, false alarms, median delay [s], number of detected runs.
+        """Return threshold factor, false alarms, median delay [s] and number of detected runs.
 
-        Of the dangerous runs of all faults; one row for each of the factors.
+        Rows are by factor, and count the dangerous runs of all faults.
         """
         rows = []
         for k, factor in enumerate(FACTORS):
@@ -258,7 +258,7 @@ class CampaignFindings:
 
 
 def finding(plan: CampaignPlan, number: int, outcome: Mapping[str, Any]) -> FaultFinding:
-    """Return the finding of a fault's outcome, null as NaN; ``number``: its index in the plan."""
+    """Return the finding of a fault's outcome; ``number``: the fault's index in the plan."""
     reacted = outcome.get("reacted", {}).get("reached", {})
     return FaultFinding(
         plan.faults[number],
@@ -273,7 +273,7 @@ def finding(plan: CampaignPlan, number: int, outcome: Mapping[str, Any]) -> Faul
 
 
 def _harm(groups: Mapping[str, Sequence[Mapping[str, int]]]) -> list[str]:
-    """Return the affected criteria and the number of faults in each group, where there are any."""
+    """Return the affected criteria and the number of affected faults in each group."""
     return [
         f"{', '.join(dict.fromkeys(name for counts in worse for name in counts))} in {len(worse)} "
         f"of {len(each)} {kind} faults"
@@ -319,7 +319,7 @@ class CampaignStore(PieceFolder):
         return f"Choose another folder with {option('out')}, or remove this folder"
 
     def kept(self, plan: CampaignPlan) -> dict[int, dict[str, Any]]:
-        """Return the stored outcomes of faults, by number, without damaged ones."""
+        """Return the stored outcomes of faults by number, without damaged outcomes."""
         outcomes = {}
         for number in self.finished() & {*range(len(plan.faults))}:
             try:
@@ -369,7 +369,7 @@ def run_campaign(
         store.begin(plan, {"name": plan.name})
     progress("healthy runs", 0.0)
     healthy = judge_healthy(plan, healthy_traces(plan))
-    # A few lanes each: several faults in parallel use the cores better than the runs of one.
+    # Each fault uses only a few lanes, so several faults in parallel use the cores better.
     outcomes = complete(
         range(len(plan.faults)),
         {} if store is None else store.kept(plan),

@@ -9,7 +9,7 @@ from typing import Any, Protocol
 
 
 class Plan(Protocol):
-    """Computation whose finished pieces can be reused: a study, a campaign."""
+    """Computation whose finished pieces can be reused, such as a study or a campaign."""
 
     @property
     def name(self) -> str:
@@ -31,8 +31,8 @@ _SHOWN = 3  # number of differing entries to list
 _WORDS = {
     "version": "the version of bywire",
     "computed equations": "the equations of the model",
-    "computed figures": "how the runs or their key figures are computed",
-    "points": "how the library draws",
+    "computed figures": "the computation of the runs or their key figures",
+    "points": "the random points from the library",
 }
 """entries whose values are not meaningful to a reader"""
 _PARTS = {"varied": ("", "together", "quantiles"), "stimuli": ("", "parameters")}
@@ -40,7 +40,7 @@ _PARTS = {"varied": ("", "together", "quantiles"), "stimuli": ("", "parameters")
 
 
 def as_json(identity: Mapping[str, Any]) -> dict[str, Any]:
-    """Return an identity with JSON types only, as it is stored."""
+    """Return an identity with only JSON types, as it is stored."""
     kept: dict[str, Any] = json.loads(json.dumps(identity, sort_keys=True, default=str))
     return kept
 
@@ -52,7 +52,7 @@ def digest_of(identity: Mapping[str, Any]) -> str:
 
 
 def differing(before: Mapping[str, Any], now: Mapping[str, Any]) -> str:
-    """Describe the entries in which two identities differ. Empty if they are unknown.
+    """Describe the entries in which two identities differ; empty if the earlier one is unknown.
 
     Examples
     --------
@@ -72,9 +72,10 @@ def differing(before: Mapping[str, Any], now: Mapping[str, Any]) -> str:
 
 
 def _is_said(name: str, old: Mapping[str, Any], new: Mapping[str, Any]) -> bool:
-    """Return whether a difference follows from that of another entry.
+    """Return whether a difference follows from the difference of another entry.
 
-    Quantiles differ if the text of a distribution does, as do all entries of newly varied numbers.
+    Quantiles differ if the text of a distribution differs, and so do all entries of newly varied
+    numbers.
     """
     whole, _, part = name.rpartition(" ")
     if part == "quantiles":

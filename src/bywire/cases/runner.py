@@ -25,7 +25,7 @@ def complete(
     workers: int | None = None,
     pool: Callable[[int], AbstractContextManager[Executor]] = thread_pool,
 ) -> dict[K, T]:
-    """Return the results of all pieces, computing only those that are missing.
+    """Return the results of all pieces, and compute only missing ones.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def complete(
     keep
         Called in this thread with each computed piece and its result.
     progress
-        Called in this thread afterward, with the piece and the finished share, 0 to 1.
+        Called in this thread afterwards, with the piece and the finished share, 0 to 1.
     workers
         Number of workers. Default: one per core.
     pool
@@ -82,7 +82,7 @@ def as_completed(
     pieces
         The pieces.
     ahead
-        Largest number of submitted unfinished pieces. Default: all.
+        Maximum number of submitted unfinished pieces. Default: all.
     """
     left = iter(pieces)
     begun = {pool.submit(compute, piece): piece for piece in islice(left, ahead)}

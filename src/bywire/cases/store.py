@@ -1,4 +1,4 @@
-"""Store of finished pieces of long work, with which an interrupted run can continue.
+"""Store of finished pieces of long work, so that an interrupted run can continue.
 
 Large pieces are files in a folder with a record of the work (`PieceFolder`). Small pieces are
 lines of one file (`PieceLines`). A killed process loses its unfinished pieces. A damaged piece
@@ -27,7 +27,7 @@ def json_object(text: bytes | str) -> dict[str, Any]:
     Raises
     ------
     ValueError
-        If the file does not contain a JSON object, or one that is nested too deeply.
+        If the file contains no JSON object, or an object that is nested too deeply.
     """
     try:
         value = json.loads(text)
@@ -42,8 +42,8 @@ def json_object(text: bytes | str) -> dict[str, Any]:
 class PieceFolder(ABC):
     """Folder with a record of the work, and a file for each finished piece.
 
-    A piece's file is written completely or not at all. Two commands may use the same folder. If
-    both compute the same piece, they only lose time.
+    A piece's file is written completely or not at all. Two commands may use the same folder; if
+    both compute the same piece, they only waste time.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ class PieceFolder(ABC):
     FILE: ClassVar[str]
     """name of a piece's file by its number, as a format"""
     SAID: ClassVar[Mapping[str, type]]
-    """further entries of the record, with their types"""
+    """other entries of the record, with their types"""
 
     folder: Path
 
@@ -81,7 +81,7 @@ class PieceFolder(ABC):
         plan
             Plan of the pieces.
         about
-            Further entries of the record.
+            Other entries of the record.
 
         Raises
         ------
@@ -141,8 +141,7 @@ class PieceFolder(ABC):
             pass
         raise FileError(
             f"{path} is damaged, or does not belong to a {self.KIND}. Run the {self.NOUN} in "
-            "another "
-            "folder",
+            "another folder",
             name=str(path),
         )
 
@@ -196,7 +195,7 @@ class PieceFolder(ABC):
 class PieceLines:
     """File with a JSON object for each finished piece, one per line.
 
-    Each object has a key, so that several works can share the file.
+    Each object has a key, so that several computations can share the file.
 
     Parameters
     ----------
@@ -207,7 +206,7 @@ class PieceLines:
     path: Path | None
 
     def pieces(self, read: Callable[[dict[str, Any]], T]) -> Iterator[tuple[str, T]]:
-        """Yield key and value of the stored pieces, without a line truncated by a killed run.
+        """Yield key and value of the stored pieces, except a line that a killed run truncated.
 
         Parameters
         ----------
@@ -251,10 +250,10 @@ class PieceLines:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             with self.path.open(
                 "a+b", buffering=0
-            ) as file:  # in a single write, as other processes may write, too
+            ) as file:  # in a single write, since other processes may also write
                 if file.tell():
                     file.seek(-1, 2)
-                    # A line truncated by a killed run must not damage this one.
+                    # A line that a killed run truncated must not damage this line.
                     line = line if file.read(1) == b"\n" else b"\n" + line
                 file.write(line)
         except OSError as error:

@@ -158,7 +158,8 @@ def list_command(
         str | None,
         typer.Argument(
             metavar="[TOPIC|NAME|WORD]",
-            help="Topic, name or search word. A name shows its options, signals and units.",
+            help="Topic, name or search word. For a name, the output shows its options, signals "
+            "and units.",
             autocompletion=completion.names_of(),
         ),
     ] = None,
@@ -187,7 +188,7 @@ def benchmark_command(
 
 
 def _benchmarks() -> ModuleType:
-    """Load the benchmarks, a folder next to ``src`` in a clone of the repository.
+    """Load the benchmarks from a folder next to ``src`` in a clone of the repository.
 
     Raises
     ------
@@ -219,7 +220,7 @@ def serve_command(
             help="Bench file, experiment or folder. Default: the current folder.",
         ),
     ] = None,
-    port: Annotated[int, typer.Option(help="Port. 0 selects a free port.")] = PORT,
+    port: Annotated[int, typer.Option(help="Port of the server. 0 selects a free port.")] = PORT,
     folder: Annotated[
         Path | None,
         typer.Option(help="Folder to serve. Default: the bench file's folder.", show_default=False),
@@ -246,10 +247,10 @@ _SIZE = "size"
 
 
 class StudyGroup(TyperGroup):
-    """Commands of studies. The name of a sizing study is short for ``size NAME``."""
+    """Commands for studies. The name of a sizing study alone is short for ``size NAME``."""
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:  # types of typer's own click
-        """Return the command of the first word; see click."""
+        """Return the command for the first word (see click)."""
         if args and args[0].endswith(".toml"):
             raise ParameterError(
                 f"{args[0]} is not a command of 'bywire study'. To run this study file, type "
@@ -271,13 +272,13 @@ margins, life, faults, design, convert, identify, replay, check, new,
 study run, study resume, study extend, study report, study status, study surrogate, study size,
 export controller, export fmu, export wasm
 """
-"""commands in the order in which the help lists them, before all others"""
+"""commands that the help lists first, in this order"""
 _GROUPS: dict[str, dict[str, Any]] = {
     "study": {
         "cls": StudyGroup,
-        "help": "Run a study with many cases (run FILE), or compare brake designs (NAME).",
+        "help": "Run a study with many cases (run FILE), or compare brake designs (size NAME).",
     },
-    "export": {"help": "Export parts of a bench for other tools."},
+    "export": {"help": "Export a bench, or parts of it, for other tools."},
 }
 """groups of commands, by their first word"""
 
@@ -339,7 +340,7 @@ def _root(
             "--system",
             metavar="PATH",
             help="Load your own brake from a Python file or package. bywire executes its code. "
-            "Allowed before or after the command.",
+            "Can come before or after the command.",
         ),
     ] = None,
 ) -> None:

@@ -1,4 +1,4 @@
-"""Tab completion in the shell for names of the cached index and for files."""
+"""Tab completion in the shell for names from the cached index and for files."""
 
 from __future__ import annotations
 

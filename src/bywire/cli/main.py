@@ -33,8 +33,9 @@ GARBAGE = 50_000
 def process() -> None:
     """Run the command line in this process, and exit without Python's finalization.
 
-    Finalization after all output would take a sixth of a warm run's time. A library's thread that
-    is still running after Ctrl-C might abort it. Functions registered with ``atexit`` still run.
+    Finalization after all output would take a sixth of a warm run's time. After Ctrl-C, a library's
+    thread that is still running might abort the finalization. Functions registered with ``atexit``
+    still run.
     """
     from bywire.core.sources import command
 
@@ -63,7 +64,7 @@ def main() -> None:
     """Run the command line, and turn user errors into one message and an exit status."""
     from bywire.core.callers import command_line
 
-    # All output is written before finalization, where Ctrl-C would kill the process by its signal.
+    # All output is written before finalization, during which Ctrl-C would kill the process.
     atexit.register(signal.signal, signal.SIGINT, signal.SIG_IGN)
     gc.set_threshold(GARBAGE, *gc.get_threshold()[1:])
     open_streams()
@@ -75,7 +76,8 @@ def main() -> None:
         message("interrupted")
         status = INTERRUPTED
     # If a KeyboardInterrupt hits text that CPython executes, as for a named tuple, CPython records
-    # it as unhandled and later kills ``python -m`` by the signal. Another named tuple resets this.
+    # it as unhandled and later kills ``python -m`` with the signal. Another named tuple resets
+    # this.
     namedtuple("Reset", ())
     raise SystemExit(status)
 
@@ -92,7 +94,7 @@ def _system_error(error: OSError) -> str:
 
 
 def _foreign_line(error: Exception) -> str:
-    """Return an error and its line if the code of a user's brake raised it, otherwise no text."""
+    """Return an error and its line if a user's brake raised it, otherwise an empty text."""
     from bywire.core.brake import foreign_line
 
     return foreign_line(error)
@@ -104,13 +106,13 @@ def _path_of(rest: Iterator[str]) -> str:
         raise ParameterError(
             "--system needs the path of a Python file or of a folder with __init__.py",
             name="--system",
-            valid="a Python file or of a folder",
+            valid="a Python file or a folder",
         )
     return path
 
 
 def systems_first(arguments: Sequence[str]) -> list[str]:
-    """Move every ``--system PATH`` in front of the command.
+    """Move every ``--system PATH`` before the command.
 
     Examples
     --------
@@ -201,12 +203,13 @@ def _explained(error: BaseException) -> int:
     if isinstance(error, MemoryError):
         limit = address_space()
         why = (
-            f"this process's address space is limited to {limit / 2**30:.3g} GiB. Raise the limit "
+            f"The address space of this process is limited to {limit / 2**30:.3g} GiB. Raise the "
+            f"limit "
             "with ulimit -v"
             if limit
-            else "free some memory, or reduce the number of cases or workers"
+            else "Free some memory, or reduce the number of cases or workers"
         )
-        message(f"error: out of memory: {why}")
+        message(f"error: out of memory. {why}")
         return FAILED
     if isinstance(error, OSError):
         message(f"error: {_system_error(error)}")
@@ -215,7 +218,7 @@ def _explained(error: BaseException) -> int:
     if foreign:
         message(f"error: {foreign}")
         return ModelError.exit_status
-    # Python would exit with status 1, which means that a requirement is not met.
+    # Python would exit with status 1, which here means that a requirement is not met.
     traceback.print_exception(error)
     message("error: this is a bug in bywire. Please report it with the lines above")
     return FAILED

@@ -49,7 +49,7 @@ def result(text: str) -> None:
 def message(text: str) -> None:
     """Print a line for the user to standard error, with control characters escaped.
 
-    A long text loses its middle, because the advice is at its end.
+    bywire shortens a long text in the middle, because the advice is at the end.
     """
     from bywire.report.wording import clean
 

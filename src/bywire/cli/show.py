@@ -73,16 +73,16 @@ def progress_bar() -> Iterator[Progress]:
 
 
 def folder(text: str) -> Path:
-    """Return the path given to ``--out``, which must not be empty.
+    """Return the path specified with ``--out``, which must not be empty.
 
     Raises
     ------
     FileError
-        If the text is empty.
+        If the path is empty.
     """
     if not text.strip():
         raise FileError(
-            "--out '' is empty. Specify a folder; '.' is the current folder",
+            "--out '' is empty. Specify a folder, such as '.' for the current folder",
             name="--out",
             value="''",
             valid="a folder",
@@ -96,7 +96,7 @@ ANOTHER = "Choose another folder with --out"
 
 @contextmanager
 def output_folder(out: Path, advice: str = ANOTHER) -> Iterator[None]:
-    """Create the output folder before the computation, so that a write error appears early.
+    """Create the output folder before the computation, so that write errors appear early.
 
     Folders created here are removed if they stay empty. ``advice`` tells the user what to do if the
     folder is not writable.
@@ -137,7 +137,7 @@ def show(
     compute
         ``compute(progress)``: the use case.
     out
-        Folder for recordings, figures and the report. If None, no files are written.
+        Folder for recordings, figures and the report. If None, bywire writes no files.
     as_json
         Whether to print one JSON object.
     advice
@@ -148,7 +148,7 @@ def show(
     Raises
     ------
     BywireError
-        If the use case raises it, or, after the numbers are shown, if files cannot be written.
+        If the use case raises it. Also, after bywire shows the numbers, if files cannot be written.
     typer.Exit
         With status 1 if a requirement is not met, and 130 after an interrupt.
     """

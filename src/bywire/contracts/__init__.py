@@ -1,1 +1,1 @@
-"""Contracts of every element, law, parameter set and model, checked by ``bywire check``."""
+"""Contracts of elements, laws, parameter sets and models, which ``bywire check`` checks."""

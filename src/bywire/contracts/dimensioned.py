@@ -1,4 +1,4 @@
-"""Numbers with units, which pass through equations and reject sums of different dimensions."""
+"""Numbers with units for the evaluation of equations; they reject sums of different dimensions."""
 
 from __future__ import annotations
 
@@ -11,23 +11,24 @@ from bywire.core import ops
 from bywire.core.dimensions import BASE, DimensionError
 from bywire.core.units import base_powers, si_value
 
-PURE = ("exp", "log", "sin", "cos", "arctan", "floor", "power")  # functions of pure numbers only
+PURE = ("exp", "log", "sin", "cos", "arctan", "floor", "power")  # accept only pure numbers
 
 
 class Dimensioned:
-    """Number with a unit; zero fits every unit, and every other plain number is pure.
+    """Number with a unit; a plain zero has any unit, and any other plain number is pure.
 
-    A plain NaN is an unknown value. It also fits every unit, and so do results computed from it.
+    A plain NaN is an unknown value. It has any unit, and results computed from it also have any
+    unit.
     """
 
-    __array_ufunc__ = None  # NumPy's scalars leave operations to this class
+    __array_ufunc__ = None  # NumPy scalars delegate operations to this class
 
     def __init__(self, value: float, unit: str = "1") -> None:
         self.value, self.powers = si_value(value, unit), base_powers(unit, BASE)
 
     @classmethod
     def of(cls, value: float, powers: tuple[float, ...]) -> Self:
-        """Return a number in SI with the exponents of its base units."""
+        """Return a number in SI units with the exponents of its base units."""
         self = cls.__new__(cls)
         self.value, self.powers = value, powers
         return self
@@ -101,7 +102,7 @@ class Dimensioned:
             x, y, powers = _alike(*args)
             return Dimensioned.of(max(x, y) if name == "fmax" else min(x, y), powers)
         raise TypeError(
-            f"ops.{name} has no rule for dimensions. Define it in Dimensioned._bywire_op"
+            f"ops.{name} has no rule for dimensions. Define the rule in Dimensioned._bywire_op"
         )
 
 
@@ -115,7 +116,7 @@ class Condition:
         raise TypeError("an equation must not branch on a value. Use ops.where")
 
     def _bywire_op(self, name: str, *args: Any) -> Any:
-        condition, then, otherwise = args  # of ops.where, the only function that takes a condition
+        condition, then, otherwise = args  # only ops.where accepts a condition
         x, y, powers = _alike(then, otherwise)
         return Dimensioned.of(x if condition.holds else y, powers)
 
@@ -150,7 +151,7 @@ def _combined(operation: Callable[[Any, Any], Any], left: Any, right: Any) -> An
     if _is_unknown(left) or _is_unknown(right):
         return float("nan")
     if _is_nothing(left) or (operation is operator.mul and _is_nothing(right)):
-        return 0.0  # zero fits every unit, even as a factor
+        return 0.0  # zero has any unit, even as a factor
     (x, of_left), (y, of_right) = _parts(left), _parts(right)
     sign = 1.0 if operation is operator.mul else -1.0
     powers = tuple(a + sign * b for a, b in zip(of_left, of_right, strict=True))
@@ -166,7 +167,7 @@ def _is_unknown(value: Any) -> bool:
 
 
 def _alike(left: Any, right: Any) -> tuple[float, float, tuple[float, ...]]:
-    """Return two numbers and their common dimension; zero and NaN have the other's."""
+    """Return two numbers and their common dimension; zero and NaN adopt the other's dimension."""
     (x, powers), (y, others) = _parts(left), _parts(right)
     if _is_nothing(left) or _is_unknown(left):
         return x, y, others

@@ -1,4 +1,4 @@
-"""Contracts of elements, control laws and parameter sets: equations, energy, values."""
+"""Contracts of elements, control laws and parameter sets: equations, energy and values."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ NODES = 4  # number of nodes of every table
 ATTEMPTS = 2000
 _SHOWN = 24  # values in a message
 MANY = 64
-"""largest number of combinations of choices for which all are tried"""
+"""maximum number of combinations of choices for which all combinations are tested"""
 
 Arguments = dict[str, Any]
 Choices = dict[str, Any]
@@ -54,8 +54,8 @@ Choices = dict[str, Any]
 def combinations(annotations: Mapping[str, Any]) -> Iterator[Choices]:
     """Yield combinations of the arguments' structural choices, such as ``par.law``.
 
-    A small number of combinations is complete. Otherwise, every choice is combined with the first
-    and with the last of all other choices.
+    If there are only a few combinations, the function yields all of them. Otherwise, it combines
+    each choice with the first and with the last value of all other choices.
 
     Raises
     ------
@@ -90,12 +90,14 @@ def _options(cls: type[ParameterSet], prefix: str) -> dict[str, tuple[Any, ...]]
         elif info.annotation is bool:
             options[prefix + name] = (False, True)
         elif name not in leaves:
-            raise TypeError(f"{cls.__module__}.{cls.__name__}.{name}: neither quantity nor choice")
+            raise TypeError(
+                f"{cls.__module__}.{cls.__name__}.{name} is neither a quantity nor a choice"
+            )
     return options
 
 
 class Sampler:
-    """Arguments with one combination of choices; its samples share one structure."""
+    """Sampler of arguments for one combination of choices; its samples have the same structure."""
 
     def __init__(self, annotations: Mapping[str, Any], choices: Choices, seed: int = 2010) -> None:
         self.annotations = dict(annotations)
@@ -106,11 +108,11 @@ class Sampler:
         self._of = {name: tuple(known.values()) for name, known in each.items()}
 
     def sample(self) -> Arguments:
-        """Return one sample of all arguments, as floats."""
+        """Return one sample of all arguments, with floats as numbers."""
         return {name: self._argument(name, note) for name, note in self.annotations.items()}
 
     def known(self, name: str) -> Number:
-        """Return the description of a flattened number; the nodes of a table share it."""
+        """Return the description of a flattened number; all nodes of a table have the same one."""
         return self._known[name if name in self._known else name.rsplit(".", 1)[0]]
 
     def _argument(self, name: str, annotation: Any) -> Any:
@@ -132,7 +134,7 @@ class Sampler:
             except ParameterError as error:
                 refusal = error
         raise ParameterError(
-            f"{cls.__module__}: no sample of {chosen} is valid: {refusal}",
+            f"{cls.__module__}: no sample with {chosen} is valid ({refusal})",
             name=cls.__module__,
             value=str(chosen),
         )
@@ -144,14 +146,14 @@ class Sampler:
         return (0.0, *np.cumsum(steps).tolist())
 
     def _draw(self, number: Number) -> float:
-        """Return a value well inside its range, with the magnitude of the nominal value."""
+        """Return a value well inside the range, with the magnitude of the nominal value."""
         if math.isfinite(number.low) and math.isfinite(number.high):
             share = self._rng.uniform(0.05, 0.95)
             return number.low + share * (number.high - number.low)
         if not math.isfinite(number.low):
             return min(number.high, number.nominal * self._rng.uniform(-1.0, 1.0))
         if number.nominal <= number.low:
-            raise ValueError(f"{number}: the nominal value must lie inside the range")
+            raise ValueError(f"{number}: the nominal value must be inside the range")
         return number.low + (number.nominal - number.low) * 10 ** self._rng.uniform(-0.3, 0.3)
 
 
@@ -160,7 +162,7 @@ def samples_of(
 ) -> tuple[Arguments, np.ndarray]:
     """Return one sample, and the numbers of ``count`` samples, shape (numbers, count).
 
-    Contracts with the same arguments use the same samples.
+    Contracts for the same arguments use the same samples.
     """
     return _samples(tuple(annotations.items()), tuple(choices.items()), count)
 
@@ -186,7 +188,7 @@ def is_table(cls: type[ParameterSet], name: str) -> bool:
 
 
 def flattened(arguments: Arguments) -> dict[str, float]:
-    """Return all numbers of some arguments by dotted name."""
+    """Return all numbers in the arguments by dotted name."""
     numbers_in: dict[str, float] = {}
     for name, value in arguments.items():
         if isinstance(value, ParameterSet):
@@ -199,7 +201,7 @@ def flattened(arguments: Arguments) -> dict[str, float]:
 
 
 def carrying(arguments: Arguments, values: Mapping[str, Any]) -> Arguments:
-    """Return arguments of the same structure with other objects as their numbers."""
+    """Return arguments with the same structure but other objects in place of the numbers."""
     renewed: Arguments = {}
     for name, value in arguments.items():
         if isinstance(value, ParameterSet):
@@ -218,12 +220,13 @@ def described(
     values: Sequence[float] | Array = (),
     is_broken: bool = True,
 ) -> str:
-    """Return the choices and values of a trial with units, for the end of a message.
+    """Return a trial's choices and values, for the end of a message.
 
     Parameters
     ----------
     structure, values
-        A sample, and its numbers in the order of `flattened`; None if all samples were equal.
+        A sample, and its numbers in the order of `flattened`; None if all samples give the same
+        result.
     is_broken
         Whether to list the values, because they broke the contract.
     """
@@ -233,7 +236,7 @@ def described(
         texts += [f"{name} = {value:.6g}" for name, value in pairs]
     more = len(texts) - _SHOWN
     shown = texts[:_SHOWN] + ([f"and {more} more"] if more > 0 else [])
-    return f"; with {', '.join(shown)}" if texts else ""
+    return f" (with {', '.join(shown)})" if texts else ""
 
 
 def symbolic(arguments: Arguments) -> tuple[ca.SX, Arguments]:
@@ -244,20 +247,20 @@ def symbolic(arguments: Arguments) -> tuple[ca.SX, Arguments]:
 
 
 def evaluate(function: Callable[..., Any], structure: Arguments, rows: Any) -> np.ndarray:
-    """Return the results of one call, one row each; ``rows`` holds floats or arrays."""
+    """Return the results of one call, one row per result; ``rows`` contains floats or arrays."""
     numbers_in = dict(zip(flattened(structure), rows, strict=True))
     results = flat(call(function, carrying(structure, numbers_in)))
     return np.array([np.broadcast_to(np.asarray(r, float), np.shape(rows[0])) for r in results])
 
 
 def traced(function: Callable[..., Any], structure: Arguments) -> tuple[ca.SX, ca.SX]:
-    """Return a column of symbols and a column of results as expressions of these."""
+    """Return a column of symbols, and a column of results as expressions of these symbols."""
     column, arguments = symbolic(structure)
     return column, ca.vertcat(*flat(call(function, arguments)))
 
 
 def call(function: Callable[..., Any], arguments: Arguments) -> Any:
-    """Call a function with the arguments that it has."""
+    """Call a function with those of the arguments that it accepts."""
     return function(**{name: arguments[name] for name in inspect.signature(function).parameters})
 
 
@@ -273,18 +276,18 @@ def samples(cls: Class) -> Iterator[ParameterSet]:
 
 
 def survives_json(cls: Class) -> Iterator[Evidence]:
-    """Check that samples of a class survive JSON."""
+    """Check that samples of a class stay the same after a round trip through JSON."""
     for par in samples(cls):
         yield set_survives_json(par)
 
 
 def set_survives_json(par: ParameterSet) -> Evidence:
-    """Check that a set survives JSON."""
+    """Check that a set stays the same after a round trip through JSON."""
     again = type(par).model_validate_json(par.model_dump_json())
     before, after = par.flat(), again.flat()
     lost = [name for name in before if before[name] != after.get(name)]
     kept = again == par and not lost
-    text = "its JSON gives the same set back" if kept else f"JSON changes {', '.join(lost)}"
+    text = "the set equals its JSON" if kept else f"JSON changes {', '.join(lost)}"
     return Evidence(kept, text)
 
 
@@ -323,9 +326,9 @@ def refuses_outside(
     Parameters
     ----------
     name
-        Dotted name of the number, or of a table of them.
+        Dotted name of a number or a table.
     expected
-        ``expected(leaf, value)``: texts that the message must contain.
+        ``expected(leaf, value)``: texts that the error message must contain.
     """
     leaf = leaf_fields(type(par))[name]
     place = _declared_at(type(par), name)
@@ -333,15 +336,15 @@ def refuses_outside(
         wrong = (*par.flat()[name][:-1], value) if is_table(type(par), name) else value
         message = refusal(par, name, wrong)
         if message is None:
-            text = f"{name} = {value!r} was accepted, but it must be {leaf.range_text}"
+            text = f"{name} accepts {value!r}, but it must be {leaf.range_text}"
             if not math.isfinite(value):
-                text += ". Write allow_inf_nan=False in its Field"
+                text += ". Add allow_inf_nan=False to its Field"
             yield Evidence(False, text, place=place)
             continue
         lacking = [part for part in expected(leaf, value) if part not in message]
-        text = f"{name} keeps its range"
+        text = f"{name} enforces its range"
         if lacking:
-            text = f"{lacking[0]!r} is missing in {message!r}"
+            text = f"the error {message!r} does not contain {lacking[0]!r}"
         yield Evidence(not lacking, text, place=place)
 
 
@@ -355,7 +358,7 @@ def outside(leaf: Leaf) -> Iterator[float]:
 
 
 def refusal(par: ParameterSet, name: str, value: Any) -> str | None:
-    """Return a set's message for a value that it rejects, or None if it accepts the value."""
+    """Return a set's error message for a value, or None if it accepts the value."""
     try:
         par.replace({name: value})
     except ParameterError as error:
@@ -364,7 +367,7 @@ def refusal(par: ParameterSet, name: str, value: Any) -> str | None:
 
 
 def _declared_at(cls: Class, name: str) -> Place:
-    """Return the line that declares a number, in the class of its group."""
+    """Return the line that declares a number in the class of its group."""
     *groups, last = name.split(".")
     for group in groups:
         inner = cls.model_fields[group].annotation
@@ -379,13 +382,13 @@ Function = Callable[..., Any]
 
 SAMPLES = 30
 BACK_ENDS = 1e-12
-"""largest difference between floats, arrays and symbols, relative to the largest value"""
+"""maximum difference between floats, arrays and symbols, relative to the largest value"""
 DIFFERENCE = 1e-6
-"""step of the differences, relative to the nominal value"""
+"""step of the finite differences, relative to the nominal value"""
 SLOPE = 1e-7
-"""largest deviation of a derivative from the differences"""
+"""maximum deviation of a derivative from finite differences"""
 PREFIX = 1e-12
-"""largest deviation of the factor of a unit to SI from one"""
+"""maximum deviation from one of a unit's SI factor"""
 
 
 def with_units(sampler: Sampler) -> Arguments:
@@ -396,23 +399,24 @@ def with_units(sampler: Sampler) -> Arguments:
 
 
 def has_annotated_units(function: Function) -> Iterator[Evidence]:
-    """Check that results have the dimension of their annotation, for all choices."""
+    """Check that results have the dimension of their annotation for all choices."""
     arguments, returns = signature_of(function)
     expected = numbers("result", returns)
     for choices in combinations(arguments):
         got = flat(call(function, with_units(Sampler(arguments, choices))))
         for (name, number), value in zip(expected.items(), got, strict=True):
-            text = f"{name} is {value}, not {number.unit}{described(choices)}"
+            text = f"{name} is {value}, but its unit is {number.unit}{described(choices)}"
             yield Evidence(fits(value, number.unit), text)
 
 
 def is_in_SI(function: Function) -> Iterator[Evidence]:
-    """Check that all units are SI, since no code applies a prefix's factor."""
+    """Check that all units are SI units, because no code applies the factor of a prefix."""
     arguments, returns = signature_of(function)
     for argument, annotation in (*arguments.items(), ("result", returns)):
         for name, number in numbers(argument, annotation).items():
             factor = Dimensioned(1.0, number.unit).value
-            yield measured(abs(factor - 1.0), PREFIX, f"{name} [{number.unit}] is {factor:g} of SI")
+            text = f"{name} has the unit {number.unit}, which is {factor:g} SI units"
+            yield measured(abs(factor - 1.0), PREFIX, text)
 
 
 def has_agreeing_back_ends(function: Function) -> Iterator[Evidence]:
@@ -425,19 +429,20 @@ def has_agreeing_back_ends(function: Function) -> Iterator[Evidence]:
         arrays = evaluate(function, structure, samples)
         column, results = traced(function, structure)
         symbols = ca.Function("f", [column], [results])(samples).full()
-        # A difference of large terms is only as accurate as these terms, so the row's largest value
-        # is the scale.
+        # A difference of large terms is only as accurate as its terms, so use the row's largest
+        # value as the scale.
         scale = np.abs(floats).max(axis=1, keepdims=True)
         for name, other in (("arrays", arrays), ("symbols", symbols)):
             apart = np.abs(other - floats)
             off = _relative(apart, scale)
             at = int(np.argmax((apart / np.where(scale > 0, scale, 1)).max(axis=0)))
             where = described(choices, structure, samples[:, at], off > BACK_ENDS)
-            yield measured(off, BACK_ENDS, f"{name} differ from floats by {off:.1e}{where}")
+            text = f"results for {name} and floats differ by {off:.1e}{where}"
+            yield measured(off, BACK_ENDS, text)
 
 
 def has_its_slopes(function: Function) -> Iterator[Evidence]:
-    """Check that the symbolic Jacobian equals the function's slope, away from kinks."""
+    """Check that the symbolic Jacobian equals the function's slope except at kinks."""
     arguments, _ = signature_of(function)
     for choices in combinations(arguments):
         sampler = Sampler(arguments, choices)
@@ -460,20 +465,22 @@ def has_its_slopes(function: Function) -> Iterator[Evidence]:
         ]
         for j, (name, nominal, wide, narrow) in enumerate(zip(names, nominals, *both, strict=True)):
             scale = largest / nominal + np.abs(exact[:, j])
-            # If the two differences disagree, there is a kink or a jump between their ends.
+            # If the two differences disagree, there is a kink or a jump in the interval.
             smooth = np.abs(wide - narrow) <= 1e-3 * scale
             if not np.all(smooth.mean(axis=1) > 0.5):
-                yield Evidence(False, f"kinks everywhere along {name}{described(choices)}")
+                text = f"the function has kinks everywhere along {name}{described(choices)}"
+                yield Evidence(False, text)
                 return
             off = np.abs(narrow - exact[:, j]) / np.where(scale > 0, scale, 1)
             share = float(off[smooth].max())
             at = int(np.argmax(np.where(smooth, off, -1.0).max(axis=0)))
             where = described(choices, structure, samples[:, at], share > SLOPE)
-            yield measured(share, SLOPE, f"slope along {name} is off by {share:.1e}{where}")
+            text = f"the error of the slope along {name} is {share:.1e}{where}"
+            yield measured(share, SLOPE, text)
 
 
 def _slopes(function: Function, structure: Arguments, matrix: Array, steps: Array) -> Array:
-    """Return central differences along every row of the samples, shape (rows, results, samples)."""
+    """Return central differences along each row of the samples, shape (rows, results, samples)."""
     moves = np.kron(np.diag(steps), np.ones(matrix.shape[1]))
     many = np.tile(matrix, len(steps))
     difference = evaluate(function, structure, many + moves) - evaluate(
@@ -484,26 +491,27 @@ def _slopes(function: Function, structure: Arguments, matrix: Array, steps: Arra
 
 
 def _relative(off: Array, scale: Array) -> float:
-    """Return the largest relative difference; infinite if the scale is zero but values differ."""
+    """Return the maximum relative difference; infinite if the scale is zero but values differ."""
     wide = np.broadcast_to(scale, off.shape)
     with np.errstate(divide="ignore", invalid="ignore"):
         share = np.where(off == 0.0, 0.0, off / wide)
     return float(share.max())
 
 
-# --- Energy: the stored energy changes by the power in minus the losses
-# An element with ``energy`` also has ``power_in``. If the energy depends on a ``State``, it has
-# ``mass`` and ``balance``. If the energy depends on inputs, it has ``input_rate``, a tuple with
-# their derivatives under their names. Without ``power_loss`` it is lossless. An argument whose
-# type another function of the element returns (the contact forces) is computed by that function.
+# --- Energy: the rate of the stored energy equals the input power minus the losses
+# An element with ``energy`` also has ``power_in``. If the energy depends on a ``State``, the
+# element has ``mass`` and ``balance``. If the energy depends on inputs, it has ``input_rate``, a
+# tuple with the derivatives of these inputs under the same names. Without ``power_loss``, the
+# element is lossless. If another function of the element returns the type of an argument (such as
+# the contact forces), that function computes the argument.
 
 BALANCE = 1e-9
-"""share of the powers; the series for the fluid's flow energy has an error of about 1e-10"""
+"""maximum error relative to the powers; the series for the fluid's flow energy has about 1e-10"""
 ENERGETIC = ("energy", "power_in", "power_loss", "mass", "balance", "input_rate")
 
 
 def has_rates_of_its_states(module: ModuleType) -> Iterator[Evidence]:
-    """Check that balance over mass has the dimension of the derivative of the state."""
+    """Check that balance divided by mass has the dimension of the state's derivative."""
     mass, balance = (functions(module)[name] for name in ("mass", "balance"))
     arguments = merged((mass, balance))
     states = numbers("state", module.State)
@@ -514,7 +522,7 @@ def has_rates_of_its_states(module: ModuleType) -> Iterator[Evidence]:
             rate, unit = top / bottom, f"({number.unit})/s"
             yield Evidence(
                 fits(rate, unit),
-                f"rate of {name} is {rate}, not {unit}{described(choices)}",
+                f"the rate of {name} is {rate}, but its unit is {unit}{described(choices)}",
                 place=place_of(balance),
             )
 
@@ -528,7 +536,8 @@ def keeps_energy(module: ModuleType) -> Iterator[Evidence]:
     place = place_of(laws["energy"])
     if needed - laws.keys():
         missing = ", ".join(sorted(needed - laws.keys()))
-        yield Evidence(False, f"it stores energy, so it also needs {missing}", place=place)
+        text = f"the element stores energy, so it also needs {missing}"
+        yield Evidence(False, text, place=place)
         return
     arguments = merged(laws.values())
     is_alive = False
@@ -550,7 +559,7 @@ def keeps_energy(module: ModuleType) -> Iterator[Evidence]:
         powers, hidden = (out.full() for out in compiled(samples))
         if hidden.any():
             text = (
-                "the energy depends on inputs: write input_rate(u), which returns their "
+                "the energy depends on inputs. Add a function input_rate(u) that returns their "
                 f"derivatives{described(choices)}"
             )
             yield Evidence(False, text, place=place)
@@ -563,10 +572,10 @@ def keeps_energy(module: ModuleType) -> Iterator[Evidence]:
         at = int(np.argmax(shares))
         share = float(shares[at])
         where = described(choices, structure, samples[:, at], share > BALANCE)
-        text = f"d(energy)/dt is off by {share:.1e} of the powers{where}"
+        text = f"the error of d(energy)/dt is {share:.1e} of the powers{where}"
         yield measured(share, BALANCE, text, place)
     if not is_alive:
-        yield Evidence(False, "all powers are zero", place=place)
+        yield Evidence(False, "all powers are zero for all choices", place=place)
 
 
 def loses_what_it_says(module: ModuleType) -> Iterator[Evidence]:
@@ -574,7 +583,7 @@ def loses_what_it_says(module: ModuleType) -> Iterator[Evidence]:
     loss = functions(module)["power_loss"]
     claim, place = loss.__doc__ or "", place_of(loss)
     if (">= 0" in claim) == ("signed" in claim):
-        text = "the docstring of power_loss must say '>= 0' or 'signed'"
+        text = "the docstring of power_loss must contain either '>= 0' or 'signed'"
         yield Evidence(False, text, place=place)
         return
     if "signed" in claim:
@@ -588,11 +597,13 @@ def loses_what_it_says(module: ModuleType) -> Iterator[Evidence]:
         at = int(np.argmin(values))
         least = float(values.flat[at])
         where = described(choices, structure, samples[:, at], not least >= 0.0)
-        yield Evidence(least >= 0.0, f"power_loss falls to {least:g} W{where}", place=place)
+        yield Evidence(
+            least >= 0.0, f"the minimum of power_loss is {least:g} W{where}", place=place
+        )
 
 
 def _consistent(module: ModuleType, known: dict[str, Any], sample: Arguments) -> Arguments:
-    """Return the arguments; the element's own laws replace those that they determine."""
+    """Return the arguments, with those that the element's own laws determine replaced."""
     computed: Arguments = {}
     for law in (f for k, f in functions(module).items() if k not in ENERGETIC):
         takes, gives = signature_of(law)
@@ -606,7 +617,7 @@ def _consistent(module: ModuleType, known: dict[str, Any], sample: Arguments) ->
 def _rates(
     module: ModuleType, laws: dict[str, Any], known: dict[str, Any], sample: Arguments
 ) -> dict[str, Any]:
-    """Return the derivatives of all states and moving inputs, by the name of their argument."""
+    """Return the derivatives of all states and varying inputs, by the name of their argument."""
     rates: dict[str, Any] = {}
     place = {note: name for name, note in known.items() if is_signals(note)}
     if "balance" in laws and hasattr(module, "State"):
@@ -629,17 +640,17 @@ OF_A_FUNCTION: dict[str, Contract] = {
     "back ends": has_agreeing_back_ends,
     "derivatives": has_its_slopes,
 }
-"""contracts of every public function"""
+"""contracts of each public function"""
 
 OF_A_CLASS: dict[str, Contract] = {
     "round trip": survives_json,
     "refusals": keeps_its_ranges,
 }
-"""contracts of every class of parameters"""
+"""contracts of each parameter class"""
 
 
 def demands_on(element: Element) -> Demands:
-    """Yield every contract of an element."""
+    """Yield all contracts of an element."""
     functions = element.functions
     for name, function in functions.items():
         for contract, test in OF_A_FUNCTION.items():

@@ -19,7 +19,7 @@ from bywire.core.signals import signal_in
 
 @dataclass(frozen=True)
 class Number:
-    """Description of one number among a function's arguments or results."""
+    """Description of a number among a function's arguments or results."""
 
     unit: str
     nominal: float
@@ -29,14 +29,14 @@ class Number:
 
 @dataclass(frozen=True)
 class Element:
-    """File of equations: a physical element, or a control law.
+    """File of equations: a physical element or a control law.
 
     Parameters
     ----------
     name
-        Dotted name of its module, for example ``"plant.dc_motor"``.
+        Dotted name of the module, for example ``"plant.dc_motor"``.
     module
-        Its functions, ``Parameters`` and signal tuples.
+        Module with functions, ``Parameters`` and signal tuples.
     """
 
     name: str
@@ -44,17 +44,17 @@ class Element:
 
     @property
     def summary(self) -> str:
-        """First line of its file's docstring."""
+        """First line of the file's docstring."""
         return (self.module.__doc__ or "").strip().partition("\n")[0]
 
     @property
     def functions(self) -> dict[str, Callable[..., Any]]:
-        """Its public functions."""
+        """Public functions of the element."""
         return functions(self.module)
 
 
 def _declared(module: ModuleType) -> Iterator[Element]:
-    """Yield the element of a module; packages and files of whole brakes have none."""
+    """Yield the element of a module; packages and files of whole brakes contain no element."""
     if not hasattr(module, "__path__") and not hasattr(module, "BRAKE") and functions(module):
         yield Element(module.__name__.removeprefix("bywire."), module)
 
@@ -79,7 +79,7 @@ def elements_by_name() -> dict[str, Element]:
 
 
 def elements_of(brake: Brake) -> dict[str, Element]:
-    """Return the elements and laws in a brake's package, and those that its modules import."""
+    """Return the elements and laws in a brake's package or imported by its modules."""
     ASSEMBLIES.of(brake.module)  # loads its models and the modules that they use
     known = every_element()
     bring = {**ELEMENTS.of(brake.module), **LAWS.of(brake.module)}
@@ -112,7 +112,7 @@ def functions(module: ModuleType) -> dict[str, Callable[..., Any]]:
         if inspect.isfunction(value)
         and value.__module__ == module.__name__
         and not name.startswith("_")
-        and name not in ("watch", "exists")  # reads recordings; reads choices
+        and name not in ("watch", "exists")  # one reads recordings, the other reads choices
     }
 
 
@@ -131,17 +131,17 @@ def signature_of(function: Callable[..., Any]) -> tuple[dict[str, Any], Any]:
     names = list(inspect.signature(function).parameters)
     missing = [name for name in (*names, "return") if name not in hints]
     if missing:
-        raise TypeError(f"{function.__module__}.{function.__name__}: no type for {missing}")
+        raise TypeError(f"{function.__module__}.{function.__name__} does not annotate {missing}")
     return {name: hints[name] for name in names}, hints["return"]
 
 
 def merged(members: Iterable[Callable[..., Any]]) -> dict[str, Any]:
-    """Return the arguments of an element's functions, in which each name has one meaning."""
+    """Return the arguments of an element's functions; a name must mean the same in all of them."""
     known: dict[str, Any] = {}
     for function in members:
         for name, annotation in signature_of(function)[0].items():
             if known.setdefault(name, annotation) != annotation:
-                raise TypeError(f"{function.__module__}: argument {name} has two meanings")
+                raise TypeError(f"{function.__module__}: argument {name} has two annotations")
     return known
 
 

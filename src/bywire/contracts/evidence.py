@@ -1,4 +1,4 @@
-"""Evidence on a contract: outcome, measure, and place in the code."""
+"""Evidence for a contract: outcome, measure, and place in the code."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class NotCheckedError(Exception):
 
 @dataclass(frozen=True)
 class Place:
-    """Line of a file; line 0 stands for the whole file."""
+    """Line of a file; line 0 means the whole file."""
 
     file: str
     line: int
@@ -31,18 +31,18 @@ class Place:
 
 @dataclass(frozen=True)
 class Evidence:
-    """Evidence on a contract.
+    """Evidence for or against a contract.
 
     Parameters
     ----------
     holds
-        Whether the subject fulfills the contract.
+        Whether the subject meets the contract.
     text
-        Text of the finding, with its choices or signal.
+        Text of the finding, with choices or signal.
     figure, limit
         Measure and its limit; None if the contract has none.
     place
-        Line to inspect, if it differs from the subject's.
+        Line to inspect, if it is not the subject's line.
     is_error
         Whether an error prevented the check.
     """
@@ -56,12 +56,12 @@ class Evidence:
 
 
 def measured(figure: float, limit: float, text: str, place: Place | None = None) -> Evidence:
-    """Return evidence that holds if a figure is at most its limit; NaN never holds."""
+    """Return evidence that holds if a measure is at most its limit; NaN never holds."""
     return Evidence(bool(figure <= limit), text, float(figure), limit, place)
 
 
 def worst(evidence: Iterable[Evidence]) -> Evidence:
-    """Return the first evidence that does not hold, otherwise the evidence nearest its limit."""
+    """Return the first evidence that does not hold, or the evidence that is nearest its limit."""
     nearest: Evidence | None = None
     for each in evidence:
         if not each.holds:
@@ -82,12 +82,12 @@ Contract = Callable[[Any], Evidence | Iterator[Evidence]]
 
 
 def examine(contract: Contract, subject: Any, place: Place | None = None) -> Evidence:
-    """Return the evidence on a contract; an error in the subject's equations breaks the contract.
+    """Return the evidence for a contract; an error in the subject's equations breaks the contract.
 
     Parameters
     ----------
     place
-        Place of the subject, if it differs from its code's place.
+        Place of the subject, if it is not the place of its code.
 
     Raises
     ------
@@ -99,7 +99,7 @@ def examine(contract: Contract, subject: Any, place: Place | None = None) -> Evi
         return evidence if isinstance(evidence, Evidence) else worst(evidence)
     except NotCheckedError:
         raise
-    except Exception as error:  # any error in a user's equations
+    except Exception as error:  # a user's equations may raise any error
         text = " ".join(str(error).split())
         at = place or place_of(subject)
         said = f"{type(error).__name__}: {text}"
@@ -119,12 +119,12 @@ def place_of(subject: Any) -> Place:
 
 @lru_cache(maxsize=1024)
 def _source(subject: Any) -> tuple[list[str], int]:
-    """Return the lines of a function or class; for a class its whole file is parsed."""
+    """Return the lines of a function or class; for a class, Python parses the whole file."""
     return inspect.getsourcelines(subject)
 
 
 def field_place(cls: type[Any], name: str) -> Place:
-    """Return the line on which a class declares a field, otherwise the class's line."""
+    """Return the line on which a class declares a field, or the line of the class."""
     at = place_of(cls)
     declaring: Any = cls
     try:
@@ -154,7 +154,7 @@ Outcome = Literal["holds", "broken", "not checked"]
 
 @dataclass(frozen=True)
 class Finding:
-    """Finding on one contract of one subject.
+    """Finding for one contract of one subject.
 
     Parameters
     ----------
@@ -165,7 +165,7 @@ class Finding:
     outcome
         ``holds``, ``broken``, or ``not checked``.
     text
-        Text of the finding, or the reason why it was not checked.
+        Text of the finding, or the reason why the contract was not checked.
     figure, limit
         Measure and its limit; None if the contract has none.
     place
@@ -218,9 +218,9 @@ class Demand:
 
 
 def one_by_cause(findings: Iterable[Finding]) -> Iterator[Finding]:
-    """Yield findings in order; report each error once, and mark other contracts as not checked.
+    """Yield findings in order, with each error once and its repetitions marked as not checked.
 
-    For example, a renamed parameter prevents all checks of a model at the same line.
+    For example, a renamed parameter causes the same error in all checks of a model.
     """
     seen: dict[tuple[str, Place], Finding] = {}
     for each in findings:

@@ -1,4 +1,4 @@
-"""Contracts of a model: units, runs, energies, sensitivities, dry friction at rest."""
+"""Contracts of a model: units, runs, energies, sensitivities, and dry friction at rest."""
 
 from __future__ import annotations
 
@@ -39,19 +39,19 @@ from bywire.simulation.sensitivity import simulate_with_sensitivities
 from bywire.simulation.symbols import SX
 
 SLOW_SHARES = (1.0, 0.1, 1e-2, 1e-3, 1e-4)
-"""shares of the controllers' moves, tried until all velocities with dry friction rest in the run"""
+"""fractions of the controllers' moves, tried until all velocities with dry friction stay at rest"""
 INSIDE = 0.9
-"""share of a friction's bounds: a force within it is held at the start"""
+"""fraction of a friction's bounds within which friction holds a force at the start"""
 SLOW = (1e-4, 1e-3, 1e-2)
-"""share of a usual speed at which smooth forces are negligible"""
+"""speeds at which smooth forces are negligible, relative to the usual speed"""
 HIDDEN = 0.1
-"""largest excess over a force proportional to speed, relative to the force at the usual speed"""
+"""maximum excess over a force proportional to speed, relative to the force at the usual speed"""
 GROWN = 0.3
-"""the same limit for a dry friction's bounds, up to a tenth of the usual speed"""
+"""the same limit for the bounds of dry friction, up to a tenth of the usual speed"""
 
 
 def rests_exactly(trial: Trial) -> Iterator[Evidence]:
-    """Check that velocities with dry friction are exactly zero, not small, below breakaway."""
+    """Check that velocities with dry friction are exactly zero below breakaway, not just small."""
     start, place = trial.start, trial.place("bounds", "friction")
     if not trial.model.frictions:
         raise NotCheckedError("the model declares no dry friction")
@@ -60,25 +60,25 @@ def rests_exactly(trial: Trial) -> Iterator[Evidence]:
     holds = _holds_at_start(trial)
     waiting = {name for name, share in holds.items() if share < INSIDE}
     if not waiting:
-        raise NotCheckedError(f"at {start.known} dry friction does not hold any velocity")
+        raise NotCheckedError(f"at {start.known}, dry friction does not hold any velocity at zero")
     for amount in SLOW_SHARES:
         run = states(simulate(trial.drive.run(amount)), names)
         for name in sorted(waiting):
             if not run[:, names.index(name)].any():
                 waiting.discard(name)
-                text = f"{name} is exactly zero at {amount:g} of the controllers' moves"
+                text = f"{name} stays exactly zero at {amount:g} of the controllers' moves"
                 yield Evidence(True, text, place=place)
-    for name in sorted(waiting):  # other loads, such as a disc's runout, may move it later
+    for name in sorted(waiting):  # other loads, such as disc runout, may move the body later
         first = float(run[1, names.index(name)])
         text = (
             f"{name} is {first:.2g} after one sample time at {SLOW_SHARES[-1]:g} of the "
-            f"controllers' moves, where {holds[name]:.2g} of its friction would hold it"
+            f"controllers' moves, but {holds[name]:.2g} of its friction would hold it at zero"
         )
         yield Evidence(first == 0.0, text, place=place)
 
 
 def _holds_at_start(trial: Trial) -> dict[str, float]:
-    """Return the share of dry friction that holds each resting velocity at the start."""
+    """Return the fraction of dry friction that holds each velocity that is zero at the start."""
     start, model = trial.start, trial.model
     x, shares = start.state, {}
     contact = _forces(trial, SX(ca.DM(list(x))))
@@ -94,7 +94,7 @@ def _holds_at_start(trial: Trial) -> dict[str, float]:
 
 
 def hides_no_friction(trial: Trial) -> Iterator[Evidence]:
-    """Check that a velocity's balance does not jump at its reversal, as with hidden friction."""
+    """Check that balances do not jump when a velocity reverses, which would be hidden friction."""
     state = signals_of(trial.model.State)
     speeds = [n for n, s in state.items() if s.unit in ("rad/s", "m/s")]
     if not speeds:
@@ -108,14 +108,17 @@ def hides_no_friction(trial: Trial) -> Iterator[Evidence]:
         far = _change(trial, contact, name, nominal)
         shares = [_change(trial, contact, name, r * nominal) / far if far else 0.0 for r in SLOW]
         sooner = max(share - r for share, r in zip(shares, SLOW, strict=True))
-        text = f"the smooth force against {name} comes {sooner:.2g} sooner than with its speed"
+        text = (
+            f"at low speed, the smooth force against {name} exceeds a proportional force by "
+            f"{sooner:.2g} of the force at the usual speed"
+        )
         if sooner > HIDDEN:
             text += ". Declare this friction in frictions and bounds to prevent creep"
         yield measured(sooner, HIDDEN, text, place)
 
 
 def _contain_zero(trial: Trial) -> Iterator[Evidence]:
-    """Check that the bounds of every friction include zero."""
+    """Check that the bounds of each friction include zero."""
     start, model = trial.start, trial.model
     contact = _forces(trial, SX(ca.DM(list(start.state))))
     bounds = model.bounds(start.state, start.state, start.memory, start.par, contact)
@@ -123,7 +126,7 @@ def _contain_zero(trial: Trial) -> Iterator[Evidence]:
         low, high = (float(ca.evalf(SX(value))) for value in pair)
         text = f"the friction of {name} is between {low:.3g} and {high:.3g}"
         if not low <= 0.0 <= high:
-            text += ": it must be low <= 0 <= high"
+            text += ". The bounds must satisfy low <= 0 <= high"
         yield Evidence(low <= 0.0 <= high, text, place=trial.place("bounds", "friction"))
 
 
@@ -133,14 +136,17 @@ def _same_at_rest(trial: Trial, name: str) -> Evidence:
     rest, far = (_bounds_at(trial, name, r * nominal) for r in (0.0, 1.0))
     slow = {r: _bounds_at(trial, name, r * nominal) for r in (*SLOW, 0.1)}
     sooner = max((width - rest) / far - r if far else 0.0 for r, width in slow.items())
-    text = f"the bounds of {name} grow by {sooner:.2g} more than with its speed"
+    text = (
+        f"at low speed, the friction bounds of {name} grow by {sooner:.2g} more than in proportion "
+        "to speed"
+    )
     if sooner > GROWN:
-        text += ", so the body creeps: a friction must have the same bounds at rest"
+        text += ", so the body creeps. Use the same bounds at rest"
     return measured(sooner, GROWN, text, trial.place("bounds", "friction"))
 
 
 def _bounds_at(trial: Trial, name: str, speed: float) -> float:
-    """Return the width between a friction's bounds at a speed of its own velocity."""
+    """Return the distance between a friction's bounds at a speed of its own velocity."""
     start, model = trial.start, trial.model
     x = start.state._replace(**{name: speed})
     contact = _forces(trial, SX(ca.DM(list(x))))
@@ -150,7 +156,7 @@ def _bounds_at(trial: Trial, name: str, speed: float) -> float:
 
 
 def _change(trial: Trial, contact: tuple[float, ...], name: str, speed: float) -> float:
-    """Return the difference of a velocity's balance between both directions."""
+    """Return the difference of a velocity's balance between the two directions."""
     start, forces = trial.start, []
     for sign in (1.0, -1.0):
         x = start.state._replace(**{name: sign * speed})
@@ -169,7 +175,7 @@ def _forces(trial: Trial, column: Any) -> tuple[float, ...]:
 # --- Contracts of a model and of its parameter sets: units, runs, energies, sensitivities
 
 OFF = 0.37
-"""distance from the start at which to evaluate equations, in usual magnitudes, to avoid zeros"""
+"""distance from the start to the evaluation point, in usual magnitudes, which avoids zeros"""
 
 
 def has_its_units(trial: Trial) -> Iterator[Evidence]:
@@ -184,12 +190,13 @@ def has_its_units(trial: Trial) -> Iterator[Evidence]:
     for name in states:
         unit = f"({states[name].unit})/s"
         rate = getattr(balance, name) / _at_least_one(getattr(mass, name))
-        yield _fits(f"rate of {name}", rate, unit, trial, "balance", "wire")
+        yield _fits(f"the rate of {name}", rate, unit, trial, "balance", "wire")
     bounds = model.bounds(x, x, m, par, contact)
     for name, pair in zip(model.frictions, bounds, strict=True):
         for value in pair:
             rate, unit = value / _at_least_one(getattr(mass, name)), f"({states[name].unit})/s"
-            yield _fits(f"bound of {name} over its mass", rate, unit, trial, "bounds", "friction")
+            what = f"the bound of {name} divided by its mass"
+            yield _fits(what, rate, unit, trial, "bounds", "friction")
     reaction = tuple(
         _at_least_one(getattr(mass, name)) * Dimensioned(0.1, states[name].unit) / second
         for name in (*model.frictions, *model.limits)
@@ -198,7 +205,7 @@ def has_its_units(trial: Trial) -> Iterator[Evidence]:
     powers = model.powers(x, x, rates, m, par, contact, reaction)
     for name, signal in signals_of(model.Flow).items():
         unit = f"({signal.unit})/s"
-        yield _fits(f"power of {name}", getattr(powers, name), unit, trial, "powers", "power")
+        yield _fits(f"the power of {name}", getattr(powers, name), unit, trial, "powers", "power")
     flow = _carrying(model.Flow, {n: 0.1 * s.nominal for n, s in signals_of(model.Flow).items()})
     recorded = model.output(x, m, par, contact, reaction, flow)
     yield from _all_fit("recorded ", recorded, signals_of(model.Output), trial, "record")
@@ -233,7 +240,7 @@ def _carrying(kind: Any, values: Mapping[str, float]) -> Any:
 
 
 def _contact(model: Any, x: Any, par: Any) -> tuple[Any, ...]:
-    """Return contact forces, overlaps divided by compliances, of either sign."""
+    """Return contact forces of either sign: overlaps divided by compliances."""
     forces: list[Any] = []
     for group, matrix in zip(model.gap(x, x, par), model.compliance(par), strict=True):
         forces += [d / matrix[k][k] for k, d in enumerate(group)]
@@ -252,22 +259,22 @@ def _all_fit(
 
 
 def _fits(what: str, value: Any, unit: str, trial: Trial, *members: str) -> Evidence:
-    text = f"{what} is {value}, not {unit}"
+    text = f"{what} is {value}, but its unit is {unit}"
     return Evidence(fits(value, unit), text, place=trial.place(*members))
 
 
-# --- Energy balance: the energy input of a run equals losses plus stored energy
+# --- Energy balance: a run's energy input equals losses plus stored energy
 
 RESIDUAL = 1e-6
-"""largest residual after subtracting the numerical error, relative to the energy turnover"""
+"""maximum residual after subtraction of the numerical error, relative to the energy turnover"""
 ENERGY_SHARES = (LARGE, 0.05)
 
 
 def closes_its_energy(trial: Trial) -> Iterator[Evidence]:
     """Check that the energy balances of a large and of a small run close.
 
-    The numerical error is proportional to the square of the step. The difference of the residuals
-    at two steps gives this error, which is subtracted.
+    The numerical error is proportional to the square of the step. The check computes this error
+    from the residuals at two steps, and subtracts it.
     """
     place = trial.place("powers", "power")
     for share in ENERGY_SHARES:
@@ -276,46 +283,46 @@ def closes_its_energy(trial: Trial) -> Iterator[Evidence]:
         turned = {book: each for book, each in fine.items() if each.turnover}
         if not turned:
             raise NotCheckedError(
-                f"the recording shows no energies (E_source, losses E_..., E_stored) that change "
+                "the recording contains no energies (E_source, losses E_..., E_stored) that change "
                 f"in a run from {trial.start.known}"
             )
         size = "large" if share == LARGE else "small"
         for book, each in turned.items():
             before = coarse[book].closing_error if book in coarse else each.closing_error
             left = (4.0 * each.closing_error - before) / 3.0 / each.turnover
-            where = f", in the balance {book!r}" if book else ""
+            where = f" in the balance {book!r}" if book else ""
             text = (
-                f"{abs(left):.1e} of the {each.turnover:.3g} J of a {size} run are unexplained"
-                + where
+                f"the residual{where} of a {size} run is {abs(left):.1e} of its turnover of "
+                f"{each.turnover:.3g} J"
             )
             yield measured(abs(left), RESIDUAL, text, place)
 
 
 def _ledgers(run: Run) -> dict[str, Ledger]:
-    """Return the energy balances of a run by name; the first one has an empty name."""
+    """Return the energy balances of a run by name; the first balance has an empty name."""
     recording = record(run, simulate(run), 0.0, 0.0, {})
     first = actuator_ledger(recording)
     return {"": first, **further_ledgers(recording)}
 
 
-# --- Sensitivities: exact derivatives of a run equal differences of runs
+# --- Sensitivities: exact derivatives of a run equal finite differences
 
 PARAMETERS = 8
-"""number of tested parameters: those with the largest effect on the states"""
+"""number of tested parameters, which have the largest effect on the states"""
 INFLUENCE = 1e-3
 """relative change of a parameter for ranking its influence"""
 DIFFERENCE = 1e-6
-"""relative step of the differences"""
+"""relative step of the finite differences"""
 SLOPE = 1e-3
-"""largest difference of a derivative, relative to that of all states, during half of the time"""
+"""maximum median error of a derivative over time, relative to the largest one of all states"""
 
 
 def has_its_derivatives(trial: Trial) -> Iterator[Evidence]:
-    """Check that derivatives of the states by the parameters equal differences of runs.
+    """Check that derivatives of states with respect to parameters equal finite differences.
 
-    The runs have no dry friction and no controllers that round. Instants of breakaway and reversal
-    depend on a parameter. Exact derivatives include this effect within a few percent; differences
-    do not.
+    The runs have no dry friction and no controllers that round. The times of breakaway and reversal
+    depend on a parameter. Exact derivatives include this effect to within a few percent, but finite
+    differences do not.
     """
     if find_compiler() is None:
         raise NotCheckedError("there is no C compiler. Install the extra bywire[compiler]")
@@ -323,9 +330,9 @@ def has_its_derivatives(trial: Trial) -> Iterator[Evidence]:
     names = [f"x_{name}" for name in trial.model.State._fields]
     chosen = _strongest(trial, run)
     if not chosen:
-        raise NotCheckedError(f"from {trial.start.known} no parameter moves any state")
+        raise NotCheckedError(f"from {trial.start.known}, no parameter affects any state")
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # from converters; these runs contain only the plant
+        warnings.simplefilter("ignore")  # converters warn, but these runs contain only the plant
         exact = simulate_with_sensitivities(run, tuple(chosen), names)
     at = run.par.leaves()
     ahead = {name: [at[name]] * 2 * len(chosen) for name in chosen}
@@ -342,19 +349,19 @@ def has_its_derivatives(trial: Trial) -> Iterator[Evidence]:
         largest = float(max(np.abs(slopes).max(), np.abs(differences).max()))
         if largest * SLOPE <= rounding.max():
             continue  # rounding hides the effect of this parameter on the states
-        # Not at all times: the instants of closing contacts move, which fixed steps do not show.
+        # Use the median, because the times of closing contacts move, which fixed steps hide.
         off = np.median(np.abs(slopes - differences), axis=0) / largest
         j = int(np.argmax(off))
         state = trial.model.State._fields[j]
         text = (
-            f"d({state})/d({name}) of {whose} without dry friction is off by {off[j]:.1e} of the "
-            "largest, in usual magnitudes, half of the time"
+            f"the median error of d({state})/d({name}) of {whose} without dry friction is "
+            f"{off[j]:.1e} of the largest derivative, in usual magnitudes"
         )
         yield measured(float(off[j]), SLOPE, text, trial.place("balance", "wire"))
 
 
 def _strongest(trial: Trial, run: Run) -> list[str]:
-    """Return the parameters with the largest effect on the states for the same relative change."""
+    """Return the parameters whose relative changes have the largest effect on the states."""
     known = dict(constants(run))
     cases: dict[str, float] = {}
     for name in known:
@@ -385,40 +392,40 @@ def _moved(run: Run, name: str, share: float) -> float:
     return value + share * (abs(value) or leaf_fields(type(run.par))[name].unit.nominal)
 
 
-# --- Runs: order of the scheme, and equal results of all engines
+# --- Runs: order of convergence, and equal results of all engines
 
 ORDER = 2.0
 SHORTFALL = 0.3
-"""largest deviation of the observed order below two; the order of an invalid model is one"""
+"""maximum shortfall of the observed order; the order of an invalid model is one instead of two"""
 HALVINGS = 4
 SMOOTH_SHARES = (1.0, 0.3, 0.1)
 SHARES = (1.0, 0.5, 0.25, 0.12, 0.06, 0.03)
-"""shares of the controllers' moves: if stick-slip shifts instants, the errors of one run scatter"""
+"""fractions of the controllers' moves; several, because the errors of a run with stick-slip vary"""
 SCATTER = 0.2
-"""lower bound for a run's standard error of the order: few errors may fit a line by chance"""
+"""minimum standard error of a run's order, because a few errors may fit a line by chance"""
 ROUNDING = 1e-12
-"""share of a state's largest or usual magnitude: smaller differences are not due to the step"""
+"""minimum difference due to the step, relative to a state's largest or usual magnitude"""
 AGREEMENT = 1e-9
-"""largest difference between engines, relative to a signal's largest value in the run, which counts
-as at least a thousandth of the usual magnitude"""
+"""maximum difference between engines, relative to a signal's largest value in the run or to a
+thousandth of its usual magnitude, whichever is larger"""
 _VIRTUAL = 0.02  # length [s] of the run that is repeated without a compiler
 
 
 def is_of_second_order(trial: Trial) -> Iterator[Evidence]:
-    """Check that every state of the plant converges with the square of the substep.
+    """Check that each state of the plant converges with the square of the substep.
 
-    This holds without and with dry friction, since a substep is cut where a velocity reverses.
+    This applies without and with dry friction, because a substep is cut where a velocity reverses.
     """
     orders = list(_orders(trial, False, ORDER))
     if not orders:
-        raise NotCheckedError(f"from {trial.start.known} no state moves enough for the check")
+        raise NotCheckedError(f"from {trial.start.known}, no state moves enough for the check")
     yield from orders
     if trial.model.frictions:
         yield from _orders(trial, True, ORDER)
 
 
 def _orders(trial: Trial, frictions: bool, expected: float) -> Iterator[Evidence]:
-    """Yield the evidence for every state that moves enough for a check."""
+    """Yield the evidence for each state that moves enough for a check."""
     start = trial.start
     steps = [start.step / 2**k for k in range(HALVINGS + 1)]
     names = start.state._fields
@@ -429,7 +436,7 @@ def _orders(trial: Trial, frictions: bool, expected: float) -> Iterator[Evidence
             runs = [
                 states(simulate(trial.drive.run(share, step, frictions)), names) for step in steps
             ]
-        except SolverError:  # a model that runs away without its friction
+        except SolverError:  # without its friction, the model diverges
             continue
         floor = ROUNDING * np.maximum(np.abs(runs[-1]).max(axis=0), nominal)
         changes = [np.sqrt(np.mean((a - b) ** 2, axis=0)) for a, b in pairwise(runs)]
@@ -439,22 +446,22 @@ def _orders(trial: Trial, frictions: bool, expected: float) -> Iterator[Evidence
         if doubt < SHORTFALL:
             how = "with" if frictions else "without"
             text = (
-                f"{name} converges with order {order:.2f} +- {doubt:.2f} in the substep {how} dry "
-                f"friction, but it must be {expected:g}"
+                f"{how} dry friction, {name} converges with the substep at an order of "
+                f"{order:.2f} +- {doubt:.2f}; the expected order is {expected:g}"
             )
             place = trial.place("balance", "wire")
             yield measured(max(expected - order - doubt, 0.0), SHORTFALL, text, place)
 
 
 def _observed(errors: Array) -> tuple[float, float]:
-    """Return the order with which errors fall, and twice its standard error.
+    """Return the order of convergence, and twice its standard error.
 
-    The order is a mean over the runs, weighted by how well their errors fit a line.
+    The order is the mean over the runs, weighted by how well their errors fit a line.
 
     Parameters
     ----------
     errors
-        Errors of every run at every halving of the step, shape (runs, halvings).
+        Errors of each run after each halving of the step, shape (runs, halvings).
     """
     logs = np.log2(errors)
     logs = logs[np.isfinite(logs).all(axis=1)]
@@ -482,7 +489,7 @@ def has_agreeing_engines(trial: Trial) -> Iterator[Evidence]:
 
 
 def has_agreeing_lanes(trial: Trial) -> Iterator[Evidence]:
-    """Check that an ensemble's lanes compute the same as the single run."""
+    """Check that an ensemble's lanes and a single run give the same results."""
     if find_compiler() is None:
         raise NotCheckedError("there is no C compiler. Install the extra bywire[compiler]")
     run = trial.large_run(frictions=True)
@@ -502,7 +509,7 @@ def _agree(
     for k, (name, signal) in enumerate(known.items()):
         scale = max(float(np.abs(first[:, k]).max()), 1e-3 * abs(signal.nominal))
         off = float(np.abs(first[:, k] - second[:, k]).max()) / scale
-        text = f"{name} of {what} is off by {off:.1e} of its largest value"
+        text = f"the error of {name} in {what} is {off:.1e} of its largest value"
         yield measured(off, AGREEMENT, text, trial.place("output", "record"))
 
 
@@ -512,7 +519,7 @@ OF_A_SET: dict[str, Contract] = {
     "round trip": set_survives_json,
     "refusals": set_keeps_its_ranges,
 }
-"""contracts of every parameter set"""
+"""contracts of each parameter set"""
 
 
 def has_faults_of_what_is_there(trial: Trial) -> Iterator[Evidence]:
@@ -526,7 +533,8 @@ def has_faults_of_what_is_there(trial: Trial) -> Iterator[Evidence]:
                 try:
                     start.par.value(name)
                 except (AttributeError, LookupError, ValueError):
-                    text = f"the fault {mode.name} changes {name}, which is not a parameter here"
+                    text = f"the fault {mode.name} changes {name}, but the model has no parameter "
+                    text += "with this name"
                     yield Evidence(False, text)
 
 
@@ -543,11 +551,11 @@ OF_A_MODEL: dict[str, Contract] = {
     "derivatives of a run": has_its_derivatives,
     "faults": has_faults_of_what_is_there,
 }
-"""contracts of every model with a start and a parameter set"""
+"""contracts of each model with a start and a parameter set"""
 
 
 def demands_on_set(name: str, par: ParameterSet) -> Demands:
-    """Yield every contract of a parameter set."""
+    """Yield all contracts of a parameter set."""
     for contract, test in OF_A_SET.items():
         yield Demand(contract, name, par, test)
 
@@ -557,7 +565,7 @@ OF_ITS_NUMBERS = ("exact rest", "hidden friction", "energy of a run")
 
 
 def demands_on_model(name: str, trial: Trial, of_numbers: bool = False) -> Demands:
-    """Yield every contract of a model, or only those that depend on its numbers."""
+    """Yield all contracts of a model, or only those that depend on its numbers."""
     for contract, test in OF_A_MODEL.items():
         if not of_numbers or contract in OF_ITS_NUMBERS:
             yield Demand(contract, name, trial, test, trial.place())

@@ -1,4 +1,4 @@
-"""Contract of a model's linearization, which must describe small motions of the plant."""
+"""Contracts of a model's linearization, which must describe small motions of the plant."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ from bywire.core.typing import Array
 from bywire.simulation.run import simulate
 
 SMALL = (1e-4, 1e-5)
-"""shares of the controllers' moves: nonlinear effects decrease from one to the next"""
+"""fractions of the controllers' moves; nonlinear effects decrease from one to the next"""
 MISMATCH = 0.02
-"""largest difference of the responses, relative to the largest value of the larger one"""
+"""maximum difference of the responses, relative to the largest value of the larger response"""
 AT_REST = 1e-3
-"""usual magnitudes per second: a start with a slower drift counts as an equilibrium"""
+"""maximum drift of an equilibrium, in usual magnitudes per second"""
 
 
 def is_its_linear_model(trial: Trial) -> Iterator[Evidence]:
@@ -45,14 +45,14 @@ def is_its_linear_model(trial: Trial) -> Iterator[Evidence]:
     The model's loops must not be at a kink at their usual operating point.
 
     If the start is an equilibrium of the smooth equations, the check removes dry friction.
-    Otherwise it holds all velocities with friction at zero.
+    Otherwise, it holds all velocities with friction at zero.
     """
     start = trial.start
     try:
         linear, removed = _linear(trial)
         _require_loops_off_corners(trial)
     except CornerError as error:
-        yield Evidence(False, f"at {start.known}: {error}", place=trial.place("balance", "wire"))
+        yield Evidence(False, f"at {start.known}, {error}", place=trial.place("balance", "wire"))
         return
     names = start.state._fields
     period, step = start.period, start.step / 4
@@ -61,7 +61,7 @@ def is_its_linear_model(trial: Trial) -> Iterator[Evidence]:
         base = states(simulate(trial.drive.run(0.0, step, not removed)), names)
         runs = [states(simulate(trial.drive.run(s, step, not removed)), names) for s in SMALL]
     except SolverError as error:
-        raise NotCheckedError(f"the small run from {start.known} fails: {error}") from error
+        raise NotCheckedError(f"the small run from {start.known} failed: {error}") from error
     expected = _response(linear, trial.drive.rows[: len(base)], period)
     deviations = [(run - base) / share for run, share in zip(runs, SMALL, strict=True)]
     nominal = [abs(s.nominal) for s in signals_of(trial.model.State).values()]
@@ -74,11 +74,11 @@ def is_its_linear_model(trial: Trial) -> Iterator[Evidence]:
             continue
         moving += 1
         off = min(float(np.abs(run[:, k] - exact).max()) for run in deviations) / size
-        how = "without dry friction" if removed else "with friction holding all its velocities"
-        text = f"{name} differs from its linear response by {off:.1e} of its largest value, {how}"
+        how = "without dry friction" if removed else "with all velocities held by friction"
+        text = f"{how}, {name} differs from its linear response by {off:.1e} of its largest value"
         yield measured(off, MISMATCH, text, place)
     if not moving:
-        raise NotCheckedError(f"from {start.known} the controllers move no state")
+        raise NotCheckedError(f"from {start.known}, the controllers do not move any state")
 
 
 def _require_loops_off_corners(trial: Trial) -> None:
@@ -89,12 +89,12 @@ def _require_loops_off_corners(trial: Trial) -> None:
                 loop.gain_and_closed(trial.start.par, loop.at.default)
             except CornerError:
                 raise
-            except InputError:  # a loop for other choices
+            except InputError:  # the loop is for other choices
                 continue
 
 
 def _linear(trial: Trial) -> tuple[LinearModel, bool]:
-    """Return the linear model, and whether it is without dry friction."""
+    """Return the linear model, and whether dry friction is removed from it."""
     start = trial.start
     reasons = []
     nominal = np.array([s.nominal for s in signals_of(trial.model.State).values()])
@@ -119,12 +119,12 @@ def _linear(trial: Trial) -> tuple[LinearModel, bool]:
         if drift <= AT_REST:
             return linear, friction == "removed"
         name = linear.states[int(np.argmax(np.abs(linear.rate / nominal)))]
-        reasons.append(f"at {start.known} {name} is not at rest")
+        reasons.append(f"at {start.known}, {name} is not at rest")
     raise NotCheckedError("; ".join(dict.fromkeys(reasons)))
 
 
 def _response(linear: LinearModel, inputs: Array, period: float) -> Array:
-    """Return the states for inputs that are held for a sample time, shape (rows, states)."""
+    """Return the states for inputs that are constant over a sample time, shape (rows, states)."""
     n, m = linear.B.shape
     block = np.zeros((n + m, n + m))
     block[:n, :n], block[:n, n:] = linear.A, linear.B
@@ -137,11 +137,11 @@ def _response(linear: LinearModel, inputs: Array, period: float) -> Array:
 
 
 MOST = 40
-"""largest number of a model's operations to put at their kinks, one per place in the source"""
+"""maximum number of a model's operations to test at their kinks, one per place in the source"""
 ONE_SIDED = 1e-3
-"""largest deviation of a linear model from one-sided differences, relative to the largest effect"""
+"""maximum deviation of a linear model from one-sided differences, relative to the largest effect"""
 ROUNDING = 1e-14
-"""largest error of the differences of rates"""
+"""maximum error of the differences of rates"""
 _NEWTON = 8
 
 
@@ -156,7 +156,7 @@ def is_linear_beside_its_corners(trial: Trial) -> Iterator[Evidence]:
     try:
         at = smooth_point(trial.model, start.par, (start.state, start.memory, None))
     except InputError as error:
-        raise NotCheckedError(f"at {start.known}: {error}") from error
+        raise NotCheckedError(f"at {start.known}, {error}") from error
     free = free_signals(at, trial.model.State._fields, trial.model.Memory._fields, ())
     usual = magnitudes(at)
     kinks = kinks_at(at, free, usual, outputs=False, ticks=False)
@@ -189,7 +189,7 @@ def _driven(
 
 
 def _with_its_contacts(at: SmoothPoint) -> SmoothPoint | None:
-    """Return a point with its closed contacts; None if one just touches or is at a limit."""
+    """Return a point with its closed contacts; None if a contact just touches or is at a limit."""
     model = at.model
     state = cast(NamedTuple, cast(Any, model.State)(*at.state.tolist()))
     memory = cast(NamedTuple, cast(Any, model.Memory)(*at.memory.tolist()))
@@ -206,7 +206,7 @@ def _kink(kinks: list[Kink], order: int) -> Kink | None:
 
 
 def _beside(trial: Trial, at: SmoothPoint, free: NDArray[np.bool_], place: str) -> Evidence:
-    """Return whether the linear models at a kink match the equations next to it."""
+    """Return evidence that the linear models at a kink match the equations next to it."""
     model = trial.model
     n, m = at.state.size, at.memory.size
     state = cast(NamedTuple, cast(Any, model.State)(*at.state.tolist()))
@@ -217,9 +217,9 @@ def _beside(trial: Trial, at: SmoothPoint, free: NDArray[np.bool_], place: str) 
         return np.hstack([made.A, made.B])
 
     try:
-        sides, how = [linear()], "without a side"
+        sides, how = [linear()], "without a specified side"
     except CornerError:
-        sides, how = [], "on a stated side"
+        sides, how = [], "on a specified side"
         for side in (ABOVE, BELOW):
             with taking(side):
                 sides.append(linear())
@@ -228,12 +228,12 @@ def _beside(trial: Trial, at: SmoothPoint, free: NDArray[np.bool_], place: str) 
     for away in (by, -by):
         once, twice = (at.moved(share * away).plant()[4][:, 0] for share in (0.5, 1.0))
         if not (np.isfinite(once).all() and np.isfinite(twice).all()):
-            return Evidence(True, f"{place} is at its kink, near which a value is not finite")
+            return Evidence(True, f"{place} is at its kink, but a value near it is not finite")
         expected, step = twice - once, 0.5 * away[: n + m]
         size = np.maximum(np.abs(sides[0]), np.abs(sides[-1])) @ np.abs(step)
         rounding = ROUNDING * (np.abs(once) + np.abs(twice))
         # A slope that needs more than a second to change a signal by its magnitude is negligible.
         size = np.maximum(size, rounding / ONE_SIDED + REACH * magnitudes(at)[:n])
         most = max(most, min(float(np.max(np.abs(J @ step - expected) / size)) for J in sides))
-    text = f"with {place} at its kink, the linear model {how} is off by {most:.1e}"
+    text = f"with {place} at its kink, the error of the linear model {how} is {most:.1e}"
     return measured(most, ONE_SIDED, text, trial.place("balance", "wire"))

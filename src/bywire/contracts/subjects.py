@@ -25,20 +25,20 @@ from bywire.core.signals import signals_of
 
 
 def demands_on(name: str | None, figures: Collection[str]) -> Iterator[Demand]:
-    """Yield every contract of a subject.
+    """Yield all contracts of a subject.
 
     Parameters
     ----------
     name
-        Name of a brake, a model, an experiment, an element, a control law or a parameter set;
-        default: everything installed.
+        Name of a brake, a model, an experiment, an element, a control law or a parameter set.
+        Default: everything that is installed.
     figures
         Names of the figures that experiments may use.
 
     Raises
     ------
     UnknownNameError
-        When the name is unknown, with the nearest names.
+        When the name is unknown. The message contains the nearest names.
     """
     if name is None:
         yield from _on_elements(every_element().values())
@@ -58,9 +58,9 @@ def demands_on(name: str | None, figures: Collection[str]) -> Iterator[Demand]:
 
 
 def _element(name: str) -> Element:
-    """Return an element by its dotted name, or by the last part if it is unique.
+    """Return an element by its dotted name, or by the last part of the name if it is unique.
 
-    Hyphens count as underscores, since module names have no hyphens.
+    Hyphens count as underscores, because module names have no hyphens.
     """
     known, module = every_element(), name.replace("-", "_")
     ends = [full for full in known if full.rpartition(".")[2] == module]
@@ -91,7 +91,7 @@ def _on_set(entry: CitedSet) -> Iterator[Demand]:
 
 
 def _on_model(model: Any) -> Iterator[Demand]:
-    """Yield a model's contracts: all with its first parameter set, then those on numbers."""
+    """Yield all contracts of a model with its first set; with others, those on numbers."""
     entries = [e for e in PARAMETER_SETS.all().values() if e.assembly == model.name]
     for k, entry in enumerate(entries):
         subject = f"{model.name} ({entry.name})"
@@ -105,7 +105,7 @@ def _trial(model: type[Any], entry: CitedSet) -> Trial:
 
 
 def _rig_trial(model: type[Any]) -> Trial:
-    """Return the trial of a model without a parameter set, from an experiment of its brake."""
+    """Return the trial of a model without a parameter set; an experiment of its brake starts it."""
     module = ASSEMBLIES.owner(model.name)
     sets = [entry.parameters() for entry in PARAMETER_SETS.of(module).values()]
     return Trial(model, lambda: start_of_a_rig(model(), sets, module))
@@ -147,7 +147,7 @@ class Rehearsal:
 
     @cached_property
     def cases(self) -> tuple[Case, ...]:
-        """The experiment's runs, with zero stimuli in place of a bench file's."""
+        """The experiment's runs, with zeros instead of a bench file's stimuli."""
         experiment, options = self.experiment, self.experiment.defaults
         stimulus: Any = None
         if experiment.driven_unit is not None:
@@ -158,7 +158,7 @@ class Rehearsal:
         return (experiment.preview or experiment.cases)(self.par, options, stimulus)
 
     def recordings(self) -> Mapping[str, xr.Dataset]:
-        """Return recordings of brakes at rest, with zeros everywhere."""
+        """Return recordings of brakes at rest, in which all values are zero."""
         experiment, options = self.experiment, self.experiment.defaults
         recordings = {} if experiment.static is None else experiment.static(self.par, options)
         for case in self.cases:
@@ -190,19 +190,19 @@ def has_its_assembly(rehearsal: Rehearsal) -> Evidence:
 
 
 def has_its_figures(rehearsal: Rehearsal) -> Evidence:
-    """Check that every figure that the experiment lists is declared."""
+    """Check that each figure that the experiment lists is declared."""
     return _named("figure", rehearsal.experiment.figures, rehearsal.figures)
 
 
 def drives_stimuli(rehearsal: Rehearsal) -> Iterator[Evidence]:
-    """Check for each run that its model has the stimuli that the experiment drives."""
+    """Check that the model of each run has the stimuli that the experiment drives."""
     for case in rehearsal.cases:
         driven = case.stimulus(np.zeros(1))
         yield _named(f"stimulus of {case.model.name}", driven, case.model.Stimulus._fields)
 
 
 def judges_what_is_recorded(rehearsal: Rehearsal) -> Evidence:
-    """Check that the computed key figures match the declared ones.
+    """Check that the computed key figures match the declared key figures.
 
     Raises
     ------
@@ -215,15 +215,17 @@ def judges_what_is_recorded(rehearsal: Rehearsal) -> Evidence:
     except (KeyError, AttributeError, UnknownNameError, ModelError):
         raise  # a name is missing, or a key figure cannot be translated to C
     except Exception as error:
-        raise NotCheckedError(f"no recorded signal moves: {error}") from error
+        raise NotCheckedError(f"the recording has no changing signal: {error}") from error
     declared = experiment.kpis_with(options)
     missing = [name for name in declared if name not in given]
     if missing:
-        return Evidence(False, f"it does not compute the declared key figures {', '.join(missing)}")
+        names = ", ".join(missing)
+        return Evidence(False, f"the experiment does not compute the declared key figures {names}")
     other = [name for name, unit in given.items() if declared.get(name) != unit]
     if other:
         texts = [f"{name} in {given[name]}" for name in other]
-        return Evidence(False, f"it does not declare the key figures {', '.join(texts)}")
+        names = ", ".join(texts)
+        return Evidence(False, f"the experiment does not declare the key figures {names}")
     return Evidence(True, f"{len(given)} key figures")
 
 
@@ -238,11 +240,11 @@ OF_AN_EXPERIMENT: dict[str, Contract] = {
     "stimuli": drives_stimuli,
     "key figures": judges_what_is_recorded,
 }
-"""contracts of every experiment"""
+"""contracts of each experiment"""
 
 
 def demands_on_experiment(experiment: Experiment, figures: Collection[str]) -> Demands:
-    """Yield every contract of an experiment."""
+    """Yield all contracts of an experiment."""
     rehearsal, place = Rehearsal(experiment, figures), Place(*EXPERIMENTS.place(experiment.name))
     for contract, test in OF_AN_EXPERIMENT.items():
         yield Demand(contract, experiment.name, rehearsal, test, place)

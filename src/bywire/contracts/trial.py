@@ -1,4 +1,4 @@
-"""Trial of a model with a parameter set: start of its runs, and their shared results."""
+"""Trial of a model with a parameter set: the start of its runs, and their shared results."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from bywire.simulation.ensemble import simulate_ensemble
 from bywire.simulation.run import Run, Trajectory, simulate
 
 STEP = 20e-6
-"""substep [s] of the runs, or the next smaller one that divides the sample times"""
+"""substep [s] of the runs, or the next smaller value that divides the sample times"""
 ACTIVE = 0.2
 """duration [s] of the single wave that excites a run, after which the stimulus is constant"""
 DURATION = 0.3
@@ -32,14 +32,14 @@ DURATION = 0.3
 
 @dataclass(frozen=True)
 class Start:
-    """Model with parameters and a start, ready to run.
+    """Model with its parameters and the start of its runs.
 
     Parameters
     ----------
     model, par
         The system and its parameters.
     state, memory, stimulus
-        Start of the run, at rest if a rest is declared.
+        Initial values of a run, at rest if the model declares a rest.
     known
         Source of the start, for example ``"loop pressure"``.
     """
@@ -58,7 +58,7 @@ class Start:
 
     @property
     def step(self) -> float:
-        """Substep [s]: at most `STEP`, and a divisor of every sample time."""
+        """Substep [s]: at most `STEP`, and a divisor of each sample time."""
         periods = [task.period for task in self.model.tasks(self.par)]
         for count in range(int(np.ceil(self.period / STEP - 1e-9)), 100_000):
             step = self.period / count
@@ -67,7 +67,7 @@ class Start:
         return self.period
 
     def run(self, share: float, duration: float = DURATION, record: float = 0.0) -> Run:
-        """Return a run in which every signal of the stimulus makes one wave within its range.
+        """Return a run in which each signal of the stimulus makes one wave within its range.
 
         Parameters
         ----------
@@ -100,11 +100,11 @@ class Start:
 
 
 def start_of(model: Model, par: ParameterSet) -> Start:
-    """Return the start of a model's runs with some parameters.
+    """Return the start of a model's runs for a parameter set.
 
-    The start is an operating point of a loop of the model, or the start of an experiment, with the
-    same choices if possible. Otherwise it is the model's rest, which is often at an end stop, where
-    contacts just touch and few contracts can be checked.
+    The start is an operating point of one of the model's loops, or the start of an experiment, with
+    the same choices if possible. Otherwise, it is the model's rest. This is often at an end stop,
+    where contacts just touch and only a few contracts can be checked.
     """
     known = list(_points(model, par)) or list(_cases(model, par))
     same = [each for each in known if each.par.choices() == par.choices()]
@@ -120,21 +120,21 @@ def start_of_a_rig(model: Model, sets: Iterable[ParameterSet], module: str) -> S
     Parameters
     ----------
     sets
-        Parameters to try: those of the model's brake.
+        Parameter sets of the model's brake, which the function tries.
     module
-        Module of that brake.
+        Module of the brake.
 
     Raises
     ------
     ParameterError
-        When no experiment starts the model.
+        When no experiment can start the model.
     """
     for par in sets:
         for start in _cases(model, par, module):
             return start
     raise ParameterError(
-        f"there is no parameter set for a {model.name}, and no experiment starts one with the sets "
-        "of its brake. Declare a bywire.CitedSet of that assembly",
+        f"there is no parameter set for a {model.name}, and no experiment starts it with a "
+        "parameter set of its brake. Declare a bywire.CitedSet for this assembly",
         name=model.name,
     )
 
@@ -144,7 +144,7 @@ def _points(model: Model, par: ParameterSet) -> Iterator[Start]:
         if loop.assembly == model.name:
             try:
                 point = loop.point(par, loop.at.default)
-            except InputError:  # a loop for other choices
+            except InputError:  # the loop is for other choices
                 continue
             if type(point.model) is type(model):
                 yield Start(
@@ -168,7 +168,7 @@ def _cases(model: Model, par: ParameterSet, module: str = "") -> Iterator[Start]
             InputError,
             AttributeError,
             TypeError,
-        ):  # an experiment that needs other parameters, or a stimulus
+        ):  # the experiment needs other parameters, or a stimulus
             continue
         for case in cases:
             if type(case.model) is type(model):
@@ -184,11 +184,11 @@ def _cases(model: Model, par: ParameterSet, module: str = "") -> Iterator[Start]
                 break
 
 
-# --- Wrapped models: all states and memory recorded; the plant alone with a prescribed memory
+# --- Wrapped models that record all states and memory, or run only the plant with given memory
 
 
 class Clock(NamedTuple):
-    """Integral that every model has."""
+    """Integral of a wrapped model."""
 
     t: Annotated[float, Signal("s", "time")]
 
@@ -210,7 +210,7 @@ class Probe(Wrapping):
     model
         The model.
     held
-        Whether the stimulus is the memory itself, so that the plant runs without controllers.
+        Whether the stimulus is the memory, so that the plant runs without controllers.
     frictions
         Whether to include dry friction.
     """
@@ -221,17 +221,17 @@ class Probe(Wrapping):
 
     @property
     def Stimulus(self) -> type[NamedTuple]:
-        """Stimulus of the model, or its memory."""
+        """Stimulus of the model, or the memory."""
         return self.inner.Memory if self.held else self.inner.Stimulus
 
     @property
     def Flow(self) -> type[NamedTuple]:
-        """Integral: only time."""
+        """Integrals, which contain only time."""
         return Clock
 
     @property
     def Output(self) -> type[NamedTuple]:
-        """All states and all of the memory."""
+        """All states and the whole memory."""
         output: type[NamedTuple] = _recorded(type(self.inner), self.State, self.Memory)
         return output
 
@@ -241,7 +241,7 @@ class Probe(Wrapping):
         return self.inner.frictions if self.rubs else ()
 
     def tasks(self, par: Any) -> tuple[Task, ...]:
-        """Return the controllers, or the task that passes on the prescribed memory."""
+        """Return the controllers, or a task that sets the prescribed memory."""
         tasks = self.inner.tasks(par)
         if not self.held:
             return tasks
@@ -253,7 +253,7 @@ class Probe(Wrapping):
     def bounds(
         self, x: Any, xe: Any, memory: Any, par: Any, contact: tuple[float, ...]
     ) -> tuple[Bounds, ...]:
-        """Return the bounds of the frictions, if there are any."""
+        """Return the bounds of the frictions; empty without frictions."""
         return super().bounds(x, xe, memory, par, contact) if self.rubs else ()
 
     def powers(self, *_: Any) -> Any:
@@ -261,20 +261,20 @@ class Probe(Wrapping):
         return Clock(1.0)
 
     def output(self, x: Any, memory: Any, *_: Any) -> Any:
-        """Return all states and all of the memory."""
+        """Return all states and the whole memory."""
         return self.Output(*x, *memory)
 
 
 @dataclass(frozen=True, eq=False)
 class Drive:
-    """Memory over time, as written by the controllers of a run, to prescribe in other runs.
+    """Memory that the controllers write in a run, to prescribe it in other runs.
 
     Parameters
     ----------
     start
-        Start of that run.
+        Start of the run.
     rows
-        Difference of the memory from its value at the start, at every sample time, shape (samples,
+        Difference between the memory and its initial value at each sample time, shape (samples,
         memories).
     """
 
@@ -282,12 +282,12 @@ class Drive:
     rows: Array
 
     def run(self, share: float = 1.0, step: float = 0.0, frictions: bool = True) -> Run:
-        """Return a run of the plant alone.
+        """Return a run of only the plant.
 
         Parameters
         ----------
         share
-            Prescribed share of the memory's changes.
+            Factor for the memory's changes.
         step
             Substep [s]. Default: the start's.
         frictions
@@ -339,7 +339,7 @@ def states(trajectory: Trajectory, names: Sequence[str]) -> Array:
 # --- The trial
 
 LARGE = 0.5
-"""amplitude of the stimulus in large runs, relative to the signals' usual magnitudes"""
+"""amplitude of the stimulus in large runs, relative to each signal's usual magnitude"""
 
 
 class Trial:
@@ -358,12 +358,12 @@ class Trial:
 
     @cached_property
     def start(self) -> Start:
-        """Model with its parameters, at the start of its runs.
+        """Model with its parameters and the start of its runs.
 
         Raises
         ------
         NotCheckedError
-            When no start is known.
+            When the model has no start.
         """
         try:
             return self._find_start()
@@ -372,7 +372,7 @@ class Trial:
 
     @property
     def model(self) -> Model:
-        """The model on trial."""
+        """The model that is checked."""
         return self.start.model
 
     @cached_property
@@ -382,16 +382,16 @@ class Trial:
         Raises
         ------
         NotCheckedError
-            When that run fails.
+            When the run fails.
         """
         try:
             return drive_of(self.start, LARGE)
         except RunError as error:
-            raise NotCheckedError(f"the run from {self.start.known} fails: {error}") from error
+            raise NotCheckedError(f"the run from {self.start.known} failed: {error}") from error
 
     @cached_property
     def rounds(self) -> bool:
-        """Whether a controller rounds, as a converter or an encoder does."""
+        """Whether a controller rounds values, like a converter or an encoder."""
         ticks = prepare(self.model, self.start.par).program.ticks
         return any(
             tick.instruction_id(k) == ca.OP_FLOOR
@@ -400,10 +400,10 @@ class Trial:
         )
 
     def large_run(self, frictions: bool) -> Run:
-        """Return a large run from the start, with states and memory recorded.
+        """Return a large run from the start that records states and memory.
 
-        If a controller rounds, the run contains only the plant: the last digit of a signal may
-        change a code, and there are no derivatives.
+        If a controller rounds, the run contains only the plant, because the last digit of a signal
+        may change a code, and derivatives do not exist.
         """
         if self.rounds:
             return self.drive.run(frictions=frictions)
@@ -411,7 +411,7 @@ class Trial:
         return replace(self.start.run(LARGE), model=probe)
 
     def place(self, *members: str) -> Place:
-        """Return the place of the model's first member among some names, otherwise of its class."""
+        """Return the place of the model's first member with one of these names, or of its class."""
         for member in members:
             function = vars(self.kind).get(member)
             if inspect.isfunction(function):
@@ -420,13 +420,13 @@ class Trial:
 
 
 def constants(run: Run) -> Iterator[tuple[str, float]]:
-    """Yield a run's numbers that may vary within an ensemble, without tables and sample times."""
+    """Yield the numbers that an ensemble of the run may vary, without tables and sample times."""
     periods = [task.period for task in run.model.tasks(run.par)]
     for name, value in run.par.flat().items():
         if name in run.par.leaves():
             try:
                 moved = run.par.replace({name: float(np.nextafter(value, np.inf))})
-            except ParameterError:  # the number is at the end of its range
+            except ParameterError:  # the number is at an end of its range
                 continue
             if [task.period for task in run.model.tasks(moved)] == periods:
                 yield name, float(value)

@@ -1,1 +1,1 @@
-"""Control laws, one per file: sampled, pure, and based on the values that the ECU assumes."""
+"""Control laws, one per file: sampled pure functions that use the values that the ECU assumes."""

@@ -15,8 +15,8 @@ from bywire.core.signals import Pressure, Signal
 BUILD, DUMP, HOLD, STEPPED = 0.0, 1.0, 2.0, 3.0
 PHASES = ("build", "dump", "hold", "stepped")
 """names of the phases 0 to 3"""
-_FAR = 0.5  # share of the pressure that remains if a wheel slips far despite a dump
-_LEAST = 0.05  # smallest share of the pressure: from lower ones, steps would be too slow
+_FAR = 0.5  # fraction of the pressure that remains if a wheel slips far despite a dump
+_LEAST = 0.05  # minimum fraction of the pressure, because steps from less would be too slow
 
 SampleTime = Annotated[float, Signal("s", "sample time", 1e-3), Gt(0)]
 Flag = Annotated[float, Signal("1", "flag")]
@@ -27,23 +27,24 @@ Speed = Annotated[float, Unit("m/s", 5.0), Field(gt=0, allow_inf_nan=False)]
 class Parameters(ParameterSet):
     """Thresholds, times, and pressures relative to the last pressure that the road could hold.
 
-    Thresholds act on the slip ahead, which the wheel's deceleration predicts for ``t_lead``. A
-    threshold is thus a line in the plane of slip and deceleration: a wheel that slows down quickly
-    crosses it while its slip is still small. No parameter depends on the road.
+    Thresholds apply to the predicted slip, which extrapolates the slip by ``t_lead`` with the
+    wheel's deceleration. A threshold is therefore a line in the plane of slip and deceleration. A
+    wheel that slows down quickly crosses it while its slip is still small. No parameter depends on
+    the road.
     """
 
     slip_keep: Fraction
-    """slip ahead above which the first build-up stops"""
+    """predicted slip above which the first build-up stops"""
     slip_dump: Fraction
-    """slip ahead above which pressure is reduced"""
+    """predicted slip above which pressure is reduced"""
     slip_back: Fraction
     """slip below which a wheel has recovered"""
     t_lead: TimeConstant
-    """prediction time of the slip ahead"""
+    """prediction time of the slip"""
     a_hold: Annotated[float, Unit("m/s**2", 10.0), Field(ge=0, allow_inf_nan=False)]
-    """recovery rate of a wheel, relative to constant slip, below which pressure falls further"""
+    """wheel recovery rate, relative to constant slip, below which pressure is reduced further"""
     t_hold: Duration
-    """shortest time for which pressure is held"""
+    """minimum time for which pressure is held"""
     t_most: Duration
     """time after which pressure is built up again in any case"""
     dump: Annotated[float, Unit("1/s", 100.0), Field(gt=0, allow_inf_nan=False)]
@@ -51,25 +52,25 @@ class Parameters(ParameterSet):
     depth: Fraction
     """pressure at the end of a dump, relative to the last pressure that the road could hold"""
     back: Factor
-    """pressure at which the stepped build-up begins, relative to the same pressure"""
+    """pressure at which the stepped build-up begins, relative to the same reference"""
     t_step: Duration
     """time between two steps"""
     step: Fraction
-    """first step, relative to the same pressure"""
+    """first step, relative to the same reference"""
     growth: Factor
-    """ratio of a step to the previous one: build-up accelerates while the wheel does not lock"""
+    """ratio of a step to the previous step; build-up accelerates while the wheel does not lock"""
     tau_a: TimeConstant
-    """time constant of the deceleration's filter"""
+    """time constant of the deceleration filter"""
     tau_p: TimeConstant
-    """time constant of the brake behind its demand, as assumed by the controller"""
+    """time constant from demand to brake pressure, as assumed by the controller"""
     v_off: Speed
     """speed below which the wheel may lock"""
     v_fall: Speed
-    """speed below which thresholds fall with speed, because sensors lag"""
+    """speed below which thresholds decrease with speed, because sensors lag"""
 
 
 class State(NamedTuple):
-    """Phase and its start, demand, pressures, the next step, and the filtered deceleration."""
+    """Phase and its start, demand, pressures, next step, and filtered deceleration."""
 
     phase: Annotated[float, Signal("1", "phase of anti-lock control", 3.0)]
     since: Annotated[float, Signal("s", "time since the last phase or step began", 0.1)]
@@ -81,12 +82,12 @@ class State(NamedTuple):
 
 
 class Input(NamedTuple):
-    """State of wheel and vehicle, the demand of this and the last sample, and the last output."""
+    """State of wheel and vehicle, demand of this and the previous sample, and previous output."""
 
     v: Annotated[float, Signal("m/s", "vehicle speed", 20.0), Ge(0)]
     a: Annotated[float, Signal("m/s**2", "measured deceleration of the vehicle", 10.0)]
     v_wheel: Annotated[float, Signal("m/s", "measured tread speed", 20.0)]
-    v_last: Annotated[float, Signal("m/s", "tread speed at the last sample", 20.0)]
+    v_last: Annotated[float, Signal("m/s", "tread speed at the previous sample", 20.0)]
     slip: Annotated[float, Signal("1", "braking slip", 0.1)]
     inertia: Annotated[float, Signal("Pa*s**2/m", "pressure that slows a free wheel", 1e4)]
     p_most: Pressure
@@ -106,10 +107,10 @@ class Seen(NamedTuple):
 
     biting: Annotated[float, Signal("1", "the first bite is enough")]
     locking: Annotated[float, Signal("1", "the wheel tends to lock")]
-    falling: Annotated[float, Signal("1", "a dump did not bring it back in time")]
-    recovered: Annotated[float, Signal("1", "it may be braked again")]
-    dumped: Annotated[float, Signal("1", "enough pressure is taken back")]
-    whole: Annotated[float, Signal("1", "nothing is taken from the demand any more")]
+    falling: Annotated[float, Signal("1", "the wheel did not recover in time after a dump")]
+    recovered: Annotated[float, Signal("1", "the wheel can be braked again")]
+    dumped: Annotated[float, Signal("1", "pressure is reduced enough")]
+    whole: Annotated[float, Signal("1", "the demand is no longer reduced")]
 
 
 def seen(x: State, u: Input, slowing: Slowing, par: Parameters) -> Seen:
@@ -150,7 +151,7 @@ def next_phase(phase: Flag, s: Seen) -> Flag:
 def balanced(p: Pressure, slowing: Slowing, u: Input) -> Pressure:
     r"""Return the pressure that the road can hold, :math:`p - (a_{wheel} - a) J/(r k)`.
 
-    A wheel with more deceleration than the vehicle has more brake torque than the road can hold.
+    A wheel that decelerates more than the vehicle has more brake torque than the road can hold.
     """
     return ops.fmax(p - (slowing - u.a) * u.inertia, _LEAST * p)
 
@@ -167,9 +168,9 @@ def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, O
     p_hat = x.p_hat + T / (par.tau_p + T) * (u.p_ref - x.p_hat)
     phase = ops.where(u.p_before <= 0, BUILD, next_phase(x.phase, seen(x, u, slowing, par)))
     begun = ops.where(ops.fabs(phase - x.phase) > 0.5, 1.0, 0.0)
-    # The law estimates the road's limit again when a dump begins or the first bite ends. If a dump
-    # was not sufficient, the estimate was wrong or the road has changed. The road then holds at
-    # most the remaining pressure.
+    # The law updates its estimate of the road's limit when a dump begins or the first bite ends. If
+    # a dump was not sufficient, the estimate was wrong or the road has changed. The road can then
+    # hold at most the remaining pressure.
     held = balanced(p_hat, slowing, u)
     far = ops.where(u.slip > par.slip_dump, _FAR, par.depth)
     again = ops.where(ops.fabs(x.phase - HOLD) < 0.5, ops.fmin(held, far * x.p_held), held)

@@ -16,7 +16,7 @@ SampleTime = Annotated[float, Signal("s", "sample time", 1e-3), Gt(0)]
 
 
 class Parameters(ParameterSet):
-    """Gains of the sampled PI, forward Euler."""
+    """Gains of the sampled PI (forward Euler)."""
 
     k_p: DutyPerCurrent
     """proportional gain"""
@@ -54,8 +54,8 @@ def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, O
     .. math:: D = k_p (i_{ref} - i) + I, \quad
         I_{k+1} = I_k + T (k_i (i_{ref} - i) + (D_{sat} - D) / T_t)
 
-    D_sat is D within the smaller of the ECU's and the power stage's limit. The integral part
-    follows the realized duty cycle, not the demanded one.
+    D_sat is D, limited to the lower of the ECU's and the power stage's limit. The integral part
+    follows the realized duty cycle, not the demanded duty cycle.
     """
     error = u.i_ref - u.i_meas
     unlimited = par.k_p * error + x.integral

@@ -1,6 +1,6 @@
 """Derating: a motor's current limit falls with the winding temperature estimated by the ECU.
 
-The winding has no sensor: the ECU runs a thermal model on the current.
+The winding has no temperature sensor. The ECU runs a thermal model with the current as input.
 """
 
 from __future__ import annotations
@@ -31,33 +31,33 @@ Rise = Annotated[float, Signal("delta_degC", "rise above the air, estimated by t
 class Parameters(ParameterSet):
     """The ECU's thermal model, and the resulting current limit.
 
-    ``law``: ``"current"`` lowers the limit; ``"off"`` keeps it constant and computes nothing.
+    ``law``: ``"current"`` lowers the limit. ``"off"`` keeps it constant and computes nothing.
     """
 
     law: Literal["off", "current"]
-    """whether the limit falls with temperature"""
+    """whether the limit decreases with temperature"""
     R_hat: Resistance
     """resistance at T_ref_hat assumed by the ECU"""
     a_R_hat: TemperatureCoefficient
-    """growth of the resistance with temperature"""
+    """temperature coefficient of the resistance"""
     C_w_hat: HeatCapacity
-    """heat capacity of the winding assumed by the ECU"""
+    """winding heat capacity assumed by the ECU"""
     C_h_hat: HeatCapacity
-    """heat capacity of the housing assumed by the ECU"""
+    """housing heat capacity assumed by the ECU"""
     G_wh_hat: HeatConductance
-    """conductance from winding to housing assumed by the ECU"""
+    """thermal conductance from winding to housing assumed by the ECU"""
     G_ha_hat: HeatConductance
-    """conductance from housing to the air assumed by the ECU"""
+    """thermal conductance from housing to air assumed by the ECU"""
     T_ref_hat: Temperature
     """temperature at which R_hat is valid"""
     T_a_hat: Temperature
-    """temperature of the air assumed by the ECU"""
+    """air temperature assumed by the ECU"""
     T_derate: Temperature
-    """temperature of the winding above which the limit falls"""
+    """winding temperature above which the limit decreases"""
     T_limit: Temperature
-    """temperature at which the limit has fallen to i_least"""
+    """winding temperature at which the limit reaches i_least"""
     i_least: LeastCurrent
-    """lowest limit at any temperature"""
+    """minimum limit at any temperature"""
 
     @model_validator(mode="after")
     def _falls(self) -> Parameters:
@@ -66,7 +66,7 @@ class Parameters(ParameterSet):
                 "T_derate",
                 shown(self.T_derate, "K"),
                 f"< T_limit = {shown(self.T_limit, 'K')}",
-                "the current limit falls between these temperatures",
+                "because the current limit decreases between these temperatures",
             )
         return self
 
@@ -89,7 +89,7 @@ class Output(NamedTuple):
     """Current limit, estimated winding temperature, and whether the limit is lowered."""
 
     i_max: Annotated[float, Signal("A", "limit of the current's magnitude", 20.0)]
-    T: Annotated[float, Signal("K", "temperature of the winding, estimated", 350.0)]
+    T: Annotated[float, Signal("K", "estimated winding temperature", 350.0)]
     derated: Annotated[float, Signal("1", "motor derated")]
 
 
@@ -105,7 +105,7 @@ def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, O
     Notes
     -----
     The limit is linear instead of a switch. While a demand is at the limit, current and temperature
-    settle at the balance of heat input and heat loss, without hunting.
+    settle where heat input equals heat loss, without hunting.
     """
     if par.law == "off":
         return x, Output(u.i_max, par.T_a_hat, 0.0)

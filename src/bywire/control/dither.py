@@ -26,9 +26,9 @@ class Parameters(ParameterSet):
     """Shape of the dither."""
 
     waveform: Literal["off", "sine", "square", "triangle"]
-    """waveform; the paper's sine has the lowest harmonic distortion"""
+    """waveform; the sine wave of the paper has the lowest harmonic distortion"""
     f_dit: Frequency
-    """frequency: above the pressure loop's band, inside the current loop's"""
+    """frequency, above the pressure-loop bandwidth and below the current-loop bandwidth"""
     gain: Gain
     """amplitude relative to the assumed breakaway current"""
 
@@ -41,16 +41,16 @@ class Believed(ParameterSet):
     T_pr: Torque
     """friction torque at zero pressure"""
     f_cfr_p: TorquePerPressure
-    """growth of the Coulomb torque with pressure, apply direction"""
+    """increase of the Coulomb torque with pressure in the apply direction"""
     k_brk_p: BreakawayFactor
-    """ratio of breakaway torque to Coulomb torque, apply direction"""
+    """ratio of breakaway torque to Coulomb torque in the apply direction"""
 
 
-_ROUNDING = 1e-9  # share of the period: far above the phase's rounding, far below a sample
+_ROUNDING = 1e-9  # fraction of the period, much larger than rounding and much smaller than a sample
 
 
 class State(NamedTuple):
-    """Phase as a share of the period, 0 <= phase < 1 except for rounding."""
+    """Phase as a fraction of the period, 0 <= phase < 1 except for rounding."""
 
     phase: Annotated[float, Signal("1", "dither phase", 0.5)]
 
@@ -68,7 +68,7 @@ def breakaway_current(
 
     .. math:: i_{brkf} = \frac{k_{brk,p}}{K_e} (T_{pr} + f_{cfr,p} p_{mc})
 
-    The gear's efficiency is neglected, as in the paper; negative pressure counts as zero.
+    As in the paper, the gear efficiency is neglected. Negative pressure counts as zero.
 
     References
     ----------
@@ -87,7 +87,7 @@ def output(
 ) -> tuple[State, Output]:
     r"""Advance the dither by one sample.
 
-    A phase that differs from the end of a period or half period only by rounding counts as that
+    If a phase differs from the end of a period or half period only by rounding, it counts as this
     end. A square wave then has the same number of samples above and below zero.
 
     .. math:: i_{dit}(t) = A_{dit} \sin(2 \pi f_{dit} t), \quad A_{dit} = i_{brkf}

@@ -1,4 +1,4 @@
-"""Gain schedule of the pressure PID: its gains as a continuous function of the pressure."""
+"""Gain schedule of the pressure PID: its gains as a continuous function of pressure."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from bywire.core.signals import Signal
 
 
 class Gains(ParameterSet):
-    """Gains of a pressure region; filter and set-point weights are the PID's in all regions."""
+    """Gains in a pressure region; filter and set-point weights are the same in all regions."""
 
     k_p: CurrentPerPressure
     """proportional gain in this region"""
@@ -30,10 +30,10 @@ class Gains(ParameterSet):
 
 
 class Parameters(ParameterSet):
-    """Regions of pressure; the medium region uses the PID's own gains."""
+    """Pressure regions; the medium region uses the PID's own gains."""
 
     law: Literal["off", "regions"]
-    """whether the gains depend on the pressure"""
+    """whether the gains depend on pressure"""
     p_1: Pressure
     """boundary between low and medium pressure"""
     p_2: Pressure
@@ -73,7 +73,7 @@ def output(
     .. math:: k(p) = k_l + s_1 (k_m - k_l) + s_2 (k_h - k_m), \quad
         s_j = \mathrm{sat}_0^1 \left( \frac{p - p_j}{p_{blend}} + \frac{1}{2} \right)
 
-    The schedule alone is not bumpless: see ``pressure_pid.transferred``.
+    The schedule alone is not bumpless. For a bumpless transfer, see ``pressure_pid.transferred``.
 
     Parameters
     ----------
@@ -83,8 +83,8 @@ def output(
     References
     ----------
     Dardanelli, Alli, Savaresi (2010), Table 4, for the three regions; W. J. Rugh, J. S. Shamma,
-    Research on gain scheduling, Automatica 36 (2000), for the validity of such a schedule: near
-    each equilibrium, and for slow motion between equilibria.
+    Research on gain scheduling, Automatica 36 (2000), for the validity of such a schedule near each
+    equilibrium and for slow motion between equilibria.
     """
     if par.law == "off":
         return Output(k_p=medium.k_p, k_i=medium.k_i, k_d=medium.k_d)

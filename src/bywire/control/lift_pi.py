@@ -1,4 +1,4 @@
-"""Lift control of a two-wheeler: PI on the deceleration at which its rear wheel would lift."""
+"""Lift control of a two-wheeler: PI on the deceleration at which the rear wheel would lift."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Parameters(ParameterSet):
     """Gains of a law that acts before the wheel lifts; a lifted wheel needs a very low demand."""
 
     a_lim: Annotated[float, Unit("m/s**2", 10.0), Field(gt=0, allow_inf_nan=False)]
-    """limit of the deceleration; for a rigid body on a level road, g l_f/h"""
+    """deceleration limit, which is g l_f/h for a rigid body on a level road"""
     k_p: Annotated[float, Unit("Pa*s**2/m", 1e5), Field(ge=0, allow_inf_nan=False)]
     """proportional gain"""
     T_i: Duration
@@ -35,7 +35,7 @@ class State(NamedTuple):
 
 
 class Input(NamedTuple):
-    """Deceleration, rider's demand, the demand to lower, and its previous sample."""
+    """Deceleration, rider's demand, the demand to limit, and its previous sample."""
 
     a: Annotated[float, Signal("m/s**2", "measured deceleration", 10.0)]
     p_rider: Pressure

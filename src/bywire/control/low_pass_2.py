@@ -1,4 +1,4 @@
-"""Second-order low-pass filter, sampled."""
+"""Sampled second-order low-pass filter."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ SampleTime = Annotated[float, Signal("s", "sample time", 1e-3), Gt(0)]
 class Parameters(ParameterSet):
     """Filter between pressure and current controller, next to eq. (20) in the signal chain.
 
-    ``place`` determines where the dither is added: ``"after-dither"`` filters demand plus dither
-    (the paper's wording), ``"before-dither"`` only the demand.
+    ``place`` determines where the dither is added. ``"after-dither"`` filters demand plus dither
+    (the wording of the paper), ``"before-dither"`` filters only the demand.
     """
 
     f_c: Frequency
     """cutoff frequency"""
     zeta: Factor
-    """damping ratio; 1/sqrt(2) puts -3 dB at the cut-off"""
+    """damping ratio; with 1/sqrt(2), the gain at the cutoff frequency is -3 dB"""
     place: Literal["after-dither", "before-dither"]
     """whether the filter acts on demand plus dither, or only on the demand"""
 
@@ -53,8 +53,8 @@ def output(
 
     .. math:: \frac{\omega_c^2}{s^2 + 2 \zeta \omega_c s + \omega_c^2}
 
-    by the trapezoidal rule with a prewarped cutoff frequency, which keeps it at f_c; valid for
-    f_c T < 0.5.
+    with the trapezoidal rule and a prewarped cutoff frequency, so that the cutoff stays at f_c. It
+    is valid for f_c T < 0.5.
     """
     angle = math.pi * par.f_c * T
     g = ops.sin(angle) / ops.cos(angle)

@@ -1,4 +1,4 @@
-"""Mix of slip and deceleration of a wheel: a controlled variable if slip alone is uncertain."""
+"""Mix of a wheel's slip and deceleration, a controlled variable if slip alone is uncertain."""
 
 from __future__ import annotations
 
@@ -15,32 +15,32 @@ SampleTime = Annotated[float, Signal("s", "sample time", 1e-3), Gt(0)]
 
 
 class Parameters(ParameterSet):
-    """Shares of slip and deceleration, and the deceleration that corresponds to the slip set point.
+    """Weights of slip and deceleration, and the deceleration at the slip set point.
 
-    With ``alpha`` = 1 only slip counts, with 0 only deceleration. In between, the controller
-    demands less slip on a road with more adhesion. Deceleration contains the slip rate, times speed
-    over gravity. It needs separate gains, but fixed gains suffice at every speed.
+    With ``alpha`` = 1, only slip counts. With 0, only deceleration counts. In between, the
+    controller demands less slip on a road with more adhesion. Deceleration contains the slip rate
+    times speed divided by gravity. It needs separate gains, but fixed gains work at every speed.
     """
 
     alpha: Weight
-    """fraction of the slip"""
+    """weight of the slip"""
     eta_set: Annotated[float, Unit("1", 0.5), Field(ge=0, allow_inf_nan=False)]
     """set point of the wheel's deceleration relative to gravity"""
     tau: TimeConstant
-    """time constant of the deceleration's filter"""
+    """time constant of the deceleration filter"""
     g: Annotated[float, Unit("m/s**2", 9.81), Field(gt=0, allow_inf_nan=False)]
     """gravity"""
 
 
 class State(NamedTuple):
-    """Speed of the tread at the last sample, and the filtered deceleration over gravity."""
+    """Tread speed at the previous sample, and filtered deceleration relative to gravity."""
 
-    v_last: Annotated[float, Signal("m/s", "tread speed at the last sample", 20.0)]
+    v_last: Annotated[float, Signal("m/s", "tread speed at the previous sample", 20.0)]
     eta: Annotated[float, Signal("1", "deceleration of the wheel relative to gravity", 1.0)]
 
 
 class Input(NamedTuple):
-    """Slip and its set point, and the speed of the tread."""
+    """Slip and its set point, and the tread speed."""
 
     slip_set: Annotated[float, Signal("1", "slip set point", 0.1)]
     slip: Annotated[float, Signal("1", "braking slip", 0.1)]
@@ -48,7 +48,7 @@ class Input(NamedTuple):
 
 
 class Output(NamedTuple):
-    """Mixed variables in place of set point and slip."""
+    """Mixed variables that replace set point and slip."""
 
     set_point: Annotated[float, Signal("1", "mixed set point", 0.1)]
     mixed: Annotated[float, Signal("1", "mixed slip and deceleration", 0.1)]

@@ -1,4 +1,4 @@
-"""Static map from the pedal's potentiometer to the pressure set point."""
+"""Static map from the pedal potentiometer's voltage to the pressure set point."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class Parameters(ParameterSet):
     """Piecewise linear map, constant outside its nodes."""
 
     V_nodes: Annotated[Nodes, Unit("V", 2.5)]
-    """potentiometer voltages, increasing"""
+    """potentiometer voltages in increasing order"""
     p_nodes: Annotated[Nodes, Unit("Pa", 2e6)]
     """set points at these voltages"""
 

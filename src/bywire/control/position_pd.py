@@ -1,4 +1,4 @@
-"""Motor position control: stiffness and damping from the encoder, current demand to the drive."""
+"""Motor position control: the current demand adds stiffness and damping to the encoder angle."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ SampleTime = Annotated[float, Signal("s", "sample time", 2e-4), Gt(0)]
 
 
 class Parameters(ParameterSet):
-    """Second-order position loop, without integral part.
+    """Second-order position loop without an integral part.
 
-    The brake uses a high bandwidth (60 Hz); a low bandwidth (12 Hz) stays within the current limit.
+    The brake uses a high bandwidth (60 Hz). A low bandwidth (12 Hz) stays within the current limit.
     """
 
     f_n: Frequency
@@ -26,9 +26,9 @@ class Parameters(ParameterSet):
     zeta: Factor
     """damping ratio"""
     c: Weight
-    """fraction of the reference's speed that is exempt from damping; 0 damps the whole speed"""
+    """fraction of the reference speed that is exempt from damping; 0 damps the whole speed"""
     f_speed: Frequency
-    """corner frequency of the filter for the encoder's differences"""
+    """cutoff frequency of the filter for the encoder differences"""
     i_max: Current
     """limit of the current demand's magnitude"""
     J_hat: Inertia
@@ -38,9 +38,9 @@ class Parameters(ParameterSet):
 
 
 class State(NamedTuple):
-    """Last angle and filtered speed."""
+    """Previous angle and filtered speed."""
 
-    last: Annotated[float, Signal("rad", "last measured angle", 3.0)]
+    last: Annotated[float, Signal("rad", "previous measured angle", 3.0)]
     speed: Annotated[float, Signal("rad/s", "measured speed", 50.0)]
 
 
@@ -65,11 +65,12 @@ def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, O
         i = \frac{J}{K_T} \left(\omega_n^2 (\theta_{ref} - \theta)
         + 2 \zeta \omega_n (c\, \omega_{ref} - \hat\omega)\right)
 
-    with the speed from the encoder's differences after a first-order filter.
+    where the speed is computed from encoder differences with a first-order filter.
 
     References
     ----------
-    Roberts et al. (2003), section "Motor & rollerscrew alone": two bandwidths, without the law.
+    Roberts et al. (2003), section "Motor & rollerscrew alone", for the two bandwidths; it does not
+    state the law.
     """
     angle = 2.0 * math.pi * par.f_speed * T
     difference = (u.theta - x.last) / T

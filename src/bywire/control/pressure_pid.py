@@ -23,7 +23,7 @@ SampleTime = Annotated[float, Signal("s", "sample time", 1e-3), Gt(0)]
 
 
 class Parameters(ParameterSet):
-    """Gains of the continuous PID; discretized by backward differences."""
+    """Gains of the continuous PID, which is discretized with backward differences."""
 
     k_p: CurrentPerPressure
     """proportional gain"""
@@ -32,11 +32,11 @@ class Parameters(ParameterSet):
     k_d: CurrentTimePerPressure
     """derivative gain"""
     tau_d: TimeConstant
-    """time constant of the derivative's filter"""
+    """time constant of the derivative filter"""
     b: Weight
     """set-point weight of the proportional part"""
     c: Weight
-    """set-point weight of the derivative part; with 0 it acts only on the measurement"""
+    """set-point weight of the derivative part, which acts only on the measurement if it is 0"""
     T_t: Duration
     """tracking time of the anti-windup"""
     i_max: Current
@@ -48,7 +48,7 @@ class State(NamedTuple):
 
     integral: Annotated[float, Signal("A", "integral part", 3.0)]
     slope: Annotated[float, Signal("A", "derivative part", 1.0)]
-    last: Annotated[float, Signal("Pa", "last differentiated signal", 2e6)]
+    last: Annotated[float, Signal("Pa", "previous differentiated signal", 2e6)]
 
 
 class Input(NamedTuple):
@@ -99,13 +99,14 @@ def transferred(
 
     .. math:: I \leftarrow I + (k_p^{old} - k_p) (b r - p)
 
-    The demand at this input then equals the demand with the old gains. Integral and derivative part
-    are currents, which new k_i and k_d do not change.
+    The demand at this input then equals the demand with the old gains. Integral and derivative
+    parts are currents, so new k_i and k_d do not change them.
 
     Notes
     -----
-    With a pressure-dependent k_p, the demand contains the integral of k_p over the error. At an
-    equilibrium, the loop's linear model equals that of fixed gains at the equilibrium's pressure.
+    With a pressure-dependent k_p, the demand contains the integral of k_p with respect to the
+    error. At an equilibrium, the loop has the same linear model as with the fixed gains for the
+    equilibrium pressure.
 
     References
     ----------

@@ -1,4 +1,4 @@
-"""Vehicle speed from the wheels while they slip."""
+"""Vehicle speed, estimated from wheel speeds during slip."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ Speed = Annotated[float, Signal("m/s", "speed", 20.0), Ge(0)]
 
 
 class Parameters(ParameterSet):
-    """Reference speed.
+    """Estimator of the reference speed.
 
-    ``law``: ``"wheels"`` follows the faster wheel, but falls no faster than the best braking;
-    ``"accelerometer"`` integrates the measured deceleration, and returns to the faster wheel while
-    it slips little. The first law fails if both wheels slip at the same time.
+    ``law``: ``"wheels"`` follows the faster wheel, but decreases no faster than the strongest
+    braking permits. ``"accelerometer"`` integrates the measured deceleration, and returns to the
+    faster wheel while its slip is low. The first law fails if both wheels slip at the same time.
     """
 
     law: Literal["wheels", "accelerometer"]
     """source of the speed while the wheels slip"""
     a_max: Annotated[float, Unit("m/s**2", 12.0), Field(gt=0, allow_inf_nan=False)]
-    """deceleration that no braking exceeds (law "wheels")"""
+    """maximum deceleration of any braking (law "wheels")"""
     slip_small: Weight
     """slip up to which a wheel counts as reliable (law "accelerometer")"""
     tau: Duration
-    """time constant with which the reference returns to a reliable wheel"""
+    """time constant of the reference's return to a reliable wheel"""
     v_still: Annotated[float, Unit("m/s", 1.0), Field(gt=0, allow_inf_nan=False)]
     """speed below which every wheel counts as reliable, which removes errors at standstill"""
 
@@ -43,10 +43,10 @@ class State(NamedTuple):
 
 
 class Input(NamedTuple):
-    """Speeds of the treads, and deceleration."""
+    """Tread speeds and deceleration."""
 
-    v_f: Annotated[float, Signal("m/s", "measured speed of the front tread", 20.0)]
-    v_r: Annotated[float, Signal("m/s", "measured speed of the rear tread", 20.0)]
+    v_f: Annotated[float, Signal("m/s", "measured front tread speed", 20.0)]
+    v_r: Annotated[float, Signal("m/s", "measured rear tread speed", 20.0)]
     a: Annotated[float, Signal("m/s**2", "measured deceleration", 10.0)]
 
 
@@ -63,7 +63,7 @@ def output(x: State, u: Input, T: SampleTime, par: Parameters) -> State:
 
 def slip(
     v: Speed,
-    v_wheel: Annotated[float, Signal("m/s", "measured speed of the tread", 20.0)],
+    v_wheel: Annotated[float, Signal("m/s", "measured tread speed", 20.0)],
     v_off: Annotated[float, Signal("m/s", "speed below which slip is uncertain", 2.0), Gt(0)],
 ) -> Annotated[float, Signal("1", "braking slip computed by the ECU", 0.1)]:
     """Return the braking slip computed by the ECU, relative to at least ``v_off``."""

@@ -1,6 +1,6 @@
-"""Adjuster of a brake's clearance, which measures the pads' travel and turns by whole teeth.
+"""Clearance adjuster of a brake, which measures pad travel and turns by whole teeth.
 
-It acts only while the brake is parked. Its faults are parameters that affect the turning. Teeth are
+It acts only while the brake is parked. Its faults are parameters that affect the turns. Teeth are
 positive if they reduce the clearance.
 """
 
@@ -17,7 +17,7 @@ from bywire.core.signals import Signal
 
 WAITS, APPLIED, TURNS = 0.0, 1.0, 2.0
 
-_WHOLE = 1e-9  # share of a tooth: rounding error of a whole tooth
+_WHOLE = 1e-9  # rounding error of a whole tooth, in teeth
 Flag = Annotated[float, Signal("1", "flag")]
 Teeth = Annotated[float, Signal("1", "teeth")]
 
@@ -25,12 +25,12 @@ Teeth = Annotated[float, Signal("1", "teeth")]
 class Parameters(ParameterSet):
     """Thresholds and steps of the adjuster, and its fault.
 
-    ``ways``: ``"closing"`` only reduces clearance; ``"both"`` also increases a clearance below
+    ``ways``: ``"closing"`` only reduces the clearance. ``"both"`` also increases a clearance below
     ``gap_min``.
-    ``fault``: ``"none"``; ``"stuck"``: nothing turns; ``"one-way"``: the adjuster does not increase
-    clearance; ``"slips"``: every second tooth has no effect; ``"over-adjusts"``: one tooth too
-    many; ``"blind-to-heat"``: the adjuster treats a hot disc as a cold one. It does not detect any
-    of these faults and continues its count.
+    ``fault``: ``"none"``, ``"stuck"`` (nothing turns), ``"one-way"`` (the adjuster does not
+    increase the clearance), ``"slips"`` (every second tooth has no effect), ``"over-adjusts"`` (one
+    tooth too many), or ``"blind-to-heat"`` (the adjuster treats a hot disc like a cold disc). The
+    adjuster does not detect any of these faults and continues its count.
     """
 
     gap_nominal: Length
@@ -38,13 +38,13 @@ class Parameters(ParameterSet):
     band: Length
     """tolerated excess of the clearance"""
     gap_min: Length
-    """clearance of the cold brake below which the adjuster never turns; a hot disc reduces it"""
+    """cold clearance below which the adjuster never turns; a hot disc reduces the clearance"""
     tooth: Length
-    """clearance removed by a tooth"""
+    """clearance removed per tooth"""
     applications: Annotated[float, Unit("1", 3.0), Field(ge=1, allow_inf_nan=False)]
-    """number of consecutive applications with the same deviation before the adjuster turns"""
+    """number of consecutive brake applications with the same deviation before the adjuster turns"""
     growth: Annotated[float, Unit("m/K", 3e-7), Field(ge=0, allow_inf_nan=False)]
-    """clearance lost per kelvin of the disc"""
+    """loss of clearance per kelvin of disc temperature"""
     T_cold: Annotated[float, Unit("K", 300.0), Field(gt=0, allow_inf_nan=False)]
     """temperature of a cold disc"""
     ways: Literal["closing", "both"]
@@ -56,25 +56,27 @@ class Parameters(ParameterSet):
 class State(NamedTuple):
     """Memory."""
 
-    applied: Annotated[float, Signal("1", "the brake was applied since it was last parked")]
-    wide: Annotated[float, Signal("1", "applications in a row with too much gap; < 0: too little")]
-    teeth: Annotated[float, Signal("1", "teeth turned, by the adjuster's count")]
+    applied: Annotated[float, Signal("1", "the brake was applied after it was last parked")]
+    wide: Annotated[
+        float, Signal("1", "consecutive applications with too much gap; < 0: too little")
+    ]
+    teeth: Annotated[float, Signal("1", "teeth turned according to the adjuster's count")]
 
 
 class Input(NamedTuple):
     """Signals that the wear log needs."""
 
     gap: Annotated[
-        float, Signal("m", "clearance from the travel between parking and contact", 2e-4)
+        float, Signal("m", "clearance computed from the travel between parking and contact", 2e-4)
     ]
-    T: Annotated[float, Signal("K", "temperature of the disc, estimated", 350.0)]
+    T: Annotated[float, Signal("K", "estimated disc temperature", 350.0)]
     touching: Annotated[float, Signal("1", "the pads press on the disc")]
     parked: Annotated[float, Signal("1", "the brake is parked")]
     wanted: Annotated[float, Signal("1", "braking is demanded")]
 
 
 class Output(NamedTuple):
-    """Intended and actual teeth to turn now, and the state of the adjuster."""
+    """Intended and actual number of teeth to turn now, and the state of the adjuster."""
 
     teeth: Teeth
     turned: Teeth
@@ -82,17 +84,17 @@ class Output(NamedTuple):
 
 
 def cold_gap(u: Input, par: Parameters) -> Annotated[float, Signal("m", "clearance when cold")]:
-    """Return the clearance of the cold brake, from the travel to contact and the disc's growth."""
+    """Return the cold brake's clearance, from the travel to contact and the disc's expansion."""
     if par.fault == "blind-to-heat":
         return u.gap
     return u.gap + par.growth * (u.T - par.T_cold)
 
 
 def due(gap: Annotated[float, Signal("m", "clearance when cold", 2e-4)], par: Parameters) -> Teeth:
-    """Return the teeth that restore a clearance, not below the nominal or the least clearance.
+    """Return the number of teeth that restores a clearance, without going below its limits.
 
-    Below the least clearance, the result is the smallest sufficient number if the direction is
-    allowed, otherwise zero.
+    The limits are the nominal and the minimum clearance. Below the minimum clearance, the result is
+    the smallest sufficient number if the direction is allowed, and otherwise zero.
     """
     spare = gap - ops.fmax(par.gap_nominal, par.gap_min)
     closing = ops.fmax(ops.floor(spare / par.tooth + _WHOLE), 0.0)
@@ -102,12 +104,12 @@ def due(gap: Annotated[float, Signal("m", "clearance when cold", 2e-4)], par: Pa
 
 
 def turned(teeth: Teeth, before: Teeth, par: Parameters) -> Teeth:
-    """Return the teeth that actually turn, from the intended ones and the previous count."""
+    """Return the number of teeth that actually turn, from the intended number and the count."""
     if par.fault == "stuck":
         return 0.0 * teeth
     if par.fault == "one-way":
         return ops.fmax(teeth, 0.0)
-    if par.fault == "slips":  # only the odd ones of the intended teeth have an effect
+    if par.fault == "slips":  # only every second intended tooth has an effect
         return ops.floor(0.5 * (before + teeth + 1.0)) - ops.floor(0.5 * (before + 1.0))
     if par.fault == "over-adjusts":
         return teeth + ops.where(teeth > 0, 1.0, 0.0)
@@ -117,8 +119,8 @@ def turned(teeth: Teeth, before: Teeth, par: Parameters) -> Teeth:
 def output(x: State, u: Input, par: Parameters) -> tuple[State, Output]:
     """Advance the adjuster by one sample.
 
-    An application counts if the pads have touched the disc. It counts once, when the brake is
-    parked without a demand afterward.
+    A brake application counts if the pads have touched the disc. It counts once, when the brake is
+    parked afterward without a demand.
     """
     rests = ops.where(u.parked > 0.5, ops.where(u.wanted > 0.5, 0.0, 1.0), 0.0)
     finished = rests * x.applied

@@ -1,4 +1,4 @@
-"""Wheel speed from the time-stamped edges of a pulse wheel."""
+"""Wheel speed, computed from the time-stamped edges of a pulse wheel."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ Age = Annotated[float, Signal("s", "time since the last edge", 1e-3), Ge(0)]
 class Parameters(ParameterSet):
     """Wheel sensors assumed by the ECU.
 
-    ``law``: ``"period"`` divides the angle between edges by the time between them, and lets the
-    speed fall while no edge arrives; ``"difference"`` takes differences of the angle over a sample.
+    ``law``: ``"period"`` divides the angle between edges by the time between them, and decreases
+    the speed while no edge arrives. ``"difference"`` uses differences of the angle over a sample.
     """
 
     law: Literal["period", "difference"]
@@ -31,7 +31,7 @@ class Parameters(ParameterSet):
 
 
 class State(NamedTuple):
-    """Last edge, and the speed."""
+    """Angle of the last edge, and the speed."""
 
     angle: Annotated[float, Signal("rad", "angle of the last edge", 100.0)]
     age: Age
@@ -54,7 +54,7 @@ def output(x: State, u: Input, T: SampleTime, par: Parameters) -> State:
     waited = x.age + T
     slowest = 2.0 * math.pi / par.pulses / waited
     fading = ops.clip(x.omega, -slowest, slowest)
-    # Two edges within a sample may coincide after rounding.
+    # After rounding, two edges within a sample may coincide.
     elapsed = ops.fmax(waited - u.age, 1e-3 * T)
     return State(
         u.angle, ops.where(still, waited, u.age), ops.where(still, fading, turned / elapsed)

@@ -1,4 +1,4 @@
-"""Signals of different rates, instants and delays on one time axis, with a report of it."""
+"""Signals with different rates, times and delays on one time axis, with a report."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ METHODS = ("linear", "previous", "nearest", "average")
 
 _Values = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 
-_BLOCK = 1 << 20  # instants per chunk, which limits memory beside the result
-_SLACK = 1e-9  # intervals: tolerance for rounding of equal instants
+_BLOCK = 1 << 20  # times per chunk, which limits the memory in addition to the result
+_SLACK = 1e-9  # intervals: tolerance for rounding of equal times
 
 
 def resampled(
@@ -39,23 +39,23 @@ def resampled(
     step: float,
     method: str,
 ) -> NDArray[np.float64]:
-    """Return a signal at other instants.
+    """Return a signal at other times.
 
     Parameters
     ----------
     time, values
-        Increasing instants [s] and values there, shape ``(sample,)``; none is NaN.
+        Increasing times [s] and values there, shape ``(sample,)``; none is NaN.
     axis
-        Requested instants [s], within those of the signal, shape ``(instant,)``.
+        Requested times [s], within those of the signal, shape ``(time,)``.
     step
         Their distance [s].
     method
-        One of ``METHODS``, see `bywire.data.alignment.resample`.
+        One of ``METHODS`` (see `bywire.data.alignment.resample`).
 
     Returns
     -------
     numpy.ndarray
-        Shape ``(instant,)``.
+        Shape ``(time,)``.
     """
     pieces = range(0, axis.size, _BLOCK)
     at = _means(time, values, step) if method == "average" else _samples(time, values, step, method)
@@ -72,7 +72,7 @@ def _samples(
         before = np.clip(before, 0, time.size - 1)
         if method == "linear":
             line = np.asarray(np.interp(axis, time, values))
-            # A sample on the axis (except for rounding) keeps its exact value.
+            # A sample on the axis, except for rounding, keeps its exact value.
             return np.where(np.abs(time[before] - axis) <= _SLACK * step, values[before], line)
         if method == "nearest":
             after = np.minimum(before + 1, time.size - 1)
@@ -126,23 +126,23 @@ def resample(
 ) -> Aligned:
     """Bring signals to one time axis.
 
-    The axis has instants at whole multiples of the interval, in the overlap of all signals.
+    The axis contains the whole multiples of the interval in the overlap of all signals.
 
     Parameters
     ----------
     measurement
-        Result of `read_measurement`: variables with one dimension each, instants in s.
+        Result of `read_measurement`: variables with one dimension each, times in s.
     interval
         Step of the axis, text with a unit or [s].
     signals
         Names of the signals; all by default.
     method
-        ``"linear"`` or ``"previous"`` (the value holds until the next sample) or ``"nearest"``,
-        between samples; or ``"average"``, the mean of the line through the samples over an
-        interval around each instant, which keeps fast content from folding into slow.
+        Values between samples: ``"linear"``, ``"previous"`` (held until the next sample) or
+        ``"nearest"``; or ``"average"``, the mean of the line through the samples over an interval
+        around each time, which reduces aliasing.
     exclude
-        Flaws in which the result is NaN: ``"gaps"``, ``"missing"`` (NaN in the file),
-        ``"clipped"``. Other flaws are not excluded: the method bridges gaps.
+        Flaws during which the result is NaN: ``"gaps"``, ``"missing"`` (NaN in the file),
+        ``"clipped"``. The method bridges gaps that are not excluded.
     max_gap
         Longest pause that is not a gap, text with a unit or [s]; ten median steps by default.
 
@@ -154,8 +154,8 @@ def resample(
     Raises
     ------
     ParameterError
-        When interval or pause is not positive, the result would be too large, a signal has too few
-        usable values, or signals do not overlap.
+        When the interval or the longest pause is not positive, the result would be too large, a
+        signal has too few usable values, or signals do not overlap.
     UnknownNameError
         For an unknown signal, method or flaw.
     """
@@ -185,7 +185,7 @@ def resample(
 
 
 def _instants_of(measurement: xr.Dataset, name: str) -> NDArray[np.float64]:
-    """Return the instants of a signal [s]."""
+    """Return the times of a signal [s]."""
     (dim,) = measurement[name].dims
     return np.asarray(measurement[dim].values, dtype=np.float64)
 
@@ -245,7 +245,7 @@ def _axis(qualities: dict[str, ChannelQuality], step: float, method: str) -> NDA
     size = 8 * (last - first + 1) * (len(qualities) + 1)
     if size > room():
         raise ParameterError(
-            f"interval = {step:g} s would give {last - first + 1:.3g} samples of each signal, "
+            f"interval = {step:g} s would create {last - first + 1:.3g} samples of each signal, "
             f"which need {size / 2**30:.3g} GiB of memory. The limit is {room() / 2**30:.3g} GiB. "
             "Use a larger interval, or fewer signals",
             name="interval",
@@ -290,7 +290,7 @@ def _inside(
     stretch: Stretch, axis: NDArray[np.float64], step: float, reach: float, *, ends: bool
 ) -> slice:
     """Return the part of the axis whose values depend on a stretch."""
-    slack = -_SLACK * step if ends else _SLACK * step  # of a gap, the samples at its ends are good
+    slack = -_SLACK * step if ends else _SLACK * step  # the samples at the ends of a gap are good
     begin = stretch.start - reach + slack
     end = stretch.start + stretch.length + reach - slack
     return slice(int(np.searchsorted(axis, begin)), int(np.searchsorted(axis, end, side="right")))

@@ -1,6 +1,6 @@
 """Quality of measured channels: rate, jitter, gaps, missing values, clipped stretches.
 
-Also the report of their alignment to one time axis.
+It also reports their alignment to one time axis.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ sensor is unknown; if it is known, one sample at its end counts"""
 
 @dataclass(frozen=True)
 class Stretch:
-    """A piece of a channel, between two instants.
+    """A part of a channel between two times.
 
     Parameters
     ----------
     start
-        Its start [s].
+        Start [s].
     length
-        Its duration [s].
+        Duration [s].
     samples
-        Number of its samples.
+        Number of samples.
     """
 
     start: float
@@ -49,9 +49,9 @@ class ChannelQuality:
     rate
         One over the median step [Hz].
     jitter
-        Largest deviation of a step from the median step [s], without gaps.
+        Maximum deviation of a step from the median step [s], without gaps.
     start, stop
-        First and last measured instant [s].
+        First and last measured time [s].
     gaps
         Pauses longer than the limit, from the sample before to the sample after.
     missing
@@ -82,7 +82,7 @@ def quality(
     Parameters
     ----------
     time
-        Increasing instants [s], shape ``(sample,)``.
+        Increasing times [s], shape ``(sample,)``.
     values
         Values, NaN where missing, shape ``(sample,)``.
     max_gap
@@ -167,7 +167,7 @@ class AlignedChannel:
     quality
         Its quality.
     delay
-        Shift of its instants to earlier times [s].
+        Time by which its samples are moved to earlier times [s].
     excluded
         Number of samples of the common axis that are NaN because of its flaws.
     """
@@ -187,9 +187,9 @@ class AlignmentReport:
     interval
         Step of the common axis [s].
     start, stop
-        Its first and last instant [s].
+        First and last time of the axis [s].
     samples
-        Number of its instants.
+        Number of times on the axis.
     method
         Method for values between samples.
     exclude

@@ -1,4 +1,4 @@
-"""Assignment of a file's columns to signals, with units and instants."""
+"""Assignment of a file's columns to signals, with units and times."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from bywire.data.mapping import Clock, MeasurementMapping, SignalMapping
 _CLOCKS = ("time", "t", "zeit", "timestamp", "time stamp", "date time", "datetime", "x_value")
 _SHOWN = 12
 _NO_VALUE = (9.9e37, -9.9e37, 9.91e37)
-"""numbers of SCPI instruments for missing values: infinity, and not a number"""
+"""numbers of SCPI instruments for missing values: infinity and not-a-number"""
 
 
 class MissingUnitsError(UnitError):
@@ -35,7 +35,7 @@ class MissingUnitsError(UnitError):
     signals
         Name of the signal -> its column.
     clock
-        Column of the instants, if it has no unit either.
+        Time column, if it has no unit either.
     """
 
     def __init__(
@@ -50,7 +50,7 @@ class MissingUnitsError(UnitError):
 
 
 class NoClockError(FileError):
-    """A file without instants.
+    """A file without a time column.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ class Chosen:
     column
         Name of the column.
     clock
-        Source of its instants: a column with its unit, or a rate.
+        Source of its times: a column with its unit, or a rate.
     unit
         Unit of the scaled numbers.
     symbol
@@ -176,7 +176,7 @@ def choose(
     UnknownNameError
         For a signal that the mapping or the file does not have.
     FileError
-        For a missing column, or a file without instants.
+        For a missing column, or a file without times.
     UnitError
         When a unit is missing, unknown or contradicts that of the file.
     """
@@ -187,9 +187,9 @@ def choose(
                 raise unknown_name("signal", name, wanted)
         wanted = {name: wanted[name] for name in signals}
     if not wanted:
-        why = "; ".join(left_out_note(source.left_out))
+        skipped = _sentences(source.left_out)
         raise FileError(
-            f"{file} contains no signal: {_listing(source.columns)}" + (f", {why}" if why else ""),
+            f"{file} contains no signal. {_listing(source.columns)}{skipped}",
             name=str(file),
         )
     chosen: list[Chosen] = []
@@ -256,7 +256,7 @@ def _chosen(
 
 
 def _as_numbers(marks: Sequence[float | str]) -> Iterator[float]:
-    """Yield the marks of missing values that are numbers, also those written as texts."""
+    """Yield the marks of missing values that are numbers, including numbers written as texts."""
     for mark in marks:
         try:
             yield float(mark)
@@ -279,11 +279,11 @@ def _known_unit(unit: str, where: str) -> Scale:
 def _require_same(signal: SignalMapping, column: Column, where: str, is_time: bool = False) -> None:
     """Reject a mapping whose unit differs from the file's."""
     unit = _known_unit(column.unit, where)
-    said = unit_of(signal.unit)
-    if (unit.factor, unit.zero, unit.powers) == (said.factor, said.zero, said.powers):
+    mapped = unit_of(signal.unit)
+    if (unit.factor, unit.zero, unit.powers) == (mapped.factor, mapped.zero, mapped.powers):
         return
-    scale = f"set signals.{signal.name}.scale in the mapping to the value of the number 1 in"
-    wrong = "correct it" if is_time else f"{scale} {signal.unit}"
+    scale = f"set signals.{signal.name}.scale in the mapping to the value that a 1 in the file has"
+    wrong = "correct it" if is_time else f"{scale} in {signal.unit}"
     raise UnitError(
         f"{where}: the unit is {column.unit!r} in the file but {signal.unit!r} in the brackets or "
         f"the mapping. Remove {signal.unit!r}, because bywire converts {column.unit!r}. If the "
@@ -306,13 +306,13 @@ def _clock(file: Path, source: Source, column: Column, given: Clock | None) -> C
             before = (
                 ". If other lines precede the table, set skip_lines in a mapping to their number"
             )
-            why = "; ".join(("", *left_out_note(source.left_out)))
+            skipped = _sentences(source.left_out)
             raise NoClockError(
                 f"{file} has no time column. Rename a column 'time [s]', or add "
-                'time = { column = "t", unit = "ms" } or rate = "1 kHz" to a mapping: '
+                'time = { column = "t", unit = "ms" } or rate = "1 kHz" to a mapping. '
                 + _listing(source.columns)
                 + (before if len(source.columns) == 1 or source.remarks else "")
-                + why,
+                + skipped,
                 {},
             )
         clock = source.columns[name]
@@ -332,7 +332,7 @@ def _clock(file: Path, source: Source, column: Column, given: Clock | None) -> C
 
 
 def usual_clock(source: Source) -> str | None:
-    """Return the column named time or t; T in kelvin is not a time."""
+    """Return the column with a usual name of a time, such as t; T in kelvin is not a time."""
     columns = source.columns
     for usual in _CLOCKS:
         for name, column in columns.items():
@@ -357,7 +357,7 @@ def _column(file: Path, source: Source, name: str, key: str, number: int = 0) ->
     if number:
         if number > len(order):
             raise FileError(
-                f"{file} has no column {number} ({key}), only {len(order)} columns",
+                f"{file} has no column {number} ({key}). It has only {len(order)} columns",
                 name=key,
                 value=str(number),
                 valid=str(len(order)),
@@ -371,15 +371,15 @@ def _column(file: Path, source: Source, name: str, key: str, number: int = 0) ->
     reason = source.left_out.get(name) or source.left_out.get(title)
     if reason is not None:
         raise FileError(
-            f"{file}: bywire does not read the column {quoted(name)} ({key}): {reason}",
+            f"{file}: bywire does not read the column {quoted(name)} ({key}) because {reason}",
             name=key,
             value=name,
         )
     many = [other for other in columns if other.rpartition("@")[0] == name]
     near = many or get_close_matches(name, columns, n=3, cutoff=0.5)
-    hint = f"is it {' or '.join(map(repr, near))}? " if near else ""
+    hint = f"Did you mean {' or '.join(map(repr, near))}? " if near else ""
     raise FileError(
-        f"{file} has no column {quoted(name)} ({key}): {hint}{_listing(columns)}",
+        f"{file} has no column {quoted(name)} ({key}). {hint}{_listing(columns)}",
         name=key,
         value=name,
         valid=", ".join(near),
@@ -387,19 +387,24 @@ def _column(file: Path, source: Source, name: str, key: str, number: int = 0) ->
 
 
 def left_out_note(left_out: Mapping[str, str]) -> list[str]:
-    """Return one note for each reason to skip something in a file."""
+    """Return one note for each reason to skip content of a file."""
     by_reason: dict[str, list[str]] = {}
     for name, reason in left_out.items():
         by_reason.setdefault(reason, []).append(quoted(name))
     return [
         f"not read: {', '.join(names[:_SHOWN])}"
         + (f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else "")
-        + f": {reason}"
+        + f". Reason: {reason}"
         for reason, names in by_reason.items()
     ]
+
+
+def _sentences(left_out: Mapping[str, str]) -> str:
+    """Return the notes of `left_out_note` as sentences after another one."""
+    return "".join(f". {note[0].upper()}{note[1:]}" for note in left_out_note(left_out))
 
 
 def _listing(columns: Mapping[str, Column]) -> str:
     names = list(columns)
     more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
-    return f"its columns are {', '.join(names[:_SHOWN])}{more}" if names else "it has no columns"
+    return f"Its columns are {', '.join(names[:_SHOWN])}{more}" if names else "It has no columns"

@@ -11,7 +11,7 @@ from bywire.core.unit_list import Scale, meanings_of, scale_of
 
 _PAIRS = {"]": "[", ")": "("}
 _PURE = ("-", "--", "[-]")
-"""texts that columns of pure numbers may have instead of a unit"""
+"""texts that a column of pure numbers may have instead of a unit"""
 
 
 def split_title(title: str) -> tuple[str, str]:
@@ -33,7 +33,7 @@ def split_title(title: str) -> tuple[str, str]:
 
 @cache
 def unit_of(text: str) -> Scale:
-    """Return the unit of a text: one of the list, or a product of such units.
+    """Return the unit that a text describes: one from the list, or a product of such units.
 
     Raises
     ------

@@ -33,15 +33,15 @@ class Column:
     unit
         Unit as written in the file; may be empty.
     length
-        Count of its numbers; None if it is known only after reading.
+        Number of its values; None if it is known only after reading.
     clock
-        Column of its instants, if the file defines it.
+        Its time column, if the file defines one.
     label
         Description, if the file has one.
     meanings
         Texts for its numbers 0, 1, ..., separated by blanks, if the file has them.
     path
-        Its place in the file, such as ``ScopeData.signals(1).values``; it is also valid as a name.
+        Its place in the file, such as ``ScopeData.signals(1).values``, which is also a valid name.
     """
 
     name: str
@@ -63,7 +63,7 @@ class Source(Protocol):
 
     @property
     def order(self) -> Sequence[str]:
-        """Names by column number from 1, including those of `left_out`."""
+        """Names by column number from 1, including those in `left_out`."""
         ...
 
     @property
@@ -73,7 +73,7 @@ class Source(Protocol):
 
     @property
     def remarks(self) -> Sequence[str]:
-        """Notes on the part of the file that was read."""
+        """Notes on the content that was read."""
         ...
 
     def read(self, names: Sequence[str], progress: Progress) -> dict[str, NDArray[np.float64]]:
@@ -146,23 +146,23 @@ class FileFormat:
     title
         Description of such a file in errors, with its article.
     endings
-        File endings, in lower case with the dot.
+        File extensions, in lower case with the dot.
     recognizes
         Recognizes a file by its first 1024 bytes.
     open
         Opens a file for reading; raises FileError if it is damaged. With libraries it runs in the
         child process and may raise their errors.
     write
-        Writes a complete dataset to a path that is moved into place afterwards.
+        Writes a complete dataset to a temporary path, which bywire then moves into place.
     has_many_axes
-        Whether its files can contain signals on different instants.
+        Whether its files can contain signals with different times.
     libraries
-        Modules of libraries that read it in a child process; empty if our own code reads it. A
-        module that names some declares its format as ``FORMAT``.
+        Modules of libraries that read it in a child process; empty if bywire's own code reads it.
+        The module of a format with libraries declares the format as ``FORMAT``.
     counts
         Name of a row in the library, and the number of the first one.
     also_reads
-        File endings that bywire reads but does not write.
+        File extensions that bywire reads but does not write.
     opening
         Limit of processor time to open a file [s].
     """
@@ -201,7 +201,7 @@ def library(name: str, what: str, extra: str = "measurements") -> ModuleType:
 # --- Limit of memory
 
 _MOST = 8 * 2**30  # bytes
-_SHARE = 0.5  # of the machine's memory, since data are copied once
+_SHARE = 0.5  # fraction of the machine's memory, since data are copied once
 
 
 def room() -> int:
@@ -233,6 +233,6 @@ def require_room(
         raise FileError(
             f"{file} declares {size / 2**30:.3g} GiB of numbers in {len(wanted)} columns, but the "
             f"limit is {most / 2**30:.3g} GiB. Read fewer signals. If the file itself is much "
-            "smaller, it is damaged",
+            "smaller than this, it is damaged",
             name=str(file),
         )

@@ -27,7 +27,7 @@ _NOT_READ = (
     (b"SQLite format 3", "an SQLite database", "Export its table as CSV"),
     (b"%PDF", "a PDF file", "Request the source data"),
 )
-_ASC_OF_VECTOR = (b"date ", b"base ")  # how an ASC log of a bus begins
+_ASC_OF_VECTOR = (b"date ", b"base ")  # first bytes of an ASC log of a bus
 
 FORMATS = Kind("file format", ("formats",), instances(FileFormat), "bywire.data.formats")
 """every format of measurement files"""
@@ -41,12 +41,13 @@ def format_to_read(path: Path, name: str = "") -> FileFormat:
     path
         The file.
     name
-        Format that the user names; otherwise the ending selects among those that fit the content.
+        Format that the user specifies; otherwise the extension selects among the formats that fit
+        the content.
 
     Raises
     ------
     FileError
-        When the file cannot be read, is empty, or does not match its ending or the name.
+        When the file cannot be read, is empty, or does not match its extension or the name.
     UnknownNameError
         When there is no such format.
     """
@@ -96,12 +97,12 @@ def _require_readable(path: Path, head: bytes) -> None:
 
 
 def format_to_write(path: Path, name: str = "") -> FileFormat:
-    """Return the format to write a file, by its ending or by name.
+    """Return the format to write a file, by its extension or by name.
 
     Raises
     ------
     FileError
-        When the ending belongs to no format.
+        When the extension belongs to no format.
     UnknownNameError
         When there is no such format.
     """

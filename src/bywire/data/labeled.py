@@ -49,7 +49,7 @@ def over(
     branches: tuple[str, Sequence[str]] | None = None,
     along: str = "window",
 ) -> xr.Dataset:
-    """Return columns of one quantity over another one.
+    """Return columns of one quantity versus another one.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def over(
     columns
         The columns by name, all in the same unit.
     unit, label
-        Of the quantity.
+        Unit and label of the quantity.
     branches
         Dimension and labels of several curves; the columns then have a row for each.
     along
@@ -82,7 +82,7 @@ def over(
 def at_own_places(places: Sequence[Array], rows: Sequence[Array]) -> tuple[Array, Array]:
     """Return curves at their own abscissae, in ascending order.
 
-    Nothing is interpolated: all shown points are measured points.
+    Nothing is interpolated, so all points are measured points.
 
     ``places``: abscissae of each curve, shape (n_k,), in any order; ``rows``: values there, shape
     (..., n_k).
@@ -90,8 +90,8 @@ def at_own_places(places: Sequence[Array], rows: Sequence[Array]) -> tuple[Array
     Returns
     -------
     tuple
-        Abscissae, shape (curves, n), and curves, shape (..., curves, n), with n the largest number
-        of points; shorter curves are filled with NaN.
+        Abscissae, shape (curves, n), and curves, shape (..., curves, n), where n is the maximum
+        number of points; shorter curves are filled with NaN.
     """
     count = max(place.size for place in places)
 

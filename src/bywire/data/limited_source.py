@@ -1,6 +1,6 @@
-"""Column files read in a child process, with limits of memory and time.
+"""Files of columns, read in a child process with limits of memory and time.
 
-The memory of the child is limited on Linux only, its time everywhere.
+The memory limit works on Linux only, the time limit on every system.
 """
 
 from __future__ import annotations
@@ -38,10 +38,10 @@ SECONDS = 60.0
 """time limit of a library to open a file, and between pieces [s]"""
 
 MOST_MEMORY = 4 * 2**30
-"""limit of a library's memory in bytes to read a file; also half the machine's memory"""
+"""memory limit in bytes for a library that reads a file, if half the machine's memory is larger"""
 
 _IS_LINUX = sys.platform == "linux"
-_PIPE = 2**20  # bytes of a pipe's buffer; a larger one needs fewer process switches
+_PIPE = 2**20  # bytes of a pipe's buffer; a large buffer needs fewer process switches
 _State = Literal["idle", "open", "busy"]
 """state of a child: waiting for a file, waiting for a request on the open file, or working"""
 
@@ -59,7 +59,7 @@ class Child:
     """
 
     def __init__(self, module: str) -> None:
-        # asammdf writes a temporary file, which is removed with its folder in any case.
+        # asammdf writes a temporary file, which close() always removes with its folder.
         self._folder = mkdtemp(dir=process_folder())
         self._process = start_python(
             "bywire.data.reading_child",
@@ -68,7 +68,7 @@ class Child:
             bufsize=0,
             stderr=DEVNULL,
             further={
-                **one_thread_variables(),  # it forks: it has no threads
+                **one_thread_variables(),  # it forks, so it must not have threads
                 "TMPDIR": self._folder,
                 "TEMP": self._folder,
             },
@@ -89,7 +89,7 @@ class Child:
     def ask(self, message: Mapping[str, Any]) -> None:
         """Send a message."""
         assert self._process.stdin is not None
-        with contextlib.suppress(OSError):  # it has ended; reading the answer will show it
+        with contextlib.suppress(OSError):  # it has ended, as reading the answer will show
             send(self._process.stdin, message)
 
     @contextmanager
@@ -103,7 +103,7 @@ class Child:
             watch.cancel()
 
     def reason(self) -> str:
-        """Return the reason why it ended."""
+        """Return the reason for its end."""
         status = self._process.wait()
         return "" if self.is_late else _ending(status)
 
@@ -170,7 +170,7 @@ class LimitedSource:
     def read(self, names: Sequence[str], progress: Progress) -> dict[str, NDArray[np.float64]]:
         """Return the numbers of some columns, received in pieces from the child."""
         answer = self._answer({"names": list(names)})
-        # Only now, since the child rejects unwritten numbers before memory is allocated.
+        # Allocate memory only here, after the child has rejected numbers that were never written.
         columns = [np.empty(self.columns[name].length or 0) for name in names]
         filled = [0] * len(names)
         total = sum(column.size for column in columns)
@@ -196,12 +196,12 @@ class LimitedSource:
         return dict(zip(names, columns, strict=True))
 
     def place(self, name: str, row: int) -> str:
-        """Return the place of a number, as the format counts."""
+        """Return the place of a number, counted as the format does."""
         word, first = self._kind.counts
         return f"{word} {row + first}"
 
     def _answer(self, question: Mapping[str, Any] | None) -> dict[str, Any]:
-        """Return the next message of the child; after some, it waits for the next request."""
+        """Return the child's next message; after some messages, it waits for a request."""
         if question is not None:
             self._child.ask(question)
         self._child.state = "busy"
@@ -273,7 +273,7 @@ def _limited_to(limit: int) -> str:
 
 
 def _ending(status: int) -> str:
-    """Describe the end of a process; empty if it used up its time."""
+    """Describe the end of a process; empty if it exceeded its time limit."""
     if status >= 0:
         return f"exit status {status}"
     with contextlib.suppress(ValueError):
@@ -302,7 +302,7 @@ def limited(path: Path, kind: FileFormat, seconds: float | None = None) -> Itera
     memory = min(MOST_MEMORY, int(machine_memory() / 2))
     if not _IS_LINUX:
         warnings.warn(
-            f"on this system bywire limits only the time to read {kind.title}, not the memory. "
+            f"on this system, bywire limits only the time to read {kind.title}, not the memory. "
             "Open untrusted files on Linux only",
             stacklevel=2,
         )

@@ -28,20 +28,20 @@ from bywire.data.toml_file import read_toml
 
 @dataclass(frozen=True)
 class Clock:
-    """Source of the instants of signals: a column, or a sample rate.
+    """Source of the signals' times: a column, or a sample rate.
 
     Parameters
     ----------
     column
-        Column of the instants; empty for a rate.
+        Time column; empty for a rate.
     unit
         Its unit; empty if the file contains it.
     rate
         Sample rate [Hz]; 0 for a column.
     start
-        Instant of the first sample [s], for a rate.
+        Time of the first sample [s], for a rate.
     number
-        Number of the column, from 1; 0 if it is given by name.
+        Number of the column, from 1; 0 if it is specified by name.
     """
 
     column: str = ""
@@ -68,15 +68,15 @@ class SignalMapping:
     offset
         Added to the value, in SI.
     delay
-        Delay of the column behind the quantity [s]; instants are shifted back by it.
+        Delay of the column behind the quantity [s]; its samples are moved back by this time.
     limits
-        Range of the sensor in SI, at whose ends it clips; None if unknown.
+        Range in SI at whose ends the sensor clips; None if unknown.
     label
         Description, for figures.
     clock
-        Source of its instants; None for that of the whole file.
+        Source of its times; None for that of the whole file.
     number
-        Number of the column, from 1; 0 if it is given by name.
+        Number of the column, from 1; 0 if it is specified by name.
     missing
         Numbers and texts in the file that mark missing values.
     """
@@ -104,9 +104,9 @@ class MeasurementMapping:
     signals
         Requested columns; empty for all, under their own names and units.
     clock
-        Source of the instants; None if the file defines it.
+        Source of the times; None if the file defines it.
     format
-        Name of the file's format; empty to recognize it by ending and content.
+        Name of the file's format; empty to detect it from extension and content.
     decimal, skip_lines, titles, encoding
         See `ReadOptions`.
     missing
@@ -129,24 +129,24 @@ class MeasurementMapping:
         return tuple(mark for mark in every if isinstance(mark, str))
 
 
-# --- Mapping files: strict about keys and values, and nothing is executed
+# --- Mapping files: keys and values are checked strictly, and nothing is executed
 
 _SIGNS = "1 or -1"
 _Column = Annotated[
     str | Annotated[int, Field(ge=1, le=100_000)],
-    Hint("write its title in quotation marks, or its number: columns are counted from 1"),
+    Hint("write its title in quotation marks, or its number, counted from 1"),
 ]
 _Rate = Annotated[float | None, Unit("Hz", 1e3), Field(gt=0)]
 _Instant = Annotated[float | None, Unit("s")]
 _Quoted = Annotated[str, Hint("write it in quotation marks")]
 _Missing = Annotated[
     tuple[float | str, ...],
-    Hint('write texts and numbers, as ["NA", "OVLD", 9.9E37]'),
+    Hint('write strings and numbers, such as ["NA", "OVLD", 9.9E37]'),
 ]
 
 
 class TimeSection(Section):
-    """A table ``time``: the column of the instants, or their rate."""
+    """A table ``time``: the time column, or the sample rate."""
 
     column: _Column = ""
     unit: _Quoted = ""
@@ -160,7 +160,7 @@ class TimeSection(Section):
 
 
 class _Marked(Section):
-    """A section in which a mark of missing values need not be a list."""
+    """A section in which a single mark of missing values may stand without a list."""
 
     missing: _Missing = ()
 
@@ -173,7 +173,7 @@ class _Marked(Section):
 
 
 class SignalSection(_Marked):
-    """A section ``[signals.NAME]``; offset and limits have the unit of the signal."""
+    """A section ``[signals.NAME]``; offset and limits are in the signal's unit."""
 
     column: _Column = ""
     unit: _Quoted = ""
@@ -198,7 +198,7 @@ class MappingFile(_Marked):
     decimal: Annotated[Literal["", ".", ","], Hint("it must be '.' or ','")] = ""
     skip_lines: Annotated[int, Field(ge=0, le=10_000)] = 0
     titles: Annotated[
-        bool | None, Hint("it must be true or false: whether the first row contains titles")
+        bool | None, Hint("it must be true if the first row contains titles, otherwise false")
     ] = None
     encoding: _Quoted = ""
 
@@ -231,7 +231,8 @@ def mapping_from(content: Mapping[str, Any]) -> MeasurementMapping:
 def signal_mapping(name: str, content: Mapping[str, Any], place: str) -> SignalMapping:
     """Return the mapping of a signal from a section of another file.
 
-    ``place``: the section as errors call it, ``"[stimulus]"``. Raises: as `mapping_from`.
+    ``place``: name of the section in errors, such as ``"[stimulus]"``. Raises the errors of
+    `mapping_from`.
     """
     return _signal(name, SignalSection.read(content, place), place)
 
@@ -263,7 +264,7 @@ def _signal(name: str, section: SignalSection, place: str) -> SignalMapping:
         text = f"{where}{needs_unit[0]} needs the signal's unit. Add the key unit"
         raise UnitError(text, name="unit")
     if section.scale == 0.0:
-        raise not_valid(f"{where}scale", "0", "another number", "or all values are equal")
+        raise not_valid(f"{where}scale", "0", "another number", "since 0 makes all values equal")
     if section.sign == 0:
         raise not_valid(f"{where}sign", "0", _SIGNS)
     number, column = _numbered(section.column)
@@ -293,7 +294,7 @@ def _limits(pair: Any, symbol: str, where: str) -> tuple[float, float]:
 
 
 def _difference(value: Any, symbol: str, where: str) -> float:
-    """Return an offset; one in degrees Celsius would count from another zero."""
+    """Return an offset; reject a unit with its own zero, such as degrees Celsius."""
     number = written(value, symbol, f"{where}offset")
     unit = units.split(value)[1] if isinstance(value, str) else ""
     if unit and units.has_own_zero(unit, symbol):
@@ -318,7 +319,7 @@ def _clock(
     number, column = _numbered(time.column)
     if bool(column) == (rate is not None):
         raise ParameterError(
-            f"{where}needs either time or rate, for example "
+            f"{where}needs either time or rate. For example, write "
             'time = { column = "t", unit = "ms" } or rate = "1 kHz"',
             name="time",
         )
@@ -332,7 +333,7 @@ def _clock(
         )
     if column and start is not None:
         raise ParameterError(
-            f"{where}start is valid only with a rate, as a time column defines its own times",
+            f"{where}start is valid only with a rate, because a time column defines its own times",
             name="start",
         )
     return Clock(column, unit, rate or 0.0, start or 0.0, number)
@@ -353,7 +354,7 @@ def _unit(text: str, where: str) -> str:
 
 
 def _numbered(column: str | int) -> tuple[int, str]:
-    """Return the number of a column (0 if given by title), and its title or number."""
+    """Return the number of a column (0 if specified by title), and its title or number."""
     return (column, str(column)) if isinstance(column, int) else (0, column.strip())
 
 

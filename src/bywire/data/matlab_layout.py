@@ -1,7 +1,7 @@
 """Layout of signals in MAT files of both kinds: columns of arrays, and structs with their meaning.
 
-In addition to the arrays, ``units`` contains the unit of each, ``clocks`` the name of its instants,
-and ``labels`` a description. Other files may lack these structs and then need a mapping.
+In addition to the arrays, ``units`` contains the unit of each signal, ``clocks`` the name of its
+time array, and ``labels`` a description. Files without these structs need a mapping.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ NOTES = {"units": "units", "labels": "long_name"}
 """structs of texts, and the attributes of a signal in them"""
 
 CLOCKS = "clocks"
-"""struct with the name of the instants of each signal"""
+"""struct with the name of each signal's time array"""
 
 _SIGNAL = r"(?P<signal>(?P<scope>.+)\.{}(?:\([0-9]+\))?)\.{}(?P<column>\(:,[0-9]+\)|\([0-9]+,:\))?"
 _SIMULINK = re.compile(_SIGNAL.format("signals", "values"))
@@ -36,7 +36,7 @@ OBJECT = (
 )
 """reason to skip an object"""
 
-_MOST_COLUMNS = 64  # of a table: a wider one is not a table of signals
+_MOST_COLUMNS = 64  # maximum width of a table of signals
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,62}")
 
 
@@ -51,7 +51,7 @@ class Part:
     index
         Index of the column, or row, in a table; None for a vector.
     length
-        Count of its numbers.
+        Number of its values.
     is_row
         Whether it is a row of a wide table, as Simulink's To File writes its signals.
     """
@@ -105,16 +105,16 @@ def columns_of(
 ) -> tuple[dict[str, Column], dict[str, Part]]:
     """Return the columns with their descriptions from structs, and their places.
 
-    Signals of Simulink and of dSPACE keep the names from these programs.
+    Signals from Simulink and dSPACE keep their names.
 
     Parameters
     ----------
     found
         Content of the file.
     is_increasing
-        Returns whether the numbers of a part increase, like instants.
+        Returns whether the numbers of a part increase, like times.
     remarks
-        List to which notes are added.
+        List that receives notes.
     """
     columns, parts = {}, {}
     recorded = dict(_recorded(found))
@@ -186,14 +186,14 @@ def _short(recorded: _Recorded) -> str:
 def _of_row(
     found: Found, name: str, part: Part, is_increasing: Callable[[Part], bool], remarks: list[str]
 ) -> tuple[str, str]:
-    """Return clock and unit of a row of a wide table, whose first row has the instants."""
+    """Return clock and unit of a row of a wide table whose first row contains the times."""
     first = f"{part.array}(1,:)"
     if first not in found.parts or not is_increasing(found.parts[first]):
         return "", ""
     if name == first:
         remarks.append(
-            f"{part.array} has a signal in each row. The first one increases, so bywire reads it "
-            "as time in s, as Simulink's To File writes it"
+            f"{part.array} has a signal in each row. The first row increases, so bywire reads it "
+            "as time in s, as written by Simulink's To File block"
         )
     return ("", "s") if name == first else (first, "")
 

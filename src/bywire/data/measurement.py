@@ -1,8 +1,8 @@
-"""Measurement files as datasets in SI: every signal on the instants at which it was measured.
+"""Measurement files as datasets in SI: every signal at the times at which it was measured.
 
-Signals that were measured at the same instants share a dimension. The dimension of most signals
-is ``time``; others have ``time_NAME``, with the name of their first signal. Nothing is resampled
-here: `bywire.data.alignment.resample` brings signals to one time axis, with a report.
+Signals that were measured at the same times share a dimension. The dimension of most signals is
+``time``; others have ``time_NAME``, with the name of their first signal. This module does not
+resample: `bywire.data.alignment.resample` brings signals to one time axis, with a report.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from bywire.data.format_registry import FORMATS, format_to_read, head_of
 from bywire.data.limited_source import limited
 from bywire.data.mapping import Clock, MeasurementMapping, SignalMapping, mapping_from, read_mapping
 
-_BLOCK = 1 << 20  # instants per chunk, since their differences take memory
+_BLOCK = 1 << 20  # times per chunk, since their differences need memory
 
 
 @dataclass(frozen=True)
@@ -42,11 +42,11 @@ class _AxisKey:
     Parameters
     ----------
     clock
-        Source of the instants.
+        Source of the times.
     length
         Number of samples.
     delay
-        Shift of the instants to earlier times [s].
+        Time by which the samples are moved to earlier times [s].
     """
 
     clock: Clock
@@ -57,7 +57,7 @@ class _AxisKey:
 def instants(
     file: Path, source: Source, key: _AxisKey, column: NDArray[np.float64] | None
 ) -> NDArray[np.float64]:
-    """Return the instants of an axis [s], shape ``(sample,)``; they increase.
+    """Return the times of an axis [s], shape ``(sample,)``, in increasing order.
 
     Parameters
     ----------
@@ -66,12 +66,12 @@ def instants(
     key
         Key of the axis.
     column
-        Numbers of the clock's column, converted to the instants in place; None for a rate.
+        Numbers of the time column, converted to times in place; None for a rate.
 
     Raises
     ------
     FileError
-        When instants are missing or do not increase, with the place; when they are too few or
+        When times are missing or do not increase, with the place; when there are too few, or
         their number differs from that of the samples.
     """
     clock = key.clock
@@ -82,9 +82,9 @@ def instants(
     else:
         if column.size != key.length:
             raise FileError(
-                f"{file}: the time column {clock.column!r} has {column.size} instants, but its "
-                f"signals have {key.length} samples. Specify the right time column of each signal "
-                'in a mapping, for example [signals.NAME] time = { column = "t" }',
+                f"{file}: the time column {clock.column!r} has {column.size} values, but its "
+                f"signals have {key.length} samples. Specify each signal's own time column in a "
+                'mapping, for example [signals.NAME] time = { column = "t" }',
                 name=clock.column,
                 value=str(column.size),
                 valid=str(key.length),
@@ -94,7 +94,7 @@ def instants(
             time -= key.delay
     if time.size < 2:
         raise FileError(
-            f"{file} has too few rows ({time.size}), as at least two are needed",
+            f"{file} has too few rows ({time.size}). It needs at least two",
             name=str(file),
             value=str(time.size),
         )
@@ -104,7 +104,7 @@ def instants(
 def _measured(
     file: Path, source: Source, clock: Clock, column: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    # In a table, the column of a slower clock ends earlier; the cells below are blank.
+    # In a table, the column of a slower clock ends earlier, and the cells below it are blank.
     time = column[: _filled(column)]
     bad = _first_not_increasing(time)
     if bad is not None:
@@ -114,7 +114,7 @@ def _measured(
             what = "is repeated" if now == before else f"comes after {before:.10g}"
             fix = "Time must increase. Sort the rows, and remove repeated ones"
         else:
-            what, fix = "is not an instant", "Remove the row"
+            what, fix = "is not a time", "Remove the row"
         value = f"{now:.10g} {clock.unit}"
         raise FileError(f"{where}: {value} {what}. {fix}", name=clock.column, value=value)
     convert_in_place(time, unit_of(clock.unit), "s")
@@ -122,7 +122,7 @@ def _measured(
 
 
 def _filled(column: NDArray[np.float64]) -> int:
-    """Return the count of numbers up to the last one that is not NaN."""
+    """Return the number of values up to the last one that is not NaN."""
     end = column.size
     while end:
         begin = max(0, end - _BLOCK)
@@ -134,7 +134,7 @@ def _filled(column: NDArray[np.float64]) -> int:
 
 
 def _first_not_increasing(time: NDArray[np.float64]) -> int | None:
-    """Return the first index whose instant is not later than the previous one, or None."""
+    """Return the first index whose time is not later than the previous one, or None."""
     if time.size and not np.isfinite(time[0]):
         return 0
     for begin in range(0, time.size - 1, _BLOCK):
@@ -168,10 +168,11 @@ def read_measurement(
     path
         CSV, TSV, Parquet, MAT (5 or 7.3), ASAM MDF 4 or NetCDF file.
     mapping
-        Meaning of its columns: a mapping, its tables, or the path of a mapping file. Without it
-        bywire reads every column under its own name; the file must then contain units and instants.
+        Meaning of its columns: a mapping, its tables, or the path of a mapping file. Without a
+        mapping, bywire reads every column under its own name; the file must then contain units
+        and times.
     signals
-        Names of the signals to read; all of the mapping by default.
+        Names of the signals to read; by default all in the mapping.
     progress
         Callback with a label and the finished share.
     largest
@@ -181,10 +182,10 @@ def read_measurement(
     Returns
     -------
     xarray.Dataset
-        Variables of shape ``(time,)``, or ``(time_NAME,)`` for signals on other instants, with
-        ``units`` (SI), ``long_name``, ``column`` and, where known, ``delay`` [s], ``valid_min``
-        and ``valid_max``; attributes ``source`` and ``format``. Missing values are NaN.
-        A `MeasurementWarning` reports skipped, missing and guessed items.
+        Variables of shape ``(time,)``, or ``(time_NAME,)`` for signals with other times. Their
+        attributes are ``units`` (SI), ``long_name``, ``column`` and, if known, ``delay`` [s],
+        ``valid_min`` and ``valid_max``; those of the dataset are ``source`` and ``format``.
+        Missing values are NaN. A `MeasurementWarning` reports skipped, missing and guessed items.
 
     Raises
     ------
@@ -193,7 +194,7 @@ def read_measurement(
     UnknownNameError
         For an unknown column, signal or format, with the nearest names.
     UnitError
-        When a unit is missing or unknown, or contradicts that of the file.
+        When a unit is missing or unknown, or contradicts the unit in the file.
     ParameterError
         When an entry of the mapping is not valid.
     """
@@ -324,7 +325,7 @@ def _dataset(
 def _taken(
     values: dict[str, NDArray[np.float64]], uses: Counter[str], name: str
 ) -> NDArray[np.float64]:
-    """Return numbers that may be changed: a copy, or at the last use the numbers themselves."""
+    """Return numbers that may be changed: a copy, or the numbers themselves at their last use."""
     uses[name] -= 1
     return values[name].copy() if uses[name] else values.pop(name)
 
@@ -332,10 +333,10 @@ def _taken(
 def _timed(
     file: Path, signal: Chosen, numbers: NDArray[np.float64], count: int
 ) -> NDArray[np.float64]:
-    """Return the numbers that have instants; numbers after the end of a clock must be blank."""
+    """Return the numbers that have a time; cells after the end of a clock must be blank."""
     if not np.isnan(numbers[count:]).all():
         raise FileError(
-            f"{file}: the column {signal.column!r} has numbers after the last instant of "
+            f"{file}: the column {signal.column!r} has numbers after the last time in "
             f"{signal.clock.column!r}. Specify its own time column in a mapping",
             name=signal.column,
         )
@@ -359,9 +360,9 @@ def _dimensions(chosen: Sequence[Chosen], keys: Sequence[_AxisKey]) -> dict[_Axi
 
 
 # --- A single trace, for example of a rider's pedal
-# A trace drives a model, so it must be complete: missing values and long pauses raise an error and
-# are never bridged silently. In a text table, a first row ``time [s], pedal [mm]`` contains names
-# and units; for other files, a mapping contains them.
+# A trace drives a model, so it must be complete: missing values and long pauses raise an error, and
+# bywire never bridges them silently. In a text table, a first row ``time [s], pedal [mm]`` contains
+# names and units. For other files, a mapping contains them.
 
 _GAP = 10.0  # median steps: a pause must be longer to count as a gap
 
@@ -384,11 +385,11 @@ def read_trace(
         The file.
     signals
         Required signals and their SI units, for example ``{"pedal": "m"}``: signals of the
-        mapping, or columns, ignoring case. Without it all are read, each in the SI unit of its
+        mapping, or columns, ignoring case. By default all are read, each in the SI unit of its
         quantity.
     max_gap
-        Longest pause between two instants, text with a unit or [s]. A longer one is an
-        error if it also exceeds ten median steps.
+        Maximum pause between two samples, text with a unit or [s]. A longer pause is an error if
+        it also exceeds ten median steps.
     mapping
         Meaning of the columns, if it is not in the file.
 
@@ -442,7 +443,7 @@ def trace_names(path: str | Path, mapping: Meaning = None) -> tuple[str, ...]:
 
 
 def _meaning(file: Path, mapping: Meaning) -> MeasurementMapping:
-    """Return the mapping of a trace, which may be a text table with any ending."""
+    """Return the mapping of a trace, which may be a text table with any file extension."""
     meaning = mapping_of(mapping)
     if not meaning.format and FORMATS.find("csv").recognizes(head_of(file)):
         return replace(meaning, format="csv")
@@ -468,17 +469,17 @@ def _names(file: Path, source: Source, meaning: MeasurementMapping) -> tuple[str
 
 def _chosen(file: Path, source: Source, meaning: MeasurementMapping, name: str) -> SignalMapping:
     """Return the mapping of a signal's column, ignoring case."""
-    said = meaning.signals.get(name) or SignalMapping(name, name.strip())
-    if said.column in source.columns and meaning.signals:
-        return said
-    near = [c for c in source.columns if c.casefold() == said.column.casefold()]
+    signal = meaning.signals.get(name) or SignalMapping(name, name.strip())
+    if signal.column in source.columns and meaning.signals:
+        return signal
+    near = [c for c in source.columns if c.casefold() == signal.column.casefold()]
     if len(near) > 1:
         raise FileError(
-            f"{file} has two columns named {quoted(said.column)} (case is ignored). Rename one of "
-            "them",
-            name=said.column,
+            f"{file} has two columns named {quoted(signal.column)} (case is ignored). Rename one "
+            "of them",
+            name=signal.column,
         )
-    return replace(said, column=near[0]) if near else said
+    return replace(signal, column=near[0]) if near else signal
 
 
 def _require_quantity(file: Path, source: Source, signal: xr.DataArray, symbol: str) -> None:

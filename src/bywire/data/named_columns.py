@@ -1,4 +1,4 @@
-"""Columns given on the command line, ``Pressure [psi]``, with or without a mapping file."""
+"""Columns specified on the command line, ``Pressure [psi]``, with or without a mapping file."""
 
 from __future__ import annotations
 
@@ -30,20 +30,20 @@ _BRACKETS = "each with its column's unit in the brackets, or 1 for a pure number
 
 @dataclass(frozen=True)
 class NamedColumns:
-    """Columns that a user names in addition to a mapping file, or instead of it.
+    """Columns that a user specifies in addition to a mapping file, or instead of it.
 
     Parameters
     ----------
     signals
         Name of the signal -> its column, with a unit in brackets if the file has none; or the
-        name of a signal of the mapping file.
+        name of a signal in the mapping file.
     time
-        Column of the instants, likewise; or a sample rate such as ``"1 kHz"``.
+        Time column, likewise; or a sample rate such as ``"1 kHz"``.
     units
-        SI unit of every required signal, by name. Other columns without a unit are skipped. None
+        SI unit of every required signal, by name. bywire skips other columns without a unit. None
         if all columns are required.
     driving
-        Name of the signal -> stimulus that it drives, for inputs.
+        For inputs, name of the signal -> stimulus that it drives.
     """
 
     signals: Mapping[str, str] = field(default_factory=dict)
@@ -55,14 +55,14 @@ class NamedColumns:
 def read_named(
     file: Path, meaning: MeasurementMapping, named: NamedColumns, progress: Progress
 ) -> tuple[xr.Dataset, tuple[str, ...]]:
-    """Read the named signals of a measurement file, all others, and notes.
+    """Read the specified signals of a measurement file and all others, with notes.
 
     Parameters
     ----------
     file, meaning
         The file, and its mapping.
     named
-        Columns that the user names.
+        Columns that the user specifies.
     progress
         Called with a label and the finished share.
 
@@ -94,9 +94,9 @@ def read_wanted(
     file, meaning
         The file, and its mapping.
     wanted
-        ``SIGNAL``, ``COLUMN``, ``COLUMN [unit]`` or ``SIGNAL=COLUMN [unit]``; all where empty.
+        ``SIGNAL``, ``COLUMN``, ``COLUMN [unit]`` or ``SIGNAL=COLUMN [unit]``; all if empty.
     time
-        As of `NamedColumns`.
+        See `NamedColumns`.
     progress
         Called with a label and the finished share.
 
@@ -124,11 +124,11 @@ def renamed(data: xr.Dataset, named: NamedColumns) -> xr.Dataset:
     UnknownNameError
         When a signal is missing, with the nearest names.
     ParameterError
-        When a time column is named, since signals in memory already have instants.
+        When a time column is specified, since signals in memory already have times.
     """
     if named.time:
         raise ParameterError(
-            f"{option('time')} is valid only for measurement files. Leave it out", name="time"
+            f"{option('time')} is valid only for measurement files. Remove it", name="time"
         )
     for name, column in named.signals.items():
         if column not in data:
@@ -153,7 +153,7 @@ def _signal(meaning: MeasurementMapping, name: str, column: str) -> SignalMappin
 
 
 def _timed(meaning: MeasurementMapping, time: str) -> MeasurementMapping:
-    """Return a mapping with instants from a column or a sample rate."""
+    """Return a mapping with times from a column or a sample rate."""
     if not time:
         return meaning
     try:
@@ -165,7 +165,7 @@ def _timed(meaning: MeasurementMapping, time: str) -> MeasurementMapping:
 
 @contextmanager
 def _shown_units(named: NamedColumns | None) -> Iterator[None]:
-    """Tell what to type for columns that have no unit; None where signals are merely wanted."""
+    """Add to errors what to type for columns without a unit; None for a list of signals."""
     try:
         yield
     except MissingUnitsError as error:
@@ -175,22 +175,23 @@ def _shown_units(named: NamedColumns | None) -> Iterator[None]:
         typed = _options(error.signals, "COLUMN", named)
         rate = '--time "1 kHz"' if is_command_line() else "time='1 kHz'"
         raise FileError(
-            f"{error}. Or use {typed}, {_BRACKETS}. For a constant sample rate, use {rate}",
+            f"{error}. Alternatively, use {typed}, {_BRACKETS}. For a constant sample rate, use "
+            f"{rate}",
             name="time",
         ) from None
 
 
 def _options(signals: Mapping[str, str], clock: str, named: NamedColumns | None) -> str:
-    """Return the options, or in Python the arguments, that give units to columns.
+    """Return the options, or in Python the arguments, that specify the units of columns.
 
     Parameters
     ----------
     signals
-        Name of the signal -> its column, of those without a unit.
+        Name of each signal without a unit -> its column.
     clock
-        Column of the instants, where it has none.
+        Time column, if it has no unit.
     named
-        What the user said; None where signals are merely wanted.
+        Columns that the user specified; None for a list of signals.
     """
     groups: dict[str, dict[str, str]] = {}
     for name, column in signals.items():
@@ -200,7 +201,7 @@ def _options(signals: Mapping[str, str], clock: str, named: NamedColumns | None)
         group = "signals" if named is None else "outputs" if driven is None else "inputs"
         groups.setdefault(group, {})[driven or name] = text
     if named is not None and named.units is not None and not {*signals} & {*named.units}:
-        any_column = "COLUMN [UNIT]"  # nothing is called as the model calls it
+        any_column = "COLUMN [UNIT]"  # no column has a name from the model
         groups = {"inputs": {"STIMULUS": any_column}, "outputs": {"SIGNAL": any_column}}
     of_command = is_command_line()
     texts = []

@@ -40,7 +40,7 @@ def write_recording(recording: xr.Dataset, path: str | Path) -> Path:
     recording
         Signals with ``units`` among their attributes.
     path
-        NetCDF file; an existing one is replaced.
+        NetCDF file; bywire replaces an existing one.
 
     Returns
     -------
@@ -55,7 +55,7 @@ def write_recording(recording: xr.Dataset, path: str | Path) -> Path:
     path = Path(path)
     encoding = {str(name): {"zlib": True, "complevel": 1} for name in recording.data_vars}
     try:
-        # Ctrl-C within xarray's locks would leave one locked, and closing would wait forever.
+        # Ctrl-C could leave one of xarray's locks locked, so closing would wait forever.
         with replacing(path) as fresh, interrupts_deferred():
             recording.to_netcdf(fresh, engine="netcdf4", encoding=encoding)
     except (OSError, RuntimeError, ValueError) as error:  # RuntimeError: from the HDF library
@@ -138,7 +138,7 @@ class RecordingSource:
         }
 
     def pieces(self, names: Sequence[str]) -> Iterator[tuple[str, int, NDArray[Any]]]:
-        """Yield numbers row by row; those of eight bytes without conversion."""
+        """Yield numbers row by row, without conversion if they have eight bytes."""
         for name in names:
             flat = np.ascontiguousarray(self._variables[name].values).reshape(-1)
             plain = flat.view(np.float64) if flat.itemsize == 8 else flat
@@ -167,18 +167,19 @@ def _attributes(plain: Mapping[str, Any]) -> dict[str, Any]:
 def _dataset(source: LimitedSource) -> xr.Dataset:
     columns = source.read(list(source.columns), silent)
     variables = {}
-    for name, said in source.notes["variables"].items():
-        kind = np.dtype(said["kind"])
+    for name, described in source.notes["variables"].items():
+        kind = np.dtype(described["kind"])
         if name not in columns:
-            values = np.array(said["texts"], dtype=object if kind.kind == "O" else kind)
+            values = np.array(described["texts"], dtype=object if kind.kind == "O" else kind)
         elif kind.itemsize == 8:
             values = columns.pop(name).view(kind)
         else:
             values = columns.pop(name).astype(kind)
-        variables[name] = (said["dims"], values.reshape(said["shape"]), _attributes(said["attrs"]))
+        shaped = values.reshape(described["shape"])
+        variables[name] = (described["dims"], shaped, _attributes(described["attrs"]))
     coords = {name: variables.pop(name) for name in source.notes["coords"]}
     attributes = _attributes(source.notes["attrs"])
-    if "warnings" in attributes:  # NetCDF has one text for a list of one, as earlier versions did
+    if "warnings" in attributes:  # NetCDF stores a list of one text as a text
         texts = np.atleast_1d(attributes["warnings"]).tolist()
         attributes["warnings"] = [text for text in texts if text]
     return xr.Dataset(variables, coords, attributes)
@@ -186,8 +187,8 @@ def _dataset(source: LimitedSource) -> xr.Dataset:
 
 @contextmanager
 def _open(path: Path, options: ReadOptions) -> Iterator[RecordingSource]:
-    # Not open_dataset: its indexes, not needed here, load libraries for other array types. After
-    # the fork that happens for each file, and takes half a second.
+    # Not open_dataset: its indexes, not needed here, load libraries for other array types. This
+    # would happen after each fork, for every file, and take half a second.
     store = xr.backends.NetCDF4DataStore.open(path)  # type: ignore[no-untyped-call]
     try:
         stored, attributes = store.load()

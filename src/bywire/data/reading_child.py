@@ -1,16 +1,17 @@
-"""The child process, in which a library reads a measurement file under limits.
+"""Child process in which a library reads a measurement file under limits.
 
 Libraries trust a file's own declarations: a damaged or malicious file may crash them, make them run
-forever, or request all memory. Here this ends only the child.
+forever, or request all memory. Here, such a file ends only the child.
 
-Messages in both directions consist of a length, a JSON object, and for a piece of a column its raw
-numbers: nothing is unpickled. The reader sends ``{path, folder, memory, seconds, opening}``;
-the answer is ``{columns, left_out, remarks, notes}``. It may then send ``{names}`` repeatedly,
-and ends with none; the answers are pieces ``{column, begin, count, kind}`` and ``{end, remarks}``.
-``{error}`` and ``{memory}`` end it early.
+Messages in both directions consist of a length, a JSON object and, for a piece of a column, its raw
+numbers; nothing is unpickled. The reader sends ``{path, folder, memory, seconds, opening}``, and
+receives ``{columns, left_out, remarks, notes}``. It may then send ``{names}`` repeatedly, and ends
+with an empty list. It receives pieces ``{column, begin, count, kind}`` and ``{end, remarks}``.
+``{error}`` and ``{memory}`` end the exchange early.
 
-On Linux the process imports the library once and forks for each file, so that a file costs
-milliseconds, starts from a sound state and has its own limits. Elsewhere it reads one file.
+On Linux, the process imports the library once and forks for each file. A file then costs
+milliseconds, starts from a clean state and has its own limits. Other systems use a process per
+file.
 """
 
 from __future__ import annotations
@@ -72,7 +73,7 @@ def fill(stream: IO[bytes], buffer: Any) -> bool:
 def main(module: str, is_forking: bool) -> None:
     """Read the requested files until the requests end."""
     requests, answers = open(0, "rb", buffering=0), open(os.dup(1), "wb", buffering=0)  # noqa: SIM115
-    os.dup2(2, 1)  # output of libraries is not a message
+    os.dup2(2, 1)  # libraries must not print into the messages
     kind: FileFormat = importlib.import_module(module).FORMAT
     try:
         for name in kind.libraries:
@@ -121,7 +122,7 @@ def _serve(
             while names := (receive(requests) or {"names": []})["names"]:
                 for name, begin, part in source.pieces(names):
                     _allow(request["seconds"])
-                    # In the stored type: single precision halves the traffic in the pipe.
+                    # The stored type is kept: single precision halves the traffic in the pipe.
                     is_plain = part.dtype.isnative and part.dtype.name in NUMBERS
                     numbers = np.ascontiguousarray(part, None if is_plain else np.float64)
                     place = {
@@ -149,7 +150,7 @@ def _serve(
 
 
 def _limit(memory: int) -> None:
-    """Limit this process to its current memory plus some bytes, and limit files that it writes."""
+    """Limit this process to some memory beyond its current one, and limit the files it writes."""
     import resource
 
     pages = int(Path("/proc/self/statm").read_text().split()[0])

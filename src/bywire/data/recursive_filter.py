@@ -1,6 +1,6 @@
-"""Recursive filters: low-passes, lags, colored noise.
+"""Recursive filters: low-pass filters, lags, colored noise.
 
-SciPy's filters are in a package that takes longer to load than a short run takes.
+SciPy's filters are in a package that takes longer to load than a short run takes to compute.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import numpy as np
 
 from bywire.core.typing import Array
 
-_BLOCK = 4096  # samples per solution, since a band matrix of many rows takes memory
+_BLOCK = 4096  # samples per solution, since a band matrix of many rows needs memory
 
 
 def filtered(
@@ -61,7 +61,7 @@ def low_passed(x: Array, f_c: float, interval: float) -> Array:
     x
         Samples, shape (n,).
     f_c
-        Corner frequency in Hz; for a low one, the result stays close to the first sample.
+        Cutoff frequency in Hz; if it is low, the result stays close to the first sample.
     interval
         Sample time in s.
     """
@@ -71,7 +71,7 @@ def low_passed(x: Array, f_c: float, interval: float) -> Array:
 
 
 def _recursive(a: Array, driven: Array, before: Array) -> Array:
-    """Return y of sum a_j y_(k-j) = driven_k in place of the latter; ``before``: y until then."""
+    """Return y of sum a_j y_(k-j) = driven_k, in place; ``before``: y before the first sample."""
     from scipy.linalg.blas import dtbsv
 
     p = a.size - 1

@@ -19,7 +19,7 @@ SEPARATORS = {"\t": "tab", ";": "semicolon", ",": "comma", " ": "blanks"}
 """separators of cells, in the order of the search"""
 
 HEAD = 1 << 18
-"""bytes of the head; a header must end within"""
+"""bytes of the head, in which a header must end"""
 
 _MARKS = (
     "- -- --- nan -nan nan(ind) -nan(ind) 1.#qnan 1.#ind -1.#ind 1.#inf -1.#inf na n/a n.a. #n/a "
@@ -36,9 +36,9 @@ NUMBER, TEXT, UNCLEAR = "number", "text", "time in an ambiguous order"
 """kinds of columns, in addition to those of time stamps"""
 
 _ROWS = 200  # rows used to detect the decimal mark and the kinds of columns
-_LINES = 2000  # in which the first row of numbers is looked for
+_LINES = 2000  # searched for the first row of numbers
 _NUMBER = re.compile(r"[+-]?([0-9]+([.,][0-9]*)?|[.,][0-9]+)([eE][+-]?[0-9]+)?")
-_BEGINS_LIKE_ONE = re.compile(r"[+-]?[.,]?[0-9]")  # then it is an error, and no text
+_BEGINS_LIKE_ONE = re.compile(r"[+-]?[.,]?[0-9]")  # a wrong number rather than text
 _SEP_LINE = re.compile(r'"?sep=(.)"?', re.IGNORECASE)
 _SPACED_UNIT = re.compile(r" +(?=[\[(][^\])]*[\])])")  # "t [s]  p [bar]" has two cells
 
@@ -52,7 +52,7 @@ class Dialect:
     separator
         Separator of cells.
     decimal
-        ``"."`` or ``","``; empty if the cells determine it, see `with_mark`.
+        ``"."`` or ``","``; empty if the cells determine it (see `with_mark`).
     titles
         Titles of the columns; empty without a header.
     units
@@ -72,9 +72,9 @@ class Dialect:
     marks
         Additional cells that mark missing values.
     raster
-        First instant and step [s], if no column contains the instants.
+        First time and step [s], if there is no time column.
     clocks
-        Columns with the instants of others, by column from 0, if the file defines them.
+        Time columns of other columns, by column from 0, if the file defines them.
     is_ragged
         Whether cells may be missing at the end of a row.
     notes
@@ -115,7 +115,7 @@ class Head:
     path
         Path of the file, for errors.
     lines
-        Its complete lines, with their ends.
+        Its complete lines, with their line endings.
     encoding
         Its encoding.
     options
@@ -132,7 +132,7 @@ class Head:
         return sum(len(text.encode()) for text in self.lines[:line])
 
     def plain(self, line: int) -> str:
-        """Return a line without its end."""
+        """Return a line without its line ending."""
         return self.lines[line].rstrip("\r\n")
 
     def is_blank(self, line: int) -> bool:
@@ -183,7 +183,7 @@ def head_of_table(path: Path, options: ReadOptions) -> Head:
     Raises
     ------
     FileError
-        When they are not text in the given encoding, in UTF-8 or as Windows writes it.
+        When they are not text in the specified encoding, in UTF-8 or in Windows encoding.
     """
     return Head(path, *head_text(path, options.encoding, HEAD), options)
 
@@ -191,8 +191,8 @@ def head_of_table(path: Path, options: ReadOptions) -> Head:
 def dialect_of(head: Head) -> Dialect:
     """Detect the dialect of a text table.
 
-    The table consists of the rows from the first row of numbers on, and the rows of titles and
-    units before it. Earlier lines are skipped with a note, unless they contain numbers too.
+    The table consists of the first row of numbers and all rows after it, and of the rows of titles
+    and units before it. bywire skips earlier lines with a note, unless they also contain numbers.
 
     Raises
     ------
@@ -268,7 +268,7 @@ def with_mark(path: Path, dialect: Dialect, indices: Sequence[int]) -> Dialect:
     Raises
     ------
     FileError
-        When they have both, since one may be a thousands separator.
+        When they contain both marks, since one may be a thousands separator.
     """
     if dialect.decimal:
         return dialect
@@ -318,7 +318,7 @@ def _bare_row(cells: list[str]) -> list[str]:
 
 
 def _are_numbers(cells: list[str], marks: Sequence[str] = ()) -> bool:
-    """Return whether a row is one of measured values: numbers, times and marks of missing ones."""
+    """Return whether a row contains measured values: numbers, times, marks of missing values."""
     plain = [cell for cell in cells if cell.casefold() not in MARKS and cell not in marks]
     return bool(plain) and all(_NUMBER.fullmatch(cell) or is_stamp(cell) for cell in plain)
 
@@ -332,8 +332,8 @@ def _from_numbers(
 ) -> tuple[Dialect | None, int]:
     """Return the dialect of a table by its first row of numbers, and the line of its titles.
 
-    None if there is an earlier row with the same number of cells and a number among them, which may
-    belong to the table.
+    None if an earlier row has the same number of cells and contains a number, since it may belong
+    to the table.
     """
     row = head.cells(first, separator)
     width = len(_bare_row(row))
@@ -368,7 +368,7 @@ def _from_numbers(
             f"line {above[-1] + 1} does not match the rows below it, so the columns have no titles "
             "and their names are 1, 2, ..."
         )
-    # Sentences contain blanks too; with this separator, a row must start with its number.
+    # Sentences also contain blanks; with this separator, a row must start with a number.
     first_ones = 1 if separator == " " else None
     mixed = (k for k in above if len(rows[k]) == len(row) and _has_number(rows[k][:first_ones]))
     has_titles = sum(bool(unit) and _is_unit(unit) for unit in units) > width / 2
@@ -444,7 +444,7 @@ def _is_comment(line: str) -> bool:
 
 
 def _are_units(cells: list[str]) -> bool:
-    """Return whether a row is one of units: all of them, or most and the others in brackets."""
+    """Return whether a row contains units: all cells, or most and the others in brackets."""
     plain = [cell for cell in cells if cell and cell != "-"]
     known = [cell for cell in plain if _is_unit(_bare(cell))]
     return len(known) == len(plain) or (
@@ -513,7 +513,7 @@ _VBOX_UNITS = {
     "heading": "deg",
     "height": "m",
 }
-"""units of the standard columns of a VBOX, by the manufacturer's file description"""
+"""units of a VBOX's standard columns, from the manufacturer's file description"""
 
 
 def layout_of(head: Head) -> Dialect | None:
@@ -536,7 +536,7 @@ def _lvm(head: Head) -> Dialect:
     ends = [k for k in range(len(head.lines)) if head.lines[k].startswith(END_OF_HEADER)]
     if len(ends) < 2:
         raise FileError(
-            f"{head.path} is a LabVIEW file without a table: its header has no second line "
+            f"{head.path} is a LabVIEW file without a table, because its header has no second line "
             f"{END_OF_HEADER!r}",
             name=str(head.path),
         )
@@ -577,7 +577,7 @@ def _lvm(head: Head) -> Dialect:
         step = _number(head, entries, "Delta_X", 0.0)
         if not step > 0.0:
             raise FileError(
-                f"{head.path} has no X columns, and its Delta_X = {step:g} is not valid",
+                f"{head.path} has no X columns, and its Delta_X = {step:g} must be > 0",
                 name="Delta_X",
                 value=f"{step:g}",
             )

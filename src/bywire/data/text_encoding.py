@@ -29,10 +29,10 @@ ENCODINGS = (
     "euc-kr",
     "big5",
 )
-"""encodings of text files that a mapping may name"""
+"""encodings of text files that a mapping may specify"""
 
 WINDOWS = "cp1252"
-"""encoding of tables that are not UTF-8, unless a mapping names another"""
+"""encoding of tables that are not UTF-8, unless a mapping specifies another one"""
 
 _BLOCK = 1 << 22  # bytes per block
 _MARKS = {
@@ -41,7 +41,7 @@ _MARKS = {
     codecs.BOM_UTF16_BE: "utf-16-be",
 }
 _CONTROLS = re.compile(r"[\x00-\x08\x0e-\x19\x1b-\x1f]")  # not in tables; \x1a ends DOS files
-_SHARE = 0.4  # of null bytes among every other one: text in two bytes for each character
+_SHARE = 0.4  # minimum fraction of null bytes at every other position in UTF-16 text
 
 
 def encoding_of(head: bytes, named: str = "") -> str:
@@ -52,7 +52,7 @@ def encoding_of(head: bytes, named: str = "") -> str:
     head
         Its first bytes.
     named
-        Encoding that the user names; a byte-order mark takes precedence.
+        Encoding that the user specifies; a byte-order mark takes precedence.
 
     Examples
     --------
@@ -114,12 +114,12 @@ def blocks_of(path: Path, encoding: str, size: int = _BLOCK) -> Iterator[bytes]:
 
 
 def head_text(path: Path, named: str, size: int) -> tuple[list[str], str]:
-    """Return the first lines of a text file with line ends, and its encoding.
+    """Return the first lines of a text file with line endings, and its encoding.
 
     Raises
     ------
     FileError
-        When they are not text in the named encoding, in UTF-8 or as Windows writes it.
+        When they are not text in the specified encoding, in UTF-8 or in Windows encoding.
     """
     with path.open("rb") as stream:
         encoding = encoding_of(stream.read(1024), named)
@@ -133,7 +133,7 @@ def head_text(path: Path, named: str, size: int) -> tuple[list[str], str]:
             )
     if b"\r" in content and b"\n" not in content:
         raise FileError(
-            f"{path}: lines end with CR alone. Save the file with LF line endings", name=str(path)
+            f"{path}: lines end with CR only. Save the file with LF line endings", name=str(path)
         )
     try:
         text, used = decoded(content)
@@ -143,12 +143,12 @@ def head_text(path: Path, named: str, size: int) -> tuple[list[str], str]:
 
 
 def decoded(content: bytes) -> tuple[str, str]:
-    """Return text whose encoding is not known, and the encoding if it is not UTF-8.
+    """Return text of unknown encoding, and the encoding if it is not UTF-8.
 
     Raises
     ------
     UnicodeDecodeError
-        When it is neither UTF-8 nor text as Windows writes it.
+        When it is neither UTF-8 nor text in Windows encoding.
     """
     try:
         return content.decode(), ""
@@ -169,10 +169,10 @@ def windows_note() -> str:
 
 
 def not_text(path: Path, line: int) -> FileError:
-    """Return the error for a line that is neither UTF-8 nor text as Windows writes it."""
+    """Return the error for a line that is neither UTF-8 nor text in Windows encoding."""
     valid = ", ".join(ENCODINGS)
     return FileError(
-        f"{path}, line {line} is not UTF-8 text, nor {WINDOWS} (Windows). Save it as UTF-8 (in "
+        f"{path}, line {line} is neither UTF-8 nor {WINDOWS} (Windows) text. Save it as UTF-8 (in "
         "spreadsheets: 'CSV UTF-8'). If it is text in another encoding, add the line "
         f"encoding = 'cp850' to the mapping, a TOML file ({option('mapping')}). Valid encodings "
         f"are {valid}",

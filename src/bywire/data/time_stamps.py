@@ -1,7 +1,7 @@
 """Times of day and dates in the cells of text tables, as nanoseconds.
 
-Times of day continue past midnight, see `over_midnight`. Only unambiguous formats of dates are
-read: 2026-11-26 and 26.11.2026, but not 11/26/2026.
+Times of day continue past midnight (see `over_midnight`). bywire reads only unambiguous formats of
+dates: 2026-11-26 and 26.11.2026, but not 11/26/2026.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 CLOCK, MOMENT, DAY, DIGITS = "time of day", "date and time", "date", "hhmmss"
-"""kinds of stamps; the last one is a number such as 91233.5 for 09:12:33.5"""
+"""kinds of time stamps; the last one is a number such as 91233.5 for 09:12:33.5"""
 
 _SECOND = 10**9  # nanoseconds
 _DAY = 86400 * _SECOND
@@ -80,7 +80,7 @@ def over_midnight(seconds: NDArray[np.float64]) -> int:
     """Make times of day continue past midnight, in place; return the number of midnights."""
     there = np.flatnonzero(np.isfinite(seconds))
     steps = np.diff(seconds[there])
-    passed = np.flatnonzero(steps < -43200.0)  # a jump back by more than half a day
+    passed = np.flatnonzero(steps < -43200.0)  # backward jumps of more than half a day
     days = np.zeros(seconds.size)
     days[there[passed + 1]] = 86400.0
     seconds += np.cumsum(days)

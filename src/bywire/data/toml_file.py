@@ -1,4 +1,4 @@
-"""TOML files of users: limits of size and time, kinds, and suggestions for missing files."""
+"""Users' TOML files: limits of size and time, kinds, and suggestions for missing files."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from bywire.core.scratch import NULL_CHARACTER
 LARGEST = 1_000_000
 """maximum file size in bytes, checked before parsing"""
 
-# The time to read a dotted key grows with the square of its parts, so long ones are not read.
+# The time to read a dotted key grows with the square of its parts, so bywire rejects long keys.
 _KEY_PARTS = 16
 _PART = r"""(?:[\w-]+|"[^"\n]*"|'[^'\n]*')"""
 _LONG_KEY = re.compile(rf"(?<![\w-]){_PART}(?:[ \t]*\.[ \t]*{_PART}){{{_KEY_PARTS}}}")
@@ -41,7 +41,7 @@ def read_toml(
     missing
         Returns the next step for a missing file.
     too_large
-        Next step for a file that is too large, with a period in front.
+        Next step for a file that is too large, after a period.
 
     Raises
     ------
@@ -95,7 +95,8 @@ def _text(file: Path, kind: str, missing: Callable[[Path], str], too_large: str)
         raise FileError(f"cannot read {kind} {file}: {reason}: {hint}", name=str(file)) from None
     if len(data) > LARGEST:
         raise FileError(
-            f"{file} has more than {LARGEST // 1000} kB, too large for a {kind}{too_large}",
+            f"{file} has more than {LARGEST // 1000} kB, which is too large for a {kind}"
+            f"{too_large}",
             name=str(file),
         )
     try:
@@ -145,7 +146,7 @@ def kind_of(content: Mapping[str, Any]) -> str:
 
 
 def kind_of_file(file: Path) -> str:
-    """Return the kind of a file, see `kind_of`; empty if it cannot be read."""
+    """Return the kind of a file (see `kind_of`); empty if it cannot be read."""
     try:
         return kind_of(read_toml(file, "file"))
     except FileError:
@@ -153,7 +154,7 @@ def kind_of_file(file: Path) -> str:
 
 
 def require_kind(content: Mapping[str, Any], wanted: str, file: Path) -> None:
-    """Reject the content of another kind of file, and name the command that accepts it.
+    """Reject the content of another kind of file, and mention the command that accepts it.
 
     Parameters
     ----------
@@ -207,15 +208,15 @@ def near_files(
     Parameters
     ----------
     file
-        The given path; its folder does not count.
+        The path that the user specified; its folder does not count.
     kinds
-        Requested kinds of files, see `bywire.data.toml_file.kind_of`.
+        Requested kinds of files (see `bywire.data.toml_file.kind_of`).
     folders
         Folders to search; of two files with the same name, the one in the later folder comes first.
     least
-        Least similarity, up to 1.
+        Minimum similarity, up to 1.
     with_ending
-        Whether names are compared with their endings.
+        Whether names are compared with their extensions.
     """
     word = file.name if with_ending else file.name.removesuffix(_ENDING)
     near = []

@@ -1,4 +1,4 @@
-"""Writing of datasets as measurement files, complete or not at all."""
+"""Datasets written as measurement files, completely or not at all."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ def write_measurement(
     Parameters
     ----------
     dataset
-        Variables with one dimension each, whose coordinate contains the instants [s]; ``units``
-        are SI, and a variable without them is a pure number.
+        Variables with one dimension each, whose coordinate contains the times [s]; ``units`` are
+        SI, and a variable without them is a pure number.
     path
-        Target file; its ending selects the format.
+        Target file; its extension selects the format.
     format
-        Name of the format, if not that of the ending: ``"mat73"`` for MAT 7.3.
+        Name of the format, if the extension does not define it: ``"mat73"`` for MAT 7.3.
     overwrite
         Whether to replace an existing file.
     progress
@@ -62,18 +62,18 @@ def write_measurement(
     _require_fit(dataset, target, kind)
     ready = _with_units(dataset)
     try:
-        # Output of a library is not ours.
+        # Libraries must not print into our output.
         with replacing(target) as fresh, redirect_stdout(StringIO()):
             kind.write(ready, fresh, progress)
     except InputError:
         raise
     except MemoryError:
         raise FileError(
-            f"cannot write {target}: {kind.title} of this size does not fit into memory. Write "
-            "fewer signals at a time",
+            f"cannot write {target}, because {kind.title} of this size does not fit into memory. "
+            "Write fewer signals at a time",
             name=str(target),
         ) from None
-    except Exception as error:  # libraries fail in as many ways as there are
+    except Exception as error:  # libraries raise many kinds of errors
         reason = getattr(error, "strerror", None) or " ".join(str(error).split())[:200]
         reason = reason or type(error).__name__
         raise FileError(
@@ -84,7 +84,7 @@ def write_measurement(
 
 
 def _with_units(dataset: xr.Dataset) -> xr.Dataset:
-    """Return a dataset in which every signal and its instants have a unit."""
+    """Return a dataset in which every signal and its times have a unit."""
     ready = dataset.copy()
     for name, signal in ready.data_vars.items():
         ready[name].attrs.setdefault("units", "1")
@@ -123,7 +123,7 @@ def _require_fit(dataset: xr.Dataset, target: Path, kind: FileFormat) -> None:
             dims = ", ".join(map(str, signal.dims)) or "none"
             raise FileError(
                 f"cannot write {target}: {name} has the dimensions {dims}, but a measurement file "
-                "contains signals over time alone. Select one case",
+                "contains only signals over time. Select one case",
                 name=str(name),
                 value=str(dims),
             )

@@ -50,7 +50,7 @@ from bywire.identification.residuals import by_output, explained
 from bywire.identification.unknown import Unknown
 from bywire.simulation.run import simulate
 
-_OWN = ("initial.", "start.")  # what each record has for itself
+_OWN = ("initial.", "start.")  # prefixes of unknowns that belong to a single record
 
 
 @dataclass(frozen=True)
@@ -81,10 +81,10 @@ def predict(trial: Trial, estimate: Estimate) -> Prediction:
     Parameters
     ----------
     trial
-        A record and its model. Unknowns of a single record, such as its start, are taken
-        from the estimate only if they carry this trial's label.
+        A record and its model. The estimate supplies unknowns of a single record, such as its
+        start, only if they have this trial's label.
     estimate
-        Of this or of other records; undetermined unknowns keep their start values.
+        An estimate from this or other records; undetermined unknowns keep their start values.
 
     Raises
     ------
@@ -109,7 +109,7 @@ def predict(trial: Trial, estimate: Estimate) -> Prediction:
 def computed(
     trial: Trial, estimate: Estimate, names: tuple[str, ...]
 ) -> tuple[dict[str, Array], Array]:
-    """Return outputs of a trial's run with the estimates, offsets added, and its instants [s]."""
+    """Return outputs of a trial's run with the estimates, offsets added, and its times [s]."""
     values = {
         u.name: float(v)
         for u, v in (
@@ -125,16 +125,16 @@ def computed(
 
 # --- Quality of the fit
 
-_EXPLAINED = 0.5  # of the variance: more than the residual
+_EXPLAINED = 0.5  # minimum fraction of the variance: as much as the residual
 _BETWEEN = (
     ". Outputs were measured at uneven times and interpolated, which adds errors if they "
     "change fast from sample to sample"
 )
-_FEW = 0.02  # largest share of residuals that may be outliers
-_SEVERAL, _MET = 4, 2  # starts: least number for the check, and of those at the minimum
+_FEW = 0.02  # maximum fraction of residuals that may be outliers
+_SEVERAL, _MET = 4, 2  # minimum number of starts for the check, and of those at the minimum
 _CAPTIONS = {
-    "fit": "measured, and modeled with the estimates",
-    "validation": "held-out record: measured, and modeled with the estimates",
+    "fit": "measurement, and model with the estimates",
+    "validation": "held-out measurement, and model with the estimates",
 }
 
 
@@ -142,9 +142,9 @@ def _curves_of(prediction: Prediction, role: str) -> tuple[Curve, ...]:
     """Return measured and modeled curves, one for each output."""
     label = prediction.label
     suffix = f"-{_file_name(label)}" if label else ""
-    said = f" in {label}" if label else ""
+    place = f" in {label}" if label else ""
     return tuple(
-        Curve(f"{role}-{name}{suffix}", f"{name}{said}, {_CAPTIONS[role]}.", pair, "time")
+        Curve(f"{role}-{name}{suffix}", f"{name}{place}: {_CAPTIONS[role]}.", pair, "time")
         for name, pair in prediction.pairs.items()
     )
 
@@ -155,7 +155,7 @@ def _compared(measured: MeasuredRun, trial: Trial, fit: Estimate) -> Prediction:
     Parameters
     ----------
     measured, trial
-        The record. Its own unknowns carry its label, which is empty if it was fitted alone.
+        The record. Its own unknowns have its label, which is empty if it was fitted alone.
     fit
         The estimates; undetermined unknowns keep their start values.
     """
@@ -172,7 +172,7 @@ def _compared(measured: MeasuredRun, trial: Trial, fit: Estimate) -> Prediction:
 def _checks_of(
     trials: Sequence[Trial], fit: Estimate, options: Options, resampled: bool = False
 ) -> tuple[Check, ...]:
-    """Return the checks whether the model explains the records and the values are meaningful.
+    """Check whether the model explains the records and the values are meaningful.
 
     A residual of pure noise does not prove a model: if the record is only noise, so is the residual
     of any model. Outliers under a robust loss are excluded from the residual, and counted.
@@ -184,7 +184,7 @@ def _checks_of(
     options
         Loss and limits.
     resampled
-        Whether outputs were measured at uneven instants.
+        Whether outputs were measured at uneven times.
     """
     vague = {n: why for n, why in fit.vague().items() if _of_bench(fit, n)}
     said = "; ".join(f"{label} {reason}" for label, reason in vague.items())
@@ -198,7 +198,7 @@ def _checks_of(
             "residual_over_noise",
             left,
             limit=options.most_residual,
-            note="1 if only the sensors' noise remains"
+            note="1 if only sensor noise remains"
             + _few(fit.residuals, far, robust)
             + (_BETWEEN if resampled else ""),
             next_step=_missing(fit, robust),
@@ -209,17 +209,18 @@ def _checks_of(
             explained(trials, fit, counted),
             limit=_EXPLAINED,
             at_least=True,
-            note="fraction of the outputs' variance, over their noise, that the model predicts",
-            next_step=f"check that {option('inputs')} drove the record, and check its unit and "
-            "sign ('bywire replay' plots both)",
+            note="fraction of the output variance, relative to the noise, that the model predicts",
+            next_step=f"check that the signals in {option('inputs')} drove the system during the "
+            "record, and that their units and signs are right ('bywire replay' plots inputs and "
+            "outputs)",
         ),
         Check(
             "parameters_without_meaning",
             float(len(vague)),
             limit=0.0,
             note=said or "no value is at its bound or has a 95 % interval wider than +-100 %",
-            next_step=f"remove these {option('unknowns')}, add a {option('priors')}, or record "
-            "a motion that depends on them",
+            next_step=f"remove these {option('unknowns')}, add prior knowledge "
+            f"({option('priors')}), or record a motion that depends on them",
         ),
         Check(
             "not_told",
@@ -251,7 +252,7 @@ def _few(r: Array, far: NDArray[np.bool_], robust: bool) -> str:
     if robust or not 0.0 < float(far.mean()) < _FEW or robust_scale(r) > FAR:
         return ""
     advice = f"if they are outliers, use {option('loss', 'huber')}"
-    return f", {far.sum()} of {far.size} are far off ({advice})"
+    return f". {far.sum()} of {far.size} residuals are far larger ({advice})"
 
 
 def _outliers(far: NDArray[np.bool_], options: Options) -> Check:
@@ -259,21 +260,21 @@ def _outliers(far: NDArray[np.bool_], options: Options) -> Check:
         "outliers",
         float(far.mean()),
         limit=options.most_outliers,
-        note=f"{far.sum()} of {far.size} residuals are at least {FAR:g} times the noise. A share "
-        "above the limit indicates a model error",
-        next_step="find where they occur: a cluster indicates a motion that the model lacks",
+        note=f"{far.sum()} of {far.size} residuals are at least {FAR:g} times the noise. A "
+        "fraction above the limit indicates a model error",
+        next_step="find where they occur. A cluster indicates a motion that the model lacks",
     )
 
 
 def _noise_check(doubtful: Mapping[str, str], given: Mapping[str, str]) -> tuple[Check, ...]:
-    """Return the check of noise levels that were estimated from the record.
+    """Check noise levels that were estimated from the record.
 
     Parameters
     ----------
     doubtful
-        Outputs whose noise comes out too large -> why.
+        Outputs whose noise estimate is too large -> reason.
     given
-        Noise by output, where it was given.
+        Noise by output, where the user specified it.
     """
     if all(given.values()):
         return ()
@@ -284,19 +285,19 @@ def _noise_check(doubtful: Mapping[str, str], given: Mapping[str, str]) -> tuple
             float(len(doubtful)),
             limit=0.0,
             note=note,
-            next_step="record it at rest and specify its standard deviation",
+            next_step="record the signal at rest, and specify its standard deviation",
         ),
     )
 
 
 def starts_check(reached: int, starts: int) -> tuple[Check, ...]:
-    """Return the check whether another start reached the lowest minimum, if there were several."""
+    """Check whether another start reached the lowest minimum, if there were several."""
     if starts < _SEVERAL:
         return ()
     note = "starts that reached the lowest minimum"
     if reached < _MET:
         note += (
-            f". There may be a lower one. Use more {option('starts')}, narrower ranges "
+            f". A lower minimum may exist. Use more {option('starts')}, narrower ranges "
             f"({option('unknowns')} "
             "NAME=LOW..HIGH), or fewer unknowns"
         )
@@ -313,7 +314,7 @@ def starts_check(reached: int, starts: int) -> tuple[Check, ...]:
 
 
 def _of_bench(fit: Estimate, label: str) -> bool:
-    """Return whether a label is that of a parameter; offsets and starts may be near zero."""
+    """Return whether a label belongs to a parameter; offsets and starts may be near zero."""
     unknown = fit.unknowns[fit.names.index(label)]
     return is_parameter(unknown.name) and not unknown.name.startswith(_OWN)
 
@@ -377,12 +378,12 @@ def _file_name(label: str) -> str:
 
 # --- The fit
 # Where the bench closes a loop, the measured set point drives model and controller together:
-# closed-loop output error. The run begins where the experiment does with the parameters of the
-# moment, so that an equilibrium stays one while the parameters that make it are searched.
+# closed-loop output error. The run begins at the experiment's start for the current parameters, so
+# an equilibrium remains one while the search changes the parameters that define it.
 
-_FINEST = 1.0 / 65536.0  # of a signal's range: what a converter of 16 bits resolves
+_FINEST = 1.0 / 65536.0  # of a signal's range: resolution of a 16-bit converter
 _FEWEST = 10  # samples
-_LEFT = 0.5  # of the noise: a model that leaves less was given too much
+_LEFT = 0.5  # of the noise: with a smaller residual, the assumed noise is too large
 
 
 def noise_given(name: str, text: str, unit: str) -> float:
@@ -400,7 +401,7 @@ def noise_given(name: str, text: str, unit: str) -> float:
 
 
 def _output_noise(measured: MeasuredRun, name: str, text: str) -> float:
-    """Return the standard deviation of an output's noise, as given or estimated from the record.
+    """Return the standard deviation of an output's noise, specified or estimated from the record.
 
     Parameters
     ----------
@@ -409,7 +410,7 @@ def _output_noise(measured: MeasuredRun, name: str, text: str) -> float:
     name
         Output.
     text
-        Its noise; empty for the record's own.
+        Its noise; empty to estimate it from the record.
 
     Raises
     ------
@@ -432,7 +433,7 @@ def _output_noise(measured: MeasuredRun, name: str, text: str) -> float:
             f"{name} does not change, so it determines nothing. Remove it, or excite the system",
             name=name,
         )
-    # Between uneven samples lie means of two, whose noise is smaller and no longer white.
+    # Interpolation averages neighboring samples, so the noise is smaller and no longer white.
     before = measured.data[name].attrs.get(NOISE_OF_SAMPLES)
     return max(noise_of(there) if before is None else float(before), _FINEST * span)
 
@@ -448,7 +449,7 @@ def _overestimated(
     residuals: Array,
     given: Mapping[str, str],
 ) -> dict[str, str]:
-    """Return the outputs whose noise is not determined by their record, with the reason.
+    """Return the outputs whose record does not determine their noise, with the reason.
 
     If the noise is too large, any model passes.
 
@@ -457,9 +458,9 @@ def _overestimated(
     records, trials
         Records, in the order of the residuals.
     residuals
-        Residuals over the noise.
+        Residuals divided by the noise.
     given
-        Noise by output, where it was given.
+        Noise by output, where the user specified it.
     """
     runs = {trial.label: measured for measured, trial in zip(records, trials, strict=True)}
     doubtful = {}
@@ -470,16 +471,16 @@ def _overestimated(
         left = robust_scale(r)
         even = NOISE_OF_SAMPLES not in runs[trial.label].data[name].attrs
         if even and not determines_its_noise(values):
-            why = "varies from sample to sample"
+            why = "changes from sample to sample"
         elif left < _LEFT:
-            why = f"differs from the model by only {left:.2g} of that"
+            why = f"has a residual of only {left:.2g} times the estimated noise"
         else:
             continue
         unit = difference_unit(signals_of(runs[trial.label].case.model.Output)[name].unit)
         size = shown(float(f"{trial.noise[name]:.3g}"), unit)
         key = f"{trial.label}:{name}" if trial.label else name
         doubtful[key] = (
-            f"{key} {why}, so {size} is more than its noise. Specify the noise with "
+            f"{key} {why}, so the noise estimate of {size} is too large. Specify the noise with "
             f'{option("outputs")} "{name}=NOISE {display_unit(unit)}"'
         )
     return doubtful
@@ -492,9 +493,9 @@ def _finite(signal: xr.DataArray) -> Array:
 
 # --- The fit
 
-_ROUNDED, _EXACT = "quantized", "ideal"  # of the law of a sensor or a converter
-_ROUGH = 1e-4  # of the cost: enough to begin from
-_AT_REST = 5.0  # times the noise: a start below it is none that could be estimated
+_ROUNDED, _EXACT = "quantized", "ideal"  # laws of a sensor or a converter
+_ROUGH = 1e-4  # of the cost: accurate enough for a start
+_AT_REST = 5.0  # times the noise: a smaller start cannot be estimated
 
 
 @dataclass(frozen=True)
@@ -552,7 +553,7 @@ class BenchFit:
             effort.progress,
             effort.store,
             effort.threads,
-            # A loss that redescends has far minima wherever the record is missed altogether.
+            # A redescending loss also has distant minima, where the model misses the whole record.
             partial(_nearer, problem) if options.loss == "cauchy" else None,
         )
         fit = estimate(problem, options.loss, led.best.values)
@@ -652,12 +653,12 @@ class BenchFit:
                 value=str(data),
             )
         held = self.record(bench, data, options)
-        # A label that no record has: only what all records share is known of it.
+        # No record has this label, so only the shared unknowns apply.
         return _compared(held, self.trial(held, "held out"), fit)
 
 
 def _nearer(problem: Problem, start: Array) -> Array:
-    """Return the end of a search with losses that have no far minima."""
+    """Return the result of a search with losses that have no distant minima."""
     return solve(problem, solve(problem, start, share=_ROUGH).values, "huber", share=_ROUGH).values
 
 
@@ -681,8 +682,8 @@ def _begun(bench: Bench, case: Any, values: Mapping[str, float]) -> tuple[Any, A
 def _exact_laws(cls: type[ParameterSet]) -> dict[str, str]:
     """Return the laws of a parameter class without rounding, by dotted name.
 
-    Rounding has no derivative, closed loops would look open. What rounds chooses between a law
-    that is ``"quantized"`` and one that is ``"ideal"``.
+    Rounding has no derivative, so closed loops would look open. A rounding element has a law
+    ``"quantized"`` and a law ``"ideal"``.
     """
     return {
         name: _EXACT
@@ -712,8 +713,8 @@ def _said(records: Mapping[str, MeasuredRun], options: Options, coarse: bool) ->
     period = min(task.period for task in case.model.tasks(case.par))
     if coarse and options.between == "held" and period < 0.5 * interval:
         said.append(
-            f"inputs stay constant for {1e3 * interval:.4g} ms from sample to sample, but act "
-            f"every {1e3 * period:.4g} ms. If they are smooth, use "
+            f"inputs stay constant for {1e3 * interval:.4g} ms between samples, but the model uses "
+            f"them every {1e3 * period:.4g} ms. If they are smooth, use "
             f"{option('options', {'between': 'linear'})}"
         )
     return said

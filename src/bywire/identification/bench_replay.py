@@ -172,7 +172,7 @@ class MeasuredRun:
     case
         Its run, aligned to the record.
     data
-        Measured signals over ``time`` [s], on the instants at which the model is recorded.
+        Measured signals over ``time`` [s], at the times at which the model is recorded.
     driven
         Stimulus -> measured signal.
     compared
@@ -180,7 +180,7 @@ class MeasuredRun:
     run
         Run to compute; its first ``settled`` rows are before the record.
     settled
-        Rows of the settling time.
+        Number of rows in the settling time.
     begun_at
         Option of the experiment -> signal whose first sample sets it.
     notes
@@ -216,7 +216,7 @@ def measured_run(
         Its experiment defines model, start, and unmeasured stimuli.
     data
         Measured signals over ``time`` [s], SI; resampled if the model's steps require it. The
-        run starts with the record; a negative start time is that of the experiment.
+        run starts with the record; if its time is negative, it includes part of the settling.
     inputs
         Stimulus of the model -> measured signal; default: all of the same name.
     outputs
@@ -227,13 +227,13 @@ def measured_run(
     settle
         Whether the run settles before the record, as in the experiment.
     between
-        Inputs between samples: demands of a controller are held. Smooth inputs that are read
-        faster than they were measured are better interpolated linearly.
+        Inputs between samples: a controller's demands are held. Interpolate smooth inputs linearly
+        if the model reads them faster than they were measured.
 
     Raises
     ------
     UnknownNameError
-        When a signal is not measured, or the model has none of that name.
+        When a signal is not measured, or the model has no signal of that name.
     ParameterError
         When no signal drives the model, none is compared, or an input has gaps.
     """
@@ -246,7 +246,7 @@ def measured_run(
     chosen = case_of(bench, case)
     if not settle and chosen.settle > 0.0:
         chosen = replace(chosen, settle=0.0)
-        notes = (*notes, "starts with the record, without the experiment's settling")
+        notes = (*notes, "the run starts with the record, without the experiment's settling time")
     data, chosen, said = _on_grid(bench, data, chosen)
     for signal in driven.values():
         missing = np.flatnonzero(np.isnan(data[signal].values))
@@ -330,17 +330,17 @@ def _started(
             leaf = leaf_fields(bench.definition.options)[name]
             start = max(float(first[0]), leaf.low) if first.size else leaf.low
             started = replace(bench, options={**bench.options, name: start})
-            said = f"starts at the measured {signal}, {start:.5g} {leaf.unit.symbol}"
-            return started, {name: signal}, (said,)
+            note = f"the run starts at the measured {signal}, {start:.5g} {leaf.unit.symbol}"
+            return started, {name: signal}, (note,)
     return bench, {}, ()
 
 
 def _on_grid(
     bench: Bench, data: xr.Dataset, case: Case
 ) -> tuple[xr.Dataset, Case, tuple[str, ...]]:
-    """Return data at instants of the model's recording, and the case aligned to them."""
+    """Return data at the model's recording times, and the case aligned to them."""
     interval = even_interval(data["time"].values)
-    # A clock that starts below zero is the experiment's: part of its settling was recorded.
+    # A clock that starts below zero belongs to the experiment: part of its settling was recorded.
     case = replace(case, settle=max(case.settle + min(float(data["time"].values[0]), 0.0), 0.0))
     try:
         return data, case.aligned(bench.step, interval), ()
@@ -354,9 +354,9 @@ def _on_grid(
         even, said = as_even(data, aligned.record)
         return even, aligned, tuple(said)
     raise StepError(
-        f"the step of {bench.step:g} s divides neither the measurement's {interval:g} s nor the "
-        f"recording interval of {case.record:g} s. Resample the measurement (bywire convert "
-        "--rate)",
+        f"the step of {bench.step:g} s divides neither the measurement's interval of {interval:g} "
+        f"s nor the recording interval of {case.record:g} s. Resample the measurement "
+        "('bywire convert --rate')",
         name="step",
         value=f"{bench.step:g} s",
     )
@@ -371,7 +371,7 @@ def _run(
     begin = min(float(data["time"].values[0]), 0.0)
 
     def stimulus(t: Array) -> Array:
-        """Measured values, from one sample to the next; the first one while it settles."""
+        """Return measured values between samples; the first one during settling."""
         rows = np.zeros((t.size, len(fields)))
         given = driven_at(case, t - case.settle + begin)
         at = (t - case.settle) / interval
@@ -439,14 +439,14 @@ def replay(
     Parameters
     ----------
     bench, data, inputs, outputs, case
-        See ``bywire.identification.bench_replay``.
+        See `measured_run`.
     estimate_error
         Whether the model also runs at other steps; see `bywire.bench.running.run`.
 
     Raises
     ------
     UnknownNameError
-        When a signal is not measured, or the model has none of that name.
+        When a signal is not measured, or the model has no signal of that name.
     ParameterError
         When no signal drives the model, none is compared, or an input has gaps.
     """
@@ -514,7 +514,7 @@ def beside(data: xr.Dataset, name: str, modeled: Array) -> xr.Dataset:
     name
         The signal.
     modeled
-        Modeled values at the same instants, shape (n,).
+        Modeled values at the same times, shape (n,).
     """
     attrs = {
         "units": data[name].attrs.get("units", "1"),

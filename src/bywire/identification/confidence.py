@@ -16,13 +16,13 @@ from bywire.data.recursive_filter import filtered
 from bywire.identification.estimate import Estimate
 from bywire.identification.measured import robust_scale
 
-_TOGETHER = (1, 8, 64)  # neighbors summed up
-_BLOCKS = 10  # per unknown, at least
-_KEPT = 0.9  # of the square of the Jacobian, at least
-_LEVEL = 0.01  # of the test whether residuals are white
+_TOGETHER = (1, 8, 64)  # neighbors in a sum
+_BLOCKS = 10  # minimum number per unknown
+_KEPT = 0.9  # minimum fraction of the squared Jacobian
+_LEVEL = 0.01  # significance level of the whiteness test
 _NEAREST = 3  # lags
 _GROUPS = (8, 16, 64)  # blocks of the record, in addition to single samples
-_FEWEST_GROUPS = 6.0  # that determine a variance
+_FEWEST_GROUPS = 6.0  # minimum number that determines a variance
 
 
 @dataclass(frozen=True)
@@ -54,18 +54,18 @@ def uncertainty(
 ) -> Uncertainty:
     r"""Return the covariance of a least-squares estimate.
 
-    White residuals: :math:`s^2 (J^T J)^{-1}`. For correlated neighbors, the sandwich
-    :math:`(J^T J)^{-1} J^T \Gamma J (J^T J)^{-1}` with the autocovariance :math:`\Gamma` of an
-    autoregressive model of the residuals; fewer of them then count as independent. Slow errors
-    may hide below white noise, so the same is computed for sums of neighbors, and the largest
-    result counts.
+    For white residuals, it is :math:`s^2 (J^T J)^{-1}`. For correlated neighbors, it is the
+    sandwich :math:`(J^T J)^{-1} J^T \Gamma J (J^T J)^{-1}` with the autocovariance :math:`\Gamma`
+    of an autoregressive model of the residuals; fewer residuals then count as independent. White
+    noise may hide slow errors, so bywire repeats the computation for sums of neighbors and uses
+    the largest result.
 
-    Both assume a noise that is independent of the Jacobian. If the residuals are larger where the
-    Jacobian is (noise that grows with the signal, or a model that is wrong in a part of the
-    range), the scores show it, by sample (White 1980) or summed over blocks of the record (Bester,
-    Conley and Hansen 2011). Deviations that the scores refute at 1 % are replaced by theirs. For
-    correlated neighbors, the scores are those of the residuals after whitening by the
-    autoregressive model.
+    Both formulas assume noise that is independent of the Jacobian. If the residuals are larger
+    where the Jacobian is larger (noise that grows with the signal, or a model that is wrong in
+    part of the range), the scores show it, by sample (White 1980) or summed over blocks of the
+    record (Bester, Conley and Hansen 2011). If the scores reject a standard deviation at the 1 %
+    level, the scores' standard deviation replaces it. For correlated neighbors, the scores use
+    residuals that the autoregressive model has whitened.
 
     Parameters
     ----------
@@ -76,9 +76,9 @@ def uncertainty(
     instruments
         Instruments of an instrumental-variable estimate, shape (n, p); the Jacobian by default.
     prior_rows
-        Last rows that are independent, with a standard deviation of one: prior knowledge.
+        Number of last rows that contain prior knowledge: independent, standard deviation of one.
     ordered
-        False if the order means nothing, as for single statements: they count as independent.
+        False if the order has no meaning; all residuals then count as independent.
 
     References
     ----------
@@ -112,22 +112,22 @@ def uncertainty(
 
 
 def _as_scattered(sure: Uncertainty, influence: Array, r: Array, ordered: bool) -> Uncertainty:
-    """Return an uncertainty with the deviations of the scores if these refute its own.
+    """Return an uncertainty, with the scores' deviations where the scores reject its own.
 
     Parameters
     ----------
     sure
-        Uncertainty from a noise that is independent of the Jacobian.
+        Uncertainty for noise that is independent of the Jacobian.
     influence
         Effect of each residual on each unknown, shape (n, p).
     r
         Residuals, shape (n,).
     ordered
-        Whether neighbors belong together, so that blocks of them count as well.
+        Whether the order has meaning, so that blocks of neighbors count too.
     """
-    from scipy import special  # of which stats is made, and takes long to load
+    from scipy import special  # loads much faster than scipy.stats
 
-    if sure.colored:  # neighbors that cancel out scatter less than the sum of their squares
+    if sure.colored:  # neighbors that cancel have less scatter than the sum of their squares
         model = autoregression(r)
         later = _filtered(influence[::-1], model.coefficients)[: r.size]
         influence, r = later[::-1], filtered(model.coefficients, [1.0], r)
@@ -140,7 +140,7 @@ def _as_scattered(sure: Uncertainty, influence: Array, r: Array, ordered: bool) 
         shares = np.add.reduceat(influence**2, begins, axis=0)
         total = shares.sum(axis=0)
         known = total > 0.0
-        independent = np.zeros(p)  # groups that count, by their shares (Satterthwaite 1946)
+        independent = np.zeros(p)  # effective number of groups (Satterthwaite 1946)
         independent[known] = total[known] ** 2 / (shares[:, known] ** 2).sum(axis=0) - 1.0
         variance = (scores**2).sum(axis=0) * groups / max(groups - 1.0, 1.0)
         ratio = variance / np.maximum(np.diag(sure.covariance), 1e-300)
@@ -161,7 +161,7 @@ def _blocks(values: Array, together: int) -> Array:
 
 
 def _still_told(r: Array, rows: Array, whole: Array) -> bool:
-    """Return whether there are many blocks, short relative to changes of the Jacobian."""
+    """Return whether there are enough blocks, each short relative to changes of the Jacobian."""
     kept = np.sum(rows**2, axis=0) >= _KEPT * np.sum(whole**2, axis=0)
     return bool(r.size >= _BLOCKS * rows.shape[1] and kept.all())
 
@@ -182,7 +182,7 @@ def _spread(r: Array, rows: Array, unknowns: int, ordered: bool) -> tuple[Array,
 
 @dataclass(frozen=True)
 class Autoregression:
-    """Residuals as white noise through :math:`1 / (1 + a_1 z^{-1} + ...)`.
+    """Residuals as white noise filtered by :math:`1 / (1 + a_1 z^{-1} + ...)`.
 
     Parameters
     ----------
@@ -220,7 +220,7 @@ def autoregression(residuals: Array) -> Autoregression:
 
 
 def _filtered(columns: Array, coefficients: Array) -> Array:
-    """Return columns through the noise's filter, until it has died away."""
+    """Return columns filtered by the noise model, including its decay."""
     tail = np.zeros((min(len(columns), 50 * len(coefficients)), columns.shape[1]))
     return filtered([1.0], coefficients, np.vstack((columns, tail)))
 
@@ -238,10 +238,10 @@ def autocorrelation(residuals: Array, lags: int) -> Array:
 def is_white(residuals: Array, lags: int = 20) -> bool:
     """Return whether neighbors are uncorrelated (Ljung and Box 1978, level 1 %).
 
-    The test runs twice, for the nearest neighbors and for all lags, since over 20 lags the
-    correlation of the nearest one is easily lost.
+    The test runs twice, for the nearest neighbors and for all lags, since a test over 20 lags
+    easily misses a correlation of the nearest neighbors.
     """
-    from scipy import special  # of which stats is made, and takes long to load
+    from scipy import special  # loads much faster than scipy.stats
 
     n = residuals.size
     lags = min(lags, n // 4)
@@ -256,14 +256,14 @@ def is_white(residuals: Array, lags: int = 20) -> bool:
 
 # --- Which unknowns the data determine: singular values, correlations
 
-_DETERMINED = 1.0  # largest standard deviation per scale of a determined unknown
-_FLAT = 1e-7  # singular value relative to the largest one, below which rounding decides
+_DETERMINED = 1.0  # maximum standard deviation of a determined unknown, relative to its scale
+_FLAT = 1e-7  # singular value relative to the largest one, below which only rounding is left
 _FAR = 10.0  # times the noise: residuals that noise cannot explain
-_MISFIT = 4.0  # times the noise: filtered sensor noise gives up to 3
-_AS_ASSUMED = (0.5, 1.5)  # times the assumed noise, which then explains the residual
+_MISFIT = 4.0  # times the noise: filtered sensor noise reaches 3
+_AS_ASSUMED = (0.5, 1.5)  # times the assumed noise: range in which it explains the residual
 _EXACT = (
-    "the residual is only rounding error: the record agrees with the model to the last digits. The "
-    "intervals are therefore not valid for a measured record, which contains noise"
+    "the residual is only rounding error, because the record agrees with the model to the last "
+    "digits. The intervals do not apply to a measured record, which contains noise"
 )
 _CONTRADICTED = 3.0  # standard deviations of a prior
 
@@ -273,11 +273,11 @@ class MisfitWarning(UserWarning):
 
 
 def misfit(estimate: Estimate) -> str:
-    """Describe a residual that exceeds the noise in a sentence; empty if it is only noise.
+    """Describe in a sentence a residual that exceeds the noise; empty if it is only noise.
 
-    Differences of neighboring residuals are noise; their common part beyond it comes from the
+    Differences of neighboring residuals are noise; the slow part of the residuals comes from the
     model. An assumed noise that explains the residual is accepted. Residuals from rounding or from
-    the step of the simulation do not count against the model.
+    the simulation step do not count against the model.
     """
     worst = max(
         (
@@ -302,9 +302,9 @@ def misfit(estimate: Estimate) -> str:
 
 
 def least_determined(estimate: Estimate, J: Array) -> tuple[int, str] | None:
-    """Return the unknown that the data do not determine, with the reason; None if there is none."""
+    """Return the unknown that the data determine least, with the reason; None if they suffice."""
     share = estimate.singular_values[-1] / max(estimate.singular_values[0], 1e-300)
-    reason = f"minimum singular value {share:.1e} of the largest"
+    reason = f"the smallest singular value is {share:.1e} times the largest"
     silent = np.flatnonzero(~J.any(axis=0))
     if silent.size:
         return int(silent[0]), "no measured signal depends on it"
@@ -319,7 +319,7 @@ def least_determined(estimate: Estimate, J: Array) -> tuple[int, str] | None:
         return None
     unknown = estimate.unknowns[index]
     return index, (
-        f"its standard deviation would be {relative[index]:.2g} times its usual magnitude "
+        f"its standard deviation would be {relative[index]:.2g} times its usual magnitude of "
         f"{shown(float(f'{unknown.scale:.3g}'), difference_unit(unknown.unit))} ({reason})"
     )
 
@@ -337,8 +337,9 @@ def advice(estimate: Estimate, silent: bool) -> str:
     left = robust_scale(estimate.residuals)
     if left > _FAR:
         return (
-            f"the model does not fit: its best residual is {left:.2g} times the noise. Check signs "
-            f"and units of the measured signals ({option('mapping')}), then the known parameters"
+            f"The model does not fit: its lowest residual is {left:.2g} times the noise. Check the "
+            f"signs and units of the measured signals ({option('mapping')}), then the known "
+            "parameters"
         )
     return "Switch it on, or choose another unknown" if silent else "Excite the system more"
 
@@ -346,8 +347,8 @@ def advice(estimate: Estimate, silent: bool) -> str:
 def notes_of(estimate: Estimate) -> tuple[str, ...]:
     """Return notes about correlated unknowns, bounds, contradicted priors, and misfit."""
     notes = [
-        f"{a} and {b} are correlated ({c:.3f}): the data determine their combination better "
-        "than either of them"
+        f"{a} and {b} are correlated ({c:.3f}). The data determine their combination better "
+        "than either one alone"
         for a, b, c in estimate.correlated()
     ]
     bounds = estimate.at_bounds()
@@ -373,23 +374,23 @@ def notes_of(estimate: Estimate) -> tuple[str, ...]:
 
 # --- Whether records agree
 
-_FALSE_ALARM = 1e-3  # of a false alarm, over all records and parameters
-_SMALL = 1e-3  # of the value: less matters to nobody
-_UNDETERMINED = 1e-6  # singular value per the largest one: a record that does not tell an unknown
+_FALSE_ALARM = 1e-3  # probability of a false alarm, over all records and parameters
+_SMALL = 1e-3  # of the value: smaller differences are negligible
+_UNDETERMINED = 1e-6  # singular value relative to the largest: the record lacks an unknown
 
 
 @dataclass(frozen=True)
 class Disagreement:
-    """A parameter that a record tells otherwise than the other records do.
+    """A parameter whose estimate from one record contradicts that from the other records.
 
     Parameters
     ----------
     record, name, unit
-        Which record, and which parameter.
+        The record, and the parameter with its unit.
     value, deviation
-        Of the record alone [unit].
+        Estimate from the record alone, and its standard deviation [unit].
     others, others_deviation
-        Of the other records together [unit].
+        Estimate from the other records together, and its standard deviation [unit].
     """
 
     record: str
@@ -402,7 +403,7 @@ class Disagreement:
 
     @property
     def apart(self) -> float:
-        """Difference over its standard deviation."""
+        """Difference divided by its standard deviation."""
         return abs(self.value - self.others) / math.hypot(self.deviation, self.others_deviation)
 
     def __str__(self) -> str:
@@ -424,7 +425,7 @@ class Disagreement:
 
 @dataclass(frozen=True)
 class _Told:
-    """What a record alone tells of a parameter."""
+    """Estimate of a parameter from a single record."""
 
     value: float
     deviation: float
@@ -433,19 +434,19 @@ class _Told:
 
 
 def disagreements(estimates: Mapping[str, Estimate]) -> tuple[Disagreement, ...]:
-    """Return what several records of one thing, estimated one by one, tell differently.
+    """Return the parameters on which separate estimates from several records disagree.
 
     Parameters
     ----------
     estimates
-        By the record's label, two at least; parameters go together by their names.
+        By record label, at least two; parameters are matched by name.
 
     Returns
     -------
     tuple of Disagreement
-        The largest first; empty where chance explains all, which it fails to once in a thousand
-        times. A record's estimate is compared with the mean of all others', weighted by their
-        variances.
+        The largest first. Empty if chance explains all differences; false alarms occur once in a
+        thousand times. The estimate of each record is compared with the mean of all others,
+        weighted by their variances.
 
     Raises
     ------
@@ -471,17 +472,17 @@ def disagreements(estimates: Mapping[str, Estimate]) -> tuple[Disagreement, ...]
 
 
 def between_records(estimate: Estimate, jacobian: Array) -> tuple[Disagreement, ...]:
-    """Return what the records of a joint fit tell differently.
+    """Return the parameters on which the records of a joint fit disagree.
 
-    Each record's own estimate is one step of Gauss and Newton from the joint one, so that no
-    run is computed again.
+    Each record's own estimate is one Gauss-Newton step from the joint estimate, so no run is
+    repeated.
 
     Parameters
     ----------
     estimate
-        Of all records; its parts say which residuals are whose.
+        Joint estimate; its parts assign the residuals to the records.
     jacobian
-        There, per unknown's scale, shape (n, p).
+        Jacobian at the estimate, per unknown's scale, shape (n, p).
     """
     rows: dict[str, list[int]] = {}
     begin = 0
@@ -514,7 +515,7 @@ def between_records(estimate: Estimate, jacobian: Array) -> tuple[Disagreement, 
 
 
 def _told_by(J: Array) -> list[int]:
-    """Return the unknowns that a record tells, one less of a combination that it does not."""
+    """Return the unknowns that a record determines, without undetermined combinations."""
     columns = [k for k in range(J.shape[1]) if J[:, k].any()]
     while columns:
         part = J[:, columns] / np.linalg.norm(J[:, columns], axis=0)

@@ -14,13 +14,13 @@ from bywire.identification.measured import require_signals
 from bywire.identification.output_error import even_interval
 
 _ORDER = 4
-_STENCIL = np.array([1.0, -9.0, 45.0, 0.0, -45.0, 9.0, -1.0]) / 60.0  # as convolve turns it
+_STENCIL = np.array([1.0, -9.0, 45.0, 0.0, -45.0, 9.0, -1.0]) / 60.0  # reversed, for convolve
 _REACH = 3
 _HOLD = np.array([-1.0, 13.0, 13.0, -1.0]) / 24.0
 
 
 def low_passed(values: Array, interval: float, cutoff: float) -> Array:
-    """Return low-passed signals without delay.
+    """Low-pass signals without delay.
 
     Butterworth of order 4, forward and backward (gain 1/2 at the cutoff).
 
@@ -56,10 +56,10 @@ def low_passed(values: Array, interval: float, cutoff: float) -> Array:
 
 
 def _derivative(values: Array, interval: float) -> Array:
-    """Return central differences of the sixth order; of the second at the three rows of an end.
+    """Return sixth-order central differences, second-order ones in the three rows at each end.
 
-    Second-order ones alone take 0.1 % off an acceleration at a hundredth of the sample rate,
-    which is a bias of the inertia.
+    Second-order differences reduce an acceleration at a hundredth of the sample rate by 0.1 %,
+    which biases the inertia.
     """
     slopes = np.gradient(values, interval, edge_order=2)
     if values.size > 2 * _REACH:
@@ -70,7 +70,8 @@ def _derivative(values: Array, interval: float) -> Array:
 def _centered(values: Array) -> Array:
     """Return the effect of a held signal on a double integrator around each sample.
 
-    Half an interval of delay, and the sinc of a hold up to the fourth power of the frequency.
+    It includes half an interval of delay, and the hold's sinc up to the fourth power of the
+    frequency.
     """
     padded = np.concatenate((values[:1], values[:1], values, values[-1:]))
     return np.convolve(padded, _HOLD, mode="valid")
@@ -95,13 +96,13 @@ def differentiated(
     signal
         Signal to differentiate.
     names
-        Names of its first and further derivatives.
+        Names of its first and higher derivatives.
     cutoff
         Cutoff of the low-pass filter [Hz].
     held
-        Signals that a controller sets and holds for one interval, for example a voltage: the mean
-        of the values before and after a sample acts around it. Without this they are half an
-        interval early and slightly too large.
+        Signals that a controller sets and holds for one interval, for example a voltage. Around a
+        sample, the mean of the values before and after it acts. Without this correction, the
+        signals are half an interval early and slightly too large.
 
     Raises
     ------

@@ -34,9 +34,9 @@ from bywire.identification.unknown import parameters_of
 from bywire.plant import anti_alias_filter, dc_motor
 from bywire.simulation.run import Run, simulate
 
-_AGAINST = -0.5  # correlation of demand and current that is not random
-_EXPLAINED = 0.5  # of the variance: more than the residual
-_MISFIT = 1.3  # noise of a closed loop is 1.04 of the sensor's, which is known within 10 %
+_AGAINST = -0.5  # correlation of demand and current below which one has the wrong sign
+_EXPLAINED = 0.5  # minimum fraction of the variance: as much as the residual
+_MISFIT = 1.3  # closed-loop noise is 1.04 times the sensor's, which is known to within 10 %
 
 
 def levels(
@@ -64,7 +64,7 @@ def levels(
 
 
 def noise_of_levels(answer: Array, demand: Array) -> float:
-    """Return the noise of a response [its unit], from differences while the demand rests.
+    """Return the noise of a response [its unit], from differences while the demand is constant.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ def require_steps(data: xr.Dataset, name: str, answer: str, label: str) -> None:
     name, answer
         Names of demand and current.
     label
-        Of the record.
+        Label of the record.
 
     Raises
     ------
@@ -148,7 +148,7 @@ def believable(fit: Estimate) -> dict[str, float]:
 
 
 def checks_of(trials: Sequence[Trial], fit: Estimate) -> tuple[Check, ...]:
-    """Return the checks whether the model explains the current and the values are meaningful.
+    """Check whether the model explains the current and the values are meaningful.
 
     A residual of pure noise does not prove a model: if the record is only noise, so is the residual
     of any model, even of one with zero response.
@@ -161,14 +161,14 @@ def checks_of(trials: Sequence[Trial], fit: Estimate) -> tuple[Check, ...]:
             explained(trials, fit),
             limit=_EXPLAINED,
             at_least=True,
-            note="fraction of the current's variance that the model predicts. A low share may mean "
-            "that demand and current do not belong together",
+            note="fraction of the current's variance that the model predicts. A low fraction may "
+            "mean that demand and current come from different tests",
         ),
         Check(
             "residual_over_noise",
             fit.rms,
             limit=_MISFIT,
-            note="1 if only the sensor's noise remains",
+            note="1 if only sensor noise remains",
         ),
         Check(
             "parameters_without_meaning",
@@ -285,7 +285,7 @@ class CurrentLoop:
         Notes
         -----
         The response from demand to current depends only on k_p V/L, k_i V/L and R/L. With all four
-        unknown, the least determined one keeps its value, and is named.
+        unknown, the least determined one keeps its value, and bywire reports it.
         """
         trials = [self._trial(record, par, options, label) for label, record in split(data).items()]
         return _identified_loop(trials, par, options.names(self.gains, self.winding))
@@ -334,7 +334,7 @@ class CurrentLoop:
 Amperes = Annotated[float, Signal("A", "motor current", 5.0)]
 _SETTLED = 10.0  # time constants of the sensor's filter until the start has no effect
 _SUBSTEPS = 4  # per sample, at least
-_LONGEST = 5e-6  # of a substep [s]: at 20 us L_m is 0.04 % off where L_m/R_m is 0.3 ms
+_LONGEST = 5e-6  # substep [s]: 20 us causes an error of 0.04 % in L_m for L_m/R_m = 0.3 ms
 
 
 class Parameters(ParameterSet):
@@ -414,7 +414,7 @@ def winding_trial(
     names
         Names of ``v``, ``omega`` and ``i`` in it.
     f_aa
-        Corner of the current measurement's filter [Hz].
+        Cutoff of the current measurement's filter [Hz].
     sigma
         Noise of the current [A].
 

@@ -56,7 +56,7 @@ class Equation:
 
 
 class EquationError:
-    """The equation's error and its derivatives by the unknowns, for each sample."""
+    """Error of the equation and its derivatives with respect to the unknowns, for each sample."""
 
     def __init__(self, equation: Equation, par: ParameterSet, unknowns: Sequence[Unknown]) -> None:
         model = equation.model
@@ -94,11 +94,11 @@ class EquationError:
         self._needed = [name for k, name in enumerate(self._names) if k in pattern]
         slopes = ca.densify(ca.jacobian(e, theta))
         self._function = ca.Function("e", [inputs, theta], [ca.densify(e), slopes])
-        self._calls: dict[int, BufferedCall] = {}  # by how many samples
-        self._lock = Lock()  # a call's buffers serve one at a time
+        self._calls: dict[int, BufferedCall] = {}  # by number of samples
+        self._lock = Lock()  # one thread at a time may use a call's buffers
 
     def columns(self, data: xr.Dataset) -> Array:
-        """Return the measured inputs of the equation, shape (inputs, n); zero where unread."""
+        """Return the measured inputs of the equation, shape (inputs, n); zero if unused."""
         require_signals(data, self._needed)
         count = data.sizes["time"]
         rows = [data[n].values if n in self._needed else np.zeros(count) for n in self._names]
@@ -150,8 +150,8 @@ def inverse_dynamics(
 ) -> Estimate:
     r"""Solve an equation of motion for parameters.
 
-    Least squares on :math:`e = m \dot x - balance - friction`; where e is affine in the unknowns
-    this is the linear regression :math:`e = W \pi - y` and needs no start. With instruments,
+    Least squares on :math:`e = m \dot x - balance - friction`; if e is affine in the unknowns,
+    this is the linear regression :math:`e = W \pi - y`, which needs no start. With instruments,
     the estimate solves :math:`Z^T e = 0` with Z the derivatives of e along a simulated motion
     without measurement noise: it stays unbiased even if W contains noise.
 
@@ -170,7 +170,7 @@ def inverse_dynamics(
         Frequency up to which the equation is valid [Hz]: residuals are low-passed and decimated
         to about twice that, so that they are independent. None for unfiltered samples.
     instruments
-        A simulation of the same experiment, filtered alike.
+        A simulation of the same experiment, filtered in the same way.
     weights
         Weight of each sample, the inverse of its variance up to a factor, shape (n,); equal by
         default.
@@ -204,7 +204,7 @@ def inverse_dynamics(
         e, W = rows(seen)
         if len(e) <= len(values):
             raise ParameterError(
-                f"only {len(e)} samples move faster than {equation.slowest:g}, too few for "
+                f"only {len(e)} samples are faster than {equation.slowest:g}, which is too few for "
                 f"{len(values)} unknowns. Record more motion, or reduce the slowest speed",
                 name="slowest",
                 value=f"{equation.slowest:g}",
@@ -254,7 +254,7 @@ def _require_told(W: Array, unknowns: Sequence[Unknown]) -> None:
             "moves. Excite it, or treat it as known",
             name=", ".join(silent),
         )
-    _, s, V = np.linalg.svd(W / size, full_matrices=False)  # U would have samples squared
+    _, s, V = np.linalg.svd(W / size, full_matrices=False)  # the full U is n by n
     if s[-1] < 1e-10 * s[0]:
         together = [u.label for u, v in zip(unknowns, V[-1], strict=True) if abs(v) > 0.1]
         raise ParameterError(
@@ -294,8 +294,8 @@ _FEWEST = 4  # samples of a window
 class Window:
     """Samples of steady motion.
 
-    ``rows``: indices of the samples; ``motion``: number of their motion, from one reversal to the
-    next.
+    ``rows``: indices of the samples; ``motion``: number of the motion between two reversals that
+    contains them.
     """
 
     rows: slice
@@ -307,8 +307,8 @@ def windows(
 ) -> list[Window]:
     """Return windows within the motions of a signal.
 
-    ``omega``: speed, shape (n,); ``interval``: sample time [s]; ``slowest``: least speed of a
-    motion; ``margin``: time excluded at either end of a motion [s]; ``length``: time of a window
+    ``omega``: speed, shape (n,); ``interval``: sample time [s]; ``slowest``: minimum speed of a
+    motion; ``margin``: time excluded at each end of a motion [s]; ``length``: length of a window
     [s].
     """
     way = np.where(np.abs(omega) > slowest, np.sign(omega), 0.0)
@@ -370,7 +370,7 @@ def window_residuals(
 def steady_dynamics(parts: Sequence[Problem], unknowns: Sequence[Unknown], advice: str) -> Estimate:
     """Solve the averaged equations of several bodies for their common parameters.
 
-    Every part is weighted by its own scatter from a first fit.
+    The scatter of each part in a first fit determines its weight.
 
     ``parts``: results of ``window_residuals`` for the same unknowns; ``advice``: a more
     informative experiment.

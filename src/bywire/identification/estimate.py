@@ -35,7 +35,7 @@ class Part:
     size
         Largest magnitude of the signal [unit].
     numerical
-        Root mean square of the change by half the simulation step [unit].
+        Root mean square of the change at half the simulation step [unit].
     """
 
     name: str
@@ -66,7 +66,7 @@ class Leftover:
     noise
         Assumed standard deviation [unit], or None.
     spread, size, numerical
-        As of its `Part` [unit].
+        See `Part` [unit].
     """
 
     label: str
@@ -84,7 +84,7 @@ class Leftover:
 
     @property
     def is_rounding(self) -> bool:
-        """Whether the residual is below the resolution: the record is the model's own."""
+        """Whether the residual is below the resolution, so the model itself made the record."""
         return self.rms <= _RESOLVED * max(self.size, self.spread)
 
     @property
@@ -102,23 +102,23 @@ class Leftover:
 
     @property
     def over_noise(self) -> float:
-        """Rms over the noise that the residuals' own third differences show.
+        """Ratio of rms to the noise that the residuals' third differences show.
 
-        About 1 for noise. A wrong model leaves more: slow residuals, which differences hardly
-        contain. NaN for too few residuals.
+        About 1 for noise. A wrong model leaves slow residuals, which third differences hardly
+        contain, so the ratio is larger. NaN for too few residuals.
         """
         if self.residuals.size < _FEWEST:
             return math.nan
-        # Of white noise they have 20 times the variance. Their mean square, not their median: what
-        # an encoder rounds rests from sample to sample, and jumps.
+        # Third differences of white noise have 20 times its variance. The mean square, not the
+        # median: a rounded encoder signal is constant between jumps.
         noise = math.sqrt(float(np.mean(np.diff(self.residuals, 3) ** 2)) / 20.0)
         return self.rms / noise if noise > 0.0 else math.nan
 
 
 # --- Estimates
 
-_AT = 1e-6  # of an unknown's scale: closer to a bound counts as at it
-_INDISTINCT = 0.05  # of a standard deviation: closer to a bound, the two are equal
+_AT = 1e-6  # of an unknown's scale: a value this close to a bound is at the bound
+_INDISTINCT = 0.05  # of a standard deviation: likewise
 
 
 @dataclass(frozen=True)
@@ -153,8 +153,8 @@ class Estimate:
         Singular values of the Jacobian per unknown's scale, shape (p,), largest first. A small one
         means a combination that the data hardly determine.
     residuals
-        Computed minus measured over the noise, shape (n,): of size one if the noise is as assumed.
-        They are not weighted by a robust loss.
+        Computed minus measured, divided by the noise, shape (n,): about one if the noise is as
+        assumed. A robust loss does not weight them.
     freedom
         Degrees of freedom: independent residuals minus unknowns.
     colored
@@ -206,7 +206,7 @@ class Estimate:
 
     def intervals(self, level: float = 0.95) -> Array:
         """Return the confidence intervals (Student's t), shape (p, 2)."""
-        from scipy import special  # of which stats is made, and takes long to load
+        from scipy import special  # loads much faster than scipy.stats
 
         t = float(special.stdtrit(max(self.freedom, 1.0), 0.5 + 0.5 * level))
         reach = t * self.deviations
@@ -233,11 +233,11 @@ class Estimate:
             if u.label in bounds:
                 reasons[u.label] = f"is at its bound, {shown(bounds[u.label], u.unit)}"
             elif half > abs(value):
-                reasons[u.label] = f"is {value:.3g} +- {half:.2g} {u.unit}: it may be zero"
+                reasons[u.label] = f"is {value:.3g} +- {half:.2g} {u.unit}, so it may be zero"
         return reasons
 
     def noted(self, notes: tuple[str, ...]) -> Estimate:
-        """Return the estimate with more notes."""
+        """Return the estimate with additional notes."""
         return replace(self, notes=(*self.notes, *notes))
 
     def __getitem__(self, name: str) -> float:
@@ -295,7 +295,7 @@ class Estimate:
 
     @property
     def is_exact(self) -> bool:
-        """Whether the residual is only rounding: the record is the model's own."""
+        """Whether the residual is only rounding, so the model itself made the record."""
         leftovers = self.leftovers()
         return bool(leftovers) and all(left.is_rounding for left in leftovers)
 

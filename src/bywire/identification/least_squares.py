@@ -30,16 +30,16 @@ from bywire.identification.unknown import Unknown
 
 Loss = Literal["linear", "soft_l1", "huber", "cauchy"]
 
-_LEAST = 1e-2  # mean slope of the influence
+_LEAST = 1e-2  # minimum mean slope of the influence
 
 
 def rho(z: Array, loss: Loss) -> Array:
-    r"""Return a loss and its first two derivatives by the squared residual.
+    r"""Return a loss and its first two derivatives with respect to the squared residual.
 
     Parameters
     ----------
     z
-        Squared residuals over the assumed noise, shape (n,).
+        Squares of the residuals divided by the assumed noise, shape (n,).
     loss
         ``linear`` :math:`z`; ``soft_l1`` :math:`2(\sqrt{1+z}-1)`; ``huber`` :math:`z` up to one,
         :math:`2\sqrt z-1` beyond; ``cauchy`` :math:`\ln(1+z)`.
@@ -65,7 +65,7 @@ def rho(z: Array, loss: Loss) -> Array:
 
 
 def _of_data_alone(loss: Loss, apart: int) -> Any:
-    """Return the loss for SciPy; the last rows, prior knowledge, keep their squares.
+    """Return the loss for SciPy; the last rows are prior knowledge, with the square as loss.
 
     Parameters
     ----------
@@ -82,9 +82,10 @@ def _of_data_alone(loss: Loss, apart: int) -> Any:
 
 
 def influence(r: Array, loss: Loss) -> tuple[Array, Array]:
-    r"""Return :math:`\psi(r) = r \rho'(r^2)` and its derivative by r, each of shape (n,).
+    r"""Return :math:`\psi(r) = r \rho'(r^2)` and its derivative, each of shape (n,).
 
-    Half the loss of :math:`z = r^2` is minimized: :math:`\psi` is its derivative by r.
+    The fit minimizes half the loss of :math:`z = r^2`; :math:`\psi` is the derivative of this half
+    with respect to r.
 
     References
     ----------
@@ -103,7 +104,7 @@ def _bread(slopes: Array, unknowns: int) -> float:
     Parameters
     ----------
     slopes
-        Derivatives of the influence by the residual, shape (n,).
+        Derivatives of the influence with respect to the residual, shape (n,).
     unknowns
         p.
 
@@ -131,22 +132,22 @@ class Problem:
         Varied unknowns; p of them.
     evaluate
         ``evaluate(values) -> (residuals, jacobian)``, shapes (n,) and (n, p), weighted so that
-        residuals are of size one if the noise is as assumed.
+        residuals are about one if the noise is as assumed.
     apart
-        Number of last rows that are independent of all others and correctly weighted.
+        Number of last rows that are independent of all others and already weighted.
     instrument
-        Whether the Jacobian is of a model without the noise of measured inputs, while the residuals
-        contain it. The estimate then solves for a zero product of the two, which avoids the bias of
-        least squares.
+        Whether the Jacobian comes from a model without the noise of measured inputs, while the
+        residuals contain this noise. The estimate then makes the product of the two zero, which
+        avoids the bias of least squares.
     silent
-        Reasons why no output may depend on an unknown, by name: what is switched off.
+        By name, reasons why no output may depend on an unknown, such as a model that is off.
     parts
         Groups of residuals, in their order; all in one by default.
     finer
         Like ``evaluate``, with half the simulation step; None without a simulation.
     resolved
-        Share of the cost, and of the unknowns, below which a search only follows the roughness of
-        the residuals or of a Jacobian by differences.
+        Fraction of the cost, and of the unknowns, below which a search would only follow the
+        roughness of the residuals or of a finite-difference Jacobian.
     """
 
     unknowns: tuple[Unknown, ...]
@@ -192,9 +193,9 @@ def _cost_of(problem: Problem, values: Array, loss: Loss = "linear") -> float:
 
 
 # --- Effect of the simulation step on estimates: their first-order shift at half the step
-# At the minimum the weighted residuals r are orthogonal to their derivatives J. With the residuals
-# r' of half the step they are not, and one Gauss-Newton step leads to the minimum there,
-# dx = -J^+ (r' - r): three quarters of the error of the whole step, at second order.
+# At the minimum, the weighted residuals r are orthogonal to their derivatives J. The residuals r'
+# at half the step are not. One Gauss-Newton step, dx = -J^+ (r' - r), leads to their minimum. For
+# a second-order method, it is three quarters of the error at the full step.
 
 _SMALL = 1e-6  # of an unknown's scale: smaller errors are negligible
 
@@ -207,7 +208,7 @@ def _with_step_share(
     Parameters
     ----------
     problem
-        With residuals at half the step; without them there are no errors and no warnings.
+        The problem. Without its residuals at half the step, there are no errors and no warnings.
     best
         The estimate at the minimum.
     J
@@ -231,7 +232,7 @@ def _with_step_share(
         finer = problem.finer(best.values)[0]
         difference = np.zeros(len(J))
         difference[:count] = finer - best.residuals
-    except (*NO_ESTIMATE, ValueError) as error:  # a ValueError: other rows count in half steps
+    except (*NO_ESTIMATE, ValueError) as error:  # ValueError: at half the step, other rows count
         return best, (f"the effect of the step on the estimates is unknown: {error}",)
     weights = np.ones(len(J))
     measured = count - problem.apart
@@ -273,9 +274,9 @@ def _exceeding(best: Estimate, errors: Array) -> list[str]:
 
 NO_TRIAL = (SolverError, ParameterError)
 """errors of trials whose values violate the model or the rules of its parameters"""
-_NEWTON = 8  # steps from the least sum to the solution of the instruments
-_WORSE = 0.02  # of the least sum of squares: more is another minimum
-_NEAR = 1e-2  # of the scale: how far from a bound a search with bounds may stop short of it
+_NEWTON = 8  # steps from the least-squares minimum to the instrumental-variable solution
+_WORSE = 0.02  # of the lowest cost: a larger increase means another minimum
+_NEAR = 1e-2  # of the scale: distance from a bound at which a bounded search may stop
 
 
 @dataclass(frozen=True)
@@ -304,11 +305,11 @@ def solve(
     start
         Start values, shape (p,).
     loss
-        Loss of the residuals; beyond size one a robust loss grows more slowly.
+        Loss of the residuals; above one, a robust loss grows more slowly.
     most
-        Limit of evaluations.
+        Maximum number of evaluations.
     share
-        Share of the cost: the search ends when a step gains less.
+        Fraction of the cost: the search ends when a step reduces the cost by less.
 
     Raises
     ------
@@ -336,7 +337,7 @@ def solve(
     def residuals(z: Array) -> Array:
         try:
             return both(z)[0]
-        except NO_TRIAL:  # the step diverged or left the model's range: a shorter one follows
+        except NO_TRIAL:  # the step diverged or left the model's range; a shorter step follows
             return np.full(cache_size[0], 1e6)
 
     def jacobian(z: Array) -> Array:
@@ -381,7 +382,7 @@ def _at_bounds(problem: Problem, solution: Solution, loss: Loss) -> Solution:
 
 
 def _solved(problem: Problem, begin: Array, loss: Loss) -> Solution:
-    """Return the nearest minimum, or the instruments' solution if the Jacobian is one."""
+    """Return the nearest minimum, or the instrumental-variable solution."""
     solution = solve(problem, begin, loss)
     if not problem.instrument:
         return solution
@@ -404,7 +405,7 @@ def _solved(problem: Problem, begin: Array, loss: Loss) -> Solution:
 def estimate(
     problem: Problem, loss: Loss = "linear", start: Array | None = None, *, search: bool = True
 ) -> Estimate:
-    """Return the estimate with its uncertainty; undetermined unknowns are kept and named.
+    """Return the estimate with its uncertainty, and list undetermined unknowns.
 
     Parameters
     ----------
@@ -415,7 +416,7 @@ def estimate(
     start
         Start values; the unknowns' starts by default.
     search
-        False if these values are a minimum already.
+        False if these values are already a minimum.
 
     Raises
     ------
@@ -446,7 +447,7 @@ def estimate(
         problem = problem.held(index)
         if not problem.unknowns:
             raise ParameterError(
-                f"the data determine none of {', '.join(k.unknown.label for k in kept)}: for "
+                f"the data determine none of {', '.join(k.unknown.label for k in kept)}. For "
                 f"{kept[0].unknown.label}, {kept[0].reason}. "
                 f"{advice(best, kept[0].unknown.name in problem.silent)}",
                 name=", ".join(k.unknown.label for k in kept),
@@ -460,8 +461,8 @@ def _at_minimum(problem: Problem, solution: Solution, loss: Loss) -> tuple[Estim
     data = r.size - priors
     if data <= len(problem.unknowns):
         raise ParameterError(
-            f"{data} measured values cannot determine {len(problem.unknowns)} unknowns. Measure "
-            "more",
+            f"{data} measured values cannot determine {len(problem.unknowns)} unknowns. Record "
+            "more data",
             name="unknowns",
             value=str(len(problem.unknowns)),
         )

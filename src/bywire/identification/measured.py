@@ -22,10 +22,10 @@ from bywire.data.column_units import measures, unit_of_symbol
 from bywire.data.mapping import MeasurementMapping, read_mapping
 from bywire.data.named_columns import NamedColumns, read_named, renamed
 
-_ROUNDED = 0.05  # of the samples equal the previous one: quantization by a converter
+_ROUNDED = 0.05  # fraction of samples equal to the previous one if a converter quantizes
 _LARGER = 1.5  # times the noise
 _SURE = 2.5  # standard errors of a correlation
-FAR = 4.0  # standard deviations: of white noise 1 in 16 000 lies beyond
+FAR = 4.0  # standard deviations: 1 in 16 000 samples of white noise is larger
 
 
 def noise_of(values: Array) -> float:
@@ -49,13 +49,13 @@ def determines_its_noise(values: Array) -> bool:
 
     Neighboring differences have a correlation of -3/4 if the noise is white. Toward 1, the signal
     itself dominates. Toward -1, it alternates between samples: a coarse record, or dither near half
-    the sample rate. The correlation follows from the share of neighbors with equal signs, so that
-    slips do not count. The noise is undetermined if such a signal would inflate it by half.
+    the sample rate. The correlation follows from the fraction of neighbors with equal signs, so
+    slips do not matter. The noise is undetermined if such a signal would inflate it by half.
 
     Parameters
     ----------
     values
-        Shape (n,). A signal that a converter has rounded repeats values, and is accepted.
+        Shape (n,). A signal that a converter has rounded repeats values, which is accepted.
     """
     if float(np.mean(np.diff(values) == 0.0)) > _ROUNDED:
         return True
@@ -63,7 +63,7 @@ def determines_its_noise(values: Array) -> bool:
     product = np.sign(third[1:] * third[:-1])
     correlation = np.sin(0.5 * np.pi * float(np.mean(product)))  # of Gaussian neighbors
     reach = _SURE / np.sqrt(product.size)
-    # Noise of share 1 - a, and a signal of correlation 1 or -1, make it 1 / sqrt(1 - a) times.
+    # A fraction 1 - a of noise, with a signal of correlation 1 or -1: too large by 1 / sqrt(1 - a).
     a = 1.0 - 1.0 / _LARGER**2
     low, high = -max(0.25 * a, reach), max(1.75 * a, reach)
     return bool(low <= correlation + 0.75 <= high)
@@ -72,7 +72,7 @@ def determines_its_noise(values: Array) -> bool:
 def robust_scale(residuals: Array) -> float:
     """Return the standard deviation from the median magnitude, for a Gaussian distribution.
 
-    It is about zero, not about the median, since an offset of the residuals is an error too.
+    Magnitudes are relative to zero, not to the median, since an offset is an error too.
 
     References
     ----------
@@ -92,8 +92,8 @@ def outliers(residuals: Array) -> NDArray[np.bool_]:
 # --- Records
 # Several records of one experiment follow one another in one measurement. The signal ``record``
 # numbers them, 0, 1, ...; its attribute ``flag_meanings`` names them, as the Climate and Forecast
-# conventions write it; ``begins`` says when each began on its own clock, while they are in memory.
-# Time goes on from one record to the next, so that any file can hold them.
+# conventions specify; ``begins`` contains, in memory only, the start of each on its own clock.
+# Time continues from one record to the next, so any file format can store them.
 
 RECORD = "record"
 """the signal that numbers the records"""
@@ -188,8 +188,8 @@ def after_one_another(times: Mapping[str, Array]) -> dict[str, Any]:
     Parameters
     ----------
     times
-        By record: instants within it [s], shape (n_k,), ascending; not all of its samples need
-        be there. A single record without a name gets no ``record``.
+        By record: its times [s], shape (n_k,), ascending; samples may be missing. A single record
+        without a name gets no ``record``.
     """
     begin, axis, names = 0.0, [], []
     for name, t in times.items():
@@ -199,7 +199,7 @@ def after_one_another(times: Mapping[str, Array]) -> dict[str, Any]:
         names += [name] * t.size
     attrs = {
         "units": "s",
-        "long_name": "time, records in a row" if len(times) > 1 else "time",
+        "long_name": "time, records joined" if len(times) > 1 else "time",
     }
     coordinates: dict[str, Any] = {"time": ("time", np.concatenate(axis), attrs)}
     if len(times) > 1:
@@ -213,7 +213,7 @@ _UNEVEN = 1e-3  # of a step
 _FEWEST = 10  # samples that determine the noise
 _NOT_NAMED = NamedColumns()
 NOISE_OF_SAMPLES = "noise_of_samples"
-"""attribute of a signal that was resampled: noise of the samples before, SI"""
+"""attribute of a resampled signal: noise of the original samples, SI"""
 
 
 @dataclass(frozen=True)
@@ -264,7 +264,7 @@ def measured(
     gaps
         Whether samples may be missing.
     named
-        Columns that the user names.
+        Columns that the user specifies.
     progress
         Callback with a label and the finished share.
 
@@ -370,10 +370,10 @@ def as_even(
 
 def _said(report: AlignmentReport) -> str:
     missing = max(channel.excluded for channel in report.channels)
-    left_out = f", of which {missing} are in gaps and not used" if missing else ""
+    left_out = f". {missing} of them are in gaps and not used" if missing else ""
     return (
-        f"resampled, because its samples are not evenly spaced, to {report.samples} samples every "
-        f"{1e3 * report.interval:.6g} ms{left_out}"
+        f"resampled to {report.samples} samples every {1e3 * report.interval:.6g} ms, because its "
+        f"samples are not evenly spaced{left_out}"
     )
 
 
@@ -404,5 +404,7 @@ def wrong_sign(signal: str, other: str, evidence: str) -> ParameterError:
     """
     return ParameterError(
         f"{signal} moves against {other} ({evidence}). One of them has the wrong sign. Set "
-        "sign = -1 for it in the mapping"
+        "sign = -1 for this one in the mapping",
+        name=signal,
+        value=evidence,
     )

@@ -25,13 +25,13 @@ class Effort:
     starts
         Number of starts; the first is the parameter set's own.
     spread
-        Distance of the others from the first, as a share.
+        Distance of the others from the first, as a fraction.
     seed
         Seed of their random numbers.
     threads
         Number of threads; all cores by default.
     store
-        File that keeps finished starts across an interrupt.
+        File that saves finished starts, so that an interrupted search can continue.
     progress
         Callback with a label and the finished share.
     """
@@ -82,7 +82,7 @@ class Check:
 
 @dataclass(frozen=True)
 class Curve:
-    """Measured beside modeled, or a characteristic with its band.
+    """Measured and modeled signal, or a characteristic with its band.
 
     Parameters
     ----------
@@ -159,24 +159,24 @@ class Method:
     unknowns
         Names of the parameters that it can estimate.
     several
-        Whether data may contain several records, see ``bywire.identification.measured``. Each is
+        Whether data may contain several records (see ``bywire.identification.measured``). Each is
         evenly spaced, and the method splits them.
     gaps
         Whether it accepts missing samples (NaN).
     optional
         Signals that it uses if they are measured: name -> SI unit.
     truth
-        ``truth(par, options) -> {label: value}``: true values in ``synthetic`` of estimates that
+        ``truth(par, options) -> {label: value}``: true values in ``synthetic`` for estimates that
         are not parameters of the assembly.
     further
-        Estimates that are not parameters of the assembly: name -> SI unit (empty where it is the
-        data's) and meaning, for listings.
+        Estimates that are not parameters of the assembly: name -> SI unit (empty if it is that of
+        the data) and meaning, for listings.
     simulated
         Options that only ``synthetic`` uses.
     bench_note
         Limitation of a bench with the identified values.
     bench
-        Bench whose parameters it estimates, if it is made for one.
+        Bench whose parameters it estimates, if it is for a particular bench.
     key
         Additional text that distinguishes its simulated experiments from those of other methods.
     """

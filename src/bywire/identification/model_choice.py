@@ -1,6 +1,6 @@
 r"""Choice among several models by their prediction of held-out data.
 
-Information criteria are also given, with the likelihood of correlated residuals
+The result also contains information criteria, with the likelihood of correlated residuals
 (an autoregressive model of the richest candidate's residuals): :math:`AIC = n \ln s^2 + 2 k`,
 :math:`BIC = n \ln s^2 + k \ln n`.
 """
@@ -24,7 +24,7 @@ from bywire.identification.unknown import Unknown
 
 Predict = Callable[[xr.Dataset, Array], tuple[Array, Array]]
 
-_BLOCKS = 10  # of a single record
+_BLOCKS = 10  # per record
 _FOLDS = 5
 _RECORDS = 3  # least number of records to hold out whole ones
 
@@ -63,7 +63,7 @@ class Judged:
         Mean over the folds of its held-out error minus that of the best candidate, and the
         standard error of that mean.
     aic, bic
-        Smaller is better; differences count.
+        Information criteria: smaller is better, and only differences matter.
     """
 
     candidate: Candidate

@@ -68,9 +68,9 @@ def multistart(
     problem
         Problem of your own model: ``output_error(trials, unknowns)``, or written by hand.
     count
-        Number of starts: the unknowns' own, then others around it.
+        Number of starts: the unknowns' own start, then others around it.
     spread
-        Largest distance of the others, as a share of the start.
+        Maximum distance of the others, as a fraction of the start.
     seed
         Seed of their random numbers.
     loss
@@ -78,7 +78,7 @@ def multistart(
     progress
         Callback with a label and the finished share.
     store
-        File that keeps every finished start.
+        File that saves every finished start.
 
     Returns
     -------
@@ -96,7 +96,7 @@ def multistart(
     led = search(problem, starts, loss, progress, store)
     note = f"{led.reached} of {count} starts reached the lowest minimum"
     if led.reached == 1 < count:
-        note += ". There may be a lower one. Use more starts, narrower bounds or fewer unknowns"
+        note += ". A lower minimum may exist. Use more starts, narrower bounds or fewer unknowns"
     return estimate(problem, loss, led.best.values).noted((note,))
 
 
@@ -120,19 +120,19 @@ def search(
     progress
         Callback with a label and the finished share.
     store
-        File that keeps every finished start; a search with the same residuals and starts
+        File that saves every finished start; a search with the same residuals and starts
         continues from there.
     threads
         Number of threads; all cores by default.
     before
-        First brings each start closer to a minimum.
+        Function that first brings each start closer to a minimum.
 
     Raises
     ------
     SolverError
         When no start could be computed.
     ParameterError
-        Likewise, if the parameters' rules reject the starts.
+        When the parameters' rules reject the starts.
     KeyboardInterrupt
         When interrupted; finished starts are in the store.
     """
@@ -179,7 +179,7 @@ def search(
 
 
 def nearer(problem: Problem, held: Collection[str], start: Array) -> Array:
-    """Return the result of a start with some unknowns, by name, held."""
+    """Return the end of a search that holds some unknowns, listed by name, at their starts."""
     fixed = [k for k, u in enumerate(problem.unknowns) if u.name in held]
     rest = replace(problem, unknowns=moved(problem.unknowns, start))
     for k in reversed(fixed):

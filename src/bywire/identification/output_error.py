@@ -34,7 +34,7 @@ Start = Callable[[Mapping[str, float]], tuple[Any, Any]]
 """``start(values) -> (state, memory)``: start of a run with changed parameters and start options
 (``start.NAME``)"""
 
-_SHIFT = 1e-6  # of an unknown's scale: for differences of the start
+_SHIFT = 1e-6  # of an unknown's scale: step for differences of the start
 _AFTERWARDS = ("initial.", "stimulus.")  # prefixes of unknowns that do not affect the start
 
 
@@ -74,19 +74,19 @@ def _start_slopes(
 ) -> tuple[Array, Array]:
     """Return derivatives of the initial state and memory, shapes (states, p) and (memories, p).
 
-    By central differences, one-sided at the end of a range: equilibria are smooth, and computed
-    to rounding. What ``initial.STATE`` replaces does not move.
+    They are central differences, one-sided at the end of a range, because equilibria are smooth
+    and accurate to rounding. States that ``initial.STATE`` replaces do not move.
 
     Parameters
     ----------
     start
-        Where the run begins.
+        Start of the run.
     run
-        Begins there.
+        Run that begins there.
     unknowns
-        Of the run; p of them.
+        Unknowns of the run; p of them.
     values
-        By name.
+        Values by name.
     """
     rest = {n: v for n, v in values.items() if not n.startswith(_AFTERWARDS)}
     fields = run.model.State._fields
@@ -108,41 +108,41 @@ def _start_slopes(
     return slopes[: len(fields)], slopes[len(fields) :]
 
 
-# --- A model under measured inputs alone: no controller, no energy balance
+# --- A model driven by measured inputs alone: no controller, no energy balance
 
 
 class NoPower(NamedTuple):
-    """No energy is booked."""
+    """No power: the model has no energy balance."""
 
     none: Annotated[float, Signal("W", "no power")]
 
 
 class Driven(Model):
-    """A model whose inputs were measured; a subclass has ``name``, ``State`` and ``Input``.
+    """A model with measured inputs; a subclass defines ``name``, ``State`` and ``Input``.
 
-    It also has ``mass`` and ``balance``, which gets an ``Input`` as its memory; what it
-    shows are its states unless it has an ``Output`` and ``output`` of its own. Inputs hold for
-    ``par.T_s``, the sample time, or for what ``period`` returns.
+    It also defines ``mass`` and ``balance``, which receives an ``Input`` as its memory. The
+    outputs are the states unless it defines its own ``Output`` and ``output``. Inputs are held for
+    the sample time ``par.T_s``, or for the time that ``period`` returns.
     """
 
     Flow: ClassVar = NoPower
-    Memory: ClassVar[Any] = NoPower  # these three are set where a subclass names its own types
+    Memory: ClassVar[Any] = NoPower  # these three are replaced if a subclass defines its own types
     Stimulus: ClassVar[Any] = NoPower
     Output: ClassVar[Any] = NoPower
 
     def __init_subclass__(cls, **options: Any) -> None:
-        """Take the inputs for stimuli and for what is held, and the states for outputs."""
+        """Use the inputs as stimuli and as memory, and the states as outputs."""
         super().__init_subclass__(**options)
         for kind, source in (("Memory", "Input"), ("Stimulus", "Input"), ("Output", "State")):
             if source in vars(cls) and kind not in vars(cls):
                 setattr(cls, kind, vars(cls)[source])
 
     def period(self, par: Any) -> float:
-        """Return for how long an input is held [s]."""
+        """Return the hold time of an input [s]."""
         return float(par.T_s)
 
     def tasks(self, par: Any) -> tuple[Task, ...]:
-        """Return the one that holds a sample."""
+        """Return the task that holds a sample."""
         return (Task("held", self.period(par), lambda x, m, u, par: u),)
 
     @abstractmethod
@@ -151,7 +151,7 @@ class Driven(Model):
 
     @abstractmethod
     def balance(self, x: Any, xe: Any, memory: Any, par: Any, contact: tuple[float, ...]) -> Any:
-        """Return the smooth right-hand side, a State; ``memory`` are the inputs."""
+        """Return the smooth right-hand side, a State; ``memory`` contains the inputs."""
 
     def powers(
         self,
@@ -163,7 +163,7 @@ class Driven(Model):
         contact: tuple[float, ...],
         reaction: tuple[float, ...],
     ) -> NoPower:
-        """Return none."""
+        """Return no power."""
         return NoPower(0.0 * x[0])
 
     def output(
@@ -182,33 +182,33 @@ class Driven(Model):
 # --- Residuals of output error
 
 Between = Literal["held", "linear"]
-"""what measured inputs do between samples"""
+"""measured inputs between samples"""
 
 UNEVEN = 1e-3
-"""of a step: how far instants may lie off an even grid"""
+"""maximum distance of times from an even grid, as a fraction of its step"""
 
-_DIGITS = (1, 2, 3, 4)  # of an interval that somebody chose
+_DIGITS = (1, 2, 3, 4)  # number of digits of an interval that a person chose
 
 
 @dataclass(frozen=True)
 class Trial:
-    """One measured experiment beside its model.
+    """A measured experiment with its model.
 
     Parameters
     ----------
     run
-        The model with its measured inputs; recorded at the instants of the measurement.
+        The model with its measured inputs, recorded at the times of the measurement.
     measured
-        Measured outputs by the model's names, each of shape (rows,), SI; NaN is left out.
+        Measured outputs by the model's names, each of shape (rows,), SI; NaN is ignored.
     noise
         Standard deviation of each measured output, SI.
     label
-        What names it among several.
+        Label of the trial, if there are several.
     used
         Rows that count, shape (rows,); all by default.
     start
-        ``start(values) -> (state, memory)``: where the run begins with unknowns changed, by
-        name; by default always where ``run`` does. It takes ``start.NAME`` as well.
+        ``start(values) -> (state, memory)``: start of the run for changed unknowns, by name; by
+        default always the start of ``run``. It also accepts ``start.NAME``.
     """
 
     run: Run
@@ -237,7 +237,7 @@ def trial(
     label: str = "",
     between: Between = "held",
 ) -> Trial:
-    """Return a measured experiment beside its model.
+    """Return a measured experiment with its model.
 
     Parameters
     ----------
@@ -250,13 +250,13 @@ def trial(
     outputs
         Output of the model, measured under the same name -> standard deviation of its noise.
     state, memory
-        Where the run begins; zeros by default, but for what is measured under a state's name.
+        Start of the run; by default zero, or the first sample of a signal with a state's name.
     step
         Substep [s].
     between
-        What inputs do between samples. What a controller sets is held until it sets it again. What
-        is smooth and was only read now and then, held, acts half a sample late: ``linear`` gives
-        every held value the mean of the line through the samples over the time that it holds.
+        Inputs between samples. A controller holds its demand until it sets a new one. A smooth
+        input that is held between slow samples acts half a sample late: ``linear`` replaces every
+        held value by the mean, over its hold time, of the line through the samples.
 
     Raises
     ------
@@ -296,7 +296,7 @@ def trial(
 
 
 def initial_states(trial: Trial, names: Sequence[str]) -> tuple[Unknown, ...]:
-    """Return initial states of a trial as unknowns that begin where its run begins.
+    """Return initial states of a trial as unknowns that start at its run's values.
 
     Raises
     ------
@@ -319,9 +319,9 @@ def initial_states(trial: Trial, names: Sequence[str]) -> tuple[Unknown, ...]:
 def even_interval(t: Array) -> float:
     """Return the interval of evenly spaced times [s].
 
-    Instants may lie off an even grid by a thousandth of its step, as clocks jitter and round. The
-    interval is the number of fewest digits whose grid they lie on: 24 ns of jitter at 1 kHz do
-    not make a step of 0.999999922 ms, which nothing divides.
+    Times may deviate from an even grid by a thousandth of its step, since clocks jitter and round.
+    The interval is the number with the fewest digits whose grid fits the times: 24 ns of jitter at
+    1 kHz must not result in a step of 0.999999922 ms, which no other step divides.
 
     Raises
     ------
@@ -342,8 +342,8 @@ def even_interval(t: Array) -> float:
     if np.abs(steps - middle).max() <= UNEVEN * middle:  # a clock that drifts
         return usual
     raise ParameterError(
-        f"time is not evenly spaced (steps of {steps.min():g} to {steps.max():g} s, and instants "
-        f"off an even grid by more than {UNEVEN:g} of the step). Resample the record first, with "
+        f"time is not evenly spaced: its steps are {steps.min():g} to {steps.max():g} s, and it "
+        f"deviates from an even grid by more than {UNEVEN:g} of the step. Resample it first with "
         f'bywire.resample(data, "{1e3 * float(f"{middle:.3g}"):g} ms")',
         name="time",
     )
@@ -370,15 +370,15 @@ def output_error(trials: Sequence[Trial], unknowns: Sequence[Unknown]) -> Proble
     Parameters
     ----------
     trials
-        Of models with the same kind of parameters.
+        Trials of models with the same kind of parameters.
     unknowns
-        Parameters, which all trials share unless they name a trial; ``initial.STATE``,
-        ``stimulus.NAME``, ``offset.SIGNAL`` and, with a start of its own, ``start.NAME``.
+        Parameters, which all trials share unless they specify a trial; also ``initial.STATE``,
+        ``stimulus.NAME``, ``offset.SIGNAL`` and, for a trial with ``start``, ``start.NAME``.
 
     Raises
     ------
     UnknownNameError
-        When an unknown names nothing of its trial.
+        When an unknown does not exist in its trial.
     """
     labels = [t.label for t in trials]
     for unknown in unknowns:
@@ -399,7 +399,7 @@ def output_error(trials: Sequence[Trial], unknowns: Sequence[Unknown]) -> Proble
 
 
 def _parts(trials: Sequence[Trial]) -> Iterator[Part]:
-    """Yield what the residuals of each output and trial are of, in their order."""
+    """Yield a description of the residuals of each output and trial, in their order."""
     for trial in trials:
         signals = signals_of(trial.run.model.Output)
         for name, values in trial.measured.items():
@@ -412,7 +412,7 @@ def _parts(trials: Sequence[Trial]) -> Iterator[Part]:
 
 
 def _residuals(trial: Trial, unknowns: Sequence[Unknown], values: Array) -> tuple[Array, Array]:
-    """Return computed less measured, over the noise, and its derivatives."""
+    """Return computed minus measured, divided by the noise, and its derivatives."""
     places = [k for k, u in enumerate(unknowns) if u.trial in ("", trial.label)]
     moving = [k for k in places if not unknowns[k].name.startswith("offset.")]
     signals = tuple(trial.measured)
@@ -438,7 +438,7 @@ def _computed(
     named = {u.name: float(v) for u, v in zip(unknowns, values, strict=True)}
     try:
         run = moved_run(trial.run, named, trial.start)
-    except ParameterError as error:  # bounds of several parameters together: a step too far
+    except ParameterError as error:  # the step was too large: it violates a rule between parameters
         raise SolverError(str(error)) from None
     if not unknowns:
         computed = simulate(run, signals).values

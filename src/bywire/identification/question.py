@@ -91,7 +91,7 @@ class Question:
 
     @property
     def columns(self) -> dict[str, str]:
-        """Column of each output that names one, as written."""
+        """Column of each output for which the user specified one, as written."""
         texts = {name: _column_and_noise(text)[0] for name, text in _texts_of(self.outputs).items()}
         return {name: column for name, column in texts.items() if column}
 
@@ -107,7 +107,7 @@ class Question:
 
     @property
     def given(self) -> tuple[str, ...]:
-        """Names of the fields that were given."""
+        """Names of the fields that the user specified."""
         options = {
             "bench": self.bench is not None,
             "inputs": self.inputs,
@@ -198,16 +198,16 @@ class Options(ParameterSet):
     loss: Loss
     """loss of the residuals: beyond the noise, a robust loss grows more slowly than the square"""
     between: Between
-    """inputs between samples: held, as a controller's demand, or linear, for smooth inputs that
-    act on the model faster than they were measured"""
+    """inputs between samples: held, for a controller's demand, or linear, for smooth inputs that
+    the model reads faster than they were measured"""
     most_residual: Factor
     """ratio of residual to noise above which the model does not explain the record"""
     most_outliers: Share
-    """maximum share of residuals beyond four times the noise that a robust loss may exclude"""
+    """maximum fraction of residuals beyond four times the noise that a robust loss may exclude"""
     least_vaf: Share
-    """least variance accounted for in the held-out record, for each signal"""
+    """minimum variance accounted for in the held-out record, for each signal"""
     noise: Share
-    """synthetic: standard deviation of an output's noise relative to its range, if none is given"""
+    """synthetic: standard deviation of an output's noise, relative to its range, by default"""
 
 
 # --- Unknowns as texts: names, ranges ``LOW..HIGH``, priors ``MEAN +- DEVIATION``
@@ -366,12 +366,12 @@ def _second_unit(unknown: Unknown, kind: str) -> str:
 def starts_of(
     unknowns: Sequence[Unknown], ranges: Mapping[str, str], count: int, spread: float, seed: int
 ) -> tuple[Array, ...]:
-    """Return starts: the unknowns' own, then others all over a given range.
+    """Return starts: the unknowns' own, then others throughout the specified ranges.
 
     Parameters
     ----------
     ranges
-        Texts by name; without one, starts scatter around the first.
+        Texts by name; without a range, starts scatter around the first.
     count, spread, seed
         As for `scattered`.
     """
@@ -387,7 +387,7 @@ def starts_of(
 def switched_off(
     known: ParameterSet, unknowns: Iterable[Unknown], fitted: Mapping[str, str]
 ) -> dict[str, str]:
-    """Return reasons why no output may depend on an unknown: name -> choices next to it.
+    """Return reasons why no output may depend on an unknown: name -> choices in the same group.
 
     Parameters
     ----------

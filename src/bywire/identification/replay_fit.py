@@ -1,4 +1,4 @@
-"""Fit of a replay: figures over stretches of a record, judged against tolerances."""
+"""Fit of a replay: figures over segments of a record, compared with tolerances."""
 
 from __future__ import annotations
 
@@ -33,16 +33,16 @@ _LEAST = 8  # samples in which two shifted signals must overlap to be compared
 
 @dataclass(frozen=True)
 class Lag:
-    """By how much one signal follows another.
+    """Lag of one signal behind another.
 
     Parameters
     ----------
     value
-        How much later the second signal shows what the first showed [s].
+        Delay of the second signal behind the first [s].
     correlation
         Correlation coefficient at that lag, -1 to 1; negative for signals of opposite sign.
     at_limit
-        Whether the lag lies at the end of the range that was searched, and is therefore not valid.
+        Whether the lag is at the end of the search range, and is therefore not valid.
     """
 
     value: float
@@ -58,22 +58,22 @@ def estimate_lag(
     largest: str | float = 0.1,
     interval: str | float | None = None,
 ) -> Lag:
-    """Estimate the lag of a signal behind another from what both measured.
+    """Estimate the lag of one signal behind another that measured the same event.
 
-    The correlation coefficient over the overlap is taken at every whole sample; its highest
-    magnitude is then refined between samples, with a cubic spline through the second signal.
+    bywire computes the correlation coefficient over the overlap at every whole sample, and then
+    refines its maximum magnitude between samples with a cubic spline through the second signal.
 
     Parameters
     ----------
     measurement
-        What `read_measurement` returns.
+        Result of `read_measurement`.
     first, second
         Names of two signals of the same event.
     largest
-        Largest lag to search for in both directions, text with a unit or [s].
+        Maximum lag in both directions, text with a unit or [s].
     interval
-        Step at which they are compared, text with a unit or [s]; by default that of the one
-        with fewer samples.
+        Step of the comparison, text with a unit or [s]; by default that of the signal with fewer
+        samples.
 
     Raises
     ------
@@ -84,8 +84,8 @@ def estimate_lag(
 
     Notes
     -----
-    A first-order difference in how the two sensors respond counts as lag too. To undo a lag
-    that was found, give it as ``delay`` in the mapping of the second signal.
+    A difference between the sensors' time constants also counts as lag. To remove a lag, specify
+    it as ``delay`` in the mapping of the second signal.
     """
     reach = units.parse(largest, "s", "largest")
     if interval is None:
@@ -131,7 +131,7 @@ def _coefficients(a: NDArray[np.float64], b: NDArray[np.float64], most: int) -> 
     shifts = np.arange(-most, most + 1)
 
     def summed(x: NDArray[np.float64], shift: NDArray[np.intp]) -> NDArray[np.float64]:
-        """Sum of x[i] over the i for which i + shift exists as well."""
+        """Sum of x[i] over all i for which i + shift also exists."""
         up_to = np.concatenate([[0.0], np.cumsum(x)])
         return np.asarray(up_to[np.minimum(n, n - shift)] - up_to[np.maximum(0, -shift)])
 
@@ -139,7 +139,7 @@ def _coefficients(a: NDArray[np.float64], b: NDArray[np.float64], most: int) -> 
     sum_a, sum_b = summed(a, shifts), summed(b, -shifts)
     var_a = summed(a**2, shifts) - sum_a**2 / count
     var_b = summed(b**2, -shifts) - sum_b**2 / count
-    size = _quick_length(n + most)  # what wraps around stays clear of the shifts that are asked
+    size = _quick_length(n + most)  # long enough that no requested shift wraps around
     spectrum = np.fft.rfft(b, size) * np.fft.rfft(a, size).conj()
     both = np.fft.irfft(spectrum, size)[shifts]
     floor = 1e-12 * max(float((a**2).sum()), 1e-300) * max(float((b**2).sum()), 1e-300)
@@ -148,14 +148,14 @@ def _coefficients(a: NDArray[np.float64], b: NDArray[np.float64], most: int) -> 
 
 
 def _quick_length(least: int) -> int:
-    """Return a length from ``least`` on whose transform is quick: 2^k times 1, 3, 5, 9 or 15."""
+    """Return a length >= ``least`` with a fast transform: 2^k times 1, 3, 5, 9 or 15."""
     return min(m << max(math.ceil(math.log2(least / m)), 0) for m in (1, 3, 5, 9, 15))
 
 
 def _refined(
     a: NDArray[np.float64], b: NDArray[np.float64], shift: int, sign: float
 ) -> tuple[float, float]:
-    """Return shift in samples and coefficient at the highest point around a whole shift."""
+    """Return shift in samples and coefficient at the maximum near a whole shift."""
     from scipy.optimize import minimize_scalar
 
     n = a.size
@@ -163,7 +163,7 @@ def _refined(
     first, last = max(0, 1 - shift), min(n, n - 1 - shift)
 
     def later(s: float) -> NDArray[np.float64]:
-        """Return the second signal s samples later than the first one's."""
+        """Return the second signal, s samples later than the first."""
         whole = min(max(math.floor(s), shift - 1), shift)
         left, right = (slice(first + k, last + k) for k in (whole, whole + 1))
         t, r = s - whole, 1.0 - s + whole
@@ -180,9 +180,9 @@ def _refined(
 
 
 def _spline_slopes(b: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the slopes per sample of the cubic spline through a signal, without knots at the ends.
+    """Return the slopes per sample of the not-a-knot cubic spline through a signal.
 
-    (de Boor, A Practical Guide to Splines, 1978, chapter IV; SciPy's takes long to load.)
+    (de Boor, A Practical Guide to Splines, 1978, chapter IV; SciPy's spline is slow to load.)
     """
     from scipy.linalg import solve_banded
 
@@ -197,18 +197,20 @@ def _spline_slopes(b: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _correlation(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
-    """Return the correlation coefficient; 0 where one of them does not move."""
+    """Return the correlation coefficient; 0 if one of the signals does not change."""
     a, b = a - a.mean(), b - b.mean()
     size = float(np.sqrt((a @ a) * (b @ b)))
     return float(a @ b) / size if size > 0.0 else 0.0
 
 
-# --- Stretches of a record
+# --- Segments of a record
 
-_STEADY = 0.02  # of the demand's range: it holds while it moves less than this over a window
+_STEADY = 0.02  # of the demand's range: maximum change of a demand that holds, over a window
 _WINDOW = 0.1  # s
 _MOST = 60
-_Limits = Annotated[Mapping[str, str], Field(default_factory=dict), Hint("write text, '<= 5 %'")]
+_Limits = Annotated[
+    Mapping[str, str], Field(default_factory=dict), Hint("write a string, '<= 5 %'")
+]
 _Instant = Annotated[float, Unit("s"), Hint('for example, write start = "1 s", stop = "2 s"')]
 
 
@@ -229,14 +231,14 @@ class SegmentFile(Section):
 
 @dataclass(frozen=True)
 class Segment:
-    """A stretch of a record.
+    """A segment of a record.
 
     Parameters
     ----------
     name
-        What reports call it.
+        Name in reports.
     start, stop
-        On the measurement's clock [s].
+        Ends on the measurement's clock [s].
     tolerances
         Figure, or ``SIGNAL.FIGURE`` -> limits, such as ``{"nrmse": "<= 5 %"}`` or
         ``{"lag": ">= -1 ms and <= 5 ms"}``.
@@ -249,21 +251,20 @@ class Segment:
 
 
 def whole_record(time: Array, tolerances: Mapping[str, str]) -> list[Segment]:
-    """Return the record as one stretch."""
+    """Return the record as one segment."""
     return [Segment("whole", float(time[0]), float(time[-1]), dict(tolerances))]
 
 
 def found_in(demand: xr.DataArray, tolerances: Mapping[str, str]) -> list[Segment]:
-    """Return the stretches in which a demand holds, and those in which it moves.
+    """Return the segments in which a demand holds, and those in which it moves.
 
-    It holds while it has changed by less than 2 % of its range within the last 0.1 s, so that
-    what follows a step within that time belongs to the step. Shorter stretches join the one
-    before.
+    It holds while it has changed by less than 2 % of its range within the last 0.1 s, so the
+    response within 0.1 s after a step belongs to the step. Shorter segments join the previous one.
 
     Raises
     ------
     ParameterError
-        When there are more than can be judged by eye.
+        When there are too many segments to review.
     """
     time, values = demand["time"].values, demand.values
     interval = float(np.median(np.diff(time)))
@@ -303,7 +304,7 @@ def read_segments(path: str | Path, tolerances: Mapping[str, str]) -> list[Segme
     ----------
     path
         TOML file with a section ``[segments.NAME]`` for each, with ``start``, ``stop`` and
-        ``tolerances``; a section ``[tolerances]`` holds for all.
+        ``tolerances``; a section ``[tolerances]`` applies to all.
     tolerances
         Tolerances for all segments; those in the file take precedence.
 
@@ -339,7 +340,7 @@ def _from(content: Mapping[str, Any], tolerances: Mapping[str, str]) -> list[Seg
 
 
 # --- Tolerances
-# Errors may have either sign: an upper limit alone of a signed figure bounds its magnitude.
+# Errors may have either sign. If a signed figure has only an upper limit, it limits the magnitude.
 
 SIGNED = ("bias", "lag")
 """figures that may be negative"""
@@ -383,7 +384,7 @@ def judge_fit(
     ----------
     tolerances
         Figure, or ``SIGNAL.FIGURE``, which takes precedence -> limits, joined by ``and``. An upper
-        limit of ``bias`` or ``lag`` without a lower one bounds the magnitude.
+        limit of ``bias`` or ``lag`` without a lower one limits the magnitude.
     signal, kpis
         Name and figures.
 
@@ -561,7 +562,7 @@ def _lag(part: xr.Dataset, there: NDArray[np.bool_]) -> tuple[float, str]:
             value = peak.value if abs(peak.value) > _NO_LAG * step else 0.0
             return value, f"correlation {peak.correlation:.4f}"
         reach *= 2.0
-    return math.nan, "no lag is distinct"
+    return math.nan, "the correlation has no distinct peak"
 
 
 def judged(
@@ -571,11 +572,12 @@ def judged(
 ) -> tuple[SegmentFit, ...]:
     """Return the figures of all signals over all segments, with the verdicts.
 
-    With ``others``, the results at other steps by step length relative to the run's, figures have
-    their error from the step. A tolerance that is closer than this error is undecided.
+    ``others`` contains results at other steps, by step length relative to the run's. With these,
+    figures have an error from the step. The verdict is undecided if the tolerance is closer than
+    this error.
 
-    A tolerance named ``nrmse`` holds for every signal, ``p_mc.nrmse`` for one; its limits are
-    read by `bywire.identification.replay_fit.judge_fit`.
+    A tolerance named ``nrmse`` applies to every signal, ``p_mc.nrmse`` to one;
+    `bywire.identification.replay_fit.judge_fit` reads the limits.
 
     Raises
     ------

@@ -15,7 +15,7 @@ from bywire.identification.estimate import Estimate
 from bywire.identification.method import Check
 from bywire.identification.output_error import Trial
 
-_LEVEL = 1e-3  # of a false alarm
+_LEVEL = 1e-3  # probability of a false alarm
 
 
 @checked
@@ -27,9 +27,9 @@ def lack_of_fit(
     .. math:: F = \frac{(S - S_r) / (r - p)}{S_r / (n - r)}
 
     with S the weighted sum of squared residuals, and S_r that of a model with r columns, which
-    contains the p unknowns of the fitted one to first order. For correlated readings it is divided
-    by the ratio of slow noise to the average. It is of size one for a complete model; chance
-    exceeds the limit once in a thousand times.
+    contains the p unknowns of the fitted one to first order. For correlated readings, F is divided
+    by the ratio of slow noise to the average. F is about one for a complete model, and exceeds the
+    limit by chance once in a thousand times.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def lack_of_fit(
     residuals
         One per reading, in the order of time, in its unit, shape (n,).
     weights
-        Weights of the readings, shape (n,): one over their scatter.
+        Weights of the readings, shape (n,): the inverse of their scatter.
     richer
         Columns of the richer model, shape (n, r).
     unknowns
@@ -63,7 +63,7 @@ def lack_of_fit(
         value,
         limit=float(special.fdtri(more, left, 1.0 - _LEVEL)),
         note=note,
-        next_step="find the bend in the curve, and identify the straight part of the range, or a "
+        next_step="find the bend in the curve. Identify only the straight part of the range, or a "
         "nonlinear law",
     )
 
@@ -83,7 +83,7 @@ def by_output(
 def explained(
     trials: Sequence[Trial], estimate: Estimate, counted: NDArray[np.bool_] | None = None
 ) -> float:
-    """Return the variance accounted for, each record and output about its own mean.
+    """Return the variance accounted for, relative to the mean of each record and output.
 
     Parameters
     ----------

@@ -146,8 +146,8 @@ class Tracked:
     values, deviations
         Estimates and their standard deviations after each sample, shape (n, p).
     innovations
-        Prediction error of each sample over its standard deviation, shape (n,); NaN for unused
-        samples. White and of size one if the model is right.
+        Prediction error of each sample divided by its standard deviation, shape (n,); NaN for
+        unused samples. White and about one if the model is right.
     spreads
         Variance of each sample about its prediction, shape (n,).
     """
@@ -158,7 +158,7 @@ class Tracked:
     spreads: Array
 
     def consistency(self) -> tuple[float, float]:
-        """Return mean square and lag-one correlation of the innovations: 1 and 0 when right."""
+        """Return mean square and lag-one correlation of the innovations, ideally 1 and 0."""
         nu = self.innovations[np.isfinite(self.innovations)]
         square = float(np.mean(nu**2)) if nu.size else math.nan
         if nu.size < 3 or not square > 0.0:
@@ -183,7 +183,7 @@ def kalman(
     Parameters
     ----------
     regressors, targets
-        Shapes (n, p) and (n,); samples with NaN are not used, and the parameters drift on.
+        Shapes (n, p) and (n,); samples with NaN are not used, but the parameters keep drifting.
     interval
         Sample time T [s].
     walk
@@ -283,7 +283,7 @@ def likeliest(
     deviation: Array,
     least: float = 0.0,
 ) -> Walk:
-    r"""Return drift and noise of maximum likelihood.
+    r"""Return the maximum-likelihood drift and noise.
 
     Maximum likelihood of the innovations, :math:`\min \sum \ln s_k + \nu_k^2 / s_k`; the drifts of
     all parameters are one factor times their initial deviations.
@@ -341,8 +341,8 @@ def _require_shapes(regressors: Array, targets: Array, start: Array) -> None:
     n, p = regressors.shape
     if targets.shape != (n,) or start.shape != (p,):
         raise ParameterError(
-            f"shapes do not fit: regressors {regressors.shape}, targets {targets.shape}, start "
-            f"{start.shape}; they must be (n, p), (n,) and (p,)"
+            f"the shapes of regressors {regressors.shape}, targets {targets.shape} and start "
+            f"{start.shape} are inconsistent. They must be (n, p), (n,) and (p,)"
         )
 
 
@@ -368,7 +368,7 @@ class Track:
         Maximum likelihood: growth of each parameter per square root of a second, and the standard
         deviation of the relation.
     consistency
-        Mean square and lag-one correlation of the normalized innovations: 1 and 0 when right.
+        Mean square and lag-one correlation of the normalized innovations, ideally 1 and 0.
     """
 
     relation: Relation
@@ -382,8 +382,8 @@ class Track:
 def track(name: str, data: xr.Dataset, par: Any, block: float | None = None) -> Track:
     """Track a parameter.
 
-    Samples are averaged over blocks, so that the sensor's lag and the disc's runout do not make
-    neighbors depend on each other; drift and noise are those of maximum likelihood.
+    Samples are averaged over blocks, so that sensor lag and disc runout do not correlate
+    neighbors. Drift and noise are maximum-likelihood estimates.
 
     Parameters
     ----------
@@ -394,8 +394,8 @@ def track(name: str, data: xr.Dataset, par: Any, block: float | None = None) -> 
     par
         Parameters of the brake; the tracked one starts at its value there, known to 50 %.
     block
-        Length of a block [s]; by default a turn of the disc where ``Omega`` is measured, else
-        0.1 s; longer where a record would have more than 4000.
+        Length of a block [s]; by default one disc revolution if ``Omega`` is measured, otherwise
+        0.1 s; longer if a record would have more than 4000 blocks.
 
     Raises
     ------

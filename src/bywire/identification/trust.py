@@ -66,7 +66,7 @@ def sensed(case: Case, sensors: Mapping[str, Sensor], random: np.random.Generato
 
 
 # --- Trust
-# Each experiment has its own seed, and is identified from a start off the truth. Over many of them,
+# Each experiment has its own seed, and its search starts away from the truth. Over many of them,
 # the mean estimate must match the truth within its scatter, and the 95 % intervals must contain it
 # about 95 times in 100.
 
@@ -106,7 +106,7 @@ class Outcome:
 
 
 def displaced(par: ParameterSet, names: Sequence[str], spread: float, seed: int) -> ParameterSet:
-    """Return parameters of which some are up to ``spread`` off, so that a search must move.
+    """Return parameters, some changed by up to ``spread``, so that a search has to move.
 
     Raises
     ------
@@ -157,7 +157,7 @@ def experiments(
 
 
 def experiment(method: Method, par: Any, options: Any, effort: Effort, seed: int) -> Outcome:
-    """Simulate one experiment and identify it from a start that is off."""
+    """Simulate one experiment and identify it from a displaced start."""
     try:
         data = method.synthetic(par, options, seed)
         start = par if par is None else displaced(par, method.unknowns, effort.spread, seed)
@@ -223,7 +223,7 @@ class Recovered:
         Share of 95 % intervals that contain the truth, and its own 95 % confidence interval
         (Clopper, Pearson 1934).
     scatter, claimed
-        Standard deviation of the estimates, and the root mean square of those claimed.
+        Standard deviation of the estimates, and the root mean square of those that they claim.
     """
 
     label: str
@@ -295,7 +295,7 @@ def trust(
     processes
         Number of parallel experiments; None for all cores.
     store
-        File that keeps finished experiments; the same study continues from there.
+        File that saves finished experiments; the same study continues from there.
     progress
         Callback with a label and the finished share.
 

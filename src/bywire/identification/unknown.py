@@ -50,7 +50,7 @@ class Unknown:
 
     def __post_init__(self) -> None:
         if not self.low <= self.start <= self.high:
-            valid = f"within {self.low:g} and {self.high:g} {self.unit}"
+            valid = f"between {self.low:g} and {self.high:g} {self.unit}"
             raise not_valid(f"start of {self.label}", f"{self.start:g} {self.unit}", valid)
         if not (self.scale > 0.0 and math.isfinite(self.scale)):
             raise not_valid(f"scale of {self.label}", f"{self.scale:g}", "> 0 and finite")
@@ -61,7 +61,7 @@ class Unknown:
 
     @property
     def label(self) -> str:
-        """Name, with the trial's if it belongs to one."""
+        """Name, after the trial's label if it belongs to one."""
         return f"{self.trial}:{self.name}" if self.trial else self.name
 
 
@@ -117,7 +117,7 @@ def scattered(
     Parameters
     ----------
     spread
-        Share of the start, or of the scale if the start is zero.
+        Fraction of the start, or of the scale if the start is zero.
     seed
         Seed of the random numbers.
     """

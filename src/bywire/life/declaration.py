@@ -1,7 +1,7 @@
-"""Declaration of a brake's life: slow states, their effects, and their changes by a stop.
+"""Declaration of a brake's life: slow states, their effects, and their changes during a stop.
 
-A stop changes slow states by a ten-thousandth of themselves. So stops are simulated with constant
-slow states, and these are stepped over many stops; see `bywire.life.projection`.
+A stop changes slow states by about a ten-thousandth. Stops are therefore simulated with constant
+slow states, which then advance over many stops; see `bywire.life.projection`.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ Values = dict[str, float]
 
 
 class StopConditions(ParameterSet):
-    """Conditions of a stop other than the simulated bench."""
+    """Conditions of a stop that are not part of the simulated bench."""
 
     pause: Annotated[float, Unit("s", 60.0), Field(gt=0, le=1e7, allow_inf_nan=False)]
     """time from this stop to the next"""
@@ -57,10 +57,10 @@ class Effects:
     Parameters
     ----------
     changes
-        Slow state -> its change by each stop [SI], shape (stops,). States without an entry are
+        Slow state -> its change during each stop [SI], shape (stops,). States without an entry are
         constant.
     readings
-        Measurements of these stops that are read between stops, as means [SI].
+        Means of measurements in these stops, which are read between stops [SI].
     """
 
     changes: Mapping[str, Array]
@@ -68,7 +68,7 @@ class Effects:
 
 
 def as_it_is(z: Values, readings: Mapping[str, float], par: Any, wear: Any) -> Values:
-    """Return unchanged slow states: nothing happens between stops."""
+    """Return unchanged slow states, since nothing happens between stops."""
     return z
 
 
@@ -85,26 +85,26 @@ class Life:
     experiment
         Name of the experiment that simulates a stop.
     wear, values
-        Class of the parameters of wear, and each value with its provenance.
+        Class of the wear parameters, and each value with its provenance.
     states, limits
-        Slow states, and margins until the end of life, by name.
+        Slow states, and margins to the end of life, by name.
     begin
-        ``begin(par, wear)``: slow states of the new brake; ``par`` are the bench's parameters.
+        ``begin(par, wear)``: slow states of the new brake; ``par`` contains the bench's parameters.
     follows
         ``follows(z, par, wear)``: parameters of the bench that slow states change, by dotted name.
     effects
-        ``effects(figures, stops, z, par, wear)``: effects of each stop, by its key figures and
-        conditions (arrays of shape (stops,) by name); ``z`` are the slow states of the stop.
+        ``effects(figures, stops, z, par, wear)``: effects of each stop, from its key figures and
+        conditions (arrays of shape (stops,) by name); ``z`` contains the slow states of the stop.
     left
-        ``left(z, par, wear)``: margin to each limit; life ends where the first is zero.
+        ``left(z, par, wear)``: margin to each limit; life ends when the first margin is zero.
     figures
         Key figures of the stop that ``effects`` reads.
     between
         ``between(z, readings, par, wear)``: slow states after the events between two stops.
     settings
-        Changes of the bench for its stops, in the form of ``--set``.
+        Changes to the bench for its stops, as for ``--set``.
     population
-        Variation of the stops unless a file overrides it: entries of ``[vary]`` by name.
+        Default variation of the stops: entries of ``[vary]`` by name.
     """
 
     name: str
@@ -127,7 +127,7 @@ class Life:
         require_units(self.wear)
 
     def defaults(self) -> ParameterSet:
-        """Return the validated parameters of wear."""
+        """Return the validated wear parameters."""
         return self.wear.create({name: cited.value for name, cited in self.values.items()})
 
 

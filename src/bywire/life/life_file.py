@@ -45,23 +45,23 @@ class LifePlan:
     bench
         A stop of the new brake.
     wear
-        Parameters of wear.
+        Wear parameters.
     conditions
-        Conditions of a stop that does not vary.
+        Conditions of a stop without variation.
     varied
-        Differences of stops: numbers of the bench, options, and conditions named ``stop.NAME``.
+        Variations of the stops: numbers of the bench, options, and conditions named ``stop.NAME``.
     stops
-        Stops that represent the population, simulated for each set of slow states.
+        Number of stops that represent the population, simulated for each set of slow states.
     seed
         Seed of their sample.
     share
-        A step covers at most this share of the stops that remain, 0 to 1.
+        Maximum fraction of the remaining stops in one step, 0 to 1.
     tolerance
-        Largest relative error of a rate within a step.
+        Maximum relative error of a rate within a step.
     longest
         Number of stops after which the projection ends.
     known
-        Results so far, by the bench's parameters that follow from slow states.
+        Results so far, by the bench parameters that depend on slow states.
     """
 
     name: str
@@ -93,9 +93,9 @@ class LifePlan:
 
     @cached_property
     def different(self) -> tuple[list[int], NDArray[np.intp]]:
-        """The stops with different benches, and the index of each stop of the population in them.
+        """The stops with different benches, and for each stop in the population its index in them.
 
-        Stops that differ in their conditions alone are simulated once.
+        Stops that differ only in their conditions are simulated once.
         """
         rows = [
             tuple(
@@ -115,7 +115,7 @@ class LifePlan:
 # --- Life files: TOML in, a plan out; nothing in them is executed
 
 WEAR = "wear."
-"""prefix of the names of parameters of wear"""
+"""prefix of the names of wear parameters"""
 _MOST = 4096  # stops that represent a population
 CONDITIONS = StopConditions(pause=600.0, T_air=293.15)
 """a stop every ten minutes at 20 degC"""
@@ -208,10 +208,10 @@ def _texts(changes: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _given(kind: type[ParameterSet], changes: Mapping[str, str], prefix: str) -> dict[str, Any]:
-    """Return the changes of a parameter set whose names begin with a prefix [SI]."""
+    """Return the changes to a parameter set whose names begin with a prefix [SI]."""
     named = {k.removeprefix(prefix): v for k, v in changes.items() if k.startswith(prefix)}
     require_units(kind, named)
-    return parsed(kind, named, f"name behind {prefix!r}")
+    return parsed(kind, named, f"name after {prefix!r}")
 
 
 def _varied(bench: Bench, conditions: StopConditions, section: Mapping[str, Any]) -> list[Varied]:
@@ -232,16 +232,16 @@ def _varied(bench: Bench, conditions: StopConditions, section: Mapping[str, Any]
 
 
 def _require_free(life: Life, bench: Bench, wear: ParameterSet, varied: tuple[Varied, ...]) -> None:
-    """Reject variations of numbers that follow from slow states."""
+    """Reject variations of numbers that depend on slow states."""
     slow = life.follows(life.begin(bench.par, wear), bench.par, wear)
     for each in varied:
         if not each.unit:
             name = f"[vary] {each.name}"
-            raise ParameterError(f"{name} is a choice. Only numbers can vary", name=name)
+            raise ParameterError(f"{name} is a choice, but only numbers can vary", name=name)
         for name in (each.name, *each.together):
             if name in slow:
                 raise ParameterError(
-                    f"[vary] {name} follows from wear, so it cannot vary. To change its initial "
+                    f"[vary] {name} depends on wear, so it cannot vary. To change its initial "
                     "value, use [set]",
                     name=f"[vary] {name}",
                 )

@@ -1,6 +1,6 @@
-"""Projection of a life: rates of slow states, and Heun's steps over many stops.
+"""Projection of a life: rates of slow states, and steps of Heun's method over many stops.
 
-Within a step the states advance stop by stop with constant rates, so that an adjuster acts at the
+Within a step, the states advance stop by stop with constant rates, so that an adjuster acts at the
 right stop. Only the ends of steps are simulated.
 """
 
@@ -36,7 +36,7 @@ class Rates:
     effects
         Effects of each stop of the population.
     warnings
-        Warnings of the runs.
+        Warnings from the runs.
     """
 
     z: Values
@@ -50,14 +50,14 @@ class Rates:
 
 
 def rates(plan: LifePlan, z: Values) -> Rates:
-    """Return the changes per stop at given slow states, by the plan's population of stops.
+    """Return the changes per stop at given slow states, for the plan's population of stops.
 
     Raises
     ------
     InputError
         If the brake cannot be set up with these states.
     RunError
-        If a run fails, or a stop lacks a key figure from which wear is computed.
+        If a run fails, or a stop lacks a key figure that determines wear.
     KeyboardInterrupt
         If interrupted.
     """
@@ -76,7 +76,7 @@ def stop_figures(plan: LifePlan, z: Values) -> tuple[dict[str, Array], tuple[str
 def simulated(
     plan: LifePlan, z: Values, which: Sequence[int]
 ) -> tuple[dict[str, Array], tuple[str, ...]]:
-    """Return key figures of some stops of the population, and warnings of their runs.
+    """Return key figures of some stops of the population, and warnings from their runs.
 
     Stops that do not depend on slow states are simulated once.
     """
@@ -119,7 +119,7 @@ def conditions(plan: LifePlan) -> Mapping[str, Array]:
 
 
 def _stop_bench(plan: LifePlan, follows: Mapping[str, float], k: int) -> Bench:
-    """Return a stop of the population with the parameters that follow from slow states."""
+    """Return a stop of the population with the parameters that depend on slow states."""
     drawn = {
         name: values[k].item()
         for name, values in plan.population.items()
@@ -131,8 +131,8 @@ def _stop_bench(plan: LifePlan, follows: Mapping[str, float], k: int) -> Bench:
 # --- The projection, which includes every event between stops
 
 CONFIDENCE = 0.95
-"""confidence of the interval of a life"""
-_LEAST = 0.02  # shortest step by the remaining life, as a share of the whole life
+"""confidence level of the interval of a life"""
+_LEAST = 0.02  # minimum step, as a fraction of the whole life
 
 
 @dataclass(frozen=True)
@@ -161,15 +161,15 @@ class Projection:
     plan
         Plan of the projection.
     states, left
-        Slow states, and margins to the limits, after each stop [SI]: shape (stops + 1,), the new
-        brake first.
+        Slow states, and margins to the limits, after each stop [SI]: shape (stops + 1,), starting
+        with the new brake.
     ended_by
-        Limit that ended the life; empty where the projection reached its longest life.
+        Limit that ended the life; empty if the projection reached its maximum number of stops.
     steps
         Steps of the projection.
     error
-        Half the width of the confidence interval of the number of stops, by the sample of the
-        population; NaN where the life reached no limit.
+        Half width of the confidence interval of the number of stops, due to the sample of the
+        population; NaN if the life reached no limit.
     """
 
     plan: LifePlan
@@ -181,12 +181,12 @@ class Projection:
 
     @property
     def stops(self) -> int:
-        """Stops until the end of life, or until the end of the projection."""
+        """Number of stops until the end of life, or until the end of the projection."""
         return len(next(iter(self.states.values()))) - 1
 
     @property
     def warnings(self) -> list[str]:
-        """Warnings of the runs."""
+        """Warnings from the runs."""
         each = (text for step in self.steps for r in step.rates for text in r.warnings)
         return [*dict.fromkeys(each)]
 
@@ -204,7 +204,7 @@ def projected(plan: LifePlan, progress: Progress = silent) -> Projection:
     Raises
     ------
     InputError
-        If the brake is at the end of its life from the start, or cannot be set up.
+        If the brake is already at the end of its life, or cannot be set up.
     RunError
         If a run fails.
     KeyboardInterrupt
@@ -243,8 +243,8 @@ def _require_alive(plan: LifePlan, z: Values) -> None:
         if not value > 0.0:
             limit = plan.life.limits[name]
             raise ParameterError(
-                f"life {plan.life.name!r} ends before its first stop: {limit.label} is "
-                f"{shown(value, limit.unit)} at the start, but must be above zero",
+                f"life {plan.life.name!r} ends before its first stop, because {limit.label} is "
+                f"{shown(value, limit.unit)} at the start. It must be above zero",
                 name=limit.label,
                 value=shown(value, limit.unit),
                 valid="above zero",
@@ -256,8 +256,8 @@ def _walked(
 ) -> tuple[list[Values], str]:
     """Return the slow states after each of at most ``most`` stops, and the limit that ended them.
 
-    Rates are the mean of those at both ends of the step (Heun's corrector); readings change
-    linearly from one end to the other over its ``count`` stops.
+    Rates are the mean of the rates at both ends of the step (Heun's corrector); readings change
+    linearly from one end to the other over the ``count`` stops of the step.
     """
     life, par, wear = plan.life, plan.bench.par, plan.wear
     first, last = ends
@@ -288,7 +288,7 @@ def _step(plan: LifePlan, before: Rates, held: Sequence[Values], whole: int) -> 
 
 
 def _distance(first: Values, second: Values) -> float:
-    """Return the largest relative change of a rate."""
+    """Return the maximum relative change of a rate."""
     largest = {name: max(abs(first[name]), abs(second[name])) for name in first}
     return max(
         (abs(second[name] - first[name]) / size for name, size in largest.items() if size > 0.0),
@@ -297,9 +297,9 @@ def _distance(first: Values, second: Values) -> float:
 
 
 def _interval(plan: LifePlan, steps: Sequence[Step], limit: str) -> float:
-    """Return half the width of the interval of a life [stops].
+    """Return the half width of the interval of a life [stops].
 
-    The same stops represent the population at every step, so that their errors add up.
+    The same stops represent the population at every step, so their errors add up.
     """
     if not limit:
         return math.nan
@@ -313,15 +313,16 @@ def _interval(plan: LifePlan, steps: Sequence[Step], limit: str) -> float:
 
 
 def standard_error(plan: LifePlan, values: Array) -> float:
-    """Return the standard error of a mean over the population, of values of shape (stops,).
+    """Return the standard error of a mean over the population, for values of shape (stops,).
 
     Notes
     -----
-    The population is a Latin hypercube: it is as even as possible along every quantity, so that the
+    The population is a Latin hypercube: it is as even as possible along every quantity, so the
     spread that a quantity explains is not an error of the mean. The estimate uses successive
     differences along the quantity that explains most (K. M. Wolter, Introduction to Variance
-    Estimation, section 8.2), which counts the spread by all others in full. A discrete quantity
-    may change its value exactly between two stops, by its weights: that difference is not an error.
+    Estimation, section 8.2), which fully counts the spread from all other quantities. A discrete
+    quantity may change its value exactly between two stops, because of its weights; this difference
+    is not an error.
     """
     squares = [
         np.diff(values[np.argsort(plan.population[each.name], kind="stable")]) ** 2
@@ -341,7 +342,7 @@ def _counts(law: Distribution, stops: int) -> NDArray[np.bool_]:
 
 
 def _falls(plan: LifePlan, held: Rates, limit: str) -> Array:
-    """Return the loss of margin to a limit by each stop, shape (stops,)."""
+    """Return the loss of margin to a limit during each stop, shape (stops,)."""
     life, par, wear = plan.life, plan.bench.par, plan.wear
     changes, now = held.effects.changes, life.left(held.z, par, wear)[limit]
     each = [
@@ -351,14 +352,14 @@ def _falls(plan: LifePlan, held: Rates, limit: str) -> Array:
     return now - np.array([life.left(z, par, wear)[limit] for z in each])
 
 
-# --- Brute force: stops simulated one by one, each with the slow states of the previous stop
+# --- Brute force: stops simulated one by one, each with the slow states after the previous stop
 
 
 def one_by_one(plan: LifePlan, stops: int, progress: Progress = silent) -> dict[str, Array]:
     """Return the slow states after each of some stops [SI], shape (stops + 1,) each.
 
-    The population's stops repeat in order. The result checks the error of a projection, which steps
-    over them.
+    The population's stops repeat in order. The result checks the error of a projection, which skips
+    most stops.
 
     Parameters
     ----------
@@ -372,13 +373,13 @@ def one_by_one(plan: LifePlan, stops: int, progress: Progress = silent) -> dict[
     Raises
     ------
     RunError
-        If a run fails, or a stop lacks a key figure from which wear is computed.
+        If a run fails, or a stop lacks a key figure that determines wear.
     KeyboardInterrupt
         If interrupted.
     """
     life, par, wear, count = plan.life, plan.bench.par, plan.wear, plan.count
     z = life.begin(par, wear)
-    figures, _ = stop_figures(plan, z)  # of stops before the first one, which heated the brake
+    figures, _ = stop_figures(plan, z)  # of earlier stops, which heated the brake
     path: list[Values] = [z]
     for n in range(stops):
         k = n % count

@@ -1,7 +1,7 @@
 """Heat of repeated stops: temperature of the friction surface, and wear of the pads.
 
-One body takes the friction work of every stop and cools between stops. That is enough for a life:
-the temperature of a disc depends on the pauses more than on the speeds.
+One body absorbs the friction work of every stop and cools between stops. This is sufficient for a
+life, since a disc's temperature depends more on the pauses than on the speeds.
 """
 
 from __future__ import annotations
@@ -23,21 +23,21 @@ from bywire.plant import pad_wear
 ORGANIC_LINING: Mapping[str, Cited] = MappingProxyType(
     {
         "kappa_0": chosen(3.6e-14, "180 cm^3 of pad over about 5 GJ: a car's front axle"),
-        "T_hot": chosen(503.0, "230 degC, as usual of organic linings"),
+        "T_hot": chosen(503.0, "230 degC, usual for organic linings"),
         "T_act": chosen(2760.0, "four times the wear at 400 degC"),
-        "E_pad": chosen(5e8, "the order of organic linings under load"),
+        "E_pad": chosen(5e8, "order of magnitude of organic linings under load"),
     }
 )
-"""properties of a road vehicle's pads, whatever their size"""
+"""properties of a road vehicle's pads of any size"""
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
 _HOTTEST = 1500.0  # K: cast iron melts
 
 
 class Parameters(ParameterSet):
-    """The disc as a body of one temperature."""
+    """The disc as a body with uniform temperature."""
 
     C_d: Annotated[float, Unit("J/K", 1e3), Field(gt=0, allow_inf_nan=False)]
-    """heat capacity of the body that takes the friction work"""
+    """heat capacity of the body that absorbs the friction work"""
     tau_d: Annotated[float, Unit("s", 300.0), Field(gt=0, allow_inf_nan=False)]
     """time constant of its cooling"""
 
@@ -49,7 +49,7 @@ def temperatures(work: Array, pause: Array, T_air: Array, par: Parameters) -> tu
     ----------
     work, pause, T_air
         Friction work [J], time until the next stop [s], and temperature of the air [K], shape
-        (stops,) each; after the last stop the first one follows.
+        (stops,) each; the first stop follows after the last one.
 
     Returns
     -------
@@ -82,13 +82,14 @@ def temperatures(work: Array, pause: Array, T_air: Array, par: Parameters) -> tu
 
 
 def thinned(work: Array, before: Array, after: Array, par: pad_wear.Parameters) -> Array:
-    """Return the wear of a pad by each stop [m], shape (stops,).
+    """Return the wear of a pad during each stop [m], shape (stops,).
 
-    The surface warms in proportion to the work done, from one temperature [K] to the other.
+    The surface temperature [K] rises from one value to the other in proportion to the work.
 
     Notes
     -----
-    Below the hot range wear is constant; above, it is integrated by Gauss and Legendre's rule.
+    Below the hot range, wear per work is constant; above, it is integrated by Gauss-Legendre
+    quadrature.
     """
     span = np.maximum(after - before, 1e-9)
     cold = np.clip((par.T_hot - before) / span, 0.0, 1.0)

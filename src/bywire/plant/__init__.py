@@ -1,1 +1,1 @@
-"""Physical elements, one per file: parameters, states and equations, nothing else."""
+"""Physical elements, one per file, with only parameters, states and equations."""

@@ -1,4 +1,4 @@
-"""Analog-to-digital converter: noise at its input, then resolution; the tick holds the sample."""
+"""Analog-to-digital converter with input noise and finite resolution, sampled at each tick."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Unit
 from bywire.core.signals import Signal
 
-Reading = Annotated[float, Signal("1", "reading, share of the range", 0.5)]
+Reading = Annotated[float, Signal("1", "reading, fraction of the range", 0.5)]
 Noise = Annotated[float, Signal("1", "standard normal noise", 1.0)]
 
 
 class Parameters(ParameterSet):
-    """Uniform quantizer over the sensor's span, rounding to the nearest code.
+    """Uniform quantizer over the sensor's span, which rounds to the nearest code.
 
     N codes, 0 to N - 1, represent the readings 0, 1/N, ..., 1 - 1/N. With 12 bits there are 4096
     distinct codes, the middle of the span is exactly code 2048, and the highest code is one step
@@ -28,7 +28,7 @@ class Parameters(ParameterSet):
     codes: Annotated[float, Unit("1", 4096.0), Field(ge=2, allow_inf_nan=False)]
     """number of distinct codes over the span, 4096 for 12 bits"""
     noise: Annotated[float, Unit("1", 1e-3), Field(ge=0, le=1, allow_inf_nan=False)]
-    """standard deviation of the noise at the input, share of the span"""
+    """standard deviation of the input noise, as a fraction of the span"""
 
 
 def sample(reading: Reading, noise: Noise, par: Parameters) -> Reading:
@@ -37,15 +37,15 @@ def sample(reading: Reading, noise: Noise, par: Parameters) -> Reading:
     Parameters
     ----------
     reading
-        Share of the span at the input.
+        Input as a fraction of the span.
     noise
-        A sample of a standard normal variable; the recording contains its seed.
+        A sample of a standard normal variable. The recording contains its seed.
     """
     return rounded(noisy(reading, noise, par), par)
 
 
 def noisy(reading: Reading, noise: Noise, par: Parameters) -> Reading:
-    """Return the reading with the noise at the converter's input."""
+    """Return the reading with the converter's input noise."""
     return reading + par.noise * noise
 
 

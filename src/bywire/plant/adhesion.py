@@ -1,4 +1,4 @@
-"""Adhesion of a tire on a surface as a function of slip: Burckhardt, or the Magic Formula."""
+"""Tire adhesion on a surface as a function of slip, by Burckhardt or the Magic Formula."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ Stiffness = Annotated[float, Signal("1", "stiffness factor", 10.0), Ge(8), Le(40
 Shape = Annotated[float, Signal("1", "shape factor", 1.6), Ge(1.5), Le(1.9)]
 Largest = Annotated[float, Signal("1", "maximum adhesion", 1.0), Gt(0)]
 Curvature = Annotated[float, Signal("1", "curvature factor", 0.5), Ge(0), Le(0.9)]
-_NEWTON, _LEVEL, _LEAST = 3, 1e-4, 1e-16  # steps; smallest slope, in slip; floor of roots
+_NEWTON, _LEVEL, _LEAST = 3, 1e-4, 1e-16  # steps; minimum slope, in slip; floor of roots
 _MAGIC_NEWTON = 6  # steps, from the tangent at zero; enough up to E = 1 and a peak at 6/B
 
 
 class SurfaceParameters(ParameterSet):
-    """Adhesion of a tire on a surface: after Burckhardt, and by the Magic Formula."""
+    """Tire adhesion on a surface, by Burckhardt and by the Magic Formula."""
 
     c1: Coefficient
     """limit of Burckhardt's adhesion, before c3 is subtracted"""
@@ -39,18 +39,18 @@ class SurfaceParameters(ParameterSet):
     c3: Coefficient
     """decrease of Burckhardt's adhesion up to a locked wheel"""
     B: Annotated[float, Unit("1", 10.0), Field(gt=0, allow_inf_nan=False)]
-    """stiffness factor of the Magic Formula: with C and D, the slope at no slip"""
+    """stiffness factor of the Magic Formula; B C D is the slope at zero slip"""
     C: Annotated[float, Unit("1", 1.6), Field(gt=1, lt=4, allow_inf_nan=False)]
-    """shape factor of the Magic Formula: decrease of the adhesion beyond its peak"""
+    """shape factor of the Magic Formula, which determines the decrease beyond the peak"""
     D: Coefficient
     """maximum adhesion of the Magic Formula"""
     E: Annotated[float, Unit("1", 0.5), Field(ge=-100, le=1, allow_inf_nan=False)]
-    """curvature factor of the Magic Formula: position of the peak"""
+    """curvature factor of the Magic Formula, which determines the position of the peak"""
 
     @model_validator(mode="after")
     def _has_a_peak(self) -> SurfaceParameters:
         if not self.c1 * self.c2 > self.c3:
-            reason = "at no slip, the adhesion must rise with slip"
+            reason = "at zero slip, the adhesion must rise with slip"
             raise RuleError("c1 c2", f"{self.c1 * self.c2:g}", f"> c3 = {self.c3:g}", reason)
         locked = angle(1.0, surface_of(self))
         if not 0.5 * math.pi < locked < math.pi:
@@ -64,7 +64,7 @@ class SurfaceParameters(ParameterSet):
 
 
 class Surface(NamedTuple):
-    """Coefficients of the adhesion of a tire on a surface."""
+    """Coefficients of tire adhesion on a surface."""
 
     c1: C1
     c2: C2
@@ -76,7 +76,7 @@ class Surface(NamedTuple):
 
 
 class Rising(NamedTuple):
-    """Point of the rising branch with the adhesion of another point of the curve."""
+    """Point on the rising branch with the same adhesion as another point on the curve."""
 
     mu: Annotated[float, Signal("1", "adhesion", 1.0)]
     slip: Annotated[float, Signal("1", "slip", 0.1)]
@@ -112,10 +112,10 @@ def burckhardt_peak(ground: Surface) -> Slip:
 def burckhardt_rising(
     mu: Annotated[float, Signal("1", "adhesion", 1.0), Ge(0)], ground: Surface
 ) -> Slip:
-    """Return the slip below the peak's slip at which the adhesion is ``mu``, within 5e-6.
+    """Return the slip below the peak at which the adhesion is ``mu``, to within 5e-6.
 
-    Newton's method approaches it from below. It starts at the slip without the curve's linear fall
-    or at the parabola through the peak, whichever is closer.
+    Newton's method approaches this slip from below. It starts at the slip without the curve's
+    linear decrease or at the parabola through the peak, whichever is closer.
     """
     c1, c2, c3 = ground.c1, ground.c2, ground.c3
     peak = burckhardt_peak(ground)
@@ -126,7 +126,7 @@ def burckhardt_rising(
     for _ in range(_NEWTON):
         decay = ops.exp(-c2 * slip)
         left = mu - c1 * (1.0 - decay) + c3 * slip
-        # The curve is level at the peak: the lower bound avoids dividing rounding errors by zero.
+        # The curve is flat at the peak. The lower bound avoids a division of rounding errors by 0.
         slip = slip + left / ops.fmax(c1 * c2 * decay - c3, _LEVEL * bend)
     return ops.fmin(slip, peak)
 
@@ -176,14 +176,14 @@ def adhesion(slip: Slip, ground: Surface, par: Parameters) -> Adhesion:
 
 
 def peak_slip(ground: Surface, par: Parameters) -> Slip:
-    """Return the slip at the largest adhesion, <= 1."""
+    """Return the slip at maximum adhesion, <= 1."""
     if par.curve == "magic-formula":
         return magic_rising(0.5 * math.pi, ground)
     return burckhardt_peak(ground)
 
 
 def held(slip: Slip, ground: Surface, par: Parameters) -> Rising:
-    """Return the adhesion limit at a slip: the peak up to its slip, the curve beyond.
+    """Return the adhesion limit at a slip, which is the peak below its slip and the curve beyond.
 
     The second value is the slip on the rising branch with the same adhesion.
     """

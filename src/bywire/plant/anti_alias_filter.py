@@ -32,7 +32,7 @@ class Rate(NamedTuple):
 class Input(NamedTuple):
     """Signal at the input."""
 
-    raw: Annotated[float, Signal("1", "reading, share of the range", 0.5)]
+    raw: Annotated[float, Signal("1", "reading, fraction of the range", 0.5)]
 
 
 def rate(x: State, u: Input, par: Parameters) -> Rate:

@@ -1,4 +1,4 @@
-"""Preloaded axial bearings: friction of preload, load, grease and Stribeck effect."""
+"""Preloaded axial bearings with friction due to preload, load, grease and Stribeck effect."""
 
 from __future__ import annotations
 
@@ -15,37 +15,37 @@ from bywire.core.signals import Power, Signal
 TorquePerForce = Annotated[float, Unit("N*m/N", 1e-5), Field(ge=0, allow_inf_nan=False)]
 TorquePerForceSquared = Annotated[float, Unit("N*m/N**2", 2e-9), Field(ge=0, allow_inf_nan=False)]
 AngularSpeed = Annotated[float, Unit("rad/s", 10.0), Field(gt=0, allow_inf_nan=False)]
-_STILL = 1e-9  # floor of the viscous term's argument: its slope at zero is infinite
+_STILL = 1e-9  # floor of the viscous term's argument, whose slope at zero is infinite
 
 
 class Parameters(ParameterSet):
-    """Coefficients of one shaft's bearings; the friction is set-valued at rest."""
+    """Coefficients of one shaft's bearings. The friction is set-valued at rest."""
 
     C_0: Torque
-    """friction of the preload"""
+    """friction due to preload"""
     C_1: TorquePerForce
-    """growth with the axial force"""
+    """friction growth with axial force"""
     C_2: TorquePerForceSquared
-    """growth with the square of the axial force"""
+    """friction growth with axial force squared"""
     T_nu: Torque
-    """viscous friction at omega_ref with grease of nu_ref"""
+    """viscous friction at speed omega_ref and viscosity nu_ref"""
     omega_ref: AngularSpeed
-    """speed at which T_nu is stated"""
+    """reference speed of T_nu"""
     nu: KinematicViscosity
     """viscosity of the grease"""
     nu_ref: KinematicViscosity
-    """viscosity at which T_nu is stated"""
+    """reference viscosity of T_nu"""
     k_nu: Factor
     """exponent of the viscous term, 2/3 in bearing catalogs"""
     G_S: Gain
-    """height of the Stribeck peak, share of the load-dependent friction"""
+    """height of the Stribeck peak relative to the load-dependent friction"""
     k_S: Factor
     """exponent factor of the Stribeck peak"""
     omega_S: AngularSpeed
     """characteristic speed of the Stribeck peak"""
 
 
-FAULTS = (ParameterFault("worn", "higher friction", ("C_0", "C_1", "C_2", "T_nu"), 5.0),)
+FAULTS = (ParameterFault("worn", "increased friction", ("C_0", "C_1", "C_2", "T_nu"), 5.0),)
 
 
 class Input(NamedTuple):
@@ -64,8 +64,8 @@ def friction(u: Input, par: Parameters) -> Annotated[float, Signal("N*m", "beari
 
     Notes
     -----
-    The paper's exponential contains the signed speed and would grow without bound in one direction;
-    we use the magnitude. The grease term has a reference point, so no coefficient has a hidden
+    The paper's exponential contains the signed speed and would grow without bound in one direction.
+    We use the magnitude. The grease term has a reference point, so no coefficient has a hidden
     unit. The paper writes ``G_nu (nu |omega|)^k_nu`` with nu in mm^2/s.
 
     References
@@ -75,7 +75,7 @@ def friction(u: Input, par: Parameters) -> Annotated[float, Signal("N*m", "beari
     axial = par.C_0 + par.C_1 * ops.fabs(u.force) + par.C_2 * u.force * u.force
     speed = ops.fabs(u.omega)
     ratio = par.nu / par.nu_ref * (speed / par.omega_ref)
-    # Zero at rest, where kernels skip the power; the floor keeps its slope finite.
+    # The term is zero at rest, where kernels skip the power. The floor keeps its slope finite.
     churned = ops.where(ratio > _STILL, ops.power(ops.fmax(ratio, _STILL), par.k_nu), 0.0)
     viscous = par.T_nu * churned
     stribeck = par.G_S * axial * ops.decay(par.k_S * speed / par.omega_S, rests=True)
@@ -83,5 +83,5 @@ def friction(u: Input, par: Parameters) -> Annotated[float, Signal("N*m", "beari
 
 
 def power_loss(u: Input, par: Parameters) -> Power:
-    """Return the heat of the turning bearings, >= 0."""
+    """Return the heat in the turning bearings, >= 0."""
     return friction(u, par) * ops.fabs(u.omega)

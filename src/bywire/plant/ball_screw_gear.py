@@ -1,4 +1,4 @@
-"""Rotor, gear and ball screw: motion of the drive train with its transmission losses."""
+"""Rotor, gear and ball screw: drive train motion with transmission losses."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from bywire.core.signals import Energy, Power, ReflectedInertia, Signal, Torque
 class Parameters(ParameterSet):
     """Rigid drive train with one efficiency.
 
-    ``law = "paper"`` uses eq. (8), whose constant efficiency lets the gear *generate* energy when
+    ``law = "paper"`` uses eq. (8), whose constant efficiency makes the gear *generate* energy when
     the load drives it. ``law = "directional"`` makes the loss a load-dependent friction,
     (1/eta_g - 1) times the load torque, in both directions (back-driven efficiency
     2 - 1/eta_g). This friction never generates energy, and it holds the load at rest.
@@ -22,13 +22,13 @@ class Parameters(ParameterSet):
     k_g: GearRatio
     """piston travel per shaft angle"""
     eta_g: Fraction
-    """efficiency of gear and screw, driving"""
+    """driving efficiency of gear and screw"""
     law: Literal["paper", "directional"]
     """effect of the efficiency: as in eq. (8), or as direction-dependent friction"""
     J_mot: Inertia
     """inertia of rotor, gear and screw at the motor shaft"""
     M_mc: Mass
-    """mass of the piston"""
+    """piston mass"""
 
 
 class State(NamedTuple):
@@ -79,7 +79,7 @@ def inertia(par: Parameters) -> ReflectedInertia:
 
     .. math:: M' = \eta_g J_{mot} + k_g^2 M_{mc}
 
-    (law "paper"; without eta_g for "directional").
+    for law "paper", and without eta_g for law "directional".
     """
     rotor = par.eta_g * par.J_mot if par.law == "paper" else par.J_mot
     return rotor + par.k_g * par.k_g * par.M_mc
@@ -114,12 +114,12 @@ def friction_bounds(
     load: Annotated[float, Signal("N", "piston load", 200.0)],
     par: Parameters,
 ) -> Bounds:
-    """Return the limits of the dry friction on the shaft: seals, and gear when directional.
+    """Return the limits of the dry friction on the shaft, from seals and a directional gear.
 
     Parameters
     ----------
     seal_p, seal_n
-        Magnitudes of the seal friction, apply and release.
+        Magnitudes of the seal friction while applying and releasing.
     load
         Force on the piston, against clamping.
     """
@@ -149,7 +149,7 @@ def transmission_loss(
     acceleration: Annotated[float, Signal("rad/s**2", "acceleration of the shaft", 1e3)],
     par: Parameters,
 ) -> Power:
-    r"""Return the loss of law "paper"; negative when the gear generates energy.
+    r"""Return the loss of law "paper", negative when the gear generates energy.
 
     .. math:: -W_l = (1 - \eta_g) (T - J_{mot} \dot\Omega) \Omega
 
@@ -163,6 +163,6 @@ def transmission_loss(
 
 
 def power_loss(x: State, u: Input, par: Parameters) -> Power:
-    """Return transmission plus friction losses, signed: law "paper" can generate energy."""
+    """Return transmission and friction losses (signed; law "paper" can generate energy)."""
     acceleration = balance(x, u, par).omega / inertia(par)
     return transmission_loss(x, u.torque, acceleration, par) - u.friction * x.omega

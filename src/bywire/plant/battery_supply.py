@@ -13,7 +13,7 @@ Loss = Annotated[float, Signal("W", "loss in the supply's resistance", role=Role
 
 
 class Parameters(ParameterSet):
-    """Ideal voltage source with a series resistance, without dynamics of the cells."""
+    """Ideal voltage source with a series resistance, without cell dynamics."""
 
     V_bat: Voltage
     """open-circuit voltage of the battery"""
@@ -23,12 +23,12 @@ class Parameters(ParameterSet):
 
 FAULTS = (
     ParameterFault("under-voltage", "weak battery", replaced="V_bat", value=6.0),
-    ParameterFault("bad-contact", "higher resistance of battery and leads", ("R_bat",), 10.0),
+    ParameterFault("bad-contact", "increased resistance of battery and leads", ("R_bat",), 10.0),
 )
 
 
 class Input(NamedTuple):
-    """Current of the load."""
+    """Load current."""
 
     i_dc: Annotated[float, Signal("A", "battery current", 5.0)]
 

@@ -1,4 +1,4 @@
-"""Brake discs of a wheel: largest brake torque from the pressure in the calipers."""
+"""Brake discs of a wheel: maximum brake torque at the caliper pressure."""
 
 from __future__ import annotations
 
@@ -19,22 +19,22 @@ class Parameters(ParameterSet):
     """Discs and calipers of one wheel."""
 
     faces: Count
-    """number of friction faces: two per disc"""
+    """number of friction faces, two per disc"""
     mu_pad: Factor
-    """coefficient of friction of the pads"""
+    """pad friction coefficient"""
     A_cal: Area
-    """area of the pistons on one side of a disc"""
+    """piston area on one side of a disc"""
     r_eff: Length
-    """effective radius of the pads' friction"""
+    """effective friction radius"""
     T_drag: Torque
     """torque of pads that drag without pressure; 0 for free pads"""
 
 
 FAULTS = (
-    ParameterFault("glazed", "lower pad friction", ("mu_pad",), 0.7),
+    ParameterFault("glazed", "reduced pad friction", ("mu_pad",), 0.7),
     ParameterFault(
         "dragging",
-        "a piston sticks in its caliper and pads drag (value: torque)",
+        "a piston sticks in its caliper and the pads drag (value: torque)",
         replaced="T_drag",
         value=10.0,
     ),
@@ -61,5 +61,5 @@ def torque_per_pressure(
 
 
 def output(u: Input, par: Parameters) -> Output:
-    """Return the torque; without pressure, only dragging pads contribute."""
+    """Return the torque. Without pressure, only dragging pads contribute."""
     return Output(torque=ops.fmax(torque_per_pressure(par) * u.p, par.T_drag))

@@ -1,4 +1,4 @@
-"""Brake fluid: constant bulk modulus, viscosity, and optionally entrained air."""
+"""Brake fluid with constant bulk modulus, viscosity, and optional entrained air."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ GaugePressure = Annotated[float, Signal("Pa", "pressure", 2e6), Ge(0)]
 
 
 class Parameters(ParameterSet):
-    """Newtonian fluid with a constant bulk modulus; entrained air does not move or dissolve."""
+    """Newtonian fluid with a constant bulk modulus. Entrained air does not move or dissolve."""
 
     beta: Annotated[float, Unit("Pa", 1e9), Field(gt=0, allow_inf_nan=False)]
     """bulk modulus"""
@@ -34,11 +34,11 @@ class Parameters(ParameterSet):
     rho: Density
     """density"""
     air: Literal["none", "entrained", "caliper"]
-    """place of gas bubbles: none, in the master cylinder's chamber, or in line and caliper"""
+    """location of gas bubbles: none, in the master cylinder chamber, or in line and caliper"""
     V_air: Volume
-    """volume of the gas at ambient pressure"""
+    """gas volume at ambient pressure"""
     n_air: Annotated[float, Unit("1", 1.2), Field(gt=1, le=1.7, allow_inf_nan=False)]
-    """polytropic exponent of the gas (toward 1 isothermal, 1.4 adiabatic)"""
+    """polytropic exponent of the gas (near 1: isothermal; 1.4: adiabatic)"""
     p_atm: Annotated[float, Unit("Pa", 1e5), Field(gt=0, allow_inf_nan=False)]
     """ambient pressure, absolute"""
 
@@ -63,7 +63,7 @@ FAULTS = (
 
 
 class Chamber(NamedTuple):
-    """Volume of a chamber, fluid and gas together, and its gauge pressure."""
+    """Chamber volume, including fluid and gas, and gauge pressure."""
 
     V: Annotated[float, Signal("m**3", "chamber volume", 3e-7), Ge(0)]
     p: GaugePressure
@@ -81,12 +81,12 @@ def gas_volume(p: GaugePressure, par: Parameters) -> Annotated[float, Signal("m*
 
 
 def compliance(u: Chamber, par: Parameters) -> FluidCompliance:
-    r"""Return dV/dp of the fluid in a chamber, with its gas.
+    r"""Return dV/dp of a chamber's fluid, including its gas.
 
     .. math:: \frac{V - V_g}{\beta} + \frac{V_g}{n (p_{atm} + p)}
 
-    The fluid fills only the volume that the gas leaves. With V instead of V - V_g, the stored
-    energy would not be the integral of the powers.
+    The fluid fills only the volume without gas. With V instead of V - V_g, the stored energy would
+    not be the integral of the powers.
     """
     if par.air != "entrained":
         return u.V / par.beta
@@ -95,7 +95,7 @@ def compliance(u: Chamber, par: Parameters) -> FluidCompliance:
 
 
 def gas_compliance(p: GaugePressure, par: Parameters) -> FluidCompliance:
-    r"""Return :math:`-dV_g/dp` of the gas, in any place; the parameters must declare gas.
+    r"""Return :math:`-dV_g/dp` of the gas in any location. The parameters must declare gas.
 
     .. math:: \frac{V_{air}}{n (p_{atm} + p)} \left(\frac{p_{atm}}{p_{atm} + p}\right)^{1/n}
     """
@@ -105,7 +105,7 @@ def gas_compliance(p: GaugePressure, par: Parameters) -> FluidCompliance:
 
 
 def compression_energy(u: Chamber, par: Parameters) -> Energy:
-    """Return the energy stored in a chamber by compressing its fluid and its gas."""
+    """Return a chamber's energy from the compression of its fluid and gas."""
     density = flow_energy_integral(u.p, par) / par.beta
     if par.air != "entrained":
         return u.V * density
@@ -113,7 +113,7 @@ def compression_energy(u: Chamber, par: Parameters) -> Energy:
 
 
 def gas_energy(p: GaugePressure, par: Parameters) -> Energy:
-    """Return the work stored in the compressed gas, the integral of p dV from ambient."""
+    """Return the energy in the compressed gas, the integral of p dV from ambient pressure."""
     if par.air == "none":
         return 0.0 * p * par.V_air
     n = par.n_air
@@ -124,7 +124,7 @@ def gas_energy(p: GaugePressure, par: Parameters) -> Energy:
 
 
 def inflow_energy(p: GaugePressure, par: Parameters) -> Energy:
-    r"""Return the energy supplied by inflow, of gas and fluid together.
+    r"""Return the energy that inflow supplies to gas and fluid together.
 
     .. math:: \int_0^p h(p') \left(-\frac{dV_g}{dp'}\right) dp'
 
@@ -153,7 +153,7 @@ def flow_energy(
     .. math:: h(p) = \beta (e^{p/\beta} - 1) \approx
         p (1 + \tfrac{z}{2} (1 + \tfrac{z}{3} (1 + \tfrac{z}{4}))), \quad z = p/\beta
 
-    It is flow work plus the transported compression energy. The relative error of the series is
+    This is flow work plus transported compression energy. The relative error of the series is
     z^4/120, below 1e-11 up to 50 bar.
     """
     c1 = 1.0 / (2.0 * par.beta)
@@ -167,7 +167,7 @@ def flow_energy_integral(
 ) -> PressureEnergy:
     """Return the integral of ``flow_energy`` over pressure from 0 to p.
 
-    Divided by beta it is the compression energy stored per volume.
+    Divided by beta, it is the stored compression energy per volume.
     """
     z = p / par.beta
     return 0.5 * p * p * (1.0 + z / 3.0 * (1.0 + z / 4.0 * (1.0 + z / 5.0)))

@@ -1,4 +1,4 @@
-"""Caliper with pad spring: pressure grows with the absorbed volume."""
+"""Caliper with pad spring, whose pressure increases with the absorbed volume."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ WarmingRate = Annotated[float, Unit("delta_degC/s", 1.0), Field(allow_inf_nan=Fa
 
 
 class Parameters(ParameterSet):
-    """Single-acting cylinder against the pads' elasticity.
+    """Single-acting cylinder against the elasticity of the pads.
 
-    ``law``: ``"linear"`` is eq. (11); ``"compressible"`` is eq. (10), with the compressibility
-    of the fluid in the caliper; ``"table"`` interpolates a measured pressure-volume curve, whose
-    flat start can include the volume of a knock-back. ``leak``: whether fluid is lost to the
-    outside in proportion to the pressure. ``fluid_heat``: whether the fluid in the caliper warms
-    and expands. If no port is open, it then applies the pads. Gas in line and caliper
+    ``law``: ``"linear"`` is eq. (11). ``"compressible"`` is eq. (10), with the compressibility
+    of the fluid in the caliper. ``"table"`` interpolates a measured pressure-volume curve, whose
+    flat start can include the volume of a knock-back. ``leak``: whether the caliper loses fluid to
+    the outside, in proportion to the pressure. ``fluid_heat``: whether the fluid in the caliper
+    warms and expands. If no port is open, expanding fluid applies the pads. Gas in line and caliper
     (``fluid.air = "caliper"``) increases the volume that the caliper absorbs.
     """
 
     law: Literal["linear", "compressible", "table"]
-    """relation of pressure and volume"""
+    """relation between pressure and volume"""
     A_pd: Area
     """piston area"""
     K_pd: Stiffness
@@ -42,9 +42,9 @@ class Parameters(ParameterSet):
     """volumes of the table, increasing from 0 (law "table")"""
 
     leak: Literal["tight", "leaking"]
-    """whether fluid is lost to the outside"""
+    """whether the caliper loses fluid to the outside"""
     G_leak: Conductance
-    """conductance of the leak (leak "leaking")"""
+    """leak conductance (leak "leaking")"""
     fluid_heat: Literal["off", "warming"]
     """whether the fluid in the caliper warms"""
     V_hot: Volume
@@ -61,7 +61,7 @@ class Parameters(ParameterSet):
             valid = f"of the same length as V_table, {len(V)} nodes"
             raise RuleError("p_table", f"{len(p)} nodes", valid)
         if self.law == "table" and len(p) < 2:
-            reason = "law = 'table' interpolates the table"
+            reason = "law = 'table' needs a table"
             raise RuleError("p_table", f"{len(p)} nodes", "of 2 nodes or more", reason)
         for name, nodes in (("p_table", p), ("V_table", V)):
             rising = all(a < b for a, b in pairwise(nodes))
@@ -71,7 +71,7 @@ class Parameters(ParameterSet):
 
 
 FAULTS = (
-    ParameterFault("soft", "softer pads or a hose that swells", ("K_pd",), 0.5),
+    ParameterFault("soft", "softer pads, or a swelling hose", ("K_pd",), 0.5),
     ParameterFault(
         "leaking",
         "fluid leaks to the outside (value: conductance)",
@@ -106,12 +106,12 @@ def mass(x: State, par: Parameters, fluid: brake_fluid.Parameters) -> FluidCompl
 
     .. math:: (1 + p_{pd}/\beta) \frac{A_{pd}^2}{K_{pd}} \frac{dp_{pd}}{dt} = q_{pd}
 
-    without the first factor for law "linear"; the slope of the table for law "table".
+    For law "linear", the first factor is absent. For law "table", it is the slope of the table.
 
     Notes
     -----
-    Eq. (10) as printed divides by the volume V_pd = A_pd x_pd, which is 0/0 at zero pressure;
-    with p_pd A_pd = K_pd x_pd it is the form above.
+    Eq. (10) as printed divides by the volume V_pd = A_pd x_pd, which is 0/0 at zero pressure.
+    With p_pd A_pd = K_pd x_pd it takes the form above.
 
     References
     ----------
@@ -123,7 +123,7 @@ def mass(x: State, par: Parameters, fluid: brake_fluid.Parameters) -> FluidCompl
 
 
 def _pads(x: State, par: Parameters, fluid: brake_fluid.Parameters) -> float:
-    """Return dV/dp of the pads and of the absorbed fluid."""
+    """Return dV/dp of the pads and the absorbed fluid."""
     if par.law == "table":
         return _slope(x.p, par)
     spring = par.A_pd * par.A_pd / par.K_pd
@@ -138,7 +138,7 @@ def expansion(par: Parameters) -> Annotated[float, Signal("m**3/s", "flow", 1e-8
 def balance(
     x: State, u: Input, par: Parameters
 ) -> Annotated[float, Signal("m**3/s", "flow", 1e-6)]:
-    """Return the flow that moves the pads: inflow and expansion minus leak."""
+    """Return the flow that moves the pads, which is inflow plus expansion minus leak."""
     q = u.q if par.fluid_heat == "off" else u.q + expansion(par)
     return q if par.leak == "tight" else q - par.G_leak * x.p
 
@@ -153,13 +153,13 @@ def _slope(p: float, par: Parameters) -> float:
 
 
 def energy(x: State, par: Parameters, fluid: brake_fluid.Parameters) -> Energy:
-    """Return the energy of the pads, of the inflow and of gas: integral of h(p) dV."""
+    """Return the energy of the pads, the inflow and the gas, which is the integral of h(p) dV."""
     pads = _pad_energy(x, par, fluid)
     return pads + brake_fluid.inflow_energy(x.p, fluid) if fluid.air == "caliper" else pads
 
 
 def _pad_energy(x: State, par: Parameters, fluid: brake_fluid.Parameters) -> float:
-    """Return the energy of the pads and of the absorbed fluid."""
+    """Return the energy of the pads and the absorbed fluid."""
     H = brake_fluid.flow_energy_integral
     if par.law == "table":
         total = 0.0 * H(x.p, fluid) * _slope(x.p, par)
@@ -185,7 +185,7 @@ def power_in(x: State, u: Input, par: Parameters, fluid: brake_fluid.Parameters)
 
 
 def expansion_power(x: State, par: Parameters, fluid: brake_fluid.Parameters) -> Power:
-    """Return the power of expanding fluid; negative while it cools."""
+    """Return the power of expanding fluid, negative while it cools."""
     return brake_fluid.convected_power(expansion(par), x.p, fluid)
 
 

@@ -1,4 +1,4 @@
-"""Screw of a clearance adjuster: turning reduces the clearance, otherwise the screw holds it.
+"""Screw of a clearance adjuster, which reduces the clearance by turning, and otherwise holds it.
 
 A controller sets its speed. The screw is self-locking, so no load drives it.
 """
@@ -19,15 +19,15 @@ Lag = Annotated[float, Unit("s", 5e-3), Field(gt=0, allow_inf_nan=False)]
 class Parameters(ParameterSet):
     """Screw that follows its drive with a first-order lag.
 
-    ``law``: ``"screw"``; ``"none"``: the brake has no adjuster.
+    ``law``: with ``"screw"``, the brake has an adjuster; with ``"none"``, it has none.
     """
 
     law: Literal["none", "screw"]
     """whether the brake has an adjuster"""
     tooth: Length
-    """clearance removed by a tooth"""
+    """clearance removed by one tooth"""
     tau_turn: Lag
-    """time constant with which the screw's speed follows the drive's"""
+    """time constant with which the screw speed follows the drive speed"""
 
 
 class State(NamedTuple):
@@ -45,7 +45,7 @@ class Rate(NamedTuple):
 
 
 class Input(NamedTuple):
-    """Speed of the drive."""
+    """Drive speed."""
 
     turning: Annotated[float, Signal("1/s", "teeth turned per second", 50.0)]
 
@@ -55,7 +55,7 @@ def rate(x: State, u: Input, par: Parameters) -> Rate:
 
     .. math:: \tau \ddot c + \dot c = s \dot n
 
-    with a pitch s per tooth. Whole teeth of the drive change the clearance by whole teeth.
+    with a travel s per tooth. Whole teeth of the drive change the clearance by whole teeth.
     """
     if par.law == "none":
         return Rate(0.0, 0.0)
@@ -63,5 +63,5 @@ def rate(x: State, u: Input, par: Parameters) -> Rate:
 
 
 def moved(x: State, par: Parameters) -> State:
-    """Return removed clearance and speed; zero without an adjuster."""
+    """Return removed clearance and speed, zero without an adjuster."""
     return State(0.0, 0.0) if par.law == "none" else x

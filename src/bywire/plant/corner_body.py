@@ -1,4 +1,4 @@
-"""A quarter of a car: the mass above one corner, on a straight road."""
+"""A quarter car: the mass above one corner, on a straight road."""
 
 from __future__ import annotations
 
@@ -50,8 +50,8 @@ class Input(NamedTuple):
 
 def load(
     cosine: Annotated[float, Signal("1", "cosine of the slope", 1.0)], par: Parameters
-) -> Annotated[float, Signal("N", "load of the wheel", 4e3)]:
-    """Return the load of the wheel."""
+) -> Annotated[float, Signal("N", "wheel load", 4e3)]:
+    """Return the wheel load."""
     return par.m * par.g * cosine
 
 

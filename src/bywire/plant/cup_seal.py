@@ -1,4 +1,4 @@
-"""Friction of a piston's cup seal: a force that grows with pressure, with a Stribeck peak."""
+"""Friction of a piston's cup seal, a force that increases with pressure and has a Stribeck peak."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ SlidingSpeed = Annotated[float, Unit("m/s", 1e-3), Field(gt=0, allow_inf_nan=Fal
 
 
 class Parameters(ParameterSet):
-    """Asymmetric Stribeck friction on the piston; `seal_friction` is the same at a motor's shaft.
+    """Asymmetric Stribeck friction on the piston. `seal_friction` is its equivalent at the shaft.
 
     Valid for pressures >= 0. At rest the friction is set-valued.
     """
 
     F_pr: Force
-    """friction of the preload, at zero pressure"""
+    """friction due to preload, at zero pressure"""
     f_p: ForcePerPressure
-    """growth of the Coulomb friction with pressure, toward clamping"""
+    """growth of the Coulomb friction with pressure while applying"""
     f_n: ForcePerPressure
-    """growth of the Coulomb friction with pressure, releasing"""
+    """growth of the Coulomb friction with pressure while releasing"""
     k_brk: BreakawayFactor
     """breakaway friction relative to Coulomb friction"""
     v_S: SlidingSpeed
@@ -36,7 +36,7 @@ class Parameters(ParameterSet):
 
 
 class Input(NamedTuple):
-    """Speed of the piston and chamber pressure."""
+    """Piston speed and chamber pressure."""
 
     v: Annotated[float, Signal("m/s", "piston speed", 1e-3)]
     p: Annotated[float, Signal("Pa", "chamber pressure", 2e6)]
@@ -66,6 +66,6 @@ def output(u: Input, par: Parameters) -> Output:
 
 
 def power_loss(u: Input, par: Parameters) -> Power:
-    """Return the heat of the sliding friction, >= 0."""
+    """Return the heat from sliding friction, >= 0."""
     friction = output(u, par)
     return ops.where(u.v > 0, friction.F_p, friction.F_n) * ops.fabs(u.v)

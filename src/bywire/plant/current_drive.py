@@ -22,16 +22,16 @@ from bywire.core.signals import Signal
 
 
 class Parameters(ParameterSet):
-    """Continuous current controller; the PWM ripple (40 kHz) is averaged out."""
+    """Continuous current controller with the PWM ripple (40 kHz) averaged out."""
 
     f_demand: Frequency
-    """corner frequency of the demand's filter"""
+    """corner frequency of the demand filter"""
     f_sense: Frequency
-    """corner frequency of the current measurement's filter"""
+    """corner frequency of the current measurement filter"""
     G_sense: Factor
     """scale of the current measurement; 1 if calibrated"""
     i_max: Current
-    """limit of the filtered demand's magnitude"""
+    """magnitude limit of the filtered demand"""
     k_p: DutyPerCurrent
     """proportional gain, duty cycle per current"""
     k_i: DutyPerCurrentTime
@@ -41,13 +41,13 @@ class Parameters(ParameterSet):
     V_dc: Voltage
     """supply voltage: gain and limit of the PWM stage"""
     R_off: Resistance
-    """resistance of the diodes, in which the current decays while the stage is off"""
+    """resistance of the diodes, which makes the current decay while the stage is off"""
 
 
 FAULTS = (
-    ParameterFault("under-voltage", "lower voltage at the power stage", ("V_dc",), 0.5),
-    ParameterFault("scale", "scaled current measurement", ("G_sense",), 0.5),
-    ParameterFault("derated", "lower current limit", ("i_max",), 0.5),
+    ParameterFault("under-voltage", "reduced voltage at the power stage", ("V_dc",), 0.5),
+    ParameterFault("scale", "wrong scale of the current measurement", ("G_sense",), 0.5),
+    ParameterFault("derated", "reduced current limit", ("i_max",), 0.5),
 )
 
 
@@ -92,7 +92,7 @@ def output(x: State, u: Input, par: Parameters) -> Output:
 
     .. math:: V = V_{dc}\, \mathrm{sat}(k_p e + I), \quad |\mathrm{sat}| \le 1
 
-    While the stage is off, it is back-EMF minus R_off i: the current decays and stays zero.
+    While the stage is off, the voltage is back-EMF minus R_off i. The current then decays to zero.
 
     References
     ----------
@@ -107,8 +107,8 @@ def rate(x: State, u: Input, par: Parameters) -> Rate:
 
     .. math:: \dot I = k_i e + (\mathrm{sat}(k_p e + I) - k_p e - I)/T_t
 
-    The last term is the anti-windup (our interpretation; the paper has none). While the stage is
-    off, the integral part decays with T_t.
+    The last term is the anti-windup, which is ours and not in the paper. While the stage is off,
+    the integral part decays with T_t.
     """
     e = error(x, par)
     unlimited = par.k_p * e + x.integral

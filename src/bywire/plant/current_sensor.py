@@ -1,4 +1,4 @@
-"""Hall-effect current sensor: current as a fraction of its span."""
+"""Hall-effect current sensor, whose reading is a fraction of its span."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from bywire.core.typing import Array
 from bywire.core.validity import first, outside, row_by_row
 
 MotorCurrent = Annotated[float, Signal("A", "motor current", 5.0)]
-Reading = Annotated[float, Signal("1", "reading, share of the range", 0.5)]
+Reading = Annotated[float, Signal("1", "reading, fraction of the range", 0.5)]
 
 
 class Parameters(ParameterSet):
-    """Linear between the ends of its range, saturating there; no dynamics."""
+    """Linear sensor without dynamics, which saturates at the ends of its range."""
 
     i_low: SignedCurrent
-    """lowest current of the range"""
+    """minimum current of the range"""
     i_high: SignedCurrent
     """maximum current of the range"""
 
@@ -44,13 +44,13 @@ def reading(i: MotorCurrent, par: Parameters) -> Reading:
 
 
 def value(share: Reading, par: Parameters) -> MotorCurrent:
-    """Return the current of a reading."""
+    """Return the current for a reading."""
     return par.i_low + share * (par.i_high - par.i_low)
 
 
 @row_by_row
 def watch(t: Array, u: Input, par: Parameters) -> list[str]:
-    """Warn if the current leaves the sensor's range, with the first time."""
+    """Warn if the current leaves the sensor's range, with the time when it first does."""
     text = f"the current leaves the sensor's range, {par.i_low:g} to {par.i_high:g} A,"
     beyond = outside(u.i, par.i_low, par.i_high)
     return first(t, beyond, text, ": the measured value stays at the end of the range")

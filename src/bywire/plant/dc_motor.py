@@ -13,7 +13,7 @@ Loss = Annotated[float, Signal("W", "copper loss", role=Role("sink", "copper", s
 
 
 class Parameters(ParameterSet):
-    """Constant coefficients: no saturation, no temperature, no brush voltage."""
+    """Constant coefficients, without saturation, temperature effects or brush voltage."""
 
     R_m: Resistance
     """winding resistance"""
@@ -48,7 +48,7 @@ class Balance(NamedTuple):
 
 
 class Input(NamedTuple):
-    """Voltage at the terminals, speed of the rotor."""
+    """Terminal voltage and rotor speed."""
 
     v: Annotated[float, Signal("V", "motor voltage", 6.0)]
     omega: Annotated[float, Signal("rad/s", "motor speed", 50.0)]
@@ -72,8 +72,8 @@ def balance(x: State, u: Input, par: Parameters) -> Balance:
 
     Notes
     -----
-    The printed equation has the opposite sign on its right-hand side, but current must rise with
-    voltage.
+    The printed equation has the opposite sign on its right-hand side, but the current must rise
+    with the voltage.
 
     References
     ----------

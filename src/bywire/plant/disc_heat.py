@@ -1,4 +1,4 @@
-"""Heat of a wheel's brake: discs, pads, and calipers with their fluid warm up, and pads fade."""
+"""Heat of a wheel brake: discs, pads, and calipers with fluid warm up, and pads fade."""
 
 from __future__ import annotations
 
@@ -20,13 +20,14 @@ Cooling = Annotated[
     float, Signal("W", "cooling by air", role=Role("sink", "air", book="heat", returns="any"))
 ]
 Kelvin = Annotated[float, Signal("K", "temperature", 400.0), Ge(0)]
-_STANDS = 1e-9  # of v_ref: below it the power of the speed is 0, without a slope
+_STANDS = 1e-9  # fraction of v_ref below which the power of the speed is 0, without a slope
 
 
 class Parameters(ParameterSet):
     """Three bodies with one temperature each.
 
-    ``law``: ``"lumped"``; ``"off"`` keeps the friction of cold pads and constant temperatures.
+    ``law``: with ``"lumped"``, the brake warms up. With ``"off"``, temperatures are constant and
+    the pads keep their cold friction.
     """
 
     law: Literal["off", "lumped"]
@@ -38,15 +39,15 @@ class Parameters(ParameterSet):
     C_f: HeatCapacity
     """heat capacity of the calipers with their fluid"""
     psi: Weight
-    """fraction of the friction's heat that goes into the discs"""
+    """fraction of the friction heat that enters the discs"""
     A: Area
-    """surface of the discs that the air cools"""
+    """disc surface that the air cools"""
     h_0: Convection
     """convection coefficient at rest"""
     h_1: Convection
-    """increase of h_0 at the speed v_ref"""
+    """increase over h_0 at the speed v_ref"""
     v_ref: Annotated[float, Unit("m/s", 1.0), Field(gt=0, allow_inf_nan=False)]
-    """speed to which h_1 refers"""
+    """reference speed of h_1"""
     epsilon: Weight
     """emissivity of the discs"""
     sigma: Annotated[float, Unit("W/(m**2*K**4)", 5.67e-8), Field(ge=0, allow_inf_nan=False)]
@@ -60,19 +61,19 @@ class Parameters(ParameterSet):
     G_f: HeatConductance
     """conductance from calipers to the air"""
     T_a: Temperature
-    """temperature of the air, and of all bodies before the first stop"""
+    """air temperature, and temperature of all bodies before the first stop"""
     T_1: Temperature
-    """temperature of the discs up to which the pads have the friction of cold pads"""
+    """disc temperature up to which the pads keep their cold friction"""
     T_2: Temperature
-    """temperature of the discs above which the pads are fully faded"""
+    """disc temperature above which the pads are fully faded"""
     f: Weight
-    """friction of fully faded pads, relative to that of cold pads"""
+    """friction of fully faded pads, relative to cold pads"""
     T_boil: Temperature
-    """boiling point of the fluid at atmospheric pressure, fresh"""
+    """boiling point of fresh fluid at atmospheric pressure"""
     T_wet: Temperature
-    """boiling point of the fluid at atmospheric pressure, with 3.7 % water"""
+    """boiling point of fluid with 3.7 % water at atmospheric pressure"""
     T_most: Temperature
-    """temperature of the discs up to which these values are valid"""
+    """disc temperature up to which these values are valid"""
 
     @model_validator(mode="after")
     def _fades_upward(self) -> Parameters:
@@ -85,8 +86,8 @@ class Parameters(ParameterSet):
 class State(NamedTuple):
     """Temperatures."""
 
-    T_disc: Annotated[float, Signal("K", "temperature of the discs", 450.0), Ge(0)]
-    T_pads: Annotated[float, Signal("K", "temperature of the pads", 400.0), Ge(0)]
+    T_disc: Annotated[float, Signal("K", "disc temperature", 450.0), Ge(0)]
+    T_pads: Annotated[float, Signal("K", "pad temperature", 400.0), Ge(0)]
     T_fluid: Annotated[float, Signal("K", "temperature of calipers and fluid", 320.0), Ge(0)]
 
 
@@ -107,10 +108,10 @@ class Balance(NamedTuple):
 
 
 class Input(NamedTuple):
-    """Power of the brake's friction, speed of the vehicle, and whether pads press on the discs.
+    """Friction power of the brake, vehicle speed, and whether pads press on the discs.
 
-    The power is that of the set-valued friction, limit times speed where the wheel turns and 0
-    at standstill: a locked wheel heats its tire.
+    The power comes from the set-valued friction. It is limit times speed while the wheel turns, and
+    0 at standstill, because a locked wheel heats its tire and not the brake.
     """
 
     P: Annotated[float, Signal("W", "friction power of the brake", 3e4), Ge(0)]
@@ -119,7 +120,7 @@ class Input(NamedTuple):
 
 
 class Stored(NamedTuple):
-    """Heat above the temperature of the air."""
+    """Heat above the air temperature."""
 
     discs: Annotated[float, Signal("J", "heat in the discs", 1e5)]
     pads: Annotated[float, Signal("J", "heat in the pads", 1e4)]
@@ -127,7 +128,7 @@ class Stored(NamedTuple):
 
 
 class Flows(NamedTuple):
-    """Heat flows between the bodies, and from them to the air."""
+    """Heat flows between the bodies, and from the bodies to the air."""
 
     disc_air: Annotated[float, Signal("W", "cooling of the discs", 1e3)]
     disc_pads: Annotated[float, Signal("W", "heat from discs to pads", 100.0)]
@@ -137,8 +138,8 @@ class Flows(NamedTuple):
 
 def friction(
     T_disc: Kelvin, par: Parameters
-) -> Annotated[float, Signal("1", "friction relative to that of cold pads", 1.0)]:
-    r"""Return the pads' friction relative to cold pads.
+) -> Annotated[float, Signal("1", "friction relative to cold pads", 1.0)]:
+    r"""Return the pad friction relative to cold pads.
 
     .. math:: \mu/\mu_0 = 1 - (1 - f)\, \mathrm{clip}((T_d - T_1)/(T_2 - T_1), 0, 1)
     """
@@ -165,7 +166,7 @@ def flows(x: State, u: Input, par: Parameters) -> Flows:
         P_{fa} = G_f (T_f - T_a)
     """
     warmer = x.T_disc - par.T_a
-    # T_d^4 - T_a^4 in factors, which loses no digits near the air's temperature
+    # T_d^4 - T_a^4 in factors, which lose no digits near the air temperature
     radiated = (x.T_disc * x.T_disc + par.T_a * par.T_a) * (x.T_disc + par.T_a) * warmer
     through = par.G_open + (par.G_dp - par.G_open) * u.pressed
     return Flows(
@@ -217,7 +218,7 @@ def energy(x: State, par: Parameters) -> Energy:
 
 
 def power_in(u: Input, par: Parameters) -> Power:
-    """Return the power of the friction if it heats the brake."""
+    """Return the friction power if it heats the brake."""
     return 0.0 if par.law == "off" else u.P
 
 
@@ -231,11 +232,11 @@ def power_loss(x: State, u: Input, par: Parameters) -> Cooling:
 
 @row_by_row
 def watch(t: Array, x: State, par: Parameters) -> list[str]:
-    """Warn if the fluid may boil, and if the discs exceed the valid range of the parameters."""
+    """Warn if the fluid may boil, or if the discs exceed the valid range of the parameters."""
     if par.law == "off":
         return []
     boils = "the brake fluid exceeds the boiling point of {} fluid, {},".format
-    vapor = ": vapor costs stroke, which is not simulated here"
+    vapor = ". Vapor costs stroke, but this model does not simulate that"
     wet, fresh, most = (shown(T, "K") for T in (par.T_wet, par.T_boil, par.T_most))
     return [
         *first(t, x.T_fluid > par.T_wet, boils("wet", wet), vapor),

@@ -1,4 +1,4 @@
-"""Power at the drives' input: standby of the electronics, and the rig's slow measurement."""
+"""Power at the drives' input, with standby power and the rig's slow measurement."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ Watts = Annotated[float, Signal("W", "power", 50.0)]
 
 
 class Parameters(ParameterSet):
-    """Stiff supply and lossless power stages: all power in addition to the motors' is standby."""
+    """Stiff supply and lossless power stages. All power except the motor power is standby."""
 
     P_standby: Annotated[float, Unit("W", 20.0), Field(ge=0, allow_inf_nan=False)]
-    """power of the drives' electronics, both together"""
+    """total power of the electronics of both drives"""
     tau_P: Duration
     """time constant of the power measurement"""
 
@@ -41,7 +41,7 @@ class Input(NamedTuple):
 
 
 def power(motors: Watts, par: Parameters) -> Watts:
-    """Return the power at the input; ``motors`` is the sum of V i of both motors."""
+    """Return the power at the input. ``motors`` is the sum of V i over both motors."""
     return par.P_standby + motors
 
 

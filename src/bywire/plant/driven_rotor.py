@@ -1,4 +1,4 @@
-"""Rotor of a servo motor with a prescribed current, without winding and drive."""
+"""Rotor of a servo motor with a prescribed current, without winding or drive."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ Parameters = servo_motor.Parameters
 
 
 class State(NamedTuple):
-    """Shaft angle and speed; positive toward clamping."""
+    """Shaft angle and speed, positive toward clamping."""
 
     theta: Annotated[float, Signal("rad", "motor angle", 3.0)]
     omega: Annotated[float, Signal("rad/s", "motor speed", 50.0)]
@@ -32,7 +32,7 @@ class Balance(NamedTuple):
 
 
 class Input(NamedTuple):
-    """Current, torques of the load and of the dry friction on the shaft."""
+    """Current, load torque, and dry friction torque on the shaft."""
 
     i: Annotated[float, Signal("A", "motor current", 5.0)]
     load: Annotated[float, Signal("N*m", "torque of the screw on the shaft", 0.5)]
@@ -62,5 +62,5 @@ def power_in(x: State, u: Input, par: Parameters) -> Power:
 
 
 def power_loss(x: State, par: Parameters) -> Power:
-    """Return the heat of the viscous damping, >= 0."""
+    """Return the heat from viscous damping, >= 0."""
     return servo_motor.damping_loss(servo_motor.State(0.0, x.theta, x.omega), par)

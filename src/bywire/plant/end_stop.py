@@ -1,4 +1,4 @@
-"""Pair of end stops: unilateral, stiff, damped; they push and never pull."""
+"""Pair of stiff, damped end stops, which push but never pull."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ Work = Annotated[float, Signal("W", "work on the end stops")]
 Loss = Annotated[
     float,
     Signal(
-        "W", "loss in the end stops, minus their energy at start", role=Role("sink", "end stops")
+        "W", "loss in the end stops, minus their initial energy", role=Role("sink", "end stops")
     ),
 ]
 
 
 class Parameters(ParameterSet):
-    """Two equal stops, Kelvin-Voigt damping proportional to stiffness."""
+    """Two equal stops with Kelvin-Voigt damping proportional to stiffness."""
 
     k_stop: Stiffness
     """stiffness of each stop"""
@@ -37,7 +37,7 @@ class Input(NamedTuple):
 
 
 class InputRate(NamedTuple):
-    """Derivatives of the inputs that affect the stored energy; the stops do not move."""
+    """Derivatives of the inputs that affect the stored energy. The stops do not move."""
 
     x: Annotated[float, Signal("m/s", "speed", 0.02)]
     x_rest: Annotated[float, Signal("m/s", "speed of the near stop", 0.02)]
@@ -52,7 +52,7 @@ class Forces(NamedTuple):
 
 
 class Overlaps(NamedTuple):
-    """Overlaps with damping, d = depth + tau d(depth)/dt; a force acts where d > 0."""
+    """Overlaps with damping, d = depth + tau d(depth)/dt. A force acts where d > 0."""
 
     near: Annotated[float, Signal("m", "overlap at the near stop", 1e-5)]
     far: Annotated[float, Signal("m", "overlap at the far stop", 1e-5)]
@@ -72,7 +72,7 @@ def compliance(par: Parameters) -> ContactCompliance:
 
 
 def forces(u: Input, par: Parameters) -> Forces:
-    """Return the contact forces on a body that no other contact holds: F >= d / C, F >= 0."""
+    """Return the contact forces on a body without other contacts: F >= d / C, F >= 0."""
     d, c = overlaps(u, par), compliance(par)
     return Forces(near=ops.fmax(d.near / c, 0.0), far=ops.fmax(d.far / c, 0.0))
 
@@ -83,7 +83,7 @@ def load(f: Forces) -> Annotated[float, Signal("N", "load on the body", 100.0)]:
 
 
 def input_rate(u: Input) -> InputRate:
-    """Return the rate of the travel, the port through which the stops store energy."""
+    """Return the rate of the travel, which is the port through which the stops store energy."""
     return InputRate(x=u.v, x_rest=0.0, x_end=0.0)
 
 

@@ -1,4 +1,4 @@
-"""Vapor in boiling brake fluid: bubbles above the boiling point, which falls with water content."""
+"""Vapor bubbles in brake fluid above its boiling point, which decreases with water content."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Parameters(ParameterSet):
     T_dry: Temperature
     """boiling point of fluid without water"""
     T_wet: Temperature
-    """boiling point with ``water_wet``"""
+    """boiling point of fluid with ``water_wet``"""
     water_wet: Annotated[float, Unit("1", 0.037), Field(gt=0, lt=1, allow_inf_nan=False)]
     """fraction of water in wet fluid, up to which these values are valid"""
     V: Volume
@@ -34,7 +34,7 @@ class Parameters(ParameterSet):
     growth: Growth
     """vapor volume per fluid volume and kelvin above the boiling point, at ambient pressure"""
     T_most: Temperature
-    """temperature of the fluid up to which these values are valid"""
+    """fluid temperature up to which these values are valid"""
 
     @model_validator(mode="after")
     def _boils_within_its_range(self) -> Parameters:
@@ -49,8 +49,8 @@ class Parameters(ParameterSet):
                 "water",
                 f"{self.water:g}",
                 f"<= water_wet = {self.water_wet:g}",
-                "the boiling point is known up to water_wet. Lower water, or set water_wet and "
-                "T_wet to the values of wetter fluid",
+                "the boiling point is known only up to water_wet. Reduce water, or set water_wet "
+                "and T_wet to the values of wetter fluid",
             )
         return self
 
@@ -62,7 +62,7 @@ def boiling_point(par: Parameters) -> Annotated[float, Signal("K", "boiling poin
 
     Notes
     -----
-    This is a straight line between the two tested points; in reality, the first water has the
+    This is a straight line between the two tested points. In reality, the first water has the
     largest effect.
 
     References
@@ -77,11 +77,11 @@ def volume(T: Kelvin, par: Parameters) -> Annotated[float, Signal("m**3", "vapor
 
     .. math:: V_{vapor} = \gamma V \max(T - T_b, 0)
 
-    Under pressure it is compressed like a gas (`brake_fluid`, air in line and caliper).
+    Pressure compresses the vapor like a gas (`brake_fluid`, air in line and caliper).
 
     Notes
     -----
-    The heat of 5 ml of fluid with 2.3 kJ/(kg K) suffices for 10 ml of vapor per kelvin. The growth
-    determines how much vapor forms before the fluid is pushed back or cools.
+    The heat in 5 ml of fluid with 2.3 kJ/(kg K) suffices for 10 ml of vapor per kelvin. The growth
+    determines how much vapor forms before the fluid retreats or cools.
     """
     return par.growth * par.V * ops.fmax(T - boiling_point(par), 0.0)

@@ -1,4 +1,4 @@
-"""Flywheel and disc of the test stand: coasting or driven, with runout."""
+"""Flywheel and disc of the test stand, coasting or driven, with runout."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ RunOut = Annotated[float, Unit("m", 4e-6), Field(ge=0, allow_inf_nan=False)]
 
 
 class Parameters(ParameterSet):
-    """Rigid disc and flywheel; the braking moment is dry friction, so the disc stops completely.
+    """Rigid disc and flywheel. The braking moment is dry friction, so the disc stops completely.
 
-    ``law``: with ``"coasting"``, the brake slows the disc down; with ``"driven"``, a proportional
-    speed controller of the AC motor keeps its speed near ``Omega_0``.
+    ``law``: with ``"coasting"``, the brake slows the disc down. With ``"driven"``, a proportional
+    speed controller of the AC motor keeps the disc speed near ``Omega_0``.
     """
 
     law: Literal["coasting", "driven"]
@@ -31,7 +31,7 @@ class Parameters(ParameterSet):
     J_F: BigInertia
     """inertia of flywheel and disc"""
     Omega_0: DiscSpeed
-    """speed at the start, and the set point when driven"""
+    """initial speed, and set point if the disc is driven"""
     K_drive: SpeedGain
     """gain of the speed controller (law "driven")"""
     Omega_still: StillSpeed
@@ -40,7 +40,7 @@ class Parameters(ParameterSet):
     """amplitude of the runout that the floating caliper does not follow"""
 
 
-FAULTS = (ParameterFault("run-out", "disc runout larger by a factor", ("runout",), 5.0),)
+FAULTS = (ParameterFault("run-out", "increased disc runout", ("runout",), 5.0),)
 
 
 class State(NamedTuple):
@@ -65,19 +65,19 @@ class Balance(NamedTuple):
 
 
 class Input(NamedTuple):
-    """Brake moment as a friction on the disc, against its rotation."""
+    """Brake moment as friction on the disc, against its rotation."""
 
     friction: Annotated[float, Signal("N*m", "moment of the pads on the disc", 300.0)]
 
 
-def turning(x: State, par: Parameters) -> Annotated[float, Signal("1", "direction of the disc")]:
+def turning(x: State, par: Parameters) -> Annotated[float, Signal("1", "disc direction")]:
     """Return the direction of rotation, +1 or -1, and 0 for a stopped disc."""
     backward = ops.where(x.Omega < -par.Omega_still, -1.0, 0.0)
     return ops.where(x.Omega > par.Omega_still, 1.0, backward)
 
 
 def drive_torque(x: State, par: Parameters) -> Annotated[float, Signal("N*m", "drive torque")]:
-    """Return the torque of the AC motor."""
+    """Return the AC motor torque."""
     if par.law == "coasting":
         return 0.0 * par.K_drive * x.Omega
     return par.K_drive * (par.Omega_0 - x.Omega)
@@ -93,8 +93,8 @@ def balance(x: State, u: Input, par: Parameters) -> Balance:
     return Balance(Omega=drive_torque(x, par) + u.friction, phi=x.Omega)
 
 
-def runout(x: State, par: Parameters) -> Annotated[float, Signal("m", "run-out", 4e-6)]:
-    """Return the runout at the pads: once per revolution."""
+def runout(x: State, par: Parameters) -> Annotated[float, Signal("m", "runout", 4e-6)]:
+    """Return the runout at the pads, one wave per revolution."""
     return par.runout * ops.sin(x.phi)
 
 

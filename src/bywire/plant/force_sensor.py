@@ -1,4 +1,4 @@
-"""Force sensor between two screws: both screws and the sensor as one spring, and its reading."""
+"""Force sensor between two screws. Both screws and the sensor are one spring."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ Loss = Annotated[
 
 
 class Parameters(ParameterSet):
-    """Calibrated sensor without mass, bolted to both screws for compression and tension."""
+    """Calibrated massless sensor, bolted to both screws for compression and tension."""
 
     K_F: Stiffness
     """stiffness of the sensor with its adapters"""
     tau_F: TimeConstant
     """ratio of damping to stiffness of sensor and screws"""
     f_F: Frequency
-    """corner frequency of the amplifier's filter"""
+    """corner frequency of the amplifier filter"""
 
 
 class State(NamedTuple):
-    """Reading of the amplifier."""
+    """Amplifier reading."""
 
     y: Annotated[float, Signal("N", "force measured by the sensor", 1000.0)]
 
@@ -52,7 +52,7 @@ class Input(NamedTuple):
 
 
 class InputRate(NamedTuple):
-    """Derivatives of the inputs of the stored energy; the compliance is constant."""
+    """Derivatives of the inputs of the stored energy. The compliance is constant."""
 
     X_1: Annotated[float, Signal("m/s", "velocity of screw 1", 0.02)]
     X_2: Annotated[float, Signal("m/s", "velocity of screw 2", 0.02)]
@@ -65,7 +65,7 @@ def stiffness(u: Input, par: Parameters) -> Annotated[float, Signal("N/m", "stif
 
 
 def compression(u: Input) -> Annotated[float, Signal("m", "compression of the line", 1e-4)]:
-    """Return the approach of the nuts relative to zero force; negative in tension."""
+    """Return the approach of the nuts relative to zero force, negative in tension."""
     return u.X_1 - u.X_2
 
 
@@ -75,7 +75,7 @@ def closing(u: Input) -> Annotated[float, Signal("m/s", "rate of the compression
 
 
 def force(u: Input, par: Parameters) -> AxialForce:
-    r"""Return the force in the line, :math:`F = K (d + \tau \dot d)`, compression positive.
+    r"""Return the force in the line, :math:`F = K (d + \tau \dot d)`, positive in compression.
 
     References
     ----------
@@ -90,7 +90,7 @@ def rate(x: State, u: Input, par: Parameters) -> Rate:
 
 
 def input_rate(u: Input) -> InputRate:
-    """Return the rates of the nuts, the ports through which the line stores energy."""
+    """Return the rates of the nuts, which are the ports through which the line stores energy."""
     return InputRate(X_1=u.V_1, X_2=u.V_2, c=0.0)
 
 
@@ -106,6 +106,6 @@ def power_in(u: Input, par: Parameters) -> Power:
 
 
 def power_loss(u: Input, par: Parameters) -> Loss:
-    """Return the loss of the damping, >= 0."""
+    """Return the damping loss, >= 0."""
     rate_d = closing(u)
     return stiffness(u, par) * par.tau_F * rate_d * rate_d

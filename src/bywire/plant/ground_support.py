@@ -1,4 +1,4 @@
-"""Ground below the rear wheel: it pushes and never pulls, and a landing wheel does not rebound."""
+"""Ground below the rear wheel, which pushes but never pulls. A landing wheel does not rebound."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ Loss = Annotated[
     float,
     Signal(
         "W",
-        "loss of the ground's contact, minus its energy at start",
+        "loss in the ground contact, minus its initial energy",
         role=Role("sink", "ground contact", book="vehicle"),
     ),
 ]
 
 
 class Parameters(ParameterSet):
-    """Upright stiffness of rear tire and suspension, which carries the load."""
+    """Vertical stiffness of rear tire and suspension, which supports the load."""
 
     k: Stiffness
     """stiffness"""
@@ -32,7 +32,7 @@ class Input(NamedTuple):
     """Rise of the rear wheel, and its rate."""
 
     z: Annotated[float, Signal("m", "rise of the rear wheel", 1e-2)]
-    v: Annotated[float, Signal("m/s", "speed of its rise", 0.1)]
+    v: Annotated[float, Signal("m/s", "speed of the rise", 0.1)]
 
 
 class InputRate(NamedTuple):

@@ -1,4 +1,4 @@
-"""H-bridge: static gain from duty cycle to motor voltage, averaged over the PWM period."""
+"""H-bridge as a static gain from duty cycle to motor voltage, averaged over the PWM period."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from bywire.core.signals import Signal
 
 
 class Parameters(ParameterSet):
-    """Lossless averaged bridge, without the ripple of the carrier and without dead times."""
+    """Lossless averaged bridge, without carrier ripple and dead times."""
 
     D_max: Fraction
-    """limit of the duty cycle's magnitude"""
+    """magnitude limit of the duty cycle"""
     f_pwm: Frequency
-    """PWM carrier; informative, since the bridge is averaged over its period"""
+    """PWM carrier frequency, for information only, because the bridge is averaged"""
 
 
 class Input(NamedTuple):
@@ -42,7 +42,7 @@ def limited(
 
 
 def output(u: Input) -> Output:
-    r"""Return motor voltage and battery current, power in equal to power out.
+    r"""Return motor voltage and battery current. Input power equals output power.
 
     .. math:: v = K_H D, \quad i_{dc} = D i
 

@@ -12,9 +12,7 @@ from bywire.core.quantities import Area, Damping, Length
 from bywire.core.signals import Energy, FluidCompliance, Power, Role, Signal
 from bywire.plant import brake_fluid
 
-Loss = Annotated[
-    float, Signal("W", "loss of the fluid's damping", role=Role("sink", "fluid damping"))
-]
+Loss = Annotated[float, Signal("W", "fluid damping loss", role=Role("sink", "fluid damping"))]
 
 
 class Parameters(ParameterSet):
@@ -23,15 +21,15 @@ class Parameters(ParameterSet):
     A_mc: Area
     """piston area"""
     s_mc: Length
-    """chamber length at zero travel: the travel at which its volume would be zero"""
+    """chamber length at zero travel, which equals the travel at which its volume would be zero"""
     x_rest: Length
     """travel of the retracted piston, at its near end stop and zero pressure"""
     x_end: Length
-    """travel at which the piston meets its end stop"""
+    """travel at which the piston reaches its end stop"""
     x_nominal: Length
     """travel at the nominal operating point"""
     k_damp: Damping
-    """damping of the fluid's kinetic energy"""
+    """damping coefficient of the fluid"""
 
     @model_validator(mode="after")
     def _ordered(self) -> Parameters:
@@ -99,25 +97,25 @@ def balance(u: Input, par: Parameters) -> Annotated[float, Signal("m**3/s", "flo
 
 
 def output(x: State, u: Input, par: Parameters) -> Output:
-    """Return the piston's load, pressure and damping force of eq. (4), without friction."""
+    """Return the piston load, which is pressure and damping force of eq. (4), without friction."""
     return Output(force=x.p * par.A_mc + par.k_damp * u.v)
 
 
 def input_rate(u: Input) -> InputRate:
-    """Return the rate of the travel: the chamber's volume is a port, not a state."""
+    """Return the rate of the travel, because the chamber volume is a port and not a state."""
     return InputRate(x=u.v)
 
 
 def energy(x: State, u: Input, par: Parameters, fluid: brake_fluid.Parameters) -> Energy:
-    """Return the compression energy of the fluid and of the gas in it."""
+    """Return the compression energy of the fluid and its gas."""
     return brake_fluid.compression_energy(brake_fluid.Chamber(V=volume(u, par), p=x.p), fluid)
 
 
 def power_in(x: State, u: Input, par: Parameters, fluid: brake_fluid.Parameters) -> Power:
-    """Return the power of the piston minus that of the outflow."""
+    """Return the piston power minus the outflow power."""
     return output(x, u, par).force * u.v - brake_fluid.convected_power(u.q, x.p, fluid)
 
 
 def power_loss(u: Input, par: Parameters) -> Loss:
-    """Return the heat of the damping force, >= 0."""
+    """Return the heat from the damping force, >= 0."""
     return par.k_damp * u.v * u.v

@@ -1,4 +1,4 @@
-"""Sensor of the braking moment at the caliper's mount."""
+"""Braking moment sensor at the caliper mount."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from bywire.core.signals import Signal
 
 
 class Parameters(ParameterSet):
-    """First-order lag of the mount and its amplifier, calibrated."""
+    """Calibrated first-order lag of mount and amplifier."""
 
     f_M: Frequency
     """corner frequency"""

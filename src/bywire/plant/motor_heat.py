@@ -1,7 +1,7 @@
 """Motor heat: copper loss heats the winding, which heats the housing, which heats the air.
 
-The resistance of copper grows with temperature, and magnets become weaker. The motor's resistance
-and torque constant follow from `warmth`.
+Copper resistance increases with temperature, and magnets become weaker. `warmth` returns the
+resulting resistance and torque constant of the motor.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ WINDING, HOUSING = (
 )
 Conducted = Annotated[
     float,
-    Signal("W", "heat of motors to the air", role=Role("sink", "air", book=BOOK, returns="any")),
+    Signal("W", "heat flow from motors to air", role=Role("sink", "air", book=BOOK, returns="any")),
 ]
 Kelvin = Annotated[float, Signal("K", "temperature", 400.0), Ge(0)]
 
@@ -38,8 +38,8 @@ Kelvin = Annotated[float, Signal("K", "temperature", 400.0), Ge(0)]
 class Parameters(ParameterSet):
     """Two bodies with one temperature each.
 
-    ``law``: ``"lumped"``; ``"off"`` keeps the motor at its values for ``T_ref``, with constant
-    temperatures.
+    ``law``: with ``"lumped"``, the motor warms up. With ``"off"``, temperatures are constant and
+    the motor keeps its values for ``T_ref``.
     """
 
     law: Literal["off", "lumped"]
@@ -53,15 +53,15 @@ class Parameters(ParameterSet):
     G_ha: HeatConductance
     """conductance from housing to the air"""
     a_R: TemperatureCoefficient
-    """growth of the resistance with the winding's temperature, copper"""
+    """increase in resistance with winding temperature (copper)"""
     a_K: TemperatureCoefficient
-    """fall of the torque constant with the housing's temperature, magnets"""
+    """decrease in torque constant with housing temperature (magnets)"""
     T_ref: Temperature
     """temperature at which the motor's resistance and torque constant are valid"""
     T_a: Temperature
-    """temperature of the air, and of the motor at the start"""
+    """air temperature, and initial motor temperature"""
     T_most: Temperature
-    """temperature limit of the winding's insulation"""
+    """temperature limit of the winding insulation"""
 
     @model_validator(mode="after")
     def _magnets_hold(self) -> Parameters:
@@ -80,8 +80,8 @@ class Parameters(ParameterSet):
 class State(NamedTuple):
     """Temperatures."""
 
-    T_winding: Annotated[float, Signal("K", "temperature of the winding", 350.0), Ge(0)]
-    T_housing: Annotated[float, Signal("K", "temperature of the motor's housing", 320.0), Ge(0)]
+    T_winding: Annotated[float, Signal("K", "winding temperature", 350.0), Ge(0)]
+    T_housing: Annotated[float, Signal("K", "motor housing temperature", 320.0), Ge(0)]
 
 
 class Factors(NamedTuple):
@@ -105,20 +105,21 @@ class Input(NamedTuple):
 
 
 class Stored(NamedTuple):
-    """Heat above the temperature of the air."""
+    """Heat above the air temperature."""
 
     winding: Annotated[float, Signal("J", "heat in the winding", 1e3)]
     housing: Annotated[float, Signal("J", "heat in the housing", 1e4)]
 
 
 class Warmth(NamedTuple):
-    """Resistance and torque constant relative to those at the reference temperature."""
+    """Resistance and torque constant relative to their values at the reference temperature."""
 
     R: Annotated[
-        float, Signal("1", "resistance relative to that at the reference temperature", 1.0)
+        float, Signal("1", "resistance relative to its value at the reference temperature", 1.0)
     ]
     K: Annotated[
-        float, Signal("1", "torque constant relative to that at the reference temperature", 1.0)
+        float,
+        Signal("1", "torque constant relative to its value at the reference temperature", 1.0),
     ]
 
 
@@ -141,7 +142,7 @@ def balance(x: State, u: Input, par: Parameters) -> Balance:
 
 
 def warmth(x: State, par: Parameters) -> Warmth:
-    r"""Return resistance and torque constant relative to those at the reference temperature.
+    r"""Return resistance and torque constant relative to their values at T_ref.
 
     .. math:: R/R_{ref} = 1 + a_R (T_w - T_{ref}), \quad K/K_{ref} = 1 - a_K (T_h - T_{ref})
     """
@@ -176,13 +177,13 @@ def power_loss(x: State, par: Parameters) -> Conducted:
 
 
 def cold(par: Parameters) -> State:
-    """Return the state of a motor at the temperature of the air."""
+    """Return the state of a motor at air temperature."""
     return State(par.T_a, par.T_a)
 
 
 @row_by_row
 def watch(t: Array, x: State, par: Parameters) -> list[str]:
-    """Warn if the winding exceeds the limit of its insulation."""
+    """Warn if the winding exceeds its insulation limit."""
     if par.law == "off":
         return []
     most = shown(par.T_most, "K")

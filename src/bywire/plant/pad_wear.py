@@ -1,4 +1,4 @@
-"""Brake pads: wear by friction work, and compliance of the pads in the caliper."""
+"""Brake pads: wear due to friction work, and pad compliance in the caliper."""
 
 from __future__ import annotations
 
@@ -20,20 +20,20 @@ Modulus = Annotated[float, Unit("Pa", 5e8), Field(gt=0, allow_inf_nan=False)]
 
 
 class Parameters(ParameterSet):
-    """Pads that share the friction work: of a brake, or of all brakes of an axle."""
+    """Pads that share the friction work of one brake, or of all brakes on an axle."""
 
     kappa_0: WearPerWork
     """wear volume per friction work below T_hot"""
     T_hot: AbsoluteTemperature
-    """temperature above which wear grows"""
+    """temperature above which wear increases"""
     T_act: Activation
-    """activation energy / gas constant, which determines the growth of wear above T_hot"""
+    """activation energy / gas constant, which determines the increase in wear above T_hot"""
     n_pads: Count
     """number of pads that share the work"""
     A_pad: Area
-    """area of a pad's lining"""
+    """lining area of one pad"""
     E_pad: Modulus
-    """modulus of the lining, across its thickness"""
+    """lining modulus across its thickness"""
 
 
 class Input(NamedTuple):
@@ -53,13 +53,13 @@ def wear_per_work(
     T: Annotated[float, Signal("K", "temperature of the friction surface", 400.0), Gt(0)],
     par: Parameters,
 ) -> Annotated[float, Signal("m**3/J", "wear per friction work", 3e-14)]:
-    r"""Return the volume worn per friction work.
+    r"""Return the wear volume per friction work.
 
     .. math:: \kappa = \kappa_0 \exp\left(T_{act} (1/T_{hot} - 1/\max(T, T_{hot}))\right)
 
     Notes
     -----
-    Archard's law in energy form: his coefficient is kappa times the friction coefficient.
+    This is Archard's law in energy form. His coefficient is kappa times the friction coefficient.
     """
     return par.kappa_0 * ops.exp(par.T_act / par.T_hot - par.T_act / ops.fmax(T, par.T_hot))
 
@@ -81,7 +81,7 @@ def stiffness(
     worn: Annotated[float, Signal("m", "wear of a pad", 1e-3)],
     par: Parameters,
 ) -> Annotated[float, Signal("N/m", "stiffness of caliper and pads", 3e7)]:
-    r"""Return the stiffness of a caliper whose pads have worn.
+    r"""Return the stiffness of a caliper with worn pads.
 
     .. math:: 1/K = 1/K_{cal} - 2\,\Delta h / (E_{pad} A_{pad})
     """

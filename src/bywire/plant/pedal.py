@@ -11,16 +11,16 @@ from bywire.core.signals import Signal
 
 
 class Parameters(ParameterSet):
-    """Rigid lever against a preloaded spring; the potentiometer's wiper follows the lever."""
+    """Rigid lever against a preloaded spring. The wiper of the potentiometer follows the lever."""
 
     k_spring: Stiffness
-    """stiffness of the feedback spring, at the foot"""
+    """stiffness of the feedback spring at the foot"""
     F_preload: Force
     """foot force at which the pedal starts to move"""
     x_max: Length
     """pedal travel at its stop"""
     V_ref: Voltage
-    """supply of the potentiometer"""
+    """supply voltage of the potentiometer"""
 
 
 class Input(NamedTuple):

@@ -18,14 +18,14 @@ Loss = Annotated[float, Signal("W", "loss in the pipeline", role=Role("sink", "p
 
 
 class Parameters(ParameterSet):
-    """Rigid round pipe without fluid inertia; valid for Re < Re_max."""
+    """Rigid round pipe without fluid inertia, valid for Re < Re_max."""
 
     d_pl: Length
     """inner diameter"""
     L_pl: Length
     """length"""
     k_lf: Factor
-    """coefficient of the laminar resistance; 32 in the paper, 8 in textbooks"""
+    """coefficient of the laminar resistance, 32 in the paper, 8 in textbooks"""
     Re_max: Factor
     """Reynolds number above which the flow is not laminar and bywire warns"""
 
@@ -54,7 +54,7 @@ def resistance(par: Parameters, fluid: brake_fluid.Parameters) -> FlowResistance
 
     Notes
     -----
-    The Hagen-Poiseuille law has 8 in place of 32; the coefficient is a parameter.
+    The Hagen-Poiseuille law has 8 instead of 32. Therefore the coefficient is a parameter.
 
     References
     ----------
@@ -74,7 +74,7 @@ def output(u: Input, par: Parameters, fluid: brake_fluid.Parameters) -> Output:
 
 
 def power_loss(u: Input, par: Parameters, fluid: brake_fluid.Parameters) -> Loss:
-    """Return the heat of the flow, including released compression energy, >= 0."""
+    """Return the heat from the flow, including released compression energy, >= 0."""
     q = output(u, par, fluid).q
     return q * (brake_fluid.flow_energy(u.p_a, fluid) - brake_fluid.flow_energy(u.p_b, fluid))
 
@@ -85,4 +85,4 @@ def watch(t: Array, u: Input, par: Parameters, fluid: brake_fluid.Parameters) ->
     Re = highest(output(u, par, fluid).Re)
     if not Re > par.Re_max:
         return []
-    return [f"Re = {Re:.0f} in the pipeline is above {par.Re_max:g}: not laminar"]
+    return [f"Re = {Re:.0f} in the pipeline is above {par.Re_max:g}, so the flow is not laminar"]

@@ -1,9 +1,9 @@
 """Friction between the caliper's piston and its seal: pressure that does not move the pads.
 
 A massless piston whose friction depends on its speed would chatter. Here the flow is set-valued.
-Fluid moves the piston in if the line pressure exceeds the pads' pressure by more than the friction,
-and out if it is lower by more than the friction. In between, the piston rests and the flow is zero.
-Both flows are one-sided contact forces, whose compliance is the line's resistance.
+Fluid moves the piston in if the line pressure exceeds the pad pressure by more than the friction,
+and out if it is lower by more than the friction. In between, the piston is at rest and the flow is
+zero. Both flows are one-sided contact forces, whose compliance is the line's resistance.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ Flow = Annotated[float, Signal("m**3/s", "flow into the caliper", 1e-6)]
 class Parameters(ParameterSet):
     """Coulomb friction of a piston, and the elasticity of its seal.
 
-    ``law``: ``"sticking"``; ``"off"`` for a piston without friction.
+    ``law``: with ``"sticking"``, the piston has friction; with ``"off"``, it has none.
     """
 
     law: Literal["off", "sticking"]
@@ -36,7 +36,7 @@ class Parameters(ParameterSet):
     F_fr: Force
     """friction force on the piston"""
     rollback: Weight
-    """fraction of the friction with which the deformed seal retracts the piston; 0 if seized"""
+    """fraction of the friction with which the deformed seal retracts the piston, 0 if seized"""
 
 
 FAULTS = (
@@ -53,38 +53,38 @@ FAULTS = (
 class Input(NamedTuple):
     """Pressures at both ends of line and piston."""
 
-    p_line: Annotated[float, Signal("Pa", "pressure where the line begins", 2e6)]
+    p_line: Annotated[float, Signal("Pa", "pressure at the start of the line", 2e6)]
     p_pads: Annotated[float, Signal("Pa", "pressure of the pads", 2e6)]
 
 
 class Forces(NamedTuple):
-    """Flows, both >= 0; they solve the same complementarity problem as contact forces."""
+    """Flows, both >= 0. They solve the same complementarity problem as contact forces."""
 
     inward: Annotated[float, Signal("m**3/s", "flow that moves the piston in", 1e-6), Ge(0)]
     outward: Annotated[float, Signal("m**3/s", "flow that moves the piston out", 1e-6), Ge(0)]
 
 
 class Overlaps(NamedTuple):
-    """Difference of the pressures beyond the friction."""
+    """Pressure differences beyond the friction."""
 
     inward: Annotated[float, Signal("Pa", "pressure beyond friction, inward", 1e5)]
     outward: Annotated[float, Signal("Pa", "pressure beyond friction, outward", 1e5)]
 
 
 class Thresholds(NamedTuple):
-    """Pressure differences held by the friction."""
+    """Pressure differences that friction can hold."""
 
     inward: Annotated[float, Signal("Pa", "friction per unit area, inward", 1e5)]
     outward: Annotated[float, Signal("Pa", "friction per unit area, outward", 1e5)]
 
 
 def exists(par: Parameters) -> bool:
-    """Return whether there are contacts, which a sticking piston needs."""
+    """Return whether there are contacts. A sticking piston needs them."""
     return par.law == "sticking"
 
 
 def thresholds(par: Parameters, caliper: pads.Parameters) -> Thresholds:
-    r"""Return the pressure held by the friction, :math:`F_{fr}/A`, minus roll-back outward."""
+    r"""Return the pressures that friction can hold, :math:`F_{fr}/A`, outward minus rollback."""
     taken = par.F_fr / caliper.A_pd
     return Thresholds(inward=taken, outward=(1.0 - par.rollback) * taken)
 
@@ -99,7 +99,7 @@ def overlaps(u: Input, par: Parameters, caliper: pads.Parameters) -> Overlaps:
 
 
 def compliance(pipeline: line.Parameters, fluid: brake_fluid.Parameters) -> FlowResistance:
-    """Return the pressure drop per flow: the resistance of the line."""
+    """Return the pressure drop per flow, which is the line resistance."""
     return line.resistance(pipeline, fluid)
 
 
@@ -109,7 +109,7 @@ def flow(f: Forces) -> Flow:
 
 
 def fluid_pressure(u: Input, par: Parameters, caliper: pads.Parameters) -> Pressure:
-    """Return the pressure in the caliper: that of the pads plus the pressure held by friction."""
+    """Return the caliper pressure, which is pad pressure plus pressure held by friction."""
     if par.law == "off":
         return u.p_pads
     taken = thresholds(par, caliper)
@@ -119,9 +119,9 @@ def fluid_pressure(u: Input, par: Parameters, caliper: pads.Parameters) -> Press
 def power_loss(
     u: Input, f: Forces, par: Parameters, caliper: pads.Parameters, fluid: brake_fluid.Parameters
 ) -> Power:
-    """Return the heat of the friction, including released compression energy, >= 0.
+    """Return the friction heat, including released compression energy, >= 0.
 
-    It is the power of the flow at the fluid's pressure minus that at the pads' pressure.
+    It equals the flow's power at fluid pressure minus its power at pad pressure.
     """
     if par.law == "off":
         return 0.0

@@ -1,4 +1,4 @@
-"""Single-stage planetary gear: the sun is the input, the carrier the output, the ring is fixed."""
+"""Single-stage planetary gear with the sun as input, the carrier as output, and a fixed ring."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Parameters(ParameterSet):
     @model_validator(mode="after")
     def _planets_fit(self) -> Parameters:
         if not self.z_sun < self.z_ring:
-            reason = "the planets are between them"
+            reason = "the planets are between sun and ring"
             raise RuleError("z_ring", f"{self.z_ring:g}", f"> z_sun = {self.z_sun:g}", reason)
         return self
 
@@ -52,26 +52,26 @@ class Output(NamedTuple):
 
 
 def ratio(par: Parameters) -> Annotated[float, Signal("1", "speed ratio", 5.0)]:
-    r"""Return the speed of the sun over that of the carrier, :math:`i = 1 + z_{ring}/z_{sun}`."""
+    r"""Return the ratio of sun to carrier speed, :math:`i = 1 + z_{ring}/z_{sun}`."""
     return 1.0 + par.z_ring / par.z_sun
 
 
 def output(u: Input, par: Parameters) -> Output:
-    """Return the motion of the carrier and the load on the sun: power in equals power out."""
+    """Return the carrier's motion and the load on the sun. Input power equals output power."""
     i = ratio(par)
     return Output(theta=u.theta / i, omega=u.omega / i, load=u.load / i)
 
 
 def friction(u: Input, par: Parameters) -> Annotated[float, Signal("N*m", "gear friction", 0.05)]:
-    r"""Return the magnitude of the friction torque on the sun, for a set-valued friction there.
+    r"""Return the magnitude of the friction torque on the sun, for set-valued friction.
 
     .. math:: T = (1/\eta - 1) |T_{load}| / i
 
-    in both directions: the back-driven efficiency is 2 - 1/eta, and the gear holds at rest.
+    in both directions. The back-driven efficiency is 2 - 1/eta, and the gear holds at rest.
     """
     return (1.0 / par.eta - 1.0) * ops.fabs(output(u, par).load)
 
 
 def power_loss(u: Input, par: Parameters) -> Power:
-    """Return the heat of the sliding teeth, >= 0."""
+    """Return the heat from sliding teeth, >= 0."""
     return friction(u, par) * ops.fabs(u.omega)

@@ -1,4 +1,4 @@
-"""Brake circuit whose pressure follows its demand like a second-order system."""
+"""Brake circuit with a pressure that follows its demand like a second-order system."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from bywire.core.signals import Pressure, Signal
 
 
 class Parameters(ParameterSet):
-    """Substitute for a brake-by-wire of which only the loop's dynamics are known."""
+    """Substitute for a brake by wire if only its loop dynamics are known."""
 
     f_n: Frequency
     """natural frequency of the pressure loop"""
@@ -20,7 +20,7 @@ class Parameters(ParameterSet):
     """damping ratio of the pressure loop"""
 
 
-FAULTS = (ParameterFault("slow", "a slower loop: weak drive, cold fluid", ("f_n",), 0.3),)
+FAULTS = (ParameterFault("slow", "slower loop: weak drive, cold fluid", ("f_n",), 0.3),)
 
 
 class State(NamedTuple):

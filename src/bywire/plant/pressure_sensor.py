@@ -1,4 +1,4 @@
-"""Piezoresistive pressure sensor: absolute pressure as a fraction of its span."""
+"""Piezoresistive sensor of absolute pressure, whose reading is a fraction of its span."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from bywire.core.typing import Array
 from bywire.core.validity import first, outside, row_by_row
 
 AbsolutePressure = Annotated[float, Signal("Pa", "absolute pressure", 2e6)]
-Reading = Annotated[float, Signal("1", "reading, share of the range", 0.5)]
+Reading = Annotated[float, Signal("1", "reading, fraction of the range", 0.5)]
 
 
 class Parameters(ParameterSet):
-    """Linear between the ends of its range, saturating there; no dynamics."""
+    """Linear sensor without dynamics, which saturates at the ends of its range."""
 
     p_low: SignedPressure
-    """lowest absolute pressure of the range"""
+    """minimum absolute pressure of the range"""
     p_high: SignedPressure
-    """highest absolute pressure of the range"""
+    """maximum absolute pressure of the range"""
     place: Literal["master-cylinder", "mid-pipeline"]
-    """position; mid-pipeline measures the mean of the pressures at both ends"""
+    """position; mid-pipeline measures the mean pressure of both ends"""
 
     @model_validator(mode="after")
     def _ordered(self) -> Parameters:
@@ -46,13 +46,13 @@ def reading(p: AbsolutePressure, par: Parameters) -> Reading:
 
 
 def value(share: Reading, par: Parameters) -> AbsolutePressure:
-    """Return the absolute pressure of a reading."""
+    """Return the absolute pressure for a reading."""
     return par.p_low + share * (par.p_high - par.p_low)
 
 
 @row_by_row
 def watch(t: Array, u: Input, par: Parameters) -> list[str]:
-    """Warn if the pressure leaves the sensor's range, with the first time."""
+    """Warn if the pressure leaves the sensor's range, with the time when it first does."""
     span = f"{par.p_low / 1e5:g} to {par.p_high / 1e5:g} bar absolute"
     text = f"the pressure leaves the sensor's range, {span},"
     beyond = outside(u.p, par.p_low, par.p_high)

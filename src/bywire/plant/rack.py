@@ -1,4 +1,4 @@
-"""Rack and pinion: rotation to travel, force to torque."""
+"""Rack and pinion, which convert rotation to travel and force to torque."""
 
 from __future__ import annotations
 
@@ -41,15 +41,15 @@ def output(u: Input, par: Parameters) -> Output:
 
 
 def friction(u: Input, par: Parameters) -> Annotated[float, Signal("N*m", "rack friction", 0.5)]:
-    r"""Return the magnitude of the friction torque on the pinion, for a set-valued friction there.
+    r"""Return the magnitude of the friction torque on the pinion, for set-valued friction.
 
     .. math:: T = (1/\eta - 1) r_p |F|
 
-    in both directions: the back-driven efficiency is 2 - 1/eta, and the rack holds at rest.
+    in both directions. The back-driven efficiency is 2 - 1/eta, and the rack holds at rest.
     """
     return (1.0 / par.eta - 1.0) * ops.fabs(output(u, par).load)
 
 
 def power_loss(u: Input, par: Parameters) -> Power:
-    """Return the heat of the sliding teeth, >= 0."""
+    """Return the heat from sliding teeth, >= 0."""
     return friction(u, par) * ops.fabs(u.omega)

@@ -1,4 +1,4 @@
-"""Reservoir port of the master cylinder: makeup flow, and optionally a dead stroke."""
+"""Reservoir port of the master cylinder, with makeup flow and an optional dead stroke."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ class Parameters(ParameterSet):
 
     With any law, the cup seal admits fluid if the pressure would otherwise fall below ambient (the
     model's one-sided limit). With ``law = "dead-stroke"``, an orifice is also open until the piston
-    has traveled ``x_port`` from its retracted end. With ``law = "leaking"``, the cup seal leaks
-    fluid back at every stroke.
+    has moved ``x_port`` from its retracted end. With ``law = "leaking"``, the cup seal leaks fluid
+    back in every stroke.
     """
 
     law: Literal["makeup", "dead-stroke", "leaking"]
@@ -44,7 +44,7 @@ FAULTS = (
 
 
 class Input(NamedTuple):
-    """Stroke of the piston from its retracted end, and chamber pressure."""
+    """Piston stroke from the retracted end, and chamber pressure."""
 
     x: Stroke
     p: Annotated[float, Signal("Pa", "master-cylinder pressure", 1e5)]
@@ -57,7 +57,7 @@ class Output(NamedTuple):
 
 
 def closed_at(par: Parameters) -> Stroke:
-    """Return the stroke from the retracted end after which a slow piston builds up pressure."""
+    """Return the stroke from the retracted end beyond which a slow piston builds up pressure."""
     return par.x_port if par.law == "dead-stroke" else 0.0 * par.x_port
 
 

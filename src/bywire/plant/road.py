@@ -1,4 +1,4 @@
-"""Road: surface and slope as functions of the position."""
+"""Road surface and slope as functions of position."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Gradient = Annotated[float, Unit("1", 0.05), Field(gt=-1, lt=1, allow_inf_nan=Fa
 SurfaceName = Literal[
     "dry-asphalt", "wet-asphalt", "dry-concrete", "dry-cobble", "wet-cobble", "snow", "ice", "own"
 ]
-"""names of surfaces in experiments; ``own`` is the surface of the parameters"""
+"""names of surfaces in experiments; ``own`` is the surface from the parameters"""
 
 
 class Slope(NamedTuple):
@@ -38,21 +38,21 @@ SURFACES = {
     "snow": Surface(0.1946, 94.129, 0.0646, 39.04, 1.754, 0.19, 0.9312),
     "ice": Surface(0.05, 306.39, 1e-4, 148.1, 1.653, 0.05, 1.0),
 }
-"""values for car tires from open code, attributed there to M. Burckhardt,
-Fahrwerktechnik: Radschlupf-Regelsysteme (1993); c3 of ice circulates as 0, which has no peak. The
-Magic Formulas are fitted to these curves: the same peak at the same slip, and least squares from
-no slip to a locked wheel"""
+"""values for car tires from open code, which attributes them to M. Burckhardt,
+Fahrwerktechnik: Radschlupf-Regelsysteme (1993). Published values of c3 for ice are 0, but then the
+curve has no peak. The Magic Formulas are fitted to these curves. They have the same peak at the
+same slip, and are least-squares fits from zero slip to a locked wheel"""
 
 
 class Parameters(ParameterSet):
-    """Two successive stretches of road, followed by the first one again."""
+    """Two successive road sections, followed by the first one again."""
 
     first: SurfaceParameters
-    """surface of the first stretch"""
+    """surface of the first section"""
     further: SurfaceParameters
     """surface from x_change on"""
     grip: Factor
-    """factor on the adhesion of every surface"""
+    """factor on the adhesion of all surfaces"""
     x_change: Distance
     """start of the second surface, from the front wheel's position at time zero"""
     x_back: Distance
@@ -62,7 +62,7 @@ class Parameters(ParameterSet):
     gradient: Gradient
     """rise over run, uphill positive"""
     gradient_further: Gradient
-    """rise over run on the second stretch"""
+    """rise over run on the second section"""
 
     @model_validator(mode="after")
     def _has_no_gap(self) -> Parameters:
@@ -71,7 +71,7 @@ class Parameters(ParameterSet):
                 "x_back",
                 f"{self.x_back:g} m",
                 f">= x_change + ramp = {self.x_change + self.ramp:g} m",
-                "the second surface starts before it ends",
+                "the second surface must start before it ends",
             )
         return self
 
@@ -79,21 +79,21 @@ class Parameters(ParameterSet):
 Place = Annotated[float, Signal("m", "position along the road", 30.0)]
 
 
-def share(x: Place, par: Parameters) -> Annotated[float, Signal("1", "share of the further road")]:
-    """Return the share of the second stretch at a position, 0 to 1."""
+def share(x: Place, par: Parameters) -> Annotated[float, Signal("1", "weight of second section")]:
+    """Return the weight of the second section at a position, 0 to 1."""
     begun = ops.clip((x - par.x_change) / par.ramp, 0.0, 1.0)
     return begun - ops.clip((x - par.x_back) / par.ramp, 0.0, 1.0)
 
 
 def surface(x: Place, par: Parameters) -> Surface:
-    """Return the coefficients of the adhesion at a position."""
+    """Return the adhesion coefficients at a position."""
     part, first, further = share(x, par), surface_of(par.first), surface_of(par.further)
     blend = Surface(*(a + part * (b - a) for a, b in zip(first, further, strict=True)))
     return blend._replace(c1=par.grip * blend.c1, c3=par.grip * blend.c3, D=par.grip * blend.D)
 
 
 def slope(x: Place, par: Parameters) -> Slope:
-    """Return sine and cosine of the slope's angle at a position."""
+    """Return sine and cosine of the slope angle at a position."""
     rise = par.gradient + share(x, par) * (par.gradient_further - par.gradient)
     cosine = 1.0 / ops.sqrt(1.0 + rise * rise)
     return Slope(rise * cosine, cosine)

@@ -1,4 +1,4 @@
-"""Wheel on the road, with brake and rolling resistance combined in one dry friction."""
+"""Wheel on the road, with brake and rolling resistance combined into one dry friction."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ class Parameters(ParameterSet):
     r: Length
     """rolling radius"""
     C_rr: Annotated[float, Unit("1", 0.015), Field(ge=0, lt=1, allow_inf_nan=False)]
-    """rolling resistance relative to load"""
+    """rolling resistance force relative to load"""
 
 
 class State(NamedTuple):
-    """Speed of rotation, positive rolling forward."""
+    """Speed of rotation, positive for forward rolling."""
 
     omega: Annotated[float, Signal("rad/s", "wheel speed", 60.0)]
 
@@ -51,7 +51,7 @@ class Input(NamedTuple):
 
 
 def mass(par: Parameters) -> Factors:
-    """Return the factor of the derivative: the inertia."""
+    """Return the factor of the derivative, which is the inertia."""
     return Factors(omega=par.J)
 
 

@@ -1,4 +1,4 @@
-"""Roller screw: rotation to travel, with different losses for driving and back-driven motion."""
+"""Roller screw, which converts rotation to travel, with different losses when back-driven."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Fraction, Length, Unit
 from bywire.core.signals import Power, Signal, Torque
 
-BackEfficiency = Annotated[float, Unit("1", 0.5), Field(ge=0, le=1, allow_inf_nan=False)]
+BackEfficiency = Annotated[float, Unit("1", 0.5), Field(ge=-10, le=1, allow_inf_nan=False)]
 
 
 class Parameters(ParameterSet):
     """Massless screw with friction proportional to its load.
 
-    ``law``: with ``"load"`` (reading A), the loss is a friction proportional to the axial force and
-    set-valued at rest. With ``"drive"`` (reading B), (1 - eta_f) of the motor's torque is lost in
-    either direction.
+    ``law``: with ``"load"`` (reading A), the loss is friction proportional to the axial force and
+    set-valued at rest. With ``"drive"`` (reading B), the screw loses (1 - eta_f) of the motor
+    torque in either direction.
     """
 
     lead: Length
@@ -28,13 +28,14 @@ class Parameters(ParameterSet):
     eta_f: Fraction
     """efficiency when the screw drives the load"""
     eta_b: BackEfficiency
-    """efficiency when the load drives the screw; 2 - 1/eta_f makes both losses equal"""
+    """efficiency when the load drives the screw; 2 - 1/eta_f makes both losses equal; at 0 or
+    less, the screw locks itself"""
     law: Literal["load", "drive"]
-    """quantity to which the loss is proportional: the axial force or the motor's torque"""
+    """quantity to which the loss is proportional: axial force or motor torque"""
 
 
 class Input(NamedTuple):
-    """Axial force on the screw, positive toward clamping, and the motor's torque."""
+    """Axial force on the screw, positive toward clamping, and motor torque."""
 
     force: Annotated[float, Signal("N", "axial force on the screw", 500.0)]
     torque: Annotated[float, Signal("N*m", "motor torque", 0.3)]
@@ -53,7 +54,7 @@ def slope(par: Parameters) -> Annotated[float, Signal("m/rad", "travel per angle
 
 
 def load_torque(u: Input, par: Parameters) -> Torque:
-    r"""Return the torque of the axial force on the shaft, :math:`T = F L / 2\pi`.
+    r"""Return the shaft torque from the axial force, :math:`T = F L / 2\pi`.
 
     References
     ----------
@@ -69,12 +70,12 @@ def friction(u: Input, par: Parameters) -> Output:
         T = (1/\eta_f - 1) |F| L/2\pi \text{ (load opposes)}, \quad
         T = (1 - \eta_b) |F| L/2\pi \text{ (load aids)}
 
-    (law "load"); :math:`(1 - \eta_f) |T_M|` (law "drive").
+    for law "load", and :math:`(1 - \eta_f) |T_M|` for law "drive".
 
     Notes
     -----
     The paper states a loss (1 - eta) T_DRIVE that acts as friction. Law "load" is equivalent at
-    constant speed, needs no algebraic loop, and holds at rest.
+    constant speed, needs no algebraic loop, and holds the load at rest.
 
     References
     ----------
@@ -95,6 +96,6 @@ def friction(u: Input, par: Parameters) -> Output:
 def power_loss(
     u: Input, omega: Annotated[float, Signal("rad/s", "motor speed", 50.0)], par: Parameters
 ) -> Power:
-    """Return the heat of the sliding screw, >= 0."""
+    """Return the heat from the sliding screw, >= 0."""
     T = friction(u, par)
     return ops.where(omega > 0, T.T_p, T.T_n) * ops.fabs(omega)

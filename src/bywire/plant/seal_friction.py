@@ -1,4 +1,4 @@
-"""Friction of the master cylinder's seals: a Stribeck curve that grows with pressure."""
+"""Friction of the master cylinder's seals, a Stribeck curve that increases with pressure."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from bywire.core.signals import Power, Signal
 
 
 class Parameters(ParameterSet):
-    """Asymmetric Stribeck friction, torques at the motor shaft.
+    """Asymmetric Stribeck friction, as torques at the motor shaft.
 
-    Valid for pressures >= 0. At rest the friction is set-valued: it can have any value between its
+    Valid for pressures >= 0. At rest the friction is set-valued. It can have any value between its
     two breakaway torques, so the piston sticks completely.
     """
 
     T_pr: Torque
-    """friction torque of the seals' preload, at zero pressure"""
+    """friction torque due to seal preload, at zero pressure"""
     f_cfr_p: TorquePerPressure
     """growth of the Coulomb torque with pressure, apply direction"""
     f_cfr_n: TorquePerPressure
@@ -43,7 +43,7 @@ class Parameters(ParameterSet):
 FAULTS = (
     ParameterFault(
         "swollen",
-        "higher friction, by the same factor in both directions",
+        "increased friction, by the same factor in both directions",
         ("T_pr", "f_cfr_p", "f_cfr_n"),
         1.9,
     ),
@@ -90,6 +90,6 @@ def output(u: Input, par: Parameters) -> Output:
 
 
 def power_loss(u: Input, par: Parameters) -> Power:
-    """Return the heat of the sliding friction, >= 0."""
+    """Return the heat from sliding friction, >= 0."""
     friction = output(u, par)
     return ops.where(u.omega > 0, friction.T_p, friction.T_n) * ops.fabs(u.omega)

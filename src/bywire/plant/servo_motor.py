@@ -1,4 +1,4 @@
-"""Permanent-magnet servo motor: winding, rotor, cogging, and effects of temperature."""
+"""Permanent-magnet servo motor with winding, rotor, cogging and temperature effects."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ TemperatureRise = Annotated[
 PoleCount = Annotated[float, Unit("1", 180.0), Field(gt=0, allow_inf_nan=False)]
 Loss = Annotated[float, Signal("W", "copper loss", role=Role("sink", "copper", split=True))]
 DampingLoss = Annotated[
-    float, Signal("W", "damping of the motors", role=Role("sink", "motor damping"))
+    float, Signal("W", "motor damping loss", role=Role("sink", "motor damping"))
 ]
 
 
 class Parameters(ParameterSet):
-    """Motor averaged over commutation: one winding, one current, no saturation, no iron loss."""
+    """Motor averaged over commutation, with one winding, without saturation and iron loss."""
 
     R_ref: Resistance
     """winding resistance at the reference temperature"""
@@ -51,9 +51,9 @@ class Parameters(ParameterSet):
     dT: TemperatureRise
     """temperature of winding and magnets above the reference"""
     a_R: TemperatureCoefficient
-    """growth of the resistance with temperature, copper"""
+    """increase in resistance with temperature (copper)"""
     a_K: TemperatureCoefficient
-    """fall of the torque constant with temperature, magnets"""
+    """decrease in torque constant with temperature (magnets)"""
 
 
 FAULTS = (
@@ -64,7 +64,7 @@ FAULTS = (
 
 
 class State(NamedTuple):
-    """Current, shaft angle and speed; positive toward clamping."""
+    """Current, shaft angle and speed, positive toward clamping."""
 
     i: Annotated[float, Signal("A", "current", 5.0)]
     theta: Annotated[float, Signal("rad", "motor angle", 3.0)]
@@ -88,7 +88,7 @@ class Balance(NamedTuple):
 
 
 class Input(NamedTuple):
-    """Voltage at the terminals, torques of the load and of the dry friction on the shaft."""
+    """Terminal voltage, load torque, and dry friction torque on the shaft."""
 
     v: Annotated[float, Signal("V", "motor voltage", 10.0)]
     load: Annotated[float, Signal("N*m", "torque of the screw on the shaft", 0.5)]
@@ -108,7 +108,7 @@ def torque_constant(
 
 
 def cogging(x: State, par: Parameters) -> Annotated[float, Signal("N*m", "cogging torque", 0.01)]:
-    r"""Return the cogging torque, :math:`T_{COG} = -\hat T \sin(N \theta)`, without loss."""
+    r"""Return the lossless cogging torque, :math:`T_{COG} = -\hat T \sin(N \theta)`."""
     return -par.T_cog * ops.sin(par.N_cog * x.theta)
 
 
@@ -154,7 +154,7 @@ def copper_loss(x: State, par: Parameters) -> Loss:
 
 
 def damping_loss(x: State, par: Parameters) -> DampingLoss:
-    """Return the heat of the viscous damping, >= 0."""
+    """Return the heat from viscous damping, >= 0."""
     return par.D_M * x.omega * x.omega
 
 

@@ -12,7 +12,7 @@ Loss = Annotated[float, Signal("W", "viscous loss", role=Role("sink", "viscous d
 
 
 class Parameters(ParameterSet):
-    """Inertia and damping of all bodies that turn with the shaft; no elasticity."""
+    """Inertia and damping of all bodies that turn with the shaft, without elasticity."""
 
     J: Inertia
     """inertia"""
@@ -42,7 +42,7 @@ class Balance(NamedTuple):
 
 
 class Input(NamedTuple):
-    """Torques on the shaft: driving minus load, and dry friction."""
+    """Torques on the shaft: driving torque minus load, and dry friction."""
 
     torque: Annotated[float, Signal("N*m", "torque", 0.1)]
     friction: Annotated[float, Signal("N*m", "friction torque", 0.01)]
@@ -69,5 +69,5 @@ def power_in(x: State, u: Input, par: Parameters) -> Power:
 
 
 def power_loss(x: State, par: Parameters) -> Loss:
-    """Return the heat of the viscous damping, >= 0."""
+    """Return the heat from viscous damping, >= 0."""
     return par.d * x.omega * x.omega

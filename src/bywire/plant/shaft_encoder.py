@@ -16,7 +16,7 @@ Angle = Annotated[float, Signal("rad", "motor angle", 3.0)]
 
 
 class Parameters(ParameterSet):
-    """Counter of edges, without loss; the reading is the nearest count."""
+    """Edge counter that loses no edges. The reading is the nearest count."""
 
     law: Literal["ideal", "quantized"]
     """whether the angle is rounded to whole counts"""
@@ -25,7 +25,7 @@ class Parameters(ParameterSet):
 
 
 def reading(theta: Angle, par: Parameters) -> Angle:
-    """Return the angle of the counter's reading."""
+    """Return the angle that the counter reads."""
     if par.law == "ideal":
         return theta
     count = 2.0 * math.pi / par.counts

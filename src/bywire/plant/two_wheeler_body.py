@@ -1,4 +1,4 @@
-"""Body of a two-wheeler on a straight road: braking, load transfer, and lift of the rear wheel."""
+"""Body of a two-wheeler on a straight road: braking, load transfer, and rear wheel lift."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Parameters(ParameterSet):
     """Rigid body with rider, with the front contact on the ground.
 
     ``load``: ``"lagged"`` transfers load between the wheels with the time constant ``tau_N``, like
-    suspensions; ``"rigid"`` transfers it immediately.
+    suspensions. ``"rigid"`` transfers load immediately.
     """
 
     m: BodyMass
@@ -41,7 +41,7 @@ class Parameters(ParameterSet):
     h_a: Length
     """height at which the air drag acts"""
     inertia: BodyInertia
-    """inertia of pitching about the center of gravity"""
+    """pitch inertia about the center of gravity"""
     CdA: Annotated[float, Unit("m**2", 0.4), Field(ge=0, allow_inf_nan=False)]
     """drag area"""
     rho: Annotated[float, Unit("kg/m**3", 1.2), Field(ge=0, allow_inf_nan=False)]
@@ -49,7 +49,7 @@ class Parameters(ParameterSet):
     g: Annotated[float, Unit("m/s**2", 9.81), Field(gt=0, allow_inf_nan=False)]
     """gravity"""
     load: Literal["lagged", "rigid"]
-    """kind of load transfer between the wheels"""
+    """type of load transfer between the wheels"""
     tau_N: Duration
     """time constant of the load transfer"""
 
@@ -62,11 +62,11 @@ class Parameters(ParameterSet):
 
 
 class State(NamedTuple):
-    """Position and speed of the body, load of the rear wheel, pitch about the front contact."""
+    """Position and speed of the body, rear wheel load, pitch about the front contact."""
 
     x: Annotated[float, Signal("m", "distance", 30.0)]
     v: Annotated[float, Signal("m/s", "vehicle speed", 20.0)]
-    N_lag: Annotated[float, Signal("N", "load of the rear wheel, lagged", 1e3)]
+    N_lag: Annotated[float, Signal("N", "rear wheel load, lagged", 1e3)]
     phi: Annotated[float, Signal("rad", "pitch, nose down", 0.05)]
     phi_rate: Annotated[float, Signal("rad/s", "pitch rate", 0.2)]
 
@@ -92,7 +92,7 @@ class Balance(NamedTuple):
 
 
 class Input(NamedTuple):
-    """Sum of both tires' braking forces, slope, and the ground's force on the rear wheel."""
+    """Total braking force of both tires, slope, and ground force on the rear wheel."""
 
     F: Annotated[float, Signal("N", "braking force of both tires", 1e3)]
     sine: Sine
@@ -101,10 +101,10 @@ class Input(NamedTuple):
 
 
 class Loads(NamedTuple):
-    """Loads of the wheels."""
+    """Wheel loads."""
 
-    front: Annotated[float, Signal("N", "load of the front wheel", 1e3)]
-    rear: Annotated[float, Signal("N", "load of the rear wheel", 1e3)]
+    front: Annotated[float, Signal("N", "front wheel load", 1e3)]
+    rear: Annotated[float, Signal("N", "rear wheel load", 1e3)]
 
 
 class Place(NamedTuple):
@@ -120,7 +120,7 @@ def drag(x: State, par: Parameters) -> Annotated[float, Signal("N", "air drag", 
 
 
 def center(x: State, par: Parameters) -> Place:
-    """Return the position of the center of gravity at a pitch."""
+    """Return the position of the center of gravity at the pitch angle."""
     sine, cosine = ops.sin(x.phi), ops.cos(x.phi)
     return Place(par.l_f * cosine - par.h * sine, par.h * cosine + par.l_f * sine)
 
@@ -128,7 +128,7 @@ def center(x: State, par: Parameters) -> Place:
 def static_load(
     cosine: Cosine, par: Parameters
 ) -> Annotated[float, Signal("N", "rear load at rest", 1e3)]:
-    """Return the load of the rear wheel without braking force."""
+    """Return the rear wheel load without braking force."""
     return par.m * par.g * cosine * par.l_f / par.L
 
 
@@ -137,8 +137,8 @@ def rear_load(
     F_d: Annotated[float, Signal("N", "air drag", 100.0)],
     cosine: Cosine,
     par: Parameters,
-) -> Annotated[float, Signal("N", "load of the rear wheel", 1e3)]:
-    r"""Return the rear load that keeps the body level, between zero and the whole weight.
+) -> Annotated[float, Signal("N", "rear wheel load", 1e3)]:
+    r"""Return the rear load that keeps the body level, between zero and the total weight.
 
     .. math:: N_r = (m g l_f \cos\gamma - F h - F_d (h - h_a))/L
     """
@@ -152,7 +152,7 @@ def rigid_rear_load(
     F_d: Annotated[float, Signal("N", "air drag", 100.0)],
     cosine: Cosine,
     par: Parameters,
-) -> Annotated[float, Signal("N", "load of the rear wheel", 1e3)]:
+) -> Annotated[float, Signal("N", "rear wheel load", 1e3)]:
     r"""Return `rear_load` for braking forces that follow the loads immediately.
 
     .. math::
@@ -160,9 +160,9 @@ def rigid_rear_load(
             = (m g \cos\gamma\, (l_f - \mu_f h) - F_d (h - h_a))/L
 
     Load on the rear wheel unloads the front wheel, whose force then causes less pitching. If the
-    factor on the left is not positive, no load between the limits is stable: a rear wheel that
-    sinks slightly sinks further. The rear wheel then carries no load if the right-hand side is
-    negative, and the whole weight if it is positive.
+    factor on the left is not positive, no load between the limits is stable, because a rear wheel
+    that sinks slightly continues to sink. The rear wheel then supports no load if the right-hand
+    side is negative, and the total weight if it is positive.
     """
     carried = mu_f * par.m * par.g * cosine * par.h + F_d * (par.h - par.h_a)
     left = static_load(cosine, par) - carried / par.L
@@ -174,13 +174,13 @@ def carried_load(
     N_r: Annotated[float, Signal("N", "load that holds the body level", 1e3)],
     cosine: Cosine,
     par: Parameters,
-) -> Annotated[float, Signal("N", "load of the rear wheel", 1e3)]:
-    """Return a load of the rear wheel, limited so that neither wheel pulls on the road."""
+) -> Annotated[float, Signal("N", "rear wheel load", 1e3)]:
+    """Return the rear wheel load within its limits, so that neither wheel pulls on the road."""
     return ops.clip(N_r, 0.0, par.m * par.g * cosine)
 
 
 def loads(
-    N_r: Annotated[float, Signal("N", "load of the rear wheel", 1e3)],
+    N_r: Annotated[float, Signal("N", "rear wheel load", 1e3)],
     cosine: Cosine,
     par: Parameters,
 ) -> Loads:
@@ -218,20 +218,20 @@ def balance(x: State, u: Input, par: Parameters) -> Balance:
 
 
 def energy(x: State, par: Parameters) -> Energy:
-    """Return the kinetic energy of the speed, and of pitching with the lifted mass."""
+    """Return the kinetic energy of travel and pitch, and the energy of the lifted mass."""
     at = center(x, par)
     turning = 0.5 * (par.inertia + par.m * at.l_f * at.l_f) * x.phi_rate * x.phi_rate
     return 0.5 * par.m * x.v * x.v + turning + par.m * par.g * (at.h - par.h)
 
 
 def power_in(x: State, u: Input, par: Parameters) -> Power:
-    """Return the power of tires and slope, and of the moments that pitch the body."""
+    """Return the power of tires and slope, and of the torques that pitch the body."""
     travel = -(u.F + par.m * par.g * u.sine) * x.v
     return travel + pitch_power(x, u, par) + u.support * par.L * x.phi_rate
 
 
 def pitch_power(x: State, u: Input, par: Parameters) -> Power:
-    """Return the power of the torque about the front contact, without the ground's force."""
+    """Return the power of the torque about the front contact, without the ground force."""
     at = center(x, par)
     torque = u.F * at.h + drag(x, par) * (par.h - par.h_a)
     flat = par.m * par.g * (1.0 - u.cosine) * at.l_f
@@ -248,7 +248,7 @@ def watch(t: Array, x: State, par: Parameters) -> list[str]:
     r"""Warn if the body falls over its front wheel.
 
     At the pitch :math:`\arctan(l_f/h)` the center of gravity is above the front contact. Beyond
-    it, gravity pitches the body further, regardless of the brakes.
+    this pitch, gravity continues to pitch the body regardless of the brakes.
     """
     limit = _DEGREES * ops.arctan(par.l_f / par.h)
     pitch = _DEGREES * x.phi

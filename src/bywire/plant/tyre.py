@@ -1,4 +1,4 @@
-"""Longitudinal tire: a deflection that relaxes while rolling, and slides at the adhesion limit."""
+"""Longitudinal tire model: deflection that relaxes while rolling, and slides at the limit."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Slip = Annotated[float, Signal("1", "slip", 0.1)]
 
 
 class Parameters(adhesion.Parameters):
-    """Carcass and tread as one deflection; the surface determines the adhesion."""
+    """Carcass and tread as one deflection. The surface determines the adhesion."""
 
     sigma: Length
     """relaxation length"""
@@ -26,17 +26,17 @@ class Parameters(adhesion.Parameters):
     v_low: Annotated[float, Unit("m/s", 2.0), Field(gt=0, allow_inf_nan=False)]
     """speed above which the damping c_t is zero"""
     tau_slide: Duration
-    """time constant with which a sliding tire loses the deflection beyond its limit"""
+    """time constant with which a sliding tire loses deflection beyond its limit"""
 
 
 class State(NamedTuple):
     """Deflection."""
 
-    u: Annotated[float, Signal("m", "tyre deflection", 5e-3)]
+    u: Annotated[float, Signal("m", "tire deflection", 5e-3)]
 
 
 class Contact(NamedTuple):
-    """Speeds of the vehicle and of the tread, and the surface below."""
+    """Vehicle and tread speeds, and the surface below."""
 
     v: Annotated[float, Signal("m/s", "vehicle speed", 20.0)]
     v_wheel: Annotated[float, Signal("m/s", "speed of the tread", 20.0)]
@@ -80,9 +80,9 @@ class Output(NamedTuple):
 
 
 def braking_slip(u: Contact, par: Parameters) -> Slip:
-    """Return the slip, relative to the faster of vehicle and tread; 0 at standstill.
+    """Return the slip relative to the faster of vehicle and tread, 0 at standstill.
 
-    It is 1 for a locked wheel of a moving vehicle, and always between -1 and 1.
+    The slip is always between -1 and 1. It is 1 for a locked wheel on a moving vehicle.
     """
     faster = ops.fmax(ops.fabs(u.v), ops.fabs(u.v_wheel))
     slip = (u.v - u.v_wheel) / ops.where(faster > 0, faster, par.v_low)
@@ -90,9 +90,9 @@ def braking_slip(u: Contact, par: Parameters) -> Slip:
 
 
 def limits(u: Contact, par: Parameters) -> Limits:
-    """Return the limits of the force: the peak up to its slip, the curve beyond.
+    """Return the force limits, which are the peak below its slip and the curve beyond.
 
-    The deflection follows from the slip on the curve's rising branch with the same adhesion.
+    The deflection follows from the slip with the same adhesion on the curve's rising branch.
     """
     mu, slip = adhesion.held(ops.fabs(braking_slip(u, par)), _ground(u), par)
     return Limits(mu, par.sigma * slip)
@@ -111,20 +111,20 @@ def rate(x: State, u: Input, par: Parameters) -> Annotated[float, Signal("m/s", 
     return u.v - u.v_wheel - ops.fabs(u.v) * x.u / par.sigma - beyond / par.tau_slide
 
 
-def sliding(x: State, u: Input) -> Annotated[float, Signal("1", "tyre slides")]:
-    """Return 1 where the tire slides, 0 where it sticks to the road."""
+def sliding(x: State, u: Input) -> Annotated[float, Signal("1", "tire slides")]:
+    """Return 1 if the tire slides, 0 if it sticks to the road."""
     return ops.where(ops.fabs(x.u) < u.u_max, 0.0, 1.0)
 
 
 def force_over_load(
     x: State, u: Input, par: Parameters
 ) -> Annotated[float, Signal("1", "braking force relative to load", 1.0)]:
-    """Return force over load, from the limited deflection and damping near standstill.
+    """Return the ratio of force to load, from limited deflection and damping near standstill.
 
-    Damping does not raise the force's limit.
+    Damping does not increase the force limit.
     """
     slides = sliding(x, u)
-    # An absolute value has no slope at zero, the operating point of a freely rolling wheel.
+    # An absolute value has no slope at zero, where a freely rolling wheel operates.
     bent = ops.where(x.u < 0, -x.u, x.u)
     held = adhesion.adhesion(bent / par.sigma, _ground(u), par)
     size = ops.where(slides > 0, u.mu_max, ops.fmin(held, u.mu_max))

@@ -1,4 +1,4 @@
-"""Pulse wheel on a road wheel, and the capture unit that time-stamps its edges."""
+"""Pulse wheel on a road wheel, with a capture unit that time-stamps its edges."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ WheelSpeed = Annotated[float, Signal("rad/s", "wheel speed", 60.0)]
 
 
 class Parameters(ParameterSet):
-    """One edge for each pulse, without loss; time stamps are exact.
+    """One edge for each pulse, without lost pulses. Time stamps are exact.
 
-    ``law``: ``"pulses"``, or an ``"ideal"`` angle.
+    ``law``: with ``"pulses"``, the sensor measures edges; with ``"ideal"``, the angle at any time.
     """
 
     law: Literal["ideal", "pulses"]
@@ -26,17 +26,17 @@ class Parameters(ParameterSet):
     pulses: Annotated[float, Unit("1", 48.0), Field(ge=1, allow_inf_nan=False)]
     """pulses per revolution"""
     omega_min: Annotated[float, Unit("rad/s", 0.1), Field(gt=0, allow_inf_nan=False)]
-    """lowest speed at which time stamps of edges are correct"""
+    """minimum speed at which time stamps of edges are correct"""
 
 
 class State(NamedTuple):
-    """Angle of the wheel."""
+    """Wheel angle."""
 
     theta: Annotated[float, Signal("rad", "wheel angle", 100.0)]
 
 
 class Input(NamedTuple):
-    """Speed of the wheel."""
+    """Wheel speed."""
 
     omega: WheelSpeed
 
@@ -54,7 +54,7 @@ def rate(u: Input) -> WheelSpeed:
 
 
 def reading(x: State, u: Input, par: Parameters) -> Reading:
-    """Return the angle of the last edge and the time since; for an ideal angle, zero time."""
+    """Return the angle of the last edge and the time since (zero for an ideal angle)."""
     if par.law == "ideal":
         return Reading(x.theta, 0.0)
     step = 2.0 * math.pi / par.pulses

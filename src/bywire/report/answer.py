@@ -35,22 +35,22 @@ class Answer(ABC):
 
     @property
     def warnings(self) -> list[str]:
-        """Warnings to read before using the figures; none by default."""
+        """Warnings to read before using the figures. Default: none."""
         return []
 
     @property
     def notes(self) -> list[str]:
-        """Notes on the data processing and the result; none by default."""
+        """Notes on the data processing and the result. Default: none."""
         return []
 
     @property
     def failures(self) -> list[str]:
-        """Failed checks of the result, which make it unusable; none by default."""
+        """Failed checks, which make the result unusable. Default: none."""
         return []
 
     @property
     def partial(self) -> str:
-        """Remaining content of an interrupted result; empty by default."""
+        """Remaining content of an interrupted result. Default: empty."""
         return ""
 
     @property
@@ -66,8 +66,8 @@ class Answer(ABC):
     def tables(self) -> dict[str, pd.DataFrame]:
         """Return the tables of the page as pandas frames, by caption or section.
 
-        Numbers are in the units of ``frame.attrs["units"]`` by column; a column with several units
-        is followed by a column of units.
+        Numbers are in the units in ``frame.attrs["units"]``, keyed by column. A column of units
+        follows each column with several units.
         """
         frames: dict[str, pd.DataFrame] = {}
         for section in self.document().page:
@@ -78,22 +78,22 @@ class Answer(ABC):
         return frames
 
     def plot(self, name: str = "") -> Figure:
-        """Return a figure of the report, which a notebook shows.
+        """Return a figure of the report, which a notebook displays.
 
         Parameters
         ----------
         name
-            Name of its file in the output folder, without the ending; the first one by default.
+            Name of its file in the output folder, without the extension. Default: the first figure.
 
         Returns
         -------
         matplotlib.figure.Figure
-            The figure, to be changed or saved.
+            The figure, which you can change or save.
 
         Raises
         ------
         UnknownNameError
-            When the report has no figure of that name, or none at all.
+            When the report has no figure with this name, or no figures.
         """
         require_kinds(Answer.plot, (self, name), {})
         drawn = [b for b in self.document().flat() if isinstance(b, FigureBlock) and b.name]
@@ -104,7 +104,7 @@ class Answer(ABC):
         return cast("Figure", figure)
 
     def write(self, folder: str | Path) -> list[Path]:
-        """Write recordings, figures and one self-contained page; each file whole or not at all.
+        """Write recordings, figures and one self-contained page. Each file is complete or absent.
 
         Raises
         ------
@@ -152,7 +152,7 @@ def frame_of(table: Table) -> pd.DataFrame:
 
 
 def write_document(document: Document, folder: Path) -> list[Path]:
-    """Write a document's files of data, its figures, its page and its record.
+    """Write a document's data files, figures, page and record.
 
     Raises
     ------
@@ -226,8 +226,8 @@ def with_files(document: Document, files: list[Path]) -> dict[str, Any]:
 def load_matplotlib() -> None:
     """Load matplotlib with the user's configuration.
 
-    A file ``matplotlibrc`` in the working folder is ignored: it may come with somebody else's data,
-    and may start another program to set figures (TeX).
+    bywire ignores a file ``matplotlibrc`` in the working folder: it may come with somebody else's
+    data, and may start another program (TeX) to typeset figures.
     """
     is_set_here = os.path.exists("matplotlibrc")
     with contextlib.chdir(sys.prefix) if is_set_here else contextlib.nullcontext():
@@ -235,7 +235,7 @@ def load_matplotlib() -> None:
 
 
 def finite(value: Any) -> Any:
-    """Return plain data with null for infinite or undefined numbers, which JSON does not have."""
+    """Return plain data with null for infinite or undefined numbers, which JSON does not allow."""
     if isinstance(value, dict):
         return {key: finite(each) for key, each in value.items()}
     if isinstance(value, (list, tuple)):

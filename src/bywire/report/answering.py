@@ -1,4 +1,4 @@
-"""Public functions that return an answer: they check arguments and issue its warnings."""
+"""Public functions that return an answer, check arguments and issue the answer's warnings."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ Given = TypeVar("Given")
 def answering(function: Callable[Asked, Given]) -> Callable[Asked, Given]:
     """Issue the warnings of a function's answer, so that users cannot miss them.
 
-    Arguments of a type that does not match the signature are rejected before the call. Commands
-    take warnings, notes and failures from the answer, and print each in its place.
+    The wrapper rejects arguments whose types do not match the signature. Commands read warnings,
+    notes and failures from the answer, and print each in its place.
     """
 
     @wraps(function)

@@ -1,4 +1,4 @@
-"""Figures of an experiment: the kinds that experiments name, drawn from their results."""
+"""Figures of experiments: the kinds that experiments list, drawn from their results."""
 
 from __future__ import annotations
 
@@ -91,8 +91,8 @@ def _time_traces(result: Result) -> list[Shown]:
         Shown(
             f"time-traces-{label}" if len(result.recordings) > 1 else "time-traces",
             time_traces(recording, stated=stated_for(result.bench)),
-            f"Time traces{f', {label}' if len(result.recordings) > 1 else ''}. Shaded: stuck; "
-            "faintly: stuck repeatedly, with the share of the shaded time.",
+            f"Time traces{f', {label}' if len(result.recordings) > 1 else ''}. Shaded: stuck. "
+            "Lightly shaded: repeatedly stuck, with the stuck fraction of the shaded time.",
         )
         for label, recording in result.recordings.items()
         if "time" in recording.dims
@@ -120,12 +120,12 @@ def _energy_balance(result: Result) -> list[Shown]:
     for label, recording in result.recordings.items():
         suffix = f"-{label}" if len(result.recordings) > 1 else ""
         after = recording.sel(time=slice(-1e-9, None))
-        caption = "Energy balance of the actuator: sources and sinks, from time zero on."
+        caption = "Energy balance of the actuator from time zero: sources and sinks."
         books = {"energy-balance": (actuator_ledger(after), caption)}
         for book, further in further_ledgers(after).items():
             books[f"energy-{book.replace(' ', '-')}"] = (further, f"The same {book}.")
         for name, (postings, caption) in books.items():
-            with contextlib.suppress(ParameterError):  # a brake at rest turns over no energy
+            with contextlib.suppress(ParameterError):  # a brake at rest converts no energy
                 shown.append(Shown(name + suffix, ledger_bars(postings), caption))
     return shown
 
@@ -138,13 +138,13 @@ def _hysteresis_loop(result: Result) -> list[Shown]:
     figure = hysteresis_loop(
         result.recordings, setting.response, setting.drive, setting.demand, setting.smoothing
     )
-    caption = "Response over drive, up and down again."
+    caption = "Response versus drive, up and back down."
     return [Shown("hysteresis-loop", figure, caption)]
 
 
 def _stribeck_curve(result: Result) -> list[Shown]:
     figure = stribeck_curve(result.recordings["curve"])
-    return [Shown("stribeck-curve", figure, "Friction over speed.")]
+    return [Shown("stribeck-curve", figure, "Friction versus speed.")]
 
 
 def _tracking(result: Result) -> list[Shown]:
@@ -153,7 +153,7 @@ def _tracking(result: Result) -> list[Shown]:
         return []
     setting = definition.followed(result.bench.chosen_options)
     figure = tracking(result.recordings["run"], setting.signal, setting.set_point)
-    return [Shown("tracking", figure, "What follows, and its set point.")]
+    return [Shown("tracking", figure, "Signal and the set point that it follows.")]
 
 
 def _sine_sweep(result: Result) -> list[Shown]:
@@ -165,9 +165,9 @@ def _sine_sweep(result: Result) -> list[Shown]:
     if not sweep.frequencies.size:  # interrupted within the first sine
         return []
     response = Response(
-        f"{setting.response} over {setting.drive}", sweep.frequencies, sweep.values, measured=True
+        f"{setting.drive} to {setting.response}", sweep.frequencies, sweep.values, measured=True
     )
-    caption = "Gain and phase of the output, at the frequencies of the sines."
+    caption = "Gain and phase of the output at the sine frequencies."
     return [Shown("sine-sweep", bode([response]), caption)]
 
 

@@ -1,4 +1,4 @@
-"""Variables of a recording, ready to draw: label, display unit, values, fewer points."""
+"""Variables of a recording, ready to draw: label, display unit and thinned values."""
 
 from __future__ import annotations
 
@@ -62,8 +62,8 @@ def channel(recording: xr.Dataset, name: str, unit: str = "") -> Channel:
     array = recording[name]
     if array.dims != ("time",):
         raise ParameterError(
-            f"{name} has the dimensions {', '.join(map(str, array.dims)) or 'none'}: a figure "
-            "needs time only; select one case first, for example recording.isel(case=0)",
+            f"{name} has the dimensions {', '.join(map(str, array.dims)) or 'none'}. A figure "
+            "needs only time. Select one case first, for example recording.isel(case=0)",
             name=name,
             value=", ".join(map(str, array.dims)),
             valid="time",
@@ -116,8 +116,8 @@ COLUMNS = 700
 def kept_samples(x: Array, y: Array, columns: int = COLUMNS) -> IntArray:
     """Return the positions of at most five samples per pixel column that draw the same line.
 
-    In every column the first, the lowest, the highest and the last sample stay, so that a line
-    through them covers the same pixels; a gap (NaN) stays a gap.
+    Every column keeps its first, lowest, highest and last sample, so a line through them covers the
+    same pixels. A gap (NaN) remains a gap.
 
     ``x``: abscissa, not decreasing, shape ``(n,)``; ``y``: ordinate, shape ``(n,)``; ``columns``:
     pixel columns.
@@ -125,7 +125,7 @@ def kept_samples(x: Array, y: Array, columns: int = COLUMNS) -> IntArray:
     Returns
     -------
     ndarray
-        Positions of the remaining samples, ascending. Short lines keep all samples.
+        Positions of the remaining samples, in ascending order. Short lines keep all samples.
 
     References
     ----------
@@ -169,7 +169,7 @@ def phases(
     Returns
     -------
     list
-        Start and end of every span [s], ascending and disjoint.
+        Start and end of every span [s], in ascending order and disjoint.
     """
     spans = _spans(time, active)
     if len(spans) <= columns // 2:
@@ -187,7 +187,8 @@ def phases(
 class Phase:
     """A time span in which a mode is active, or active repeatedly.
 
-    ``start``, ``end``: times [s]; ``share``: share of the time in which it is active, 1 if always.
+    ``start``, ``end``: times [s]; ``share``: fraction of the time in which the mode is active, 1
+    if always.
     """
 
     start: float
@@ -198,7 +199,7 @@ class Phase:
 def lasting_phases(
     time: Array, active: NDArray[np.bool_], columns: int = COLUMNS, near: int = 16
 ) -> list[Phase]:
-    """Return the time spans in which a mode is active, with close ones merged.
+    """Return the time spans in which a mode is active, with nearby spans merged.
 
     Parameters
     ----------

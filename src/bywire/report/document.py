@@ -40,14 +40,14 @@ class Picture:
 
 @dataclass(frozen=True)
 class Paragraph:
-    """Plain text; a terminal wraps it where it is longer than a line."""
+    """Plain text; a terminal wraps it if it is longer than a line."""
 
     text: str
 
 
 @dataclass(frozen=True)
 class Listing:
-    """Plain texts with bullets, below an optional line."""
+    """Plain texts with bullets, below an optional title line."""
 
     texts: Sequence[str]
     title: str = ""
@@ -64,10 +64,10 @@ class FigureBlock:
     caption
         Description of the content.
     name
-        File name in an output folder, without the ending; empty for no file.
+        File name in an output folder, without the extension; empty for no file.
     is_long
-        Whether it takes much longer to draw than most, for example because it has many panels.
-        When figures are drawn in parallel, it is started first.
+        Whether the figure takes much longer to draw than most, for example because it has many
+        panels. Such figures start first when figures are drawn in parallel.
     """
 
     source: Figure | Callable[[], Figure]
@@ -77,7 +77,7 @@ class FigureBlock:
 
     @cached_property
     def figure(self) -> Figure | Picture:
-        """The figure, made on first use, or drawn by another process."""
+        """The figure, created on first use or drawn by another process."""
         return self.source() if callable(self.source) else self.source
 
 
@@ -104,9 +104,9 @@ class TableBlock:
     Parameters
     ----------
     title
-        Line above it on a terminal, which shows no captions; empty for none.
+        Line above the table on a terminal, which shows no captions; empty for none.
     most
-        Largest number of rows on a terminal without ``--verbose``; 0 for all.
+        Maximum number of rows on a terminal without ``--verbose``; 0 for all.
     """
 
     table: Table
@@ -117,7 +117,7 @@ class TableBlock:
 
 @dataclass(frozen=True)
 class Details:
-    """Blocks that are folded on a page; a terminal shows them with ``--verbose``.
+    """Folded blocks on a page; a terminal shows them with ``--verbose``.
 
     The reader of a page opens them.
     """
@@ -148,14 +148,14 @@ class Banner:
 
 @dataclass(frozen=True)
 class Attachment:
-    """A data file beside the page.
+    """A data file next to the page.
 
     Parameters
     ----------
     name
         File name in the output folder.
     write
-        ``write(path)``: writes the file whole or not at all and returns the path.
+        ``write(path)``: writes the complete file or nothing, and returns the path.
     after_record
         Whether the document's record is written first, so that values never exist without the
         record of their validity.
@@ -209,27 +209,27 @@ class Document:
     title, summary
         Heading of the page, and one line below it.
     sections
-        Sections of the page; or a function that makes them, where that needs drawing.
+        Sections of the page, or a function that creates them if that requires drawing.
     brief
         Texts and blocks for the terminal, mostly also on the page. The last line is the banner's
         text.
     data
-        The JSON object without the files, or a function that makes it, where that needs statistics;
-        NaN and infinite numbers become null.
+        The JSON object without the files, or a function that creates it if that requires
+        statistics. NaN and infinite numbers become null.
     banner
-        Verdict, above the contents of the page.
+        Verdict above the contents of the page.
     attachments
         Data files.
     record
-        File of the output folder for the JSON object; empty for none.
+        File for the JSON object in the output folder; empty for none.
     notices
         Lines for standard error before the result, such as changed or omitted settings.
     remarks
         Lines for standard error after the result, such as missed requirements.
     file_notes
-        Notes on the files of an output folder, or on why there are none.
+        Notes on the files of an output folder, or the reason for their absence.
     prepare
-        ``prepare(folder)``: called before writing, to reject a folder or to tidy it.
+        ``prepare(folder)``: called before writing, to reject a folder or clean it up.
     is_paged
         Whether an output folder gets a page and figures; false if an interrupt left too little.
     page_name
@@ -240,7 +240,7 @@ class Document:
         Most important message: the first words on a terminal and in the JSON object.
     changes
         The user's changes, which a terminal shows first and the JSON object contains by name; None
-        where nothing can be changed. On pages a section shows them (`bywire.report.subject`).
+        if nothing can be changed. On pages a section shows them (`bywire.report.subject`).
     """
 
     title: str
@@ -263,12 +263,12 @@ class Document:
 
     @cached_property
     def page(self) -> Sequence[Section]:
-        """The sections, made on first use."""
+        """The sections, created on first use."""
         return self.sections() if callable(self.sections) else self.sections
 
     @cached_property
     def facts(self) -> Mapping[str, Any]:
-        """The JSON object, made on first use."""
+        """The JSON object, created on first use."""
         data = self.data() if callable(self.data) else self.data
         data = {"headline": self.headline, **data} if self.headline else data
         if self.changes is None:
@@ -295,7 +295,7 @@ def spaced(blocks: Iterable[str | Block]) -> list[str | Block]:
 
 
 def flat_blocks(blocks: Iterator[Block] | Sequence[Block]) -> Iterator[Flat]:
-    """Yield blocks, with those of folded parts in their place."""
+    """Yield blocks, with the contents of folded parts in place."""
     for block in blocks:
         if isinstance(block, Details):
             yield from block.blocks

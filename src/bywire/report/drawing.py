@@ -1,7 +1,7 @@
 """Figures as pixels and vector graphics: for files and for one HTML file, in parallel.
 
-Traversing a figure's artists takes longer than writing either format, and its layout takes as long
-again. So both formats share one layout, one traversal, and the sizes of texts.
+Traversing a figure's artists takes longer than writing either format, and the layout takes equally
+long. So both formats share one layout, one traversal, and the text sizes.
 """
 
 from __future__ import annotations
@@ -53,8 +53,8 @@ _ANONYMOUS = {"Date": None, "Creator": None, "Format": None, "Type": None}
 def drawn(figure: Figure, dpi: float) -> tuple[bytes, bytes]:
     """Return a figure as PNG and as SVG file.
 
-    The layout of the figure is computed once and kept: a second layout would move it by fractions
-    of a pixel, and the same figure would give other bytes.
+    The figure's layout is computed only once: a second layout would shift it by fractions of a
+    pixel, so the same figure would give different bytes.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ def drawn(figure: Figure, dpi: float) -> tuple[bytes, bytes]:
     canvas, resolution = figure.canvas, figure.dpi
     settings = mpl.rc_context({"svg.hashsalt": "bywire"})
     with settings, warnings.catch_warnings():
-        # A character that is missing in the font is drawn as a box; that is not an error.
+        # matplotlib draws a character that is missing in the font as a box, which is not an error.
         warnings.filterwarnings("ignore", message="Glyph .* missing from")
         try:
             figure.dpi = dpi
@@ -92,7 +92,7 @@ def settle(figure: Figure) -> None:
 class _Vector(RendererSVG):
     """Vector graphics in pixels, with texts as text.
 
-    A text is stretched to its intended width if another font is used.
+    Texts are stretched to their intended width if another font is used.
     """
 
     def __init__(self, width: float, height: float, dpi: float) -> None:
@@ -220,7 +220,7 @@ class _Both(RendererBase):
     def get_text_width_height_descent(
         self, s: str, prop: FontProperties, ismath: Any
     ) -> tuple[float, float, float]:
-        """Return the size of a text in pixels, measured only once, for the layout."""
+        """Return the size of a text in pixels, measured only once for the layout."""
         key = s, hash(prop), ismath
         if key not in self._sizes:
             self._sizes[key] = self._agg.get_text_width_height_descent(s, prop, ismath)
@@ -237,11 +237,11 @@ class _Both(RendererBase):
         return draw
 
     def start_rasterizing(self) -> None:
-        """Begin a part that is an image in vector graphics too, such as a color scale."""
+        """Begin a part that is an image even in vector graphics, such as a color scale."""
         self._image = RendererAgg(self.width, self.height, self.dpi)
 
     def stop_rasterizing(self) -> None:
-        """End that part, and draw the image."""
+        """End this part, and draw the image."""
         if self._image is None:
             return
         pixels = np.asarray(self._image.buffer_rgba())
@@ -313,7 +313,7 @@ def figure_bytes(figure: Figure | Picture, kind: str = "png") -> bytes:
     """
     if kind not in _KINDS:
         raise FileError(
-            f"figures are not written as {kind!r}. Change the extension to .png or .svg"
+            f"bywire cannot write figures as {kind!r}. Change the extension to .png or .svg"
         )
     if isinstance(figure, Picture):
         return figure.png if kind == "png" else figure.svg
@@ -323,26 +323,26 @@ def figure_bytes(figure: Figure | Picture, kind: str = "png") -> bytes:
 
 
 def save_figure(figure: Figure | Picture, path: str | os.PathLike[str]) -> Path:
-    """Write a figure as PNG or SVG, by the ending of the path.
+    """Write a figure as PNG or SVG, depending on the path's extension.
 
     Raises
     ------
     FileError
-        When the ending is another one or the file cannot be written.
+        When the path has another extension or the file cannot be written.
     """
     target = Path(path)
     return write_bytes(target, figure_bytes(figure, target.suffix.removeprefix(".").lower()))
 
 
 def write_bytes(path: str | os.PathLike[str], content: bytes) -> Path:
-    """Write a file whole or not at all; an older file stays until the new one is complete.
+    """Write a complete file or nothing; an older file remains until the new one is complete.
 
-    A missing folder is created.
+    The function creates a missing folder.
 
     Raises
     ------
     FileError
-        When the folder cannot be created or is not writable; names the file and the reason.
+        When the folder cannot be created or is not writable. The message contains file and reason.
     """
     target = Path(path)
     try:
@@ -352,8 +352,8 @@ def write_bytes(path: str | os.PathLike[str], content: bytes) -> Path:
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise FileError(
-            f"cannot write {target}: {reason}: make room there, or choose a folder that you may "
-            "write to"
+            f"cannot write {target}: {reason}. Free some space there, or choose a writable folder",
+            name=str(target),
         ) from None
     return target
 
@@ -373,7 +373,7 @@ def inline_figures(
 ) -> list[str]:
     """Return the HTML of figures with their captions as descriptions.
 
-    All are SVG at first; while they exceed the budget, the largest becomes a PNG if that is
+    All are SVG at first. While they exceed the budget, the largest one becomes a PNG if the PNG is
     smaller.
 
     ``figures``: figures and their alternative texts; ``budget``: bytes for all of them.
@@ -401,7 +401,7 @@ def _svg(figure: Figure | Picture, text: str, prefix: str) -> str:
 
 
 def axes_of(figure: Figure | Picture) -> str:
-    """Return an attribute with the positions of axes, as shares of the figure, and their limits."""
+    """Return an attribute with the positions of axes, relative to the figure, and their limits."""
     if isinstance(figure, Picture):
         return figure.axes
     known = [
@@ -463,9 +463,9 @@ _blocks: list[FigureBlock] = []
 
 @contextmanager
 def drawn_side_by_side(blocks: Sequence[FigureBlock]) -> Iterator[None]:
-    """Draw figures while the block runs, where they are many and this process can be forked.
+    """Draw figures while the block runs, if there are many and this process can be forked.
 
-    At its end they are replaced by the drawn ones. Others are drawn on request.
+    The drawn figures replace them at the end of the block. Other figures are drawn on request.
     """
     count = worker_count(most=len(blocks))
     if len(blocks) <= FEW or count == 1 or not may_copy():
@@ -473,7 +473,7 @@ def drawn_side_by_side(blocks: Sequence[FigureBlock]) -> Iterator[None]:
         return
     _blocks[:] = blocks
     with processes(count, list, is_copied=True) as pool:
-        # Long ones start first: at the end all other processes would wait for them.
+        # Long ones start first, because at the end all other processes would wait for them.
         order = sorted(range(len(blocks)), key=lambda k: not blocks[k].is_long)
         drawn = {k: pool.submit(_picture, k) for k in order}
         yield

@@ -1,4 +1,4 @@
-"""Figure: energy balance, by sources and sinks."""
+"""Figure: energy balance of sources and sinks."""
 
 from __future__ import annotations
 
@@ -36,18 +36,18 @@ COLORS = {
     "E_caliper": style.YELLOW,
     "E_stored": style.BLUE,
 }
-"""fixed colors of energies in every figure; others use the remaining colors"""
+"""fixed colors of energies in every figure; other energies use the remaining colors"""
 SOURCE_COLORS = ("#4A4A4A", "#9A9A9A", "#C4C4C4")
 SMALL = 1e-3
 """fraction of the total energy below which entries are merged into the rest"""
 NEGLIGIBLE = 1e-9
-"""share below which the rest is not drawn"""
+"""fraction below which the rest is not drawn"""
 REST_COLOR = "#E4E4E4"
 
 
 @dataclass(frozen=True)
 class Entry:
-    """A piece of a bar: label, energy [J, not negative] and color."""
+    """A segment of a bar: label, energy [J, not negative] and color."""
 
     label: str
     energy: float
@@ -62,19 +62,19 @@ def energy_balance(
 ) -> Figure:
     """Draw two stacked bars of equal length: sources and sinks of the energy.
 
-    Every entry is signed, and its sign decides the side: a source that takes energy back is among
-    the sinks; a gear loss below zero and an emptied store are among the sources. The residual of
-    the energy balance is drawn as a hatched piece.
+    Every entry is signed, and its sign decides the side. A source that receives energy is among the
+    sinks. A negative gear loss and an emptied store are among the sources. A hatched segment shows
+    the residual of the energy balance.
 
     Parameters
     ----------
     recording
         Recording with energies [J]; the difference between end and start counts.
     source
-        Variable with the energy from the source; or label by variable of several sources; by
-        default those of the recording's brake.
+        Variable with the energy from the source, or labels of several sources by variable. Default:
+        the sources of the recording's brake.
     sinks
-        Label by variable of every sink; by default those of the recording's brake. Variables that
+        Labels of the sinks by variable. Default: the sinks of the recording's brake. Variables that
         are missing in the recording are left out.
 
     Raises
@@ -154,7 +154,7 @@ def _gathered(entries: list[Entry], total: float) -> list[Entry]:
 
 
 def _colors(sinks: Sequence[str]) -> dict[str, str]:
-    """Return a color for every variable, different ones as long as the palette lasts."""
+    """Return a color for every variable; colors differ as long as the palette suffices."""
     known = {COLORS[name] for name in sinks if name in COLORS}
     left = cycle([c for c in dict.fromkeys(COLORS.values()) if c not in known] or [style.BLACK])
     colors: dict[str, str] = {}

@@ -22,8 +22,8 @@ from bywire.report.channel import axis_unit, channel, decimate, kept_samples
 from bywire.report.panels import Role
 from bywire.report.wording import amount, in_display_unit
 
-_NAMED = 8  # largest number of records with room for their names
-_ROOM = 0.06  # share of the height of the first panel for the names
+_NAMED = 8  # maximum number of records with room for their names
+_ROOM = 0.06  # fraction of the first panel's height for the names
 
 
 def mark_records(panels: Sequence[Axes], at: xr.DataArray) -> None:
@@ -35,7 +35,7 @@ def mark_records(panels: Sequence[Axes], at: xr.DataArray) -> None:
         Panels with a common abscissa.
     at
         The abscissa in display units; its coordinate ``record`` names each sample's record. Without
-        this coordinate nothing is drawn.
+        this coordinate, the function draws nothing.
     """
     if "record" not in at.coords or at.coords["record"].dims != at.dims:
         return
@@ -63,16 +63,16 @@ def mark_records(panels: Sequence[Axes], at: xr.DataArray) -> None:
             )
 
 
-# --- Curves, measured beside modeled, and values with their band
+# --- Measured and modeled curves, and values with their bands
 
-_MOST = 6  # largest number of curves of a family with a color each
-_LINE = 1.3  # width of the line in the middle of a band [pt]
+_MOST = 6  # maximum number of curves in a family that have different colors
+_LINE = 1.3  # width of the center line of a band [pt]
 
 
 def method_curve(curve: Curve) -> Figure:
     """Draw measured and modeled with their difference below, or values with 95 % bands.
 
-    A few measured points are drawn without a line between them. Thin lines and names separate
+    If there are only a few measured points, no line connects them. Thin lines and names separate
     successive records.
     """
     if "measured" in curve.data and "modeled" in curve.data:
@@ -122,7 +122,7 @@ def _beside(curve: Curve) -> Figure:
 
 
 def _over_frequency(upper: Axes, lower: Axes, symbol: str) -> None:
-    """Make the frequency logarithmic, and a gain too; but not a phase."""
+    """Make the axes of frequency and gain logarithmic, but not that of phase."""
     lower.set_xscale("log")
     style.log_ticks(lower.xaxis)
     if symbol not in ("degree", "rad"):
@@ -138,7 +138,7 @@ def _draw_pair(
     color: str,
     few: bool,
 ) -> None:
-    """Draw measured and modeled; a curve of a family in its own color, measured pale and wide."""
+    """Draw measured and modeled; a family's measured curves are wide and pale, one color each."""
     for values, role, word in zip(
         pair, (Role.MEASURED, Role.SIMULATED), ("measured", "modeled"), strict=True
     ):
@@ -211,7 +211,7 @@ def _bands(axes: Axes, curve: Curve) -> None:
 
 
 def _drawn(at: Array, values: Array) -> tuple[Array, ...]:
-    """Return a line with fewer points where its abscissa is monotonic."""
+    """Return a line with fewer points if its abscissa is monotonic."""
     if np.all(np.diff(at) >= 0.0):
         keep = kept_samples(at, values)
         return at[keep], values[keep]
@@ -219,7 +219,7 @@ def _drawn(at: Array, values: Array) -> tuple[Array, ...]:
 
 
 def _family(array: xr.DataArray, x: xr.DataArray) -> list[tuple[int, str]]:
-    """Return number and label of each curve; a curve without a family has no label."""
+    """Return number and label of each curve; a single curve has no label."""
     others = [dim for dim in array.dims if dim != x.dims[-1]]
     if not others:
         return [(0, "")]
@@ -254,7 +254,7 @@ def _x_label(data: xr.Dataset, x: str) -> str:
 
 
 def _band_label(axes: Axes, half: Array, symbol: str) -> str:
-    """Return the legend of a 95 % band: its width, and whether the line hides it.
+    """Return the legend of a 95 % band: its width, and whether the center line hides the band.
 
     ``half`` widths of the band are in ``symbol``, NaN where there is none; the drawn data set the
     limits of the axes.
@@ -266,7 +266,7 @@ def _band_label(axes: Axes, half: Array, symbol: str) -> str:
     figure = axes.get_figure()
     points = 0.0 if figure is None else 72.0 * axes.bbox.height / figure.dpi
     drawn = 2.0 * display_factor(symbol) * most / max(abs(high - low), 1e-300) * points
-    hidden = ", within the line" if drawn < _LINE else ""
+    hidden = ", hidden by the line" if drawn < _LINE else ""
     return f"95 % band (± {amount(most, difference_unit(symbol), 2)} at most{hidden})"
 
 
@@ -295,7 +295,7 @@ def residual_figure(estimate: Estimate) -> Figure:
     whole.plot(*decimate(order, r), color=style.BLUE, **look)
     whole.axhline(0.0, color=style.GRAY, linewidth=0.6)
     whole.margins(x=0.02 if few else 0.0)
-    whole.set_xlabel("number of the measured value")
+    whole.set_xlabel("number of measured value")
     whole.set_ylabel("weighted residual [-]")
     _histogram(spread, r)
     lags = min(_LAGS, max(r.size // 2, 1))
@@ -328,11 +328,11 @@ def _histogram(axes: Axes, r: Array) -> None:
 
 # --- Correlations: which unknowns the data hardly separate
 
-_NUMBERED = 14  # largest number of unknowns with room for numbers
+_NUMBERED = 14  # maximum number of unknowns with room for numbers
 
 
 def correlation_matrix(estimate: Estimate) -> Figure:
-    """Draw the correlation matrix with its numbers; blue is negative, red positive."""
+    """Draw the correlation matrix with its numbers; blue is negative, red is positive."""
     names, c = estimate.names, estimate.correlation
     size = len(names)
     height = min(max(1.6 + 0.36 * size, 2.4), 6.5)
@@ -368,7 +368,7 @@ def replay_figure(
 ) -> Figure:
     """Draw demand, measured (solid blue) and simulated (dashed red), and simulated minus measured.
 
-    Thin lines separate segments; a segment that misses a tolerance is shaded.
+    Thin lines separate segments. Segments that miss a tolerance are shaded.
 
     Parameters
     ----------

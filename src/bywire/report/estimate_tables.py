@@ -24,8 +24,8 @@ def estimate_table(
     Parameters
     ----------
     estimate
-        Estimates; unknowns that the data do not determine are below them. If the model is
-        simulated, a column gives the error from the simulation step.
+        Estimates. Unknowns that the data do not determine follow below them. If the model is
+        simulated, a column contains the error from the simulation step.
     start
         Initial values of the search, by label.
     put_in
@@ -141,7 +141,7 @@ def check_table(checks: Sequence[Check]) -> Table:
 
 
 def figure_table(identified: Identified) -> Table:
-    """Return a method's further results."""
+    """Return a method's other results."""
     return Table(
         (Column("result"), Column("value", numeric=True)),
         tuple(

@@ -1,4 +1,4 @@
-"""Figures of a fault campaign: times until danger and detection, and the price of alarms."""
+"""Figures of a fault campaign: times until danger and detection, and the cost of alarms."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from bywire.core.typing import Array
 from bywire.report import style
 
 _ROW = 0.2  # height of a fault [inch]
-_MOST = 60  # largest number of faults in a figure
-_LEAST = 0.5e-3  # s: times of immediate detection are drawn at the edge of a logarithmic axis
+_MOST = 60  # maximum number of faults in a figure
+_LEAST = 0.5e-3  # s: immediate detection is drawn at the lower end of the logarithmic axis
 
 
 class FaultTimes(NamedTuple):
@@ -25,7 +25,7 @@ class FaultTimes(NamedTuple):
 
 
 def fault_times(faults: Sequence[FaultTimes]) -> Figure:
-    """Draw when each fault violates criteria and when it is detected, the quickest on top.
+    """Draw when each fault violates criteria and when it is detected, with the fastest on top.
 
     ``faults``: at least one; those without a violation come last.
     """
@@ -71,7 +71,7 @@ Curve = Sequence[tuple[float, int, float, int]]
 
 
 def alarm_curves(curves: Mapping[str, Curve], healthy: int) -> Figure:
-    """Draw the detection delay of dangerous faults over false alarms of healthy runs, by residual.
+    """Draw each residual's detection delay of dangerous faults versus alarms in healthy runs.
 
     Parameters
     ----------

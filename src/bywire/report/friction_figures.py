@@ -1,4 +1,4 @@
-"""Figures: friction loop of drive over response, and friction over speed."""
+"""Figures: friction loop of response versus drive, and friction versus speed."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 ARROWS_AT = (0.35, 0.75)
-"""positions of the arrows along a branch, as shares of its drawn length"""
+"""positions of the arrows along a branch, as fractions of its drawn length"""
 
 
 def hysteresis_loop(
@@ -31,20 +31,20 @@ def hysteresis_loop(
     demand: str = "",
     average: float = 0.0,
 ) -> Figure:
-    """Draw response over drive, applying solid and releasing dashed, one color per recording.
+    """Draw response versus drive, applying solid and releasing dashed, one color per recording.
 
     Parameters
     ----------
     recordings
-        Recordings of a ramp up and down again, by their label in the legend.
+        Recordings of a ramp up and back down, by their label in the legend.
     response, drive
         Variables, for example a pressure and a current.
     demand
-        Variable whose maximum separates applying from releasing; if a recording does not have it,
-        the drive.
+        Variable whose maximum separates applying from releasing. Default, also for a recording
+        without this variable: the drive.
     average
-        Averaging time [s] of the loop, usually one dither period; the ripple around it is then
-        drawn pale. 0 draws the raw signals.
+        Averaging time [s] of the loop, usually one dither period. The ripple around it is then
+        pale. 0 draws the raw signals.
 
     Raises
     ------
@@ -128,13 +128,13 @@ def _draw_branch(
 
 
 def _length_along(x: Array, y: Array) -> Array:
-    """Return the share of the drawn length at every point, 0 to 1."""
+    """Return the fraction of the drawn length at every point, 0 to 1."""
     steps = np.hypot(*(np.diff(v) / (float(np.ptp(v)) or 1.0) for v in (x, y)))
     length = np.concatenate([[0.0], np.cumsum(np.nan_to_num(steps))])
     return length / (length[-1] or 1.0)
 
 
-# --- Dry friction over speed, for several levels of what it depends on
+# --- Dry friction versus speed at several load levels
 
 
 def stribeck_curve(
@@ -143,9 +143,9 @@ def stribeck_curve(
     friction: str = "",
     measured: Mapping[float, tuple[Array, Array]] | None = None,
 ) -> Figure:
-    """Draw dry friction over speed, one line per level.
+    """Draw dry friction versus speed, with one line per level.
 
-    At rest friction is set-valued: between its two breakaway values the line is vertical.
+    At rest, friction is set-valued, so the line between its two breakaway values is vertical.
 
     Parameters
     ----------
@@ -154,7 +154,7 @@ def stribeck_curve(
         ascending speed, which contains 0 twice, once for each end of the interval at rest. All have
         units.
     friction
-        Name of the friction in it; empty for its first variable.
+        Name of the friction variable; empty for the dataset's first variable.
     measured
         Measured speeds and frictions, SI, by level; drawn as points.
 
@@ -171,7 +171,7 @@ def stribeck_curve(
     array = curve[friction]
     if array.ndim != 2 or array.size == 0:
         raise ParameterError(
-            f"{friction} has the shape {array.shape}: a Stribeck curve needs a level and a speed",
+            f"{friction} has the shape {array.shape}. A Stribeck curve needs a level and a speed",
             name=friction,
             value=str(array.shape),
         )

@@ -16,7 +16,7 @@ from bywire.core.callers import is_command_line
 from bywire.core.version import __version__
 from bywire.report.wording import clean
 
-_DIGITS = 12  # digits of a digest and a commit: enough to distinguish files and commits
+_DIGITS = 12  # digits of a digest or a commit: enough to distinguish files and commits
 _LARGEST = 64 * 2**20  # bytes of a hashed input file: a larger one would delay the report
 _COMMIT = frozenset("0123456789abcdef")
 
@@ -37,7 +37,7 @@ def identity() -> list[tuple[str, str]]:
         rows.append(("command", shlex.join(["bywire", *words])))
         rows += [("input", text) for text in _inputs(words)]
     else:
-        rows.append(("command", "called from Python, or from a form of bywire serve"))
+        rows.append(("command", "called from Python or from a bywire serve form"))
     return [(label, clean(text)) for label, text in rows if text]
 
 
@@ -52,7 +52,7 @@ def _person() -> str:
     """Return the user's name; empty if the system does not have it."""
     try:
         return getpass.getuser()
-    except (KeyError, OSError):  # a user without an entry, as in some containers
+    except (KeyError, OSError):  # a user without an account entry, as in some containers
         return ""
 
 

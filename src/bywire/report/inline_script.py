@@ -18,7 +18,7 @@ def admitted(text: str) -> str:
     return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
 
 
-# --- Scripts without what is for those who change them
+# --- Scripts without comments and indentation
 
 _COMMENT = r"/\*.*?\*/\s*|^//[^\n]*\n|[ \t]+//[^\n]*$"
 _LEFT_OUT = re.compile(rf"{_COMMENT}|^[ \t]+", re.DOTALL | re.MULTILINE)
@@ -27,7 +27,7 @@ _LEFT_OUT = re.compile(rf"{_COMMENT}|^[ \t]+", re.DOTALL | re.MULTILINE)
 def bare(script: str) -> str:
     """Return a script without comments and indentation.
 
-    No text in it may contain two slashes after a space, nor a slash before a star.
+    Its texts must not contain two slashes after a space, or a slash before a star.
 
     Examples
     --------

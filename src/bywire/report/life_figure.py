@@ -1,4 +1,4 @@
-"""Figure: slow states over a life, and the remaining margins to its limits."""
+"""Figure: slow states over the lifetime, and the remaining margins to their limits."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _HEIGHT = 1.15  # height of a panel [inch]
 
 @dataclass(frozen=True)
 class Course:
-    """A quantity over stops.
+    """A quantity versus the number of stops.
 
     Parameters
     ----------
@@ -28,7 +28,7 @@ class Course:
     values
         Shape (stops + 1,).
     is_left
-        Whether it is a remaining margin: zero is the end.
+        Whether it is a remaining margin, which ends at zero.
     """
 
     label: str
@@ -38,14 +38,14 @@ class Course:
 
 
 def life_figure(courses: Sequence[Course], marks: Sequence[int]) -> Figure:
-    """Draw quantities over the number of stops, one panel each; a dotted line at zero is the end.
+    """Draw quantities versus the number of stops, one panel each; a dotted line at zero is the end.
 
     Parameters
     ----------
     courses
         Quantities, from the top.
     marks
-        Numbers of the simulated stops: dots.
+        Numbers of the simulated stops, drawn as dots.
     """
     figure, rows = style.new_figure(0.5 + _HEIGHT * len(courses), [1.0] * len(courses))
     for axes, course in zip(rows, courses, strict=True):

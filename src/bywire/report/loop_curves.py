@@ -27,7 +27,7 @@ _Points = Callable[[LoopCurve], tuple[Array, Array]]
 def _draw_family(
     axes: Axes, family: Family, points: _Points, *, stable_only: bool = False, label: str = ""
 ) -> None:
-    """Draw one line per curve; unstable loops dashed, the worst one on top with its value.
+    """Draw one line per curve: unstable loops dashed, the worst curve on top with its value.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def _draw_family(
     points
         Abscissa and ordinate of a curve.
     stable_only
-        Whether to leave out unstable loops, for quantities without a meaning there.
+        Whether to leave out unstable loops, for which some quantities have no meaning.
     label
         Legend of a single curve.
     """
@@ -65,7 +65,7 @@ def _draw_family(
 
 
 def _value_bar(figure: Figure, panels: list[Axes], family: Family) -> None:
-    """Add the scale of the varied parameter beside the panels; not for a single curve."""
+    """Add the scale of the varied parameter next to the panels, except for a single curve."""
     if family.name and len(family.curves) >= 2:
         value_scale(figure, panels, family.name, family.unit, family.values)
 
@@ -83,7 +83,7 @@ def _name(family: Family, label: str) -> str:
 
 
 def loop_gain(family: Family) -> Figure:
-    """Draw magnitude and phase of the loop gain, with margins of the worst curve as spans."""
+    """Draw magnitude and phase of the loop gain, with the worst curve's margins as bars."""
     figure, (upper, lower) = style.new_figure(5.0, (1.0, 1.0))
     _draw_family(upper, family, _magnitude, label="loop gain L")
     _draw_family(lower, family, _phase)
@@ -106,7 +106,7 @@ def loop_gain(family: Family) -> Figure:
 
 
 def _spans(upper: Axes, lower: Axes, worst: LoopCurve) -> None:
-    """Draw phase margin and gain margin as spans, with their frequencies."""
+    """Draw phase margin and gain margin as bars, with their frequencies."""
     margins = worst.margins
     if math.isfinite(margins.phase_at):
         text = f"phase margin {margins.phase:.3g}° at {margins.phase_at:.3g} Hz"
@@ -163,9 +163,9 @@ _LEFT, _RIGHT, _HALF = -3.2, 1.6, 1.9  # visible part of the plane
 def nyquist(family: Family) -> Figure:
     """Draw the loop gain in the complex plane near -1.
 
-    The mirror image of negative frequencies is left out. The disk belongs to the worst curve; a
-    loop gain outside it tolerates simultaneous changes of gain and phase. Unstable loops have no
-    disk.
+    The mirror image of negative frequencies is left out. The disk belongs to the worst curve. A
+    loop gain that stays outside it tolerates simultaneous changes of gain and phase. Unstable loops
+    have no disk.
     """
     figure, (axes,) = style.new_figure(5.2)
     worst = family.curves[family.worst]
@@ -189,7 +189,7 @@ def nyquist(family: Family) -> Figure:
     )
     axes.axhline(0.0, color=style.GRAY, linewidth=0.6, zorder=1)
     axes.axvline(0.0, color=style.GRAY, linewidth=0.6, zorder=1)
-    axes.set_xlim(_LEFT, _RIGHT, auto=True)  # matplotlib would complain about fixed ones
+    axes.set_xlim(_LEFT, _RIGHT, auto=True)  # matplotlib would warn about fixed limits
     axes.set_ylim(-_HALF, _HALF, auto=True)
     axes.set_aspect("equal", adjustable="datalim")  # more is visible where there is room
     axes.set_xlabel("real part of L [-]")
@@ -226,11 +226,11 @@ _MARK: dict[str, Any] = {
     "zorder": 5,
     "linestyle": "none",
 }
-"""style of the points where margins are read"""
+"""style of the points that determine the margins"""
 
 
 def _mark_on_the_circle(axes: Axes, worst: LoopCurve) -> None:
-    """Mark the points where phase and gain margin are read."""
+    """Mark the points that determine the phase and gain margins."""
     margins = worst.margins
     if math.isfinite(margins.phase_at):
         angle = math.radians(margins.phase - 180.0)
@@ -265,10 +265,10 @@ _GRID = 361
 
 
 def nichols(family: Family) -> Figure:
-    """Draw the loop gain over its phase, with contours of constant magnitude of T.
+    """Draw the loop gain versus its phase, with contours of constant magnitude of T.
 
-    The disk margin of the worst curve keeps the area around -180° free: there ``|S - T|`` is larger
-    than its largest value on the curve.
+    The disk margin of the worst curve keeps the area around -180° free: there ``|S - T|`` exceeds
+    its maximum on the curve.
     """
     figure, (axes,) = style.new_figure(5.0)
     left, right = _phases(family)
@@ -336,7 +336,7 @@ def _in_decibels(curve: LoopCurve) -> tuple[Array, Array]:
 
 
 def _mark_on_the_chart(axes: Axes, worst: LoopCurve) -> None:
-    """Mark -1 and the points where phase and gain margin are read."""
+    """Mark -1 and the points that determine the phase and gain margins."""
     margins = worst.margins
     axes.plot(
         -180.0,
@@ -378,7 +378,7 @@ _LOWEST = -60.0  # visible range, dB
 
 
 def sensitivity(family: Family) -> Figure:
-    """Draw the magnitudes of S and T over frequency, without unstable loops."""
+    """Draw the magnitudes of S and T versus frequency, without unstable loops."""
     figure, panels = style.new_figure(4.8, (1.0, 1.0))
     for axes, quantity, limit in ((panels[0], "S", MOST_S), (panels[1], "T", MOST_T)):
         _panel(axes, family, quantity, limit)
@@ -458,7 +458,7 @@ class DesignCurve:
 
 
 def loop_gains(curves: Sequence[DesignCurve], phase_margin: float | None) -> Figure:
-    """Draw magnitude and phase of the loop gains, with the phase margin as a vertical span.
+    """Draw magnitude and phase of the loop gains, with the phase margin as a vertical bar.
 
     ``curves``: at most three sets of gains, in their order; ``phase_margin``: the required one
     [degree], drawn as a limit of the phase at the crossovers.
@@ -586,7 +586,7 @@ def steps(curves: Sequence[DesignCurve], overshoot: float | None) -> Figure:
         )
     axes.set_xlim(0.0, end)
     axes.set_xlabel(style.axis_label("time", "s"))
-    axes.set_ylabel("output over step [-]")
+    axes.set_ylabel("output relative to step [-]")
     style.legend_above(axes)
     return figure
 

@@ -1,6 +1,6 @@
-"""Self-contained HTML file of a report: it loads nothing, and all text is escaped.
+"""Self-contained HTML file of a report, which loads nothing and escapes all text.
 
-Its only script lets readers zoom figures; without it nothing is missing.
+Its only script lets readers zoom into figures. Without the script, no content is missing.
 """
 
 from __future__ import annotations
@@ -45,12 +45,12 @@ def write_page(
     files: Sequence[str] = (),
     made: Sequence[tuple[str, str]] = (),
 ) -> Path:
-    """Write a report as one HTML file, whole or not at all.
+    """Write a report as one complete HTML file, or nothing.
 
     Parameters
     ----------
     path
-        File to write; a missing folder is created.
+        File to write. The function creates a missing folder.
     title
         Heading of the page.
     summary
@@ -62,7 +62,7 @@ def write_page(
     files
         Names of the files that belong to the report.
     made
-        Identity of the report, see `bywire.report.identity`.
+        Identity of the report (see `bywire.report.identity`).
 
     Raises
     ------
@@ -227,7 +227,7 @@ def _verdicts_first(table: Table) -> Table:
 def table_html(table: Table, *, is_sortable: bool = False) -> str:
     """Return a table as HTML; every text in it is escaped.
 
-    Cells of a sortable table have their numbers in an attribute, in one unit.
+    Cells of a sortable table contain their numbers in an attribute, in one unit.
     """
     table = _verdicts_first(table)
     heading = "".join(

@@ -52,19 +52,19 @@ class Panel:
     Parameters
     ----------
     quantity
-        Label of the ordinate, without its unit; short, for low panels.
+        Label of the ordinate, without its unit and short enough for low panels.
     traces
-        Lines of one unit, the judged one first; variables that are missing in a recording are left
-        out.
+        Lines of one unit, with the judged line first. Variables that are missing in a recording are
+        left out.
     saturation
         Variable that is 1 while the quantity is saturated.
     saturated
         Legend of the saturation.
     limit
-        Parameter of the recording that bounds the first trace on both sides; its lines are drawn
-        where the trace comes near.
+        Parameter of the recording that bounds the first trace on both sides. Its lines are drawn if
+        the trace comes near them.
     levels
-        Names of the values 0, 1, 2, ... of a mode, which is drawn in steps.
+        Names of a mode's values 0, 1, 2, ...; the mode is drawn in steps.
     height
         Relative height.
     """
@@ -93,7 +93,7 @@ class Panels:
 
 
 PANELS = Kind("panels", ("panels",), instances(Panels))
-"""the panels of every brake, in a module ``panels`` of its package"""
+"""the panels of every brake, in the module ``panels`` of its package"""
 
 
 def declared_panels(recording: xr.Dataset) -> list[Panels]:
@@ -103,7 +103,7 @@ def declared_panels(recording: xr.Dataset) -> list[Panels]:
 
 
 def panels_by_unit(recording: xr.Dataset) -> tuple[Panel, ...]:
-    """Return panels for a recording of any model: signals of one unit, two by two.
+    """Return panels for a recording of any model: signals of one unit, two per panel.
 
     A set point (attribute ``set_point_of``) is drawn with its signal. Cumulative signals (energies,
     times) and modes, which are 0 or 1, have no panel.

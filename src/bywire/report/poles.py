@@ -1,4 +1,4 @@
-"""Figures: poles in the plane of rates, and root loci."""
+"""Figures: poles in the complex plane, and root loci."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from bywire.report.wording import amount, in_display_unit
 
 _RATIOS = (0.1, 0.2, 0.4, 0.6, 0.8)
 """damping ratios that are drawn"""
-_BEYOND = 0.35  # visible part of the unstable half plane, as a share of the radius
+_BEYOND = 0.35  # visible part of the unstable half plane, relative to the radius
 
 
 def planes(titles: tuple[str, ...], height: float = 4.2) -> tuple[Figure, list[Axes]]:
@@ -38,18 +38,18 @@ def planes(titles: tuple[str, ...], height: float = 4.2) -> tuple[Figure, list[A
 
 
 def _draw_plane(axes: Axes, radius: float, period: float, growth: float = 0.0) -> None:
-    """Draw rays, circles and borders of the upper half plane up to a radius.
+    """Draw rays, circles and limits of the upper half plane up to a radius.
 
     Parameters
     ----------
     axes
         Axes for the lines.
     radius
-        Largest magnitude of a visible rate [1/s].
+        Maximum magnitude of a visible rate [1/s].
     period
         Sample time [s], 0 for none. Poles cannot be distinguished above half its frequency, f_s/2.
     growth
-        Largest real part that must be visible [1/s]; at least a share of the radius is.
+        Maximum real part that must be visible [1/s]; at least a fraction of the radius is visible.
     """
     right = max(_BEYOND * radius, 1.05 * growth)
     axes.axvspan(0.0, 10.0 * radius, color="#F7E3DA", zorder=0.5, linewidth=0.0)
@@ -107,7 +107,7 @@ def _draw_plane(axes: Axes, radius: float, period: float, growth: float = 0.0) -
 
 
 def _shown_radius(sizes: list[float], period: float) -> float:
-    """Return the radius that shows rates of given magnitudes [1/s], at most half the sampling's."""
+    """Return the radius that shows rates of these magnitudes [1/s], within the sampling limit."""
     largest = max((s for s in sizes if math.isfinite(s) and s > 0.0), default=1.0)
     return min(1.1 * largest, 1.02 * np.pi / period) if period else 1.1 * largest
 
@@ -119,7 +119,7 @@ _SLOW = 4.0
 
 
 def pole_map(rates: NDArray[np.complex128], period: float, bandwidth: float) -> Figure:
-    """Draw poles in two planes: all up to the sampling limit, and the slow, dominant ones.
+    """Draw poles in two planes: all poles up to the sampling limit, and the slow, dominant poles.
 
     Of each pair, the pole with positive frequency is drawn. The unstable half is shaded.
 
@@ -130,13 +130,13 @@ def pole_map(rates: NDArray[np.complex128], period: float, bandwidth: float) -> 
     period
         Sample time [s].
     bandwidth
-        Bandwidth of the loop [Hz]; NaN where there is none.
+        Bandwidth of the loop [Hz]; NaN if there is none.
     """
     sizes = np.abs(rates)
     moving = rates[(sizes > STILL) & (rates.imag >= -STILL)]
     whole = _shown_radius([float(s) for s in np.abs(moving)], period)
     radius = _slow_radius([float(s) for s in np.abs(moving)], bandwidth, whole)
-    figure, panels = planes(("poles", "the slow ones"))
+    figure, panels = planes(("poles", "slow poles"))
     for axes, size in zip(panels, (whole, radius), strict=True):
         _draw_plane(axes, size, period)
         for unstable in (False, True):
@@ -180,22 +180,22 @@ def _slow_radius(sizes: list[float], bandwidth: float, whole: float) -> float:
     return min(_SLOW * middle, whole)
 
 
-# --- Root locus: poles of a loop or a plant against a parameter
+# --- Root locus: poles of a loop or a plant versus a parameter
 
 _COLORS = "viridis"
 _ROOM = 1.3  # margin around the visible poles
 
 
 def root_locus(locus: Locus, bandwidth: float) -> Figure:
-    """Draw the root locus in two planes: all poles up to the sampling limit, and the slow ones.
+    """Draw the root locus in two planes: all poles up to the sampling limit, and the slow poles.
 
     Parameters
     ----------
     locus
         The poles.
     bandwidth
-        Largest bandwidth of the loop over the range [Hz]; NaN for none: then the poles that become
-        unstable determine the second plane.
+        Maximum bandwidth of the loop over the range [Hz]; NaN if there is none. In that case, the
+        poles that become unstable determine the second plane.
     """
     rates = locus.rates
     sizes = [float(s) for s in np.abs(rates[np.isfinite(rates)]) if s > STILL]
@@ -204,7 +204,7 @@ def root_locus(locus: Locus, bandwidth: float) -> Figure:
     crossing = _crossing(locus)
     if not math.isfinite(bandwidth) and crossing > 0.0:
         slow = min(crossing, whole)
-    figure, panels = planes(("poles", "the slow ones"), 4.6)
+    figure, panels = planes(("poles", "slow poles"), 4.6)
     values, _ = in_display_unit(np.asarray(locus.values), locus.unit)
     norm = Normalize(values[0], values[-1])
     for axes, radius in zip(panels, (whole, slow), strict=True):
@@ -233,11 +233,11 @@ def _crossing(locus: Locus) -> float:
 
 
 def border_text(border: Border, name: str, unit: str) -> str:
-    """Return the borders of stability of a loop, in words."""
+    """Return a stability limit of a loop in words."""
     side = "below" if border.above else "above"
     swing = border.rate.imag / (2.0 * np.pi)
-    how = f"swings at {swing:.3g} Hz" if swing > 1e-3 else "drifts away"
-    return f"unstable {side} {name} = {amount(border.value, unit)}: it {how}"
+    how = f"oscillates at {swing:.3g} Hz" if swing > 1e-3 else "drifts away"
+    return f"unstable {side} {name} = {amount(border.value, unit)}: the loop {how}"
 
 
 def _ways(axes: Axes, locus: Locus, norm: Normalize, values: Array) -> None:

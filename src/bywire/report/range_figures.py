@@ -1,4 +1,4 @@
-"""Figures over varied quantities: key figures over a range, a quantity over two parameters."""
+"""Figures of varied quantities: key figures versus a range, a quantity versus two parameters."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _HEIGHT = 1.35  # height of a panel [inch]
 
 
 class Varied(Protocol):
-    """Results of a bench for every value of a range; a `BenchRange` is one."""
+    """Results of a bench for every value of a range, such as a `BenchRange`."""
 
     @property
     def bench(self) -> Bench:
@@ -59,9 +59,9 @@ class Varied(Protocol):
 
 
 def kpi_curves(varied: Varied) -> Figure:
-    """Draw every key figure that changes over the values, each in its own panel.
+    """Draw every key figure that changes over the range, each in its own panel.
 
-    Limits of requirements are drawn, and points that miss them are crosses.
+    The figure shows limits of requirements. Points that miss them are crosses.
     """
     shown = {name: pair for name, pair in _kpi_lines(varied).items() if _moves(pair[0])}
     shown = shown or _kpi_lines(varied)
@@ -139,8 +139,8 @@ def _missed(name: str, results: Sequence[Result]) -> Array:
 
 _Extend = Literal["neither", "min", "max", "both"]
 _STEPS = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0)  # share of a decade
-_EXACT = 1e-9  # share of a step: tolerance for a value on a level
-_MOST = 14  # levels; with more, colors are hard to distinguish
+_EXACT = 1e-9  # fraction of a step: tolerance for a value on a level
+_MOST = 14  # levels; more colors are hard to distinguish
 _MARKERS = ("*", "o", "s", "D")
 _HATCHES = ("///", "...", "xx")
 _LINES = ("-", "--", ":")
@@ -153,7 +153,7 @@ def contour(data: xr.Dataset, shown: Map) -> Figure:
     Parameters
     ----------
     data
-        Dataset of a study; variables with ``units`` and ``long_name``. NaN stays white.
+        Dataset of a study; variables with ``units`` and ``long_name``. NaN remains white.
     shown
         Variable, coordinates, marks and limits to draw.
 
@@ -227,7 +227,7 @@ def levels_between(low: float, high: float) -> list[float]:
 
 
 def _limits(axes: Axes, data: xr.Dataset, shown: Map, x: Array, y: Array) -> list[Line2D | Patch]:
-    """Draw the borders of the feasible region, hatched beyond; return the legend's entries."""
+    """Draw the limits of the feasible region, hatched beyond; return the legend's entries."""
     handles: list[Line2D | Patch] = []
     for k, (label, (name, level)) in enumerate(shown.limits.items()):
         values = np.asarray(data[name].transpose(shown.y, shown.x).values, dtype=float)
@@ -253,7 +253,7 @@ def _limits(axes: Axes, data: xr.Dataset, shown: Map, x: Array, y: Array) -> lis
 
 
 def _compared_lines(axes: Axes, data: xr.Dataset, shown: Map) -> list[Line2D | Patch]:
-    """Draw the lines for comparison; return the legend's entries."""
+    """Draw the comparison lines; return the legend's entries."""
     handles: list[Line2D | Patch] = []
     units = [str(data[name].attrs["units"]) for name in (shown.x, shown.y)]
     for k, (label, points) in enumerate(shown.curves.items()):

@@ -21,8 +21,8 @@ from bywire.report.wording import amount, unit_text
 
 CHARACTER = 0.62 * style.TEXT_SIZE / 72.0
 """width of a digit [inch], rounded"""
-_GAP = 2  # least number of characters between two labels
-_PLAIN = (1e-2, 1e5)  # the largest magnitude that is written without a power of ten
+_GAP = 2  # minimum number of characters between two labels
+_PLAIN = (1e-2, 1e5)  # range of maximum magnitudes that are written without a power of ten
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class Scale:
 def scale_of(values: Array, symbol: str) -> Scale:
     """Return the scale in which values are easiest to read.
 
-    It uses the unit of tables, see `bywire.report.wording.readable_unit`, with a power of ten where
+    It uses the unit of tables (see `bywire.report.wording.readable_unit`), with a power of ten if
     numbers would be too small or too large.
 
     Parameters
@@ -78,7 +78,7 @@ def scale_of(values: Array, symbol: str) -> Scale:
 def difference_scale(size: float, symbol: str) -> Scale:
     """Return the scale of differences of a figure: in its unit, for temperatures in K.
 
-    ``size``: largest magnitude of the figure, in ``symbol``.
+    ``size``: maximum magnitude of the figure, in ``symbol``.
     """
     of = difference_unit(symbol)
     unit = readable_unit(size, of)
@@ -98,7 +98,7 @@ def write_out(axis: Axis) -> None:
 
 
 def few_labels(axis: Axis, room: float, most: int = 5) -> None:
-    """Label an abscissa with as many values as fit, once its data are drawn.
+    """Label an abscissa with as many values as fit, after its data are drawn.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def few_labels(axis: Axis, room: float, most: int = 5) -> None:
     room
         Approximate length of the axis [inch].
     most
-        Largest number of values.
+        Maximum number of values.
     """
     write_out(axis)
     formatter = axis.get_major_formatter()
@@ -123,7 +123,7 @@ def few_labels(axis: Axis, room: float, most: int = 5) -> None:
     for count in range(most + 1, 0, -1):  # about this number of intervals
         locator = MaxNLocator(nbins=count, steps=[1, 2, 2.5, 5, 10], min_n_ticks=1)
         rows.append([at for at in locator.tick_values(low, high) if low <= at <= high])
-    # A single value shows no scale: then the ends of a finer row are labeled, if it does not fit.
+    # A single value shows no scale, so the ends of a finer row are labeled if the row does not fit.
     ends = [[row[0], row[-1]] for row in rows if len(row) > 1]
     several = [row for row in rows if len(row) > 1]
     for places in (*several, *ends, *rows):
@@ -133,7 +133,7 @@ def few_labels(axis: Axis, room: float, most: int = 5) -> None:
 
 
 def beyond(limit: float, values: Array) -> int:
-    """Return the side of a limit that is so far away that it would squeeze values; 0: neither."""
+    """Return the side of a limit that is too far away to show with the values; 0: neither side."""
     if not values.size:
         return 0
     low, high = float(values.min()), float(values.max())
@@ -144,7 +144,7 @@ def beyond(limit: float, values: Array) -> int:
 def limit_text(limit: float, symbol: str, size: float) -> str:
     """Return the note at the edge of an axis that does not reach a limit.
 
-    ``size``: largest magnitude on the axis, in ``symbol``, whose unit it takes.
+    ``size``: maximum magnitude on the axis, in ``symbol``; it determines the unit.
     """
     return f"limit {amount(limit, symbol, like=size)}"
 
@@ -161,11 +161,11 @@ def name_beyond(
     text
         Text of `limit_text`.
     far
-        Side of the limit, see `beyond`.
+        Side of the limit (see `beyond`).
     color
         Color of the text.
     place
-        Position of the text; at that side by default.
+        Position of the text. Default: that side.
     """
     axes.set_title(
         f"{text} →" if far > 0 else f"← {text}",

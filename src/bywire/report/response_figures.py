@@ -38,7 +38,7 @@ class Response:
     frequency
         Frequencies [Hz], ascending and positive, shape ``(n,)``.
     value
-        Complex response, shape ``(n,)``; NaN where there is none.
+        Complex response, shape ``(n,)``; NaN where it is undefined.
     measured
         Whether to draw points instead of a line.
     """
@@ -59,8 +59,8 @@ class Response:
             )
         if not bool(np.all(np.asarray(self.frequency) > 0)):
             raise ParameterError(
-                f"response {self.label!r} has a frequency that is not above 0 Hz: "
-                "a logarithmic axis cannot show it",
+                f"response {self.label!r} has a frequency that is not above 0 Hz, which a "
+                "logarithmic axis cannot show",
                 name=self.label,
                 valid="above 0 Hz",
             )
@@ -94,11 +94,11 @@ def bode(
     responses
         Responses, each with its label.
     gain_unit
-        Unit of 0 dB, in common spelling (``"bar/A"``); ``"1"`` for a pure number.
+        Unit of 0 dB in its usual spelling (``"bar/A"``); ``"1"`` for a pure number.
     marks
-        Frequencies [Hz] to mark by their label, for example the crossover.
+        Frequencies [Hz] to mark, by label, for example the crossover.
     depth
-        Depth below the largest magnitude [dB]; responses further below are left out.
+        Depth below the maximum magnitude [dB]; lower responses are left out.
 
     Raises
     ------
@@ -150,7 +150,7 @@ def bode(
 
 
 def _above(response: Response, depth: float) -> Response:
-    """Return a response up to where it stays below a depth [dB]."""
+    """Return the part of a response before it falls below a depth [dB] for good."""
     size = response.magnitude_db
     seen = np.flatnonzero(size > np.nanmax(size, initial=-math.inf) - depth)
     if not math.isfinite(depth) or not seen.size:
@@ -174,14 +174,13 @@ def _phase_ticks(responses: Sequence[Response]) -> MultipleLocator:
 
 _POINTS = 400
 _DECADES = 3.0
-_APART = 16  # of the points of further models
+_APART = 16  # spacing of the points of other models
 
 
 def plant_figures(models: Mapping[str, LinearModel], band: float) -> list[tuple[str, Figure]]:
-    """Return name and figure of every output for the first input.
+    """Return name and figure of every output's response to the first input.
 
-    ``models``: label -> model, of the same inputs and outputs; ``band``: end of the frequencies
-    [Hz].
+    ``models``: label -> model, of the same inputs and outputs; ``band``: maximum frequency [Hz].
     """
     f = np.geomspace(band * 10.0**-_DECADES, band, _POINTS)
     first = next(iter(models.values()))
@@ -195,9 +194,9 @@ def plant_figures(models: Mapping[str, LinearModel], band: float) -> list[tuple[
         unit = f"{unit_text(shown) or '1'}/{unit_text(display_unit(taken)) or '1'}"
         lines = []
         for k, (label, response) in enumerate(values.items()):
-            # Points on top of a line: otherwise equal models would hide each other.
+            # Points on top of a line, because equal models would otherwise hide each other.
             some = slice(None) if k == 0 else slice(k * _APART // 2, None, _APART)
-            path = f"{label}, {signal} by {first.inputs[0]}"
+            path = f"{label}, {first.inputs[0]} to {signal}"
             lines.append(Response(path, f[some], scale * response[some, row, 0], measured=k > 0))
         drawn.append((signal, bode(lines, gain_unit=unit)))
     return drawn
@@ -207,7 +206,7 @@ def plant_figures(models: Mapping[str, LinearModel], band: float) -> list[tuple[
 
 _DASHES: tuple[style.Dash, ...] = ("-", "--", ":")
 _MARKERS = ("o", "s", "^", "D", "v", "P", "X")
-_LEAST = 0.01  # share of the tolerance: smaller differences are drawn at the lower edge
+_LEAST = 0.01  # fraction of the tolerance: smaller differences are drawn at the lower edge
 
 
 def differences(
@@ -215,7 +214,7 @@ def differences(
     sizes: Mapping[str, tuple[Array, Array]],
     tolerance: tuple[float, float],
 ) -> Figure:
-    """Draw the size of differences of gain and phase over frequency, logarithmically.
+    """Draw the magnitude of gain and phase differences versus frequency on logarithmic axes.
 
     Parameters
     ----------
@@ -267,7 +266,7 @@ def differences(
     return figure
 
 
-# --- Bandwidth over a range of one parameter, by amplitude
+# --- Bandwidth versus a range of one parameter, by amplitude
 
 _COLORS = (style.BLUE, style.VERMILLION, style.GREEN, style.PURPLE, style.ORANGE, style.SKY)
 
@@ -275,17 +274,17 @@ _COLORS = (style.BLUE, style.VERMILLION, style.GREEN, style.PURPLE, style.ORANGE
 def bandwidth_range(
     response: xr.Dataset, labels: Sequence[float], name: str, symbol: str
 ) -> Figure:
-    """Draw the bandwidth of every amplitude; a ring marks the worst case.
+    """Draw the bandwidth at every amplitude; a ring marks the worst case.
 
     Parameters
     ----------
     response
         Dataset with ``bandwidth`` [Hz] over ``variant`` and ``amplitude``; where it is beyond the
-        measured frequencies, an arrow is drawn at the last one.
+        measured frequencies, an arrow marks the last frequency.
     labels
         Values of the varied quantity, SI, shape (variants,).
     name, symbol
-        Its name and SI unit.
+        Name and SI unit of the varied quantity.
     """
     figure, (axes,) = style.new_figure(2.9)
     x, _ = in_display_unit(np.asarray(labels), symbol)

@@ -20,7 +20,7 @@ from bywire.core.scratch import UNFINISHED, scratch_folder
 PAGE = "report.html"
 """file of the page, which lists the files of its result"""
 
-_SAYS = "This result was not written to its end: the same command writes it again. Its files:"
+_SAYS = "This result is incomplete. Rerun the same command to write it again. Its files:"
 _OURS = (".html", ".json", ".nc", ".png", ".toml")
 _META = "bywire-files"
 _HEAD = 65536  # characters of a page that contain its list, which is at the beginning
@@ -41,7 +41,7 @@ class ResultFolder:
         self.folder, self.scratch = folder, scratch
 
     def move(self, is_whole: bool = True) -> None:
-        """Move the files into place, remove those of the older result, and mark incomplete ones."""
+        """Move the files into place, remove the older result's, and mark incomplete results."""
         new = [path.name for path in self.scratch.iterdir() if path.is_file()]
         if not new:
             return
@@ -71,9 +71,9 @@ def result_folder(folder: Path) -> Iterator[ResultFolder]:
     Raises
     ------
     FileError
-        When the folder cannot be created or is not writable; the older result then stays.
+        When the folder cannot be created or is not writable. The older result then remains.
     KeyboardInterrupt
-        When interrupted, with advice; the written files are then in the folder, marked as
+        When interrupted, with advice. The written files are then in the folder, marked as
         unfinished.
     """
     try:
@@ -81,7 +81,7 @@ def result_folder(folder: Path) -> Iterator[ResultFolder]:
     except OSError as error:
         reason = error.strerror or str(error)
         raise FileError(
-            f"cannot make the output folder {folder}: {reason}", name=str(folder)
+            f"cannot create the output folder {folder}: {reason}", name=str(folder)
         ) from None
     try:
         with scratch_folder(folder) as scratch:
@@ -94,13 +94,13 @@ def result_folder(folder: Path) -> Iterator[ResultFolder]:
             place.move()
     except KeyboardInterrupt:
         raise KeyboardInterrupt(
-            f"the report in {folder} is not complete: the same command writes it"
+            f"the report in {folder} is incomplete. Rerun the same command to complete it"
         ) from None
     except OSError as error:
         reason = error.strerror or str(error)
         raise FileError(
-            f"cannot write the result to {folder}: {reason}: make room there, or name another "
-            "folder",
+            f"cannot write the result to {folder}: {reason}. Free some space there, or choose "
+            "another folder",
             name=str(folder),
         ) from None
 

@@ -1,7 +1,7 @@
-"""Schematic of a model as SVG: parts as boxes, wires by their names, and a table of them.
+"""Schematic of a model as SVG: parts as boxes, wires with their names, and a table of both.
 
-The layout is that of K. Sugiyama et al.: edges against the flow are reversed, every edge gets
-passages in the layers that it crosses, and nodes move toward their neighbors.
+The layout is that of K. Sugiyama et al.: edges against the flow are reversed, every edge
+gets passages in the layers that it crosses, and nodes move toward their neighbors.
 
 References
 ----------
@@ -25,7 +25,7 @@ from bywire.report.tables import Table, text_table
 K = TypeVar("K", bound=Hashable)
 
 _SWEEPS = 24
-_LOWEST = 12.0  # height of a passage, which only an edge crosses
+_LOWEST = 12.0  # height of a passage that only an edge crosses
 
 
 @dataclass(frozen=True)
@@ -74,9 +74,9 @@ def layered(
     edges
         Source and target; a node is not its own target.
     gap
-        Least distance of two nodes in a layer.
+        Minimum distance between two nodes in a layer.
     first
-        Nodes with a separate layer each, before all others.
+        Nodes that each have a separate layer, before all others.
     """
     links = list(dict.fromkeys(edges))
     layer = _layer_of(list(heights), links, list(first))
@@ -149,7 +149,7 @@ def _neighbours(segments: Iterable[tuple[Hashable, Hashable]]) -> dict[Hashable,
 def _ordered(
     members: list[list[Hashable]], beside: Mapping[Hashable, Sequence[Hashable]]
 ) -> list[list[Hashable]]:
-    """Return the layers with each node near the mean position of its neighbors; the best found."""
+    """Return the best layers found, with each node near its neighbors' mean position."""
     best, fewest = [list(each) for each in members], _crossings(members, beside)
     for sweep in range(_SWEEPS):
         ways = range(1, len(members)) if sweep % 2 == 0 else range(len(members) - 2, -1, -1)
@@ -211,7 +211,7 @@ def _heights(
 
 
 def _spread(wanted: Sequence[float], apart: Sequence[float]) -> list[float]:
-    """Return positions nearest to the desired ones, by least squares, with their distances."""
+    """Return the least-squares positions nearest to the desired ones, with minimum distances."""
     shifts = [0.0]
     for each in apart:
         shifts.append(shifts[-1] + each)
@@ -228,7 +228,7 @@ def _spread(wanted: Sequence[float], apart: Sequence[float]) -> list[float]:
 
 # --- The drawing
 
-_LETTER = 7.3  # width of a letter at 13 px, a little more than the mean
+_LETTER = 7.3  # width of a letter at 13 px, slightly more than the mean
 _SMALL = 6.2  # the same at 11 px
 _HEAD, _ROW, _PILL = 40.0, 17.0, 24.0
 _GAP, _CHANNEL, _MARGIN = 16.0, 54.0, 34.0
@@ -308,7 +308,7 @@ class Schematic:
 
 
 def schematic(network: Network) -> Schematic:
-    """Lay a network out: the ECU first, then the plant along the flow of its signals."""
+    """Lay out a network: the ECU first, then the plant along the flow of its signals."""
     first = [node for node in network.nodes if node.kind == "stimulus"]
     first += [node for node in network.nodes if node.kind == "task"]
     edges = [(c.source, c.target) for c in network.connections]
@@ -334,7 +334,7 @@ def schematic(network: Network) -> Schematic:
 
 
 def schematic_svg(network: Network, title: str) -> str:
-    """Return the schematic of a model as an SVG element that takes the color of the page's text.
+    """Return the schematic of a model as an SVG element in the page's text color.
 
     ``title``: its text for screen readers; every name in it is text as well.
     """
@@ -353,7 +353,7 @@ def schematic_svg(network: Network, title: str) -> str:
 
 
 def _sides(node: Node, network: Network, layers: Layers) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the ports at the left and at the right; one with inputs from both sides is at both."""
+    """Return the ports on the left and the right; a port with inputs from both is on both."""
     left, right = [], []
     for port in network.ports.get(node, ()):
         ways = {layers.layer[s] < layers.layer[node] for s in network.sources(node, port)}
@@ -465,7 +465,7 @@ def _box(box: Box, network: Network) -> str:
     return f'<g>{rect} fill-opacity="{shade}"/>{"".join(texts)}</g>'
 
 
-# --- With its text: which input of which part comes from where
+# --- Table: the source of every input
 
 
 def schematic_blocks(model: Any, par: Any) -> list[Drawing | Details]:
@@ -485,7 +485,7 @@ def schematic_blocks(model: Any, par: Any) -> list[Drawing | Details]:
     wires = sum(node.kind == "wire" for node in known.nodes)
     caption = (
         f"Schematic of {known.name}, from its equations: {parts} parts, {wires} wires (rounded). "
-        "Signals along the flow enter at the left, feedback enters at the right."
+        "Forward signals enter on the left, and feedback enters on the right."
     )
     title = f'Schematic of {known.name}; the table "Parts and wires" has the same content'
     return [

@@ -1,4 +1,4 @@
-"""Values stated by a source: levels and ranges below our curves, and texts for tables."""
+"""Values stated by a source: levels and ranges behind our curves, and texts for tables."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _OPACITY = 0.15  # opacity of a band: the curves' grid shines through
 def draw_stated(axes: Axes, levels: Sequence[StatedLevel | StatedRange], shown: Channel) -> None:
     """Draw levels as lines across an axes and ranges as bands, each with its own legend entry.
 
-    They are drawn below the curves. ``shown``: a channel of the axes, for its unit.
+    They are drawn behind the curves. ``shown``: a channel of the axes, for its unit.
     """
     from bywire.report import style  # loaded with Matplotlib, which texts for tables do not need
 

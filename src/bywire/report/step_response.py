@@ -39,9 +39,9 @@ class StepLimits:
     before, after
         Set point before and after it.
     band
-        Half width of the tolerance band, as a share of the step.
+        Half width of the tolerance band, relative to the step.
     overshoot
-        Largest overshoot as a share of the step; ``None`` for no limit.
+        Maximum overshoot relative to the step; ``None`` for no limit.
     """
 
     start: float
@@ -53,19 +53,19 @@ class StepLimits:
     def __post_init__(self) -> None:
         if self.before == self.after:
             raise ParameterError(
-                f"StepLimits: before and after are both {self.after:g}: they must differ",
+                f"StepLimits: before and after are both {self.after:g}. They must differ",
                 name="after",
                 value=f"{self.after:g}",
             )
 
     def level(self, share: float) -> float:
-        """Return the level at a share of the step: 0 before it, 1 after it."""
+        """Return the level at a fraction of the step: 0 before it, 1 after it."""
         return self.before + share * (self.after - self.before)
 
 
 @dataclass(frozen=True)
 class StepFacts:
-    """Computed figures of a step response; ``None`` for those that were not computed.
+    """Computed figures of a step response; ``None`` for figures that were not computed.
 
     Parameters
     ----------
@@ -74,9 +74,9 @@ class StepFacts:
     settling_time
         From the step until the response stays in the band [s].
     overshoot
-        As a share of the step.
+        Relative to the step.
     rise_from, rise_to
-        Shares of the step between which the rise is measured.
+        Fractions of the step between which the rise is measured.
     """
 
     rise_time: float | None = None
@@ -96,7 +96,7 @@ def step_limits(
     definition, options
         The experiment and its options.
     verdicts
-        Requirements; one on the overshoot is drawn.
+        Requirements. The figure shows a requirement on the overshoot.
     """
     setting = None if definition.step is None else definition.step(options)
     if setting is None or setting.start is None or setting.end is None:
@@ -175,8 +175,8 @@ def step_response(
     measured
         Recording to compare with.
     smoothing
-        Averaging time [s] of the judged curve, which is then drawn thin, with the raw one pale
-        behind it and the marks on it. 0 if the raw curve was judged.
+        Averaging time [s] of the judged curve. The judged curve is then thin, with the marks on it
+        and the pale raw curve behind it. 0 if the raw curve was judged.
     stated
         Levels and ranges stated by a source; those of the variable are drawn.
     """
@@ -261,7 +261,7 @@ def _after_step(shown: Channel, limits: StepLimits) -> int:
 
 
 def _first_crossing(shown: Channel, limits: StepLimits, level: float) -> float:
-    """Return when the response first reaches a level; NaN where it never does."""
+    """Return when the response first reaches a level; NaN if it never does."""
     begin = _after_step(shown, limits)
     rising = limits.after > limits.before
     values = shown.values[begin:]
@@ -286,7 +286,7 @@ def _peak(shown: Channel, limits: StepLimits) -> tuple[float, float]:
     return float(shown.time[k]), float(shown.values[k])
 
 
-# --- How well a variable follows its moving set point
+# --- A variable that tracks a moving set point
 
 
 def tracking(recording: xr.Dataset, variable: str, set_point: str) -> Figure:

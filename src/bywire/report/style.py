@@ -1,7 +1,7 @@
 """Style of every figure: colors, line styles by meaning, legends, axes, scales.
 
 Nothing here changes matplotlib's global state, and pyplot is never imported. Matplotlib itself is
-loaded for the first figure, because that takes half as long as a short command.
+loaded for the first figure, because loading takes half as long as a short command.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def _averaging_time(time: Array) -> float:
 
 
 def inside(shown: Channel) -> tuple[Channel, float] | None:
-    """Return the moving average and its averaging time [s] where a line fills an area."""
+    """Return the moving average and its averaging time [s] if a line fills an area."""
     if not _is_band(shown) or not bool(np.all(np.isfinite(shown.values))):
         return None
     width = _averaging_time(shown.time)
@@ -83,7 +83,7 @@ TEXT_SIZE = 8.5
 FEW = 40
 """number of points up to which they are drawn without a line"""
 
-_EM_PER_CHARACTER = 0.58  # of the default font, a little more than its mean
+_EM_PER_CHARACTER = 0.58  # of the default font, slightly more than its mean
 _EMS_BESIDE_TEXT = 4.4  # handle, its gap and the gap between columns in a legend
 
 
@@ -122,7 +122,7 @@ def new_figure(
     """Return a figure with panels one above the other.
 
     ``height``: height of the figure [inch]; ``heights``: relative heights of the panels;
-    ``is_shared``: whether they share their abscissa; otherwise each may have another quantity.
+    ``is_shared``: whether they share their abscissa; otherwise each may show another quantity.
     """
     from matplotlib.figure import Figure
 
@@ -154,7 +154,7 @@ def dress(axes: Axes) -> None:
 
 
 def few_ticks(axes: Axes, count: int) -> None:
-    """Leave at most ``count`` intervals on the ordinate of a low panel."""
+    """Limit the ordinate of a low panel to ``count`` intervals."""
     from matplotlib.ticker import MaxNLocator
 
     axes.yaxis.set_major_locator(MaxNLocator(nbins=count, steps=[1, 2, 2.5, 5, 10]))
@@ -179,7 +179,7 @@ def plain(text: object, longest: int = 90) -> str:
     text
         Text from a user or a recording.
     longest
-        Largest number of characters; longer text is cut.
+        Maximum number of characters; longer text is cut.
     """
     line = clean(text).replace("\n", " ")
     short = line if len(line) <= longest else line[: longest - 1] + "…"
@@ -228,8 +228,8 @@ def draw_channel(
     """Draw a channel over time, labeled by its name and ``suffix``.
 
     Ripple that is too fast to be visible is drawn as the pale band that it fills, with its moving
-    average on it, and the label mentions it. For a set point only the average is drawn then,
-    because its band would hide the judged line.
+    average on it, and the label mentions it. In this case, only the average of a set point is
+    drawn, because its band would hide the judged line.
     """
     scale, _ = time_scale(shown.time)
     look = STROKES[role]
@@ -264,9 +264,9 @@ def legend_above(axes: Axes, handles: Sequence[Artist] | None = None) -> None:
     Parameters
     ----------
     axes
-        Axes to put it on.
+        Axes for the legend.
     handles
-        Entries; by default everything in the axes with a label.
+        Entries. Default: everything in the axes with a label.
     """
     entries = axes.get_legend_handles_labels()[0] if handles is None else list(handles)
     if entries:
@@ -304,7 +304,7 @@ _BRIGHTEST = 0.9  # part of the color map: brighter colors are not visible on wh
 
 
 def value_color(values: Sequence[float], k: int) -> Color:
-    """Return the color of a value among others."""
+    """Return the color of one of several values."""
     low, high = min(values), max(values)
     share = (values[k] - low) / (high - low) if high > low else 0.0
     import matplotlib as mpl
@@ -315,7 +315,7 @@ def value_color(values: Sequence[float], k: int) -> Color:
 def value_scale(
     figure: Figure, panels: list[Axes], name: str, unit: str, values: Sequence[float]
 ) -> None:
-    """Put the scale of a varied quantity beside the panels.
+    """Put the scale of a varied quantity next to the panels.
 
     Parameters
     ----------
@@ -335,7 +335,7 @@ def value_scale(
     bar.set_label(axis_label(name, unit), fontsize=TEXT_SIZE)
 
 
-# --- The one legend of a figure whose panels share what their lines mean
+# --- One legend for a figure whose panels use the same lines
 
 _COLUMNS = 4  # that fit
 

@@ -105,11 +105,11 @@ def value_changes(
     before
         Original values, by name.
     of
-        Owner of the original values, see `Change`.
+        Owner of the original values (see `Change`).
     prefix
         Prefix of the names.
     origins
-        Sources of the original values, by name; empty by default.
+        Sources of the original values, by name. Default: empty.
     """
     leaves, values = leaf_fields(type(now)), now.flat()
     units = {name: leaves[name].unit.symbol if name in leaves else "1" for name in values}
@@ -191,7 +191,7 @@ def changes_block(
         )
     )
     if varied:
-        return Paragraph(f"Only {', '.join(varied)} varied; apart from that, {unchanged}.")
+        return Paragraph(f"Only {', '.join(varied)} varied. Otherwise, {unchanged}.")
     return Paragraph(f"Nothing was changed: {unchanged}.")
 
 
@@ -216,7 +216,7 @@ def _option_changes(bench: Bench) -> Iterator[Change]:
 
 
 def _unset(bench: Bench, option: str) -> str:
-    """Return the default of an option that names a signal, given all other options."""
+    """Return the default of an option that specifies a signal, with all other options set."""
     others = {name: value for name, value in bench.options.items() if name != option}
     try:
         unset = experiment_of(bench.experiment, bench.parameters, bench.assembly, others)
@@ -285,7 +285,7 @@ class Subject:
         varied: Collection[str] = (),
         further: tuple[Change, ...] = (),
     ) -> Subject:
-        """Return a bench as a subject, with its own name and summary by default.
+        """Return a bench as a subject. Default: the bench's name and summary.
 
         ``varied``: quantities with several values; ``further``: other changes.
         """
@@ -321,7 +321,7 @@ class Subject:
     def provenance(self, *notes: str, has_changes: bool = True) -> Section:
         """Return the section on the origin of a report: notes, changes, source, all parameters.
 
-        ``has_changes``: whether it contains the changes, instead of an earlier section.
+        ``has_changes``: whether it contains the changes, rather than an earlier section.
 
         Raises
         ------

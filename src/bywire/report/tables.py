@@ -28,7 +28,7 @@ class Cell:
     Parameters
     ----------
     value
-        Number, or another value for a table of data; the text if there is none.
+        Number, or another value for a data table. Default: the text.
     unit
         Unit of a number, SI unless the text has another unit; ``"1"`` for a pure number.
     """
@@ -110,7 +110,7 @@ class KpiRow:
     stated, where
         Value stated by a source, as text, and the place there; empty for none.
     converges
-        Whether runs with several steps converge; otherwise ``error`` is only a bound.
+        Whether runs with several steps converge. Otherwise ``error`` is only a bound.
     """
 
     name: str
@@ -188,9 +188,9 @@ class ParameterRow:
 
 
 def kpi_table(rows: Iterable[KpiRow]) -> Table:
-    """Return the table of key figures; columns of limits, errors, statements only if needed.
+    """Return the table of key figures, with columns of limits, errors and statements if needed.
 
-    A value is written with the significant digits of its error.
+    Each value has the significant digits that its error allows.
     """
     listed = list(rows)
     limited = any(row.limit for row in listed)
@@ -258,7 +258,7 @@ def reproduction_table(rows: Iterable[ReproductionRow]) -> Table:
 
 
 def verdict_table(rows: Iterable[ReproductionRow]) -> Table:
-    """Return the same table without tolerances and notes, narrow enough for a terminal."""
+    """Return the table without tolerances and notes, which is narrow enough for a terminal."""
     return Table(
         (
             Column("statement"),
@@ -304,7 +304,7 @@ def parameter_table(rows: Iterable[ParameterRow]) -> Table:
 
 
 def text_table(heading: Sequence[str], rows: Iterable[Sequence[object]]) -> Table:
-    """Return a table of plain texts, and of ready-made cells."""
+    """Return a table of plain texts and finished cells."""
     cells = (
         (each if isinstance(each, Cell) else Cell(clean(each)) for each in row) for row in rows
     )

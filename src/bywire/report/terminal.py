@@ -24,7 +24,7 @@ WIDTH = 120
 """maximum number of characters in a line of prose"""
 GAP = "  "
 NARROWEST = 12
-"""least width of a column that is wrapped"""
+"""minimum width of a wrapped column"""
 LONGEST_WORD = 40
 """length of the longest word that is never broken"""
 LONGEST_VALUE = 60
@@ -87,13 +87,13 @@ def _text(block: str | Block, verbose: bool) -> str | None:
     table = replace(table, rows=table.rows[: len(table.rows) - rest])
     lines = [block.title] if block.title else []
     lines.append(table_text(table, _columns()))
-    how = "--verbose shows them" if is_command_line() else "tables() has them"
-    lines += [f"and {rest} more rows: {how}"] if rest else []
+    how = "use --verbose to show them" if is_command_line() else "tables() contains them"
+    lines += [f"and {rest} more rows ({how})"] if rest else []
     return "\n".join(lines)
 
 
 def _columns() -> int:
-    """Return the line length of the terminal; for a pipe, that of a log."""
+    """Return the line length of the terminal, or of a log for a pipe."""
     return shutil.get_terminal_size((WIDTH, 24)).columns
 
 

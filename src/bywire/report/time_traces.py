@@ -31,8 +31,8 @@ if TYPE_CHECKING:
     from bywire.report.style import Color
 
 FAULTS = "faults"
-"""variable that counts the present faults: a bar along the lower edge shows them"""
-_HEIGHT = 0.04  # height of a bar, as a share of the panel
+"""variable that counts the active faults: a bar along the lower edge shows them"""
+_HEIGHT = 0.04  # height of a bar, relative to the panel
 
 
 def _mark_saturation(axes: Axes, panel: Panel, recording: xr.Dataset) -> None:
@@ -60,7 +60,7 @@ def _mark_faults(axes: Axes, recording: xr.Dataset, *, named: bool) -> None:
 def _mark_faults_of(
     axes: Axes, recordings: Sequence[xr.Dataset], colors: Sequence[str | Color], factor: float
 ) -> list[Artist]:
-    """Draw the fault bars of several recordings: a common one if their times are equal.
+    """Draw the fault bars of several recordings: a common bar if their times are equal.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def _mark_faults_of(
     Returns
     -------
     list
-        The entry of a legend; empty without a fault.
+        Entry of the legend; empty without a fault.
     """
     from matplotlib.patches import Patch
 
@@ -128,7 +128,7 @@ def _spans(recording: xr.Dataset, variable: str) -> list[tuple[float, float]]:
 
 _NEAR = 0.5
 """fraction of a limit above which its lines are drawn"""
-_LASTING = 0.9  # share of a phase above which short breaks are ignored
+_LASTING = 0.9  # fraction of a phase above which short breaks are ignored
 
 
 def time_traces(
@@ -142,24 +142,24 @@ def time_traces(
 ) -> Figure:
     """Draw panels of variables over a shared time axis.
 
-    Phases in which all friction elements are stuck are shaded; those with repeated sticking, as
-    under dither, more faintly. Saturation is a bar along the upper edge.
+    Phases in which all friction elements are stuck are shaded. Phases with repeated sticking, as
+    with dither, are shaded lightly. Saturation is a bar along the upper edge.
 
     Parameters
     ----------
     recording
         Recording to draw.
     panels
-        Panels to draw; by default those that the recording's brake or rig declares (of several, the
-        ones with most variables of the recording), else its signals by their units. Panels without
-        any variable are left out, and those that stay at zero unless all do.
+        Panels to draw. Default: the panels that the recording's brake or rig declares (of several,
+        those with the most variables of the recording), else its signals by unit. Panels without
+        any variable are left out, as are panels that stay at zero, unless all do.
     limits
         Step that judges the first trace of the first panel: its band and limit are drawn.
     measured
         Recording for comparison, for example of a test rig, with the names and units of
-        ``recording``; it may lack variables, and have other sample times. It is solid blue, with
-        ``recording`` dashed red on top. Then only the first trace and the set points of every panel
-        are drawn.
+        ``recording``; it may lack variables, and have other sample times. It is solid blue,
+        with ``recording`` in dashed red on top. Then only the first trace and the set points of
+        every panel are drawn.
     stuck
         Variable that is 1 while shafts and pistons stick.
     stated
@@ -176,8 +176,8 @@ def time_traces(
         raise ParameterError(
             f"the recording has none of the variables {wanted}"
             if wanted
-            else "the recording has none of the variables that time traces show: energies and "
-            "modes alone have no panel"
+            else "the recording has none of the variables that time traces show. Energies and "
+            "modes have no panel"
         )
     left = list(stated)
     heights = [panel.height for panel, _ in present]
@@ -310,7 +310,7 @@ def _shade_stuck(axes: Axes, recording: xr.Dataset, variable: str, *, named: boo
 
 
 def _mark_limit(axes: Axes, panel: Panel, recording: xr.Dataset, first: Channel) -> None:
-    """Draw the limits of a panel's first trace where it comes near; distant ones are left out."""
+    """Draw the limits of a panel's first trace if it comes near; distant limits are left out."""
     level = _limit_of(recording, panel)
     if level is None:
         return
@@ -352,8 +352,8 @@ def _set_ticks(axes: Axes, panel: Panel, first: Channel) -> None:
 
 _DOTS: style.Dash = (0, (1.2, 1.2))
 """style of the second line of a panel"""
-_APART = 0.03  # of the lines' range: a closer set point of the same color is hidden
-_BRIEF = 0.01  # share of the time axis: shorter differences are not visible
+_APART = 0.03  # fraction of the lines' range: a closer set point of the same color is hidden
+_BRIEF = 0.01  # fraction of the time axis: shorter differences are not visible
 
 
 @dataclass(frozen=True)
@@ -392,7 +392,7 @@ def _draw_target(
     """Draw a set point: once, in black, if it is equal in all recordings.
 
     Different set points are drawn in their recordings' colors, without those hidden by their lines.
-    ``lines``: names of the lines, the following one first.
+    ``lines``: names of the lines, starting with the line that follows the set point.
     """
     stroke = style.STROKES[Role.SET_POINT]
     shown = [channel(recording, name, unit) for recording in recordings]
@@ -419,7 +419,7 @@ def _draw_target(
 
 
 def _are_seen(targets: Sequence[Channel], followed: Sequence[Channel]) -> bool:
-    """Return whether a set point of any recording is visible beside the line that follows it."""
+    """Return whether a set point of any recording is visible next to the line that follows it."""
     ends = [each for line in followed for each in (np.nanmin(line.values), np.nanmax(line.values))]
     close = _APART * (max(ends) - min(ends))
     brief = _BRIEF * max(float(line.time[-1] - line.time[0]) for line in followed)
@@ -436,7 +436,7 @@ def _draw_limits_of(
     looks: Sequence[Look],
     first: Channel,
 ) -> list[Line2D]:
-    """Draw the limits of a panel's first trace where it comes near; each once."""
+    """Draw the limits of a panel's first trace if it comes near; each limit once."""
     stroke = style.STROKES[Role.LIMIT]
     levels = [_limit_of(recording, panel) for recording in recordings]
     is_one = len(set(levels)) == 1
@@ -525,8 +525,8 @@ def overlaid_panels(
     present = _chosen(data)
     if not present:
         raise ParameterError(
-            f"the {len(recordings)} recordings share no signal over time that moves, so "
-            "they cannot be overlaid"
+            f"the {len(recordings)} recordings have no common time signal that changes, so "
+            "bywire cannot overlay them"
         )
     looks = _looks(list(recordings), scale, skipped)
     heights = [panel.height for panel, _ in present]
@@ -652,14 +652,14 @@ def _factor(recordings: Sequence[xr.Dataset]) -> tuple[float, str]:
     return style.time_scale(np.asarray(_longest(recordings)["time"].values, dtype=np.float64))
 
 
-# --- Differences: each minus the first, at the first one's times
+# --- Differences: each recording minus the first, at the first recording's times
 
 _LEAST = 1e-9
-"""fraction of a signal's largest magnitude below which a difference counts as rounding"""
+"""fraction of a signal's maximum magnitude below which a difference counts as rounding"""
 
 
 def difference_figure(recordings: Mapping[str, xr.Dataset]) -> Figure | None:
-    """Draw the differences of each recording from the first; None where there are none.
+    """Draw the differences of each recording from the first; None without differences.
 
     ``recordings``: by their label in the legend.
     """
@@ -672,8 +672,8 @@ def difference_figure(recordings: Mapping[str, xr.Dataset]) -> Figure | None:
 def differences_from_first(recordings: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
     """Return the common signals of all recordings, minus those of the first.
 
-    Signals are interpolated linearly between samples; there is no difference beyond the end of a
-    run, nor of modes, which are whole numbers.
+    Signals are interpolated linearly between samples. Differences end with the shorter run. Modes,
+    which are whole numbers, have no difference.
 
     Parameters
     ----------
@@ -725,7 +725,7 @@ def _less(other: xr.Dataset, base: xr.Dataset, names: list[str]) -> xr.Dataset:
     return xr.Dataset(signals, coords={"time": base["time"]}, attrs=kept)
 
 
-# --- The same variables of several recordings, one color each
+# --- The same variables from several recordings, one color each
 
 _ROOM = "  "  # extra space for short labels of wide letters
 _DASHES_OF_A_VARIABLE: tuple[style.Dash, ...] = ("-", (0, (4, 2)), (0, (1.5, 1.5)))

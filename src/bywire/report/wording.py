@@ -13,8 +13,8 @@ from bywire.core.units import unit_text as unit_text
 
 F = TypeVar("F")
 
-_ROUNDING = 1e-9  # share of the largest magnitude, below which a number is a rounding error
-_LEAST = 1e-3  # least error of zero that is written, in its unit
+_ROUNDING = 1e-9  # fraction of the maximum magnitude below which a number is a rounding error
+_LEAST = 1e-3  # minimum error of zero that is written, in its unit
 
 
 def in_display_unit(value: F, symbol: str) -> tuple[F, str]:
@@ -36,7 +36,7 @@ def readable_units(symbol: str) -> str:
 
 
 def amount(value: float | None, symbol: str, digits: int = 4, like: float | None = None) -> str:
-    """Return a value with its unit in ``digits`` significant digits; a whole count in all digits.
+    """Return a value with its unit in ``digits`` significant digits; a whole count has all digits.
 
     Parameters
     ----------
@@ -164,7 +164,7 @@ def beside_limit(
 
 
 def part_text(value: float, symbol: str, whole: float) -> str:
-    """Return a part of a whole; what does not count beside the whole is ``"< "`` a bound.
+    """Return a part of a whole; a part that is negligible next to the whole is ``"< "`` a bound.
 
     Examples
     --------
@@ -212,7 +212,7 @@ def _readable(number: float, value: float, symbol: str) -> tuple[float, str]:
 
 
 def range_text(leaf: Leaf, value: object = None) -> str:
-    """Return the valid range of a parameter, for instance ``> 0 mm``.
+    """Return the valid range of a parameter, for example ``> 0 mm``.
 
     Parameters
     ----------

@@ -1,17 +1,17 @@
-// Zooms the figures of a report by wheel (with Ctrl, or once a figure has the focus), drag, double
-// click, keys, buttons. A drag across panels over time looks closer at that time in all of them;
+// Zooms into the figures of a report by wheel (with Ctrl, or if a figure has the focus), drag, double
+// click, keys and buttons. A drag in a time panel zooms into that time range in all time panels;
 // all other actions change the figure's viewBox. The corner of a figure shows the pointer's position
 // in its axes, because their labels may be out of sight after a zoom.
 "use strict";
 (() => {
-  const MOST = 40;  // a figure holds a few points per pixel column: beyond, nothing new appears
+  const MOST = 40;  // a figure has a few points per pixel column: beyond, nothing new appears
   const KEYS = {
     "+": ["zoom", 0.5], "=": ["zoom", 0.5], "-": ["zoom", 2], "0": ["whole"], Escape: ["whole"],
     ArrowLeft: ["pan", -0.2, 0], ArrowRight: ["pan", 0.2, 0], ArrowUp: ["pan", 0, -0.2],
     ArrowDown: ["pan", 0, 0.2],
   };
-  const HINT = "Zoom: drag a range (in a time panel: only time, in all time panels) or turn " +
-    "the wheel; double-click to reset; keys + − 0 and arrows";
+  const HINT = "Zoom: drag over a range (in a time panel, this zooms all time panels) or turn " +
+    "the wheel. Double-click to reset. Keys: + − 0 and arrows";
   const LEAST = 8;  // px of an intended drag
   const timePanels = [];  // of all figures of the page
 

@@ -1,4 +1,4 @@
-"""Statements of a source against our results, and the root causes of disagreements."""
+"""Statements of a source compared with our results, and root causes of disagreements."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from bywire.report.wording import amount
 
 Tolerance = float | Literal["<=", ">="]
 Kind = Literal["printed", "reading", "axis", "requirement", "physical bound", "ours"]
-"""kind of a statement: a number in text, table or equation; a sentence that we read as a number;
-the end of a figure's axis; a requirement on the design; a physical limit that we derive; or our
-result without a statement"""
+"""kind of a statement: a number in text, table or equation; a sentence that we interpret as a
+number; the end of a figure's axis; a requirement on the design; a physical limit that we derive; or
+our result without a statement"""
 
 
 SHARE = "share"
-"""unit of an allowance that is a share of the stated number"""
+"""unit of an allowance that is a fraction of the stated number"""
 
 
 @checked
@@ -32,7 +32,7 @@ class Allowance:
     what
         Compared quantity.
     size
-        Largest difference that counts as agreement.
+        Maximum difference that counts as agreement.
     unit
         Unit of ``size``, or `SHARE`.
     reason
@@ -64,10 +64,10 @@ class Fact:
     kind
         Kind of the statement.
     tolerance
-        Tolerance for the verdict, see `Item`, or an `Allowance` around the number; None if there
+        Tolerance for the verdict (see `Item`), or an `Allowance` around the number; None if there
         is none.
     note
-        How its counterpart is computed, if it is the same for all sets.
+        Computation of its counterpart, if it is the same for all sets.
     """
 
     value: float
@@ -96,10 +96,10 @@ class Item:
     stated, computed
         The two numbers; None if missing.
     tolerance
-        Largest difference that counts as agreement; ``"<="`` or ``">="`` if the statement is a
+        Maximum difference that counts as agreement; ``"<="`` or ``">="`` if the statement is a
         bound on the computed number; None without a verdict.
     agrees
-        None if nothing is stated, or if the value was tuned to the statement.
+        None if the source states nothing, or if the value was tuned to the statement.
     note
         Place of the statement, and remarks for the reader.
     kind
@@ -131,7 +131,7 @@ def compared(
     *,
     tuned: Literal["", "calibrated", "an input"] = "",
 ) -> Item:
-    """Return a statement with our result and the verdict by its tolerance.
+    """Return a statement with our result and the verdict from its tolerance.
 
     Parameters
     ----------
@@ -142,11 +142,12 @@ def compared(
     computed
         Our result in the fact's unit; NaN agrees with nothing.
     tolerance
-        See `Item`; an `Allowance` lies around the stated number. ``"as stated"``: the fact's.
+        See `Item`; an `Allowance` applies around the stated number. ``"as stated"``: the fact's.
     note
         Remark for the reader, after the place of the statement and the note of the fact.
     tuned
-        How the value was made to agree. Such a statement proves nothing and gets no verdict.
+        Way in which the value was made to agree. Such a statement proves nothing and has no
+        verdict.
     """
     if tolerance == "as stated":
         tolerance = fact.tolerance
@@ -206,8 +207,8 @@ class RootCause:
     explains
         Ids of the statements that it explains; ``*`` matches anything.
     is_within_source
-        Whether the source contradicts itself, or a law of physics: its statements cannot all hold.
-        Otherwise bywire's model contradicts the source.
+        Whether the source contradicts itself or a law of physics, so that its statements cannot all
+        be true. Otherwise, bywire's model contradicts the source.
     """
 
     text: str
@@ -215,7 +216,7 @@ class RootCause:
     is_within_source: bool = False
 
     def explained(self, items: Iterable[Item]) -> list[Item]:
-        """Return the disagreements that it explains."""
+        """Return the disagreements that the cause explains."""
         return [
             item
             for item in items
@@ -224,7 +225,7 @@ class RootCause:
 
 
 class Quoted:
-    """The items' numbers, as text with unit."""
+    """Numbers of the items, as text with unit."""
 
     def __init__(self, items: Iterable[Item]) -> None:
         self._items = {item.id: item for item in items}
@@ -240,7 +241,7 @@ class Quoted:
         return amount(item.computed, item.unit, 3)
 
     def share(self, name: str) -> str:
-        """Return the computed number in percent of the stated one."""
+        """Return the computed number in percent of the stated number."""
         item = self._items[name]
         return amount(100.0 * (item.computed or 0.0) / (item.stated or 1.0), "%", 4)
 

@@ -1,4 +1,4 @@
-"""The reproduction of a source: its parts, their shared runs, tables and report."""
+"""Reproduction of a source: its parts, their shared runs, tables and report."""
 
 from __future__ import annotations
 
@@ -115,12 +115,12 @@ def kpis(result: Result) -> dict[str, float]:
 
 
 def selected(recording: xr.Dataset, *names: str) -> xr.Dataset:
-    """Return a recording with only the named variables, as far as it has them."""
+    """Return a recording with only the listed variables that it has."""
     return recording[[name for name in names if name in recording]]
 
 
 def peak(recording: xr.Dataset, name: str) -> float:
-    """Return the largest value of a signal."""
+    """Return the maximum of a signal."""
     return float(np.max(recording[name].values))
 
 
@@ -131,9 +131,9 @@ _KINDS = (
     "from printed numbers by an equation in the note. 'reading' is a sentence of the source that "
     "we interpret as a number (see its note). 'axis' is the end of a figure's axis, beyond which "
     "the source shows nothing. 'requirement' is a design requirement. 'physical bound' is a limit "
-    "that we derive. 'ours' is a number without a counterpart in the source. There is no verdict "
-    "if the source states nothing, if the value is an input or was tuned to the statement, or if "
-    "the verdict belongs to another statement."
+    "that we derive. 'ours' is a number without a counterpart in the source. A statement has no "
+    "verdict if the source states nothing, if the value is an input or was tuned to the "
+    "statement, or if the verdict belongs to another statement."
 )
 
 
@@ -162,7 +162,7 @@ def verdicts(items: Sequence[Item]) -> Table:
 
 
 def tolerances(allowances: Sequence[Allowance]) -> Table:
-    """Return the tolerances in use with their reasons."""
+    """Return the tolerances with their reasons."""
     return text_table(
         ("compared", "tolerance", "reason"),
         [(a.what, _size(a), a.reason) for a in allowances],
@@ -216,7 +216,7 @@ class Exhibit:
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """The reproduction of a table or a figure of the source.
+    """Reproduction of a table or a figure of the source.
 
     Parameters
     ----------
@@ -229,11 +229,11 @@ class Part:
     exhibits
         Figures.
     recordings
-        Recordings to keep, by the name of their file.
+        Recordings to save, by the name of their file.
     appendix
-        Tables that are folded in the report, by title.
+        Tables that the report shows collapsed, by title.
     tables
-        Tables that report and terminal show, by title: they replace the items' verdicts there.
+        Tables that replace the items' verdicts in the report and the terminal, by title.
     """
 
     title: str
@@ -252,7 +252,7 @@ class Contradiction:
     Parameters
     ----------
     title
-        Who contradicts whom.
+        Title, such as ``"bywire contradicts the paper"``.
     causes
         Causes, the most serious first.
     items
@@ -264,7 +264,7 @@ class Contradiction:
     items: Sequence[Item]
 
     def counted(self, judged: int) -> str:
-        """Return the number of statements among all that have a verdict."""
+        """Return the number of statements, out of all that have a verdict."""
         return f"{len(self.items)} of {judged} judged statements"
 
     @property
@@ -297,7 +297,7 @@ def _cause_lines(causes: Iterable[RootCause], items: Sequence[Item]) -> list[str
 
 @dataclass(frozen=True, eq=False)
 class Reproduction(Answer):
-    """The reproduction of a source.
+    """Reproduction of a source.
 
     Parameters
     ----------
@@ -310,9 +310,9 @@ class Reproduction(Answer):
     causes
         Causes of disagreements, the most serious first.
     allowances
-        The tolerances in use, with their reasons.
+        The tolerances with their reasons.
     sets
-        Titles of the parameter sets, by the text that follows ``@`` in an item's id.
+        Titles of the parameter sets, by the text after ``@`` in an item's id.
     """
 
     source: str
@@ -339,7 +339,7 @@ class Reproduction(Answer):
 
     @property
     def in_short(self) -> list[str]:
-        """Lines with the root causes, then the counts of verdicts for each parameter set."""
+        """Root causes, then counts of verdicts for each parameter set, as lines."""
         return [*_cause_lines(self.causes, self.items), *self._counts()]
 
     def _counts(self) -> list[str]:
@@ -369,7 +369,7 @@ class Reproduction(Answer):
         )
 
     def document(self) -> Document:
-        """Return contradictions, then statements with computed numbers, part by part."""
+        """Return a document of contradictions, then statements with computed numbers by part."""
         hint = f"bywire reproduce {self.source} --out FOLDER"
         counts = Listing(self._counts(), "Verdicts by parameter set")
         contradictions = self.contradictions
@@ -408,7 +408,7 @@ class Reproduction(Answer):
         )
 
     def _tables(self) -> list[str | Block]:
-        """Return the tables for a terminal: the parts' tables, and, folded, all other verdicts."""
+        """Return the tables for a terminal: other verdicts, collapsed, and the parts' tables."""
         rest = [item for part in self.parts if not part.tables for item in part.items]
         lines: list[str | Block] = []
         lines += [Details("All statements", [TableBlock(verdicts(rest))]), ""] if rest else []
@@ -438,7 +438,7 @@ class Reproduction(Answer):
         """Return the JSON object.
 
         Numbers that are not stated, computed or defined are None. A tolerance is a number in the
-        item's unit, or ``"<="`` or ``">="`` if the statement is a bound. The note ends with the
+        item's unit, or ``"<="`` or ``">="`` if the statement is a bound. Each note ends with the
         kind of statement.
         """
         return {
@@ -487,7 +487,7 @@ def reproduced(
 ) -> Reproduction:
     """Return a reproduction with its parts, computed in threads, and its root causes.
 
-    Parts wait for kernels half of the time; threads let other parts use it.
+    Parts wait for kernels half of the time, which threads let other parts use.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
 """Files of a source: parameter sets with the place of every value, statements, tolerances.
 
-The statements of a source and the interpretation of its sentences are data, in TOML files next to
+The statements of a source and the interpretations of its sentences are data in TOML files, next to
 their brake. The table ``[places]`` contains texts that several entries share; entries refer to them
 by their names in braces.
 """
@@ -43,9 +43,9 @@ class SourceFile:
     Parameters
     ----------
     file
-        TOML file; parameters of the functions below are the keys of its sections.
+        TOML file; the parameters of the functions below are the keys of its sections.
     places
-        Additional texts to which the file refers by their names in braces.
+        Additional texts to which the file refers by name in braces.
 
     Raises
     ------
@@ -119,7 +119,7 @@ class SourceFile:
         return tuple(found.values())
 
     def levels(self) -> tuple[StatedLevel | StatedRange, ...]:
-        """Return the statements that figures show as levels and ranges behind a signal's curve."""
+        """Return the statements that plots show as levels and ranges behind a signal's curve."""
         return self._shown(self._level, "levels")
 
     def figures(self) -> tuple[StatedFigure, ...]:
@@ -145,7 +145,7 @@ class SourceFile:
         to: str = "",
         where: str = "",
     ) -> StatedLevel | StatedRange:
-        """Return a level; from one statement to another, a range."""
+        """Return a level, or a range from one statement to another."""
         from bywire.bench.stated import StatedLevel, StatedRange
 
         fact = self.facts[of]
@@ -192,7 +192,7 @@ def _naming(file: Path) -> Iterator[None]:
 
 
 class Facts:
-    """Statements by name, those of a table with its name in front: ``table1.beta``.
+    """Statements by name; those of a table begin with its name: ``table1.beta``.
 
     Parameters
     ----------
@@ -204,11 +204,11 @@ class Facts:
         self._facts = dict(facts)
 
     def __getitem__(self, name: str) -> Fact:
-        """Return the statement of a name; the error for an unknown name lists the closest ones."""
+        """Return the statement of a name; the error for an unknown name lists the closest names."""
         return pick(self._facts, name, "statement")
 
     def table(self, name: str) -> dict[str, Fact]:
-        """Return the statements of a table by their names in it."""
+        """Return the statements of a table by their names in the table."""
         prefix = f"{name}."
         return {k.removeprefix(prefix): v for k, v in self._facts.items() if k.startswith(prefix)}
 
@@ -247,7 +247,7 @@ def _statement(
     tolerance: str = "",
     note: str = "",
 ) -> tuple[Fact, str]:
-    """Return a statement and the name of its tolerance; with ``read_as`` it is a reading."""
+    """Return a statement and the name of its tolerance; with ``read_as``, it is a reading."""
     kind = kind or ("reading" if read_as else "printed")
     if kind not in get_args(Kind):
         raise unknown_name("kind of statement", kind, get_args(Kind))
@@ -261,7 +261,7 @@ def _made(make: Callable[..., T], entry: Section, place: str) -> T:
     Raises
     ------
     InputError
-        For unknown keys, missing keys, and values of another kind.
+        For unknown keys, missing keys, and values of the wrong kind.
     """
     parameters = inspect.signature(make).parameters
     for key in entry:
@@ -290,7 +290,7 @@ def _filled(value: Any, places: Mapping[str, str]) -> Any:
 def _cited_values(
     table: Section, place: str, formulas: Mapping[str, Formula], groups: Groups
 ) -> dict[str, Cited]:
-    """Return the values of a table, of its group and of the tables in it, by dotted name."""
+    """Return the values of a table, of its group and of its subtables, by dotted name."""
     found: dict[str, Cited] = {}
     for name, entry in table.items():
         here = f"{place}.{name}"
@@ -313,7 +313,7 @@ def _cited(entry: Section, place: str, formulas: Mapping[str, Formula]) -> Cited
     where, given = entry["where"], [key for key in entry if key != "where"]
     if len(given) != 1 or given[0] not in kinds or not isinstance(where, str):
         raise ParameterError(
-            f"{place} needs exactly one of {', '.join(kinds)}, and a text for where",
+            f"{place} needs exactly one of {', '.join(kinds)}, and a string for where",
             name=place,
             valid=", ".join(kinds),
         )
@@ -328,7 +328,7 @@ def _cited(entry: Section, place: str, formulas: Mapping[str, Formula]) -> Cited
 def _facts(
     table: Section, allowances: Mapping[str, Allowance], name: str, outer: Section
 ) -> Iterator[tuple[str, Fact]]:
-    """Yield statements; a table's keys are the defaults of its statements."""
+    """Yield statements; a table's own keys are defaults for its statements."""
     inherited = {**outer, **{k: v for k, v in table.items() if not isinstance(v, Mapping)}}
     tables = {k: v for k, v in table.items() if isinstance(v, Mapping)}
     if name and not tables:
@@ -345,7 +345,7 @@ def _fact(entry: Section, allowances: Mapping[str, Allowance], place: str) -> Fa
 
 
 def _judged(fact: Fact) -> str:
-    """Return the place of a statement, and the reason of its tolerance."""
+    """Return the place of a statement, and the reason for its tolerance."""
     if isinstance(fact.tolerance, Allowance):
         return f"{fact.where}; tolerance ours: {fact.tolerance.reason}"
     return f"{fact.where}: {_AXIS}" if fact.kind == "axis" else fact.where

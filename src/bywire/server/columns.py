@@ -1,4 +1,4 @@
-"""Columns of a measurement, with a first plot and units to choose from, before any question."""
+"""Columns of a measurement, with a first plot and units to choose from."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from bywire.server.place import Place
 _LARGEST_TEXT = 20_000_000  # bytes of a text table that a first plot reads
 _LARGEST = 400_000_000  # bytes of numbers that a first plot reads
 _MOST = 60  # columns with a plot
-_BINS = 400  # points of a curve; each has a lowest and a highest value
+_BINS = 400  # points of a curve; each has a minimum and a maximum
 
 
 def shown_columns(place: Place, file: Path) -> dict[str, Any]:
@@ -42,7 +42,7 @@ def shown_columns(place: Place, file: Path) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``file``; ``clock``: the column that contains the instants, or empty; ``notes``; and
+        ``file``; ``clock``: the column that contains the times, or empty; ``notes``; and
         ``columns``: each has ``name``, ``unit`` as the file states it, ``length``, ``clock`` if the
         file states one, ``low`` and ``high`` by bin, and ``first``, its value at each bin's start.
 
@@ -63,13 +63,13 @@ def shown_columns(place: Place, file: Path) -> dict[str, Any]:
 
 
 def _head(file: Path, scratch: Path) -> tuple[Path, list[str]]:
-    """Return the file; if it is a large text table, its first part, with a note."""
+    """Return the file, or the first part of a large text table with a note."""
     if format_to_read(file).libraries or file.stat().st_size <= _LARGEST_TEXT:
         return file, []
     with file.open("rb") as whole:
         part = whole.read(_LARGEST_TEXT)
     head = scratch / file.name
-    head.write_bytes(part[: part.rfind(b"\n") + 1] or part)  # the last line may be cut
+    head.write_bytes(part[: part.rfind(b"\n") + 1] or part)  # the last line may be incomplete
     return head, [f"The plot shows the first {_LARGEST_TEXT / 1e6:.0f} MB of the file."]
 
 
@@ -98,13 +98,13 @@ def _columns(source: Source) -> dict[str, Any]:
 
 
 def _increases(values: NDArray[np.float64]) -> bool:
-    """Return whether values can be instants."""
+    """Return whether values can be times."""
     there = values[~np.isnan(values)]
     return there.size > 1 and bool((np.diff(there) > 0.0).all())
 
 
 def _points(values: NDArray[np.float64]) -> dict[str, list[float]]:
-    """Return the lowest and highest value of each bin of rows, and its first one."""
+    """Return the minimum, the maximum and the first value of each bin of rows."""
     if not values.size:
         return {"low": [], "high": [], "first": []}
     finite = np.where(np.isfinite(values), values, np.nan)
@@ -124,13 +124,13 @@ def _rounded(values: NDArray[np.float64], digits: int) -> list[float]:
 
 
 def meanings_for(bench: Path | None, method: str) -> dict[str, Any]:
-    """Return the signals that columns may be, of a bench or of an identification method.
+    """Return the signals of a bench or an identification method that columns may contain.
 
     Returns
     -------
     dict
-        ``inputs`` and ``outputs``: each signal has ``name``, ``label`` and ``symbol``, its SI unit;
-        and ``units``: the units to choose from, by SI unit, the usual one first.
+        ``inputs`` and ``outputs``: each signal has ``name``, ``label`` and ``symbol``, its SI unit.
+        ``units``: the units to choose from by SI unit, with the usual unit first.
     """
     inputs, outputs = _signals_of_bench(bench) if bench else ([], _signals_of_method(method))
     symbols = [each["symbol"] for each in (*inputs, *outputs)]
@@ -144,7 +144,7 @@ def _signals_of_bench(bench: Path) -> tuple[list[dict[str, str]], list[dict[str,
 
     try:
         model: Model = case_of(driven_bench(bench, {}), "").model
-    except BywireError:  # the form shows the error when it is sent
+    except BywireError:  # the form shows the error when the user sends it
         return [], []
     inputs, outputs = (_described(signals_of(kind)) for kind in (model.Stimulus, model.Output))
     return [each for each in inputs if not each["name"].startswith("noise_")], outputs
@@ -162,7 +162,7 @@ def _described(signals: Mapping[str, Signal]) -> list[dict[str, str]]:
     return [
         {"name": name, "label": each.label, "symbol": each.unit}
         for name, each in signals.items()
-        if each.role is None  # nobody measures energies
+        if each.role is None  # measurements contain no energies
     ]
 
 
@@ -172,7 +172,7 @@ def _listed() -> Mapping[str, list[str]]:
 
 
 def choosable(symbol: str) -> list[str]:
-    """Return the units to choose from for a quantity, the usual one first.
+    """Return the units to choose from for a quantity, with the usual unit first.
 
     Examples
     --------

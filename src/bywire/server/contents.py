@@ -14,7 +14,7 @@ from bywire.data.format_registry import FORMATS
 from bywire.data.toml_file import BENCH, CAMPAIGN, HEADS, LARGEST, LIFE, STUDY, kind_of, read_toml
 from bywire.server.place import Place
 
-_DEEP, _MOST = 4, 5000  # depth of nested folders, and number of files, of the search
+_DEEP, _MOST = 4, 5000  # maximum depth of nested folders and number of files in a search
 _LEFT_OUT = ("node_modules", "__pycache__", "venv", "chunks")
 REPORT = ".html"
 
@@ -26,21 +26,21 @@ class Contents:
     Parameters
     ----------
     benches
-        Bench files, with their experiment.
+        Bench files with their experiments.
     studies
-        Study files, with their bench.
+        Study files with their benches.
     campaigns
-        Files of fault campaigns, with their bench.
+        Files of fault campaigns with their benches.
     lives
-        Life files, with their life.
+        Life files with their lives.
     results
-        Result folders of benches, the latest first.
+        Result folders of benches, latest first.
     reports
-        Pages of results, the latest first.
+        Pages of results, latest first.
     measurements
         Measurement files.
     maps
-        Other TOML files, with the meaning of measurement columns.
+        Other TOML files, which may map columns to signals.
     is_whole
         Whether the search covered all files.
     """
@@ -57,7 +57,7 @@ class Contents:
 
 
 def endings() -> tuple[str, ...]:
-    """Return the endings of measurement files."""
+    """Return the file extensions of measurement files."""
     return tuple(
         dict.fromkeys(ending for kind in FORMATS.all().values() for ending in kind.endings)
     )
@@ -91,7 +91,7 @@ def _is_result(path: Path) -> bool:
 
 
 def _files(folder: Path, depth: int) -> Iterator[Path]:
-    """Yield the regular files of a folder and of its subfolders, ordered by name."""
+    """Yield the regular files of a folder and its subfolders, sorted by name."""
     try:
         with os.scandir(folder) as entries:
             sorted_entries = sorted(entries, key=lambda entry: entry.name)

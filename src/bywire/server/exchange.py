@@ -20,7 +20,7 @@ class RefusedError(Exception):
     text
         Description of the error, with advice.
     field
-        Field of the form that shows the text. Empty if the error concerns no single field.
+        Form field that shows the text. Empty if the error does not belong to a single field.
     """
 
     def __init__(self, status: int, text: str, field: str = "") -> None:
@@ -28,19 +28,19 @@ class RefusedError(Exception):
         self.status, self.text, self.field = status, text, field
 
 
-# --- Requests and answers
+# --- Requests and replies
 
 LARGEST_FORM = 200_000
-"""maximum form, in bytes"""
+"""maximum size of a form in bytes"""
 PAGES = (
     "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; "
     "frame-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
 """policy of the server's own pages"""
 REFUSAL = "default-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'self'"
-"""policy of error pages, which a frame of a page may show"""
+"""policy of error pages, which a page may show in a frame"""
 LIVE = "frame-ancestors 'self'"
-"""policy of live pages, in addition to the strict one in each page"""
+"""policy of live pages, in addition to the strict policy in each page"""
 SANDBOX = (
     "sandbox allow-scripts allow-downloads; default-src 'none'; script-src 'unsafe-inline' "
     "'wasm-unsafe-eval'; worker-src blob:; style-src 'unsafe-inline'; img-src data:; "
@@ -53,13 +53,13 @@ class Body(Protocol):
     """Stream of a request's body."""
 
     def read(self, size: int) -> bytes:
-        """Return ``size`` bytes, fewer only if the client has disconnected."""
+        """Return ``size`` bytes, or fewer if the client has disconnected."""
         ...
 
 
 @dataclass(frozen=True)
 class Request:
-    """A request of a client.
+    """Request from a client.
 
     Parameters
     ----------
@@ -111,14 +111,14 @@ class Request:
             raise RefusedError(
                 413,
                 f"{what} of {self.length / 1e6:,.1f} MB is too large (at most "
-                f"{most / 1e6:,.1f} MB). Copy it into the served folder, or make it smaller with "
+                f"{most / 1e6:,.1f} MB). Copy it to the served folder, or make it smaller with "
                 "'bywire convert'",
             )
 
 
 @dataclass(frozen=True)
 class Reply:
-    """A reply of the server.
+    """Reply of the server.
 
     Parameters
     ----------
@@ -131,7 +131,7 @@ class Reply:
     policy
         Content security policy.
     headers
-        Further headers.
+        Additional headers.
     """
 
     body: bytes | Path
@@ -142,7 +142,7 @@ class Reply:
 
 
 def page(text: str) -> Reply:
-    """Return a reply with a page of the server."""
+    """Return a reply with an HTML page."""
     return Reply(text.encode())
 
 

@@ -31,17 +31,17 @@ class Field:
         ``NAME=TEXT``), a ``flag``, a ``choice``, a measurement ``file`` or ``files`` of the folder,
         or a ``thing`` or ``things``: a known name, or a file of the folder.
     hint
-        Help of the command's option.
+        Help text of the command's option.
     example
         Value that the field shows while it is empty.
     choices
-        Returns the known names.
+        Function that returns the known names.
     offered
-        Returns the things in the folder.
+        Function that returns the things in the folder.
     is_required
-        Whether it must be filled in.
+        Whether the user must fill in the field.
     default
-        Default of a whole number or of a flag.
+        Default of a whole number or a flag.
     least
         Least valid value of a whole number.
     """
@@ -63,9 +63,9 @@ class Field:
         Raises
         ------
         InputError
-            If the value is of another kind, unknown, missing, or too long.
+            If the value is of the wrong kind, unknown, missing, or too long.
         RefusedError
-            For a path outside the folder.
+            If a path is outside the folder.
         """
         if self.kind == "flag":
             if not isinstance(given, (bool, type(None))):

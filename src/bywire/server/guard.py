@@ -1,8 +1,8 @@
-"""Access control, which accepts only this machine's requests with the link's token.
+"""Access control, which accepts only requests from this machine with the link's token.
 
-A page of another site can send requests to this machine. With a name that resolves to this machine
-it could even read the answers. The headers Host, Origin and Sec-Fetch-Site identify such requests.
-The token excludes other users and programs of this machine.
+A page on another site can send requests to this machine. With a host name that resolves to this
+machine, the page could even read the replies. The headers Host, Origin and Sec-Fetch-Site identify
+such requests. The token excludes other users and programs on this machine.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from bywire.server.address import HERE, NAMES
 from bywire.server.exchange import RefusedError
 
 _PLAIN: Final = 80
-"""default port of HTTP, which addresses omit"""
+"""default port of HTTP, which URLs omit"""
 _HERE: Final = ("same-origin", "none")
 
 
@@ -27,12 +27,12 @@ def new_token() -> str:
 
 
 def cookie_name(port: int) -> str:
-    """Return the name of the cookie; browsers share cookies between the ports of a machine."""
+    """Return the cookie's name. Browsers share cookies between the ports of a machine."""
     return f"bywire-{port}"
 
 
 def require_place(method: str, headers: Message, port: int) -> None:
-    """Reject requests to another host name, or from a page of another site.
+    """Reject requests to another host name, or from a page on another site.
 
     Raises
     ------
@@ -41,25 +41,21 @@ def require_place(method: str, headers: Message, port: int) -> None:
     """
     host = headers.get("Host", "").lower()
     if port == _PLAIN:
-        host = host.removesuffix(f":{port}")  # browsers omit it, other clients may not
+        host = host.removesuffix(f":{port}")  # browsers omit it, but other clients may not
     if host not in {name if port == _PLAIN else f"{name}:{port}" for name in NAMES}:
         raise RefusedError(
             421, f"this server answers only as {HERE}:{port}. Open the link that it printed"
         )
     origin = headers.get("Origin")
     if origin is not None and origin != f"http://{host}":
-        raise RefusedError(
-            403, "another site's page sent this request. Use the pages of this server"
-        )
+        raise RefusedError(403, "a page on another site sent this request. Use this server's pages")
     is_visit = method in ("GET", "HEAD") and headers.get("Sec-Fetch-Mode") == "navigate"
     if headers.get("Sec-Fetch-Site", "none") not in _HERE and not is_visit:
-        raise RefusedError(
-            403, "another site's page sent this request. Use the pages of this server"
-        )
+        raise RefusedError(403, "a page on another site sent this request. Use this server's pages")
 
 
 def require_token(headers: Message, query: Mapping[str, str], port: int, token: str) -> None:
-    """Reject requests without the token, in the link or in the cookie.
+    """Reject requests without the token in the link or the cookie.
 
     Raises
     ------
@@ -74,13 +70,13 @@ def require_token(headers: Message, query: Mapping[str, str], port: int, token: 
     if not any(secrets.compare_digest(each.encode(), token.encode()) for each in given):
         raise RefusedError(
             401,
-            "the token is not valid, because each start of the server creates a new one. Open the "
-            "link that 'bywire serve' printed last",
+            "the token is not valid, because the server creates a new token at each start. Open "
+            "the link that 'bywire serve' printed last",
         )
 
 
 def _kept(headers: Message, port: int) -> list[str]:
-    """Return the token of the cookie, if there is one."""
+    """Return the token in the cookie, if there is one."""
     try:
         kept = SimpleCookie(headers.get("Cookie", "")).get(cookie_name(port))
     except CookieError:

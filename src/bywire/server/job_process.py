@@ -3,7 +3,7 @@
 The order arrives as a line of JSON on standard input: ``{task, asked, folder, out, systems}``.
 Messages go as such lines to standard output: ``{progress: [label, share]}``, ``{report: true}``,
 ``{so_far}`` of a study, and finally one of ``{done}``, ``{error}`` and ``{canceled}``. When the
-server ends, standard input closes, and this process ends with all that it started.
+server ends, standard input closes, and this process ends with all its child processes.
 """
 
 from __future__ import annotations
@@ -31,10 +31,10 @@ _PAUSE = 0.1  # s between two messages on progress
 
 def main() -> None:
     """Run the ordered computation."""
-    # As in commands: run the registered exit functions, then skip Python's finalization.
+    # As for commands, run the registered exit functions, then skip Python's finalization.
     atexit.register(os._exit, 0)
     begin_to_tell()
-    with contextlib.suppress(OSError):  # if memory runs out, end this process first
+    with contextlib.suppress(OSError):  # if memory runs out, the system ends this process first
         Path("/proc/self/oom_score_adj").write_text("900")
     with interrupts_noted() as was_interrupted:
         try:

@@ -23,12 +23,12 @@ from bywire.server.task import Task
 
 
 def started(folder: Path) -> subprocess.Popen[bytes]:
-    """Start a process that waits for its order and does not run code of the served folder."""
+    """Start a process that waits for its order and does not run code from the served folder."""
     return start_python("bywire.server.job_process", untrusted=(folder,))
 
 
 def interrupt(process: subprocess.Popen[bytes]) -> None:
-    """Interrupt a process as Ctrl-C interrupts a command."""
+    """Interrupt a process in the same way as Ctrl-C interrupts a command."""
     if os.name == "posix":
         _signal(process, signal.SIGINT)
     elif process.poll() is None:
@@ -52,11 +52,11 @@ def _signal(process: subprocess.Popen[bytes], number: int) -> None:
 # --- Jobs
 
 TOGETHER = 2
-"""number of jobs that compute at the same time"""
+"""maximum number of jobs that compute at the same time"""
 MOST = 100
 """maximum number of jobs that wait or compute"""
 _KEPT = 200  # jobs in the list
-_PATIENCE = 5.0  # s that a job has to end after an interrupt
+_PATIENCE = 5.0  # s within which a job must end after an interrupt
 _ENDED = ("done", "failed", "canceled")
 
 
@@ -69,7 +69,7 @@ class Job:
     number
         Number in the list of jobs.
     task, asked
-        Its task, and the values of the task's fields.
+        Task of the job, and the values of the task's fields.
     out
         Folder, or file, of its result.
     """
@@ -114,12 +114,12 @@ class Job:
 
 
 class Jobs:
-    """The jobs of a server.
+    """Jobs of a server.
 
     Parameters
     ----------
     place
-        The served folder, the base of their paths.
+        The served folder, to which the jobs' paths are relative.
     """
 
     def __init__(self, place: Place) -> None:
@@ -135,8 +135,8 @@ class Jobs:
         Raises
         ------
         RefusedError
-            With status 409 if another job uses its folder, 429 for too many jobs, 503 during
-            shutdown.
+            With status 409 if another job uses its folder, 429 if there are too many jobs, and 503
+            during shutdown.
         """
         with self._lock:
             active = [each for each in self._jobs.values() if each.state not in _ENDED]
@@ -162,11 +162,11 @@ class Jobs:
         return job
 
     def begun(self, task: Task, asked: Mapping[str, Any]) -> Path | None:
-        """Return the folder with earlier results of the same task, to continue there, or None."""
+        """Return the folder with earlier results of the same task to continue there, or None."""
         return task.begun(asked, self._place, self._place.folders(_name(task, asked)))
 
     def all(self) -> list[Job]:
-        """Return all jobs, the latest first."""
+        """Return all jobs, latest first."""
         with self._lock:
             return sorted(self._jobs.values(), key=lambda job: -job.number)
 
@@ -185,7 +185,7 @@ class Jobs:
         return job
 
     def cancel(self, job: Job) -> None:
-        """Cancel a job. Finished parts of a study remain."""
+        """Cancel a job. Finished parts of a study stay in its folder."""
         with self._lock:
             job.is_unwanted = True
             process = job.process
@@ -196,7 +196,7 @@ class Jobs:
             watch.start()
 
     def close(self) -> None:
-        """Cancel all jobs, and wait for their end."""
+        """Cancel all jobs, and wait until they end."""
         with self._lock:
             self._is_open = False
         left = [job for job in self.all() if not job.ended.is_set()]
@@ -211,7 +211,8 @@ class Jobs:
         return self._place.fresh_folder(_name(task, asked))
 
     def _run(self, job: Job) -> None:
-        # A user waits for a live page, so it does not queue: two studies could delay it by hours.
+        # A user waits for a live page, so its job does not queue. Two studies could delay it by
+        # hours.
         with nullcontext() if job.task.form.is_file else self._turn:
             try:
                 self._compute(job)
@@ -238,7 +239,7 @@ class Jobs:
         process = job.process
         assert process.stdin is not None
         assert process.stdout is not None
-        with contextlib.suppress(OSError):  # the process has ended, as its status will show
+        with contextlib.suppress(OSError):  # the process has ended, as its exit status will show
             process.stdin.write(json.dumps(order).encode() + b"\n")
             process.stdin.flush()
         last: dict[str, Any] = {}
@@ -251,7 +252,7 @@ class Jobs:
 
     @staticmethod
     def _hear(job: Job, message: dict[str, Any]) -> dict[str, Any]:
-        """Handle a message of the process; return it if it is the final one."""
+        """Handle a message from the process, and return it if it is the final message."""
         if "progress" in message:
             label, share = message["progress"]
             job.progress = (str(label), float(share))
@@ -280,7 +281,8 @@ def _end(job: Job, last: Mapping[str, Any], status: int) -> None:
     else:
         how = f"signal {signal.Signals(-status).name}" if status < 0 else f"status {status}"
         job.message, job.state = (
-            f"the process ended with {how}, probably out of memory. Reduce the number of cases, or "
+            f"the process ended with {how}, probably because it ran out of memory. Reduce the "
+            f"number of cases, or "
             f"run 'bywire {job.task.command}' in a terminal",
             "failed",
         )

@@ -27,7 +27,7 @@ class LivePages:
     place, jobs
         The served folder, and the jobs that create the pages.
     scratch
-        Folder that keeps the pages.
+        Folder that stores the pages.
     """
 
     def __init__(self, place: Place, jobs: Jobs, scratch: Path) -> None:
@@ -36,12 +36,12 @@ class LivePages:
         self._lock = threading.Lock()
 
     def file(self, bench: str, case: str) -> Path:
-        """Return the file of a bench's live page, created if missing.
+        """Return the file of a bench's live page, which is created if missing.
 
         Raises
         ------
         InputError
-            For an invalid bench file.
+            If the bench file is invalid.
         RefusedError
             With status 422 and the reason if the page cannot be created.
         """
@@ -59,7 +59,7 @@ class LivePages:
         return job.out
 
     def _state(self, asked: dict[str, Any]) -> Iterator[str]:
-        """Yield the inputs of the page: the bench file, and the files it names."""
+        """Yield the inputs of the page: the bench file, and the files that it lists."""
         yield from (asked["bench"], asked["case"])
         if not is_file_name(asked["bench"]):
             return
@@ -102,18 +102,18 @@ def experiments() -> dict[str, str]:
 
 @dataclass(frozen=True)
 class ShownBench:
-    """A bench, as its page shows it.
+    """Bench that a page shows.
 
     Parameters
     ----------
     name
-        Its file, or the experiment.
+        File of the bench, or the experiment.
     summary
-        What it tests.
+        Purpose of the test.
     cases
-        Its runs.
+        Runs of the bench.
     trouble
-        Why it has no runs with its defaults.
+        Reason why the bench has no runs with its defaults.
     """
 
     name: str
@@ -128,16 +128,16 @@ def shown_bench(path: Path, name: str) -> ShownBench:
     Raises
     ------
     InputError
-        For an invalid bench file.
+        If the bench file is invalid.
     """
     try:
         bench = bench_file.read(path, {})
     except InputError as error:
         if is_file_name(name):
             raise
-        # Its stimulus is missing, which a measurement may provide.
+        # The stimulus is missing, but a measurement may provide it.
         return ShownBench(name, experiments()[name], trouble=str(error))
-    # Use the preview: actual runs may start where earlier ones ended, which takes a while.
+    # Use the preview. Actual runs may start where earlier runs ended, which takes a while.
     cases = bench.cases_with(bench.par, bench.chosen_options, bench.definition.preview)
     summary = f"{bench.summary()}; parameters {bench.parameters}"
     return ShownBench(name, summary, tuple(case.label for case in cases))

@@ -1,4 +1,4 @@
-"""Pages of the server: the start page, benches, studies, reports, forms, refusals."""
+"""Pages of the server: start page, benches, studies, reports, forms, error pages."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def text(shown: str) -> str:
 
 
 def row(task: Task, field: Field, there: Contents, chosen: str) -> str:
-    """Return a field with its label and its hint; ``chosen`` is its initial value."""
+    """Return a field with its label and its hint. ``chosen`` is its initial value."""
     name, mark = f"{task.name}-{field.name}", f'name="{text(field.name)}"'
     words = _hint(field)
     hint = f'<p class="hint" id="{name}-hint">{text(words)}</p>' if words else ""
@@ -71,7 +71,7 @@ def _entry(field: Field, there: Contents, attributes: str, chosen: str) -> str:
 
 
 def _select(field: Field, offered: Iterable[str], attributes: str, chosen: str) -> str:
-    """Return a selection of files in the folder and of known names."""
+    """Return a selection of files in the folder and known names."""
     many = f' multiple size="{8 if field.choices else 4}"' if field.kind in _SEVERAL else ""
     here = _options(offered, chosen)
     known = _options(field.choices(), chosen) if field.choices is not None else ""
@@ -107,49 +107,30 @@ def frame(title: str, summary: str, body: Iterable[str], *, largest: int) -> str
     Parameters
     ----------
     title, summary
-        Its heading and the line below, plain text.
+        Heading and the line below it, as plain text.
     body
         HTML.
     largest
-        Largest uploaded file, in bytes.
+        Maximum size of an uploaded file, in bytes.
     """
     inner = "\n".join(body)
     return f"""<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<title>{text(title)}</title>
-<link rel="stylesheet" href="/assets/page.css">
-<link rel="stylesheet" href="/assets/serve.css">
-<script src="/assets/columns.js" defer></script>
-<script src="/assets/serve.js" defer></script>
-</head>
-<body data-largest="{largest}">
-<header>
-<p class="home"><a href="/">Folder overview</a></p>
-<h1>{text(title)}</h1>
-<p class="summary">{text(summary)}</p>
-<p id="message" class="status bad" role="alert" hidden></p>
-<noscript><p class="status bad">These pages need JavaScript: allow it here.</p></noscript>
-</header>
-<main>
-{inner}
-<section aria-labelledby="jobs-title">
-<h2 id="jobs-title">Jobs</h2>
-<p id="no-jobs">No jobs since the server started.</p>
-<ul id="jobs"></ul>
-<p id="spoken" class="spoken" role="status"></p>
-</section>
-</main>
-<footer>bywire {text(__version__)}, on this machine only</footer>
-</body>
-</html>
+<html lang="en"> <head> <meta charset="utf-8"> <meta name="viewport" content="width=device-width,
+initial-scale=1"> <title>{text(title)}</title> <link rel="stylesheet" href="/assets/page.css"> <link
+rel="stylesheet" href="/assets/serve.css"> <script src="/assets/columns.js" defer></script> <script
+src="/assets/serve.js" defer></script> </head> <body data-largest="{largest}"> <header> <p
+class="home"><a href="/">Folder overview</a></p> <h1>{text(title)}</h1> <p
+class="summary">{text(summary)}</p> <p id="message" class="status bad" role="alert" hidden></p>
+<noscript><p class="status bad">These pages need JavaScript. Allow JavaScript for this
+address.</p></noscript> </header> <main> {inner} <section aria-labelledby="jobs-title"> <h2
+id="jobs-title">Jobs</h2> <p id="no-jobs">No jobs since the server started.</p> <ul id="jobs"></ul>
+<p id="spoken" class="spoken" role="status"></p> </section> </main> <footer>bywire
+{text(__version__)}, on this machine only</footer> </body> </html>
 """
 
 
 def section(title: str, name: str, inner: str) -> str:
-    """Return a section of a page; ``inner`` is HTML."""
+    """Return a section of a page. ``inner`` is HTML."""
     return (
         f'<section aria-labelledby="{name}-title">\n<h2 id="{name}-title">{text(title)}</h2>\n'
         f"{inner}\n</section>"
@@ -189,9 +170,9 @@ def form(
     there
         Files to choose from.
     given
-        Values that the page determines; their fields are hidden.
+        Values that the page determines. Their fields are hidden.
     open_fields
-        Number of fields shown; the others are folded.
+        Number of fields to show. The others are collapsed.
     chosen
         Initial values of fields.
     """
@@ -206,7 +187,7 @@ def form(
     ]
     first, others = "\n".join(shown[:open_fields]), "\n".join(shown[open_fields:])
     folded = f"<details>\n<summary>More</summary>\n{others}\n</details>\n" if others else ""
-    # The script enables the button: without the script, it would send the form nowhere.
+    # The script enables the button. Without the script, the button would send the form nowhere.
     return (
         f'<form class="task" data-task="{text(task.name)}">\n{hidden}{first}\n{folded}'
         f'<button type="submit" disabled>{text(task.form.action)}</button>\n</form>'
@@ -224,13 +205,13 @@ def index_page(folder: str, there: Contents, experiments: Mapping[str, str], lar
     Parameters
     ----------
     folder
-        Its name.
+        Name of the folder.
     there
-        Its contents.
+        Contents of the folder.
     experiments
         Experiments of all known brakes, with their summaries.
     largest
-        Largest uploaded file, in bytes.
+        Maximum size of an uploaded file, in bytes.
     """
     benches = [[link("/bench", name, of=name), text(what)] for name, what in there.benches.items()]
     studies = [[link("/study", name, of=name), text(what)] for name, what in there.studies.items()]
@@ -267,15 +248,19 @@ def index_page(folder: str, there: Contents, experiments: Mapping[str, str], lar
         ),
     ]
     if not there.is_whole:
-        body.insert(0, "<p>The folder has more files than listed here: serve a smaller one.</p>")
-    return frame(folder, "Benches, studies and results of this folder", body, largest=largest)
+        body.insert(
+            0,
+            "<p>The folder contains more files than listed here. Serve a smaller "
+            "folder to see all.</p>",
+        )
+    return frame(folder, "Benches, studies and results in this folder", body, largest=largest)
 
 
 def _listed(headings: list[str], rows: list[list[str]], what: str) -> str:
     return table(headings, rows) if rows else f"<p>There are no {text(what)} yet.</p>"
 
 
-# --- Benches, studies, reports, forms, refusals
+# --- Benches, studies, reports, forms, error pages
 
 
 def bench_page(bench: ShownBench, there: Contents, largest: int) -> str:
@@ -288,7 +273,7 @@ def bench_page(bench: ShownBench, there: Contents, largest: int) -> str:
     there
         Contents of the folder.
     largest
-        Largest uploaded file, in bytes.
+        Maximum size of an uploaded file, in bytes.
     """
     given = {"bench": bench.name}
     body = [
@@ -307,7 +292,7 @@ def _live(bench: ShownBench) -> str:
         return f"<p>{text(bench.trouble)}</p>"
     cases = bench.cases
     if not cases:
-        return "<p>This experiment computes a characteristic, not a run: use Run with Python.</p>"
+        return "<p>This experiment computes a characteristic, not a run. Use Run with Python.</p>"
     address = f"/live?of={quote(bench.name, safe='')}"
     first = f"{address}&case={quote(cases[0], safe='')}" if len(cases) > 1 else address
     choice = ""
@@ -319,8 +304,8 @@ def _live(bench: ShownBench) -> str:
         )
     return (
         f'{choice}<iframe id="live" title="Live page of {text(bench.name)}" src="{text(first)}">'
-        f'</iframe>\n<p><a id="live-link" href="{text(first)}">The live page by itself</a>. Its '
-        "first start takes a while.</p>"
+        f'</iframe>\n<p><a id="live-link" href="{text(first)}">Open only the live '
+        "page</a>. The first start takes a while.</p>"
     )
 
 
@@ -335,15 +320,16 @@ def study_page(
     Parameters
     ----------
     study, bench
-        Its file, and the bench that it varies.
+        Study file, and the bench that the study varies.
     report
-        Path of its page in the folder, whether or not it exists; see `bywire.server.routes`.
+        Path of the study's page in the folder, whether or not it exists (see
+        `bywire.server.routes`).
     progress
-        Its progress as a sentence.
+        Progress of the study as a sentence.
     there
         Contents of the folder.
     largest
-        Largest uploaded file, in bytes.
+        Maximum size of an uploaded file, in bytes.
     """
     is_there = report in there.reports
     address = text(quote(f"/file/{report}"))
@@ -367,7 +353,7 @@ def study_page(
 def report_page(name: str) -> str:
     """Return a page that shows a file in a frame, which the policy of this page restricts.
 
-    The policy of the outer page decides where a frame may navigate, by a script, a link or a timer.
+    The outer page's policy determines where a script, a link or a timer in the frame may navigate.
     A file opened directly in a tab would have no outer page.
     """
     address = text(quote(f"/file/{name}"))
@@ -390,7 +376,7 @@ def report_page(name: str) -> str:
 
 
 def task_page(task: Task, there: Contents, chosen: Mapping[str, str], largest: int) -> str:
-    """Return the page of a task; ``chosen`` has initial values of fields."""
+    """Return the page of a task. ``chosen`` contains initial values of fields."""
     inner = form(task, there, {}, open_fields=4, chosen=chosen)
     return frame(
         task.form.title,
@@ -400,11 +386,11 @@ def task_page(task: Task, there: Contents, chosen: Mapping[str, str], largest: i
     )
 
 
-# --- A refusal
+# --- Error pages
 
 
 def refusal_page(status: int, message: str) -> str:
-    """Return an error page without style or script: its reader may not have the token."""
+    """Return an error page without style or script, because its reader may lack the token."""
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="color-scheme" content="light dark">\n'

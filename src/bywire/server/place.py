@@ -19,7 +19,7 @@ from bywire.server.exchange import RefusedError
 
 RESULTS, MEASUREMENTS = "results", "measurements"
 _LONGEST = 100  # characters of an uploaded file's name
-_LONGEST_FOLDER = 60  # characters of the name of a result's folder, of four bytes at most
+_LONGEST_FOLDER = 60  # characters of a result folder's name, each at most four bytes
 _PLAIN = re.compile(r"[^A-Za-z0-9._-]+")
 
 
@@ -28,18 +28,18 @@ _claiming = threading.Lock()
 
 @dataclass(frozen=True)
 class Place:
-    """A served folder and its files.
+    """Served folder and its files.
 
     Parameters
     ----------
     root
-        The folder's resolved path.
+        Resolved path of the folder.
     """
 
     root: Path
 
     def inside(self, text: str) -> Path:
-        """Return the path that a text names in the folder, whether or not it exists.
+        """Return the path in the folder that a string specifies, whether or not it exists.
 
         Hidden files and links that leave the folder are excluded.
 
@@ -56,16 +56,16 @@ class Place:
             path = (self.root / text).resolve()
             with suppress(FileNotFoundError, NotADirectoryError):
                 path.lstat()
-        except (OSError, RuntimeError, ValueError):  # a loop of links, too long a name
+        except (OSError, RuntimeError, ValueError):  # a loop of links, or a name that is too long
             raise self.unknown(text) from None
         if not path.is_relative_to(self.root):
             raise self.unknown(text)
-        if any(each.startswith(".") for each in path.relative_to(self.root).parts):  # by a link
+        if any(each.startswith(".") for each in path.relative_to(self.root).parts):  # via a link
             raise self.unknown(text)
         return path
 
     def file(self, text: str) -> Path:
-        """Return the file that a text names.
+        """Return the file that a string specifies.
 
         Raises
         ------
@@ -85,7 +85,7 @@ class Place:
         )
 
     def named(self, path: Path) -> str:
-        """Return the name of a path in links: relative to the folder."""
+        """Return a path's name in links, relative to the folder."""
         return path.relative_to(self.root).as_posix()
 
     def fresh_folder(self, stem: str) -> Path:
@@ -94,7 +94,7 @@ class Place:
         Raises
         ------
         FileError
-            If it cannot be created.
+            If the folder cannot be created.
         """
         parent = self._made(RESULTS)
         for number in range(1, 10_000):
@@ -112,12 +112,12 @@ class Place:
         )
 
     def same_folder(self, name: str) -> Path:
-        """Return the single folder in which a file's result is continued."""
+        """Return the only folder in which a file's result continues."""
         self._made(RESULTS)
         return self.inside(f"{RESULTS}/{folder_name(name)}")
 
     def folders(self, stem: str) -> list[Path]:
-        """Return the result folders of a name, the latest first."""
+        """Return the result folders with a name, latest first."""
         found = {
             int(path.name.removeprefix(f"{stem}-")): path
             for path in self._made(RESULTS).glob(f"{escape(stem)}-*")
@@ -131,15 +131,15 @@ class Place:
         Raises
         ------
         FileError
-            If it cannot be created.
+            If the folder cannot be created.
         """
         return self._made(MEASUREMENTS)
 
     def kept(self, fresh: Path, name: str) -> Path:
-        """Give an uploaded measurement the first free name, and return its path.
+        """Move an uploaded measurement to the first free name, and return its path.
 
-        Existing files are never replaced, even if several files of one name arrive simultaneously.
-        Names that differ only in case count as equal, for systems that ignore case.
+        This never replaces existing files, even if several files with one name arrive at the same
+        time. Names that differ only in case count as equal, because some systems ignore case.
 
         Raises
         ------
@@ -204,7 +204,7 @@ def safe_name(name: str) -> str:
     last = re.split(r"[/\\]", name)[-1]
     stem, dot, ending = last.rpartition(".")
     plain = _PLAIN.sub("-", stem if dot else last).strip("-._")[:_LONGEST] or "measurement"
-    if re.fullmatch(r"(?i)(con|prn|aux|nul|(com|lpt)\d)(\..*)?", plain):  # devices of Windows
+    if re.fullmatch(r"(?i)(con|prn|aux|nul|(com|lpt)\d)(\..*)?", plain):  # Windows devices
         plain = f"measurement-{plain}"
     return f"{plain}.{_PLAIN.sub('', ending)}" if dot and _PLAIN.sub("", ending) else plain
 
@@ -215,7 +215,7 @@ def place_of(folder: Path) -> Place:
     Raises
     ------
     FileError
-        If it is not a folder.
+        If the path is not a folder.
     """
     if not folder.is_dir():
         raise FileError(

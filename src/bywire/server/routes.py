@@ -28,13 +28,13 @@ _PIECE = 2**20
 
 
 def uploaded(place: Place, request: Request, name: str, largest: int) -> Path:
-    """Store an uploaded file, completely or not at all, under a free name.
+    """Store an uploaded file under a free name. If the upload fails, store nothing.
 
     Raises
     ------
     RefusedError
-        With status 415 for an unknown format, 411 and 413 for the length, 400 for an incomplete
-        upload.
+        With status 415 for an unknown format, 411 or 413 for an invalid length, and 400 for an
+        incomplete upload.
     OSError
         If the disk is full.
     """
@@ -106,7 +106,7 @@ def answer(service: Service, request: Request) -> Reply:
         With status 404 for an unknown path, 405 for a method that the path does not support, and
         if the route rejects the request.
     InputError
-        For invalid values.
+        If a value is invalid.
     """
     method = "GET" if request.method == "HEAD" else request.method
     for first, route in _ROUTES.items():
@@ -162,7 +162,7 @@ def _study(service: Service, request: Request, rest: str) -> Reply:
     service.place.file(name)
     if name not in there.studies:
         raise ParameterError(
-            f"{name} is not a study file, because it has no bench and no section [vary]", name=name
+            f"{name} is not a study file, because it has no bench and no [vary] section", name=name
         )
     folder = f"{RESULTS}/{folder_name(name)}"
     progress = how_far(service.place.root / folder)
@@ -233,7 +233,7 @@ def _upload(service: Service, request: Request, rest: str) -> Reply:
 
 
 def _columns(service: Service, request: Request, rest: str) -> Reply:
-    """Return a measurement's columns, and the signals that they may be."""
+    """Return a measurement's columns, and the signals that they may contain."""
     del rest
     path = service.place.file(request.query.get("file", ""))
     if path.suffix.lower() not in endings():

@@ -15,25 +15,25 @@ from bywire.server.live_pages import LivePages
 from bywire.server.place import Place
 
 LARGEST_FILE = 1_000_000_000
-"""maximum uploaded measurement, in bytes"""
+"""maximum size of an uploaded measurement, in bytes"""
 
 
 @dataclass(frozen=True)
 class Service:
-    """A served folder.
+    """Served folder.
 
     Parameters
     ----------
     place, jobs, live_pages
-        The folder, its computations, and its live pages.
+        The folder, its jobs, and its live pages.
     largest
-        Largest uploaded measurement, in bytes.
+        Maximum size of an uploaded measurement, in bytes.
     token
         Token of the link.
     reading
-        Lock to read a bench in the server's process, because registries are not thread-safe.
+        Lock for reading a bench in the server's process, because registries are not thread-safe.
     plotting
-        Lock to read a measurement for a first plot, because several would need too much memory.
+        Lock for reading a measurement for a first plot, because several plots need too much memory.
     """
 
     place: Place
@@ -47,7 +47,7 @@ class Service:
 
 @contextmanager
 def service_of(place: Place, scratch_parent: Path, largest: int) -> Iterator[Service]:
-    """Yield the resources of a server; its jobs and temporary files end with the block.
+    """Yield the resources of a server. Its jobs and temporary files end with the block.
 
     Raises
     ------

@@ -64,7 +64,7 @@ class Handler(BaseHTTPRequestHandler):
     service: Service
 
     def parse_request(self) -> bool:
-        """Read request line and headers; reject a line without an HTTP version."""
+        """Read the request line and the headers, and reject a line without an HTTP version."""
         if not super().parse_request():
             return False
         if self.request_version == "HTTP/0.9":
@@ -97,7 +97,7 @@ class Handler(BaseHTTPRequestHandler):
                 return self._refused(404, "this file does not exist, because its name is not valid")
             place = f"{error.filename}: " if error.filename else ""
             return self._refused(507, f"{place}{error.strerror or error}. Free some space there")
-        except Exception as error:  # a defect ends a request, not the server
+        except Exception as error:  # a defect ends the request, not the server
             traceback.print_exception(error)
             return self._refused(
                 500,
@@ -130,7 +130,7 @@ class Handler(BaseHTTPRequestHandler):
         cookie = (
             f"{guard.cookie_name(port)}={self.service.token}; Path=/; HttpOnly; SameSite=Strict"
         )
-        # One slash: two would mean another host.
+        # A single slash, because two slashes would mean another host.
         target = f"/{urlsplit(self.path).path.lstrip('/')}" + (f"?{others}" if others else "")
         return Reply(b"", status=303, headers={"Location": target, "Set-Cookie": cookie})
 
@@ -159,7 +159,7 @@ class Handler(BaseHTTPRequestHandler):
         size = body.stat().st_size if isinstance(body, Path) else len(body)
         self.send_response(reply.status)
         if any(name in self.headers for name in ("Content-Length", "Transfer-Encoding")):
-            self.close_connection = True  # an unread body must not be parsed as the next request
+            self.close_connection = True  # or the unread body would be parsed as a request
         headers = {
             **_HEADERS,
             "Content-Type": reply.kind,
@@ -180,9 +180,9 @@ class Handler(BaseHTTPRequestHandler):
             self.wfile.write(body)
 
     def _linger(self) -> None:
-        """Read the rest of a body: a client cut off while sending would never read the reply."""
+        """Read the rest of a body. A client that is cut off while sending never reads the reply."""
         until = time.monotonic() + _LINGER
-        with contextlib.suppress(OSError):  # the client has disconnected, or sends no more
+        with contextlib.suppress(OSError):  # the client has disconnected, or has stopped sending
             self.connection.shutdown(socket.SHUT_WR)
             while (left := until - time.monotonic()) > 0.0:
                 self.connection.settimeout(left)
@@ -219,14 +219,14 @@ class Handler(BaseHTTPRequestHandler):
 
 
 class _Body:
-    """The body of a request; its first read sends "100 Continue" if the client expects it."""
+    """Body of a request. Its first read sends "100 Continue" if the client expects this."""
 
     def __init__(self, handler: Handler) -> None:
         self._handler = handler
         self._is_awaited = handler.headers.get("Expect", "").lower() == "100-continue"
 
     def read(self, size: int) -> bytes:
-        """Return ``size`` bytes, fewer only if the client has disconnected."""
+        """Return ``size`` bytes, or fewer if the client has disconnected."""
         if self._is_awaited:
             self._is_awaited = False
             self._handler.wfile.write(b"HTTP/1.1 100 Continue\r\n\r\n")
@@ -252,7 +252,7 @@ class _Server(ThreadingHTTPServer):
 
 @dataclass(frozen=True)
 class Opened:
-    """A listening server.
+    """Listening server.
 
     Parameters
     ----------
@@ -268,7 +268,7 @@ class Opened:
 
     @property
     def port(self) -> int:
-        """Port on which it listens."""
+        """Port on which the server listens."""
         return int(self.server.server_address[1])
 
 
@@ -280,14 +280,14 @@ def opened(
     folder: str | Path = "",
     largest: int = LARGEST_FILE,
 ) -> Iterator[Opened]:
-    """Yield a listening server; it answers once its ``server.serve_forever()`` is called.
+    """Yield a listening server, which replies once its ``server.serve_forever()`` is called.
 
     Parameters
     ----------
     subject, port, folder
         See `serve`.
     largest
-        Largest uploaded measurement, in bytes.
+        Maximum size of an uploaded measurement, in bytes.
 
     Raises
     ------
@@ -330,8 +330,8 @@ def serve(
 
     Live pages compute in the browser, like those of `bywire.page`. Tasks that need Python (reports,
     replay of measurements, identification, design, campaigns) run in separate processes. The server
-    answers only requests of this machine that contain the link's token. It neither reads nor writes
-    outside the folder.
+    accepts only requests from this machine that contain the link's token. It neither reads nor
+    writes files outside the folder.
 
     Parameters
     ----------
@@ -352,13 +352,13 @@ def serve(
     Raises
     ------
     FileError
-        If the folder does not exist or is not writable, or the bench file is outside of it.
+        If the folder does not exist or is not writable, or the bench file is outside the folder.
     ParameterError
         If the port is in use.
     UnknownNameError
-        For an unknown experiment.
+        If the experiment is unknown.
     KeyboardInterrupt
-        At the end, when jobs have ended and temporary files are removed.
+        At the end, after jobs have ended and temporary files are removed.
     """
     with _ended_as_by_ctrl_c(), opened(subject, port=port, folder=folder) as it:
         say(it.link)
@@ -367,7 +367,7 @@ def serve(
 
 @contextmanager
 def _ended_as_by_ctrl_c() -> Iterator[None]:
-    """Make a termination signal, or a closed terminal, end a server as Ctrl-C does: cleanly."""
+    """Make a termination signal, or a closed terminal, end a server as cleanly as Ctrl-C."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return

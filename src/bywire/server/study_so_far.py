@@ -1,4 +1,4 @@
-"""Messages of a job's process to its server, with a study's results so far."""
+"""Messages from a job's process to its server, with a study's results so far."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _told: list[IO[str]] = []
 
 
 def begin_to_tell() -> None:
-    """Reserve standard output for messages; output of a brake's code goes to standard error."""
+    """Reserve standard output for messages. Output of a brake's code goes to standard error."""
     _told.append(os.fdopen(os.dup(1), "w", encoding="utf-8"))
     os.dup2(2, 1)
 
@@ -39,14 +39,14 @@ def tell(**said: Any) -> None:
 
 # --- A study
 
-_ESTIMATE, _REPORT = 1.0, 5.0  # least time between two of each, s
-_SHARE = 5.0  # and at least this many times the duration of one
+_ESTIMATE, _REPORT = 1.0, 5.0  # minimum time between two messages of each kind, s
+_SHARE = 5.0  # and at least this multiple of the time that one message takes
 _BINS = 30
-_MOST = 4  # figures of a study without requirements
+_MOST = 4  # maximum number of figures of a study without requirements
 
 
 class StudyProgress:
-    """Reports the results of a study so far, at intervals between its chunks."""
+    """Reporter of a study's results so far, at intervals between its chunks."""
 
     def __init__(self, folder: Path, progress: Progress) -> None:
         self._folder, self._progress = folder, progress
@@ -80,9 +80,9 @@ class StudyProgress:
 
 
 def so_far(findings: Findings) -> list[dict[str, Any]]:
-    """Return intermediate results of each requirement, otherwise of the first key figures.
+    """Return intermediate results for each requirement, or else for the first key figures.
 
-    A study that searches for its cases has none, because shares of such cases mean nothing.
+    A study that searches for its cases has none, because fractions of such cases mean nothing.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ def so_far(findings: Findings) -> list[dict[str, Any]]:
     Returns
     -------
     list of dict
-        For each its ``text``, the ``counts`` of its histogram, and the histogram's ``ends`` with
+        For each, its ``text``, the ``counts`` of its histogram, and the histogram's ``ends`` with
         units.
     """
     if not findings.plan.is_sampled or not len(findings.cases):

@@ -1,4 +1,4 @@
-"""Tasks of pages: all use cases with a form."""
+"""Tasks that pages offer: all use cases with a form."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Task:
     case, form
         The use case, and its form as declared.
     fields
-        Fields of the form, in their order.
+        Fields of the form, in the order shown.
     """
 
     case: UseCase
@@ -46,7 +46,7 @@ class Task:
 
     @property
     def command(self) -> str:
-        """Words of the same command, after ``bywire``."""
+        """Words of the corresponding command, after ``bywire``."""
         return self.case.commands[0].words
 
     def read(self, form: Mapping[str, Any], place: Place) -> dict[str, Any]:
@@ -55,10 +55,10 @@ class Task:
         Raises
         ------
         UnknownNameError
-            For unknown fields.
+            If a field is unknown.
         RefusedError
-            With the field: status 404 for a path outside the folder, 422 for any other invalid
-            value.
+            Contains the field, with status 404 for a path outside the folder, and 422 for any other
+            invalid value.
         """
         known = {field.name: field for field in self.fields}
         for name in form:
@@ -72,20 +72,20 @@ class Task:
         return asked
 
     def compute(self, asked: Mapping[str, Any], out: Path, progress: Progress) -> Answer:
-        """Call the function; ``out`` is the folder, or file, of the result."""
+        """Call the function. ``out`` is the folder, or file, of the result."""
         shown = StudyProgress(out, progress) if self.form.is_kept else progress
         answer: Answer = self.case.call(self._filled_in(asked), out=out, progress=shown)
         return answer
 
     def begun(self, asked: Mapping[str, Any], place: Place, folders: Sequence[Path]) -> Path | None:
-        """Return the folder with earlier results of the same values, to continue there, or None."""
+        """Return the folder with earlier results for the same values to continue there, or None."""
         if self.case.holds is None:
             return None
         read = self.case.read(self._from_anywhere(asked, place))
         return next((each for each in folders if self.case.holds(each, read)), None)
 
     def said_of(self, asked: Mapping[str, Any]) -> str:
-        """Return the subject that lists of jobs show."""
+        """Return the subject that the list of jobs shows."""
         subject = asked[self.form.subject]
         return ", ".join(subject) if isinstance(subject, list) else str(subject)
 
@@ -130,7 +130,7 @@ class Task:
     def _require_fitting(self, given: Mapping[str, Any], place: Place) -> None:
         """Raise the use case's error with the field that causes it.
 
-        This is the first field for which the error remains the same without all later fields.
+        This is the first field for which the error stays the same if all later fields are removed.
         """
         try:
             self.case.read(given)
@@ -202,12 +202,12 @@ def _names(*kinds: str) -> list[str]:
 
 
 def _path_of(name: str, place: Place) -> Path:
-    """Return the absolute path of a file in the folder; other names stay."""
+    """Return the absolute path of a file in the folder, or the name itself for other names."""
     return place.root / name if is_file_name(name) else Path(name)
 
 
 def _run_of(name: str, place: Place) -> Path:
-    """Return the path of a run; a result takes precedence over an experiment of its name."""
+    """Return the path of a run. A result takes precedence over an experiment with its name."""
     from bywire.bench.bench_file import names_experiment
     from bywire.bench.result_folder import is_result_folder
 

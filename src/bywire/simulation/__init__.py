@@ -1,1 +1,1 @@
-"""Time stepping, kernel emission, compilation, and runs, independent of any brake."""
+"""Time stepping, generation and compilation of kernels, and runs, independent of any brake."""

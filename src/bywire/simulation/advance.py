@@ -23,7 +23,7 @@ from bywire.simulation.schedule import Layout, Schedule
 Progress = Callable[[float], None]
 
 _CHUNK_SECONDS = 0.1
-_PART = 8.0  # cost of a cut substep's part, in ordinary substeps
+_PART = 8.0  # cost of one part of a cut substep, in ordinary substeps
 
 
 def advance_all(
@@ -46,11 +46,11 @@ def advance_all(
         The engine's state vector, updated in place. After an interrupt it contains the state after
         the finished frames.
     values
-        Recorded rows from the first frame on, filled in place, shape (rows, signals).
+        Recorded rows, starting at the first frame, filled in place, shape (rows, signals).
     progress
-        Called with the finished share, 0 to 1, after every chunk.
+        Called with the finished fraction, 0 to 1, after every chunk.
     begin, last
-        First frame and end frame. Default: those of the run.
+        First frame and end frame. Default: the whole run.
     most
         The run's work limit; see `work_of`.
 
@@ -95,7 +95,7 @@ def advance_all(
 def work_of(schedule: Schedule, layout: Layout, frames: int, vector: Array) -> Any:
     """Return the work of each run up to a frame, in ordinary substeps.
 
-    Parts of cut substeps cost more, as they share no operations with ordinary substeps.
+    Parts of cut substeps cost more, because they share no operations with ordinary substeps.
     """
     tries = vector[layout.start["counters"] + 2]
     return frames * schedule.substeps + _PART * tries
@@ -113,9 +113,9 @@ def require_work(work: Any, most: Any) -> None:
 
 
 def require_finite(layout: Layout, vector: Array, what: str) -> None:
-    """Raise ``SolverError`` if a carried value of one or several runs is infinite or NaN.
+    """Raise ``SolverError`` if a value in one or several state vectors is infinite or NaN.
 
-    Checking only the states is not enough: a friction with a NaN force would seem to stick.
+    Checking only the states is not enough, because a friction with a NaN force would seem to stick.
     """
     if not np.all(np.isfinite(vector[: layout.start["counters"]])):
         raise SolverError(
@@ -126,7 +126,7 @@ def require_finite(layout: Layout, vector: Array, what: str) -> None:
         )
 
 
-# --- Changes: between two frames, with all states and memories kept
+# --- Changes of parameters between two frames; states and memories stay the same
 # If such a parameter belongs to an energy store, the change does work. This work is recorded, so it
 # is part of the energy balance and not of its closing error. A contact's loss is its work minus its
 # stored energy, and therefore includes the work of a change in that contact.
@@ -137,7 +137,7 @@ _TOLERANCE = 1e-9
 
 @dataclass(frozen=True)
 class Change:
-    """Parameters from a time on.
+    """New parameters that apply from a certain time.
 
     Parameters
     ----------
@@ -145,8 +145,8 @@ class Change:
         Time since the start of the run [s], rounded up to a frame. Every tick and every recorded
         row begins a frame.
     par
-        All parameters from that time on. Choices may differ if the model's states, its memory and
-        the sample times stay the same.
+        All parameters from that time. Choices may differ if the model's states, its memory and the
+        sample times stay the same.
     """
 
     time: float
@@ -154,14 +154,14 @@ class Change:
 
 
 def frame_of(change: Change, schedule: Schedule) -> int:
-    """Return the first frame with a change."""
+    """Return the first frame with the changed parameters."""
     return max(math.ceil(change.time / schedule.frame - _TOLERANCE), 0)
 
 
 def pieces(
     par: ParameterSet, changes: Sequence[Change], schedule: Schedule
 ) -> Iterator[tuple[int, int, ParameterSet]]:
-    """Yield the stretches of a run with equal parameters: first frame, end frame, parameters.
+    """Yield the parts of a run with constant parameters: first frame, end frame, parameters.
 
     ``par``: parameters at the start.
     """
@@ -177,18 +177,19 @@ def pieces(
 
 
 def require_unchanged(changes: Sequence[Change], what: str) -> None:
-    """Reject a run's changes for results that would ignore them.
+    """Reject changes of parameters for results that would ignore them.
 
     Raises
     ------
     ParameterError
-        When the run has changes; ``what``: results that cannot be computed.
+        When the run has changes; ``what``: the results that cannot be computed.
     """
     if changes:
         raise ParameterError(
-            f"{what} are not available for a run whose parameters change, for example by a fault: "
-            "remove the change, or set the parameters from the start",
+            f"{what} are not available for a run whose parameters change, for example due to a "
+            "fault. Remove the change, or set the parameters from the start",
             name="changes",
+            value=what,
         )
 
 
@@ -196,14 +197,14 @@ def require_unchanged(changes: Sequence[Change], what: str) -> None:
 def put_in_signals(output: type) -> Mapping[str, Signal]:
     """Return the signals for the work of changes, one for each energy balance of an Output.
 
-    The first balance's signal has the plain name; it is the actuator's balance if there is one.
+    The first balance's signal has the plain name. This is the actuator's balance if it exists.
     """
     books = dict.fromkeys(_books(output).values())
     first = "" if "" in books else next(iter(books), "")
     return {
         _PUT_IN if book == first else f"{_PUT_IN}_{book.replace(' ', '_')}": Signal(
             "J",
-            "energy put in by changed parameters",
+            "energy added by parameter changes",
             role=Role("source", "changed parameters", book=book),
         )
         for book in sorted(books, key=lambda book: book != first)
@@ -211,10 +212,10 @@ def put_in_signals(output: type) -> Mapping[str, Signal]:
 
 
 def energies(output: type, names: Sequence[str]) -> Array:
-    """Return which outputs are stored energies, and in which energy balance.
+    """Return which outputs are stored energies of each energy balance.
 
-    Stored energies jump at changes; integrals do not. The shape is (balances, outputs), with 1 if
-    an output belongs to the balance, in the order of `put_in_signals`.
+    Stored energies jump at changes, but integrals do not. The shape is (balances, outputs), in the
+    order of `put_in_signals`. An entry is 1 if the output belongs to the balance.
     """
     books = _books(output)
     signals = put_in_signals(output).values()
@@ -228,11 +229,11 @@ def _books(output: type) -> dict[str, str]:
 
 
 def energy_of(engine: Engine, request: Request, vector: Array, books: Array) -> Array:
-    """Return the total energy of each balance at an instant with a request's parameters [J].
+    """Return the total energy of each balance for a state vector and a request's parameters [J].
 
     ``books``: `energies` of all outputs.
     """
-    end = request.schedule.frames  # a stretch without frames has only the row at its end
+    end = request.schedule.frames  # an interval without frames has only the row at its end
     row = np.empty((1, books.shape[1]))
     asked = replace(request, selection=np.arange(books.shape[1], dtype=np.int32))
     engine.advance(asked, vector.copy(), end, end, row)

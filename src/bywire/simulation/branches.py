@@ -1,8 +1,8 @@
-"""Savings in a kernel: values that depend only on a mode, branches not taken, and ramps.
+"""Savings in a kernel: values that depend only on a mode, skipped branches, and ramps.
 
-A mode is a set of a few truth values. Some values depend only on these and on parameters, such as a
-substep's matrix, its pivots and their reciprocals. The kernel recomputes them when a truth value
-changes: a few hundred times in a run of many thousand substeps.
+A mode is a set of a few truth values. Some values depend only on the mode and on parameters, such
+as a substep's matrix, its pivots and their reciprocals. The kernel recomputes them when a truth
+value changes, which happens a few hundred times in a run of many thousand substeps.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ class Modes:
     first
         Nodes that determine the truth values, in order.
     atoms
-        The truth values; empty if a mode does not pay off.
+        The truth values; empty if a mode would not save time.
     values
-        Nodes to recompute when a truth value changes, in order, without truth values.
+        Other nodes to recompute when a truth value changes, in order.
     rest
         All other nodes, in order.
     """
@@ -94,9 +94,9 @@ def cost(graph: Graph, node: Node) -> float:
 def _classified(
     graph: Graph, order: Sequence[Node], level: Levels, refused: Collection[Node]
 ) -> dict[Node, frozenset[Node]]:
-    """Return every node that a mode determines, with the truth values that determine it."""
+    """Return each node that a mode determines, with the truth values that determine the node."""
     deciding: dict[Node, frozenset[Node]] = {}
-    late: set[Node] = set()  # depends on such a node, but not only on it
+    late: set[Node] = set()  # nodes that also depend on other nodes
     for node in order:
         changing = [a for a in graph.arguments(node) if level[a] > 0]
         if all(a in deciding for a in changing):
@@ -111,7 +111,7 @@ def _classified(
 def _poor_atoms(
     graph: Graph, order: Sequence[Node], deciding: dict[Node, frozenset[Node]]
 ) -> set[Node]:
-    """Return truth values that determine too few values to pay off."""
+    """Return the truth values that determine too few values to save time."""
     worth: dict[Node, float] = {}
     for node in order:
         price = 0.0 if graph.nodes[node].op in _FREE else cost(graph, node)
@@ -121,10 +121,10 @@ def _poor_atoms(
 
 
 # --- Branches and ramps
-# A selection computes both arms. If only one arm needs costly functions, such as the curve of a
-# sliding tire, the processor skips them while the other arm is selected. Selections with the same
-# condition share common nodes of their arms: the first selection computes them for all others.
-# The values do not change.
+# A selection computes both arms. If only one arm needs costly functions, such as the friction curve
+# of a sliding tire, a branch skips them while the other arm is selected. Selections with the same
+# condition share common nodes of their arms: the first selection computes these nodes for the
+# others. The values do not change.
 
 _WORTH = 45.0  # cost of operations: a costly function and a few before it
 _SELECTIONS = ("if_else_zero", "select")
@@ -137,11 +137,11 @@ class Arm:
     Parameters
     ----------
     nodes
-        Nodes computed in it, in order.
+        Nodes that the arm computes, in order.
     kept
         Nodes that a later selection with the same condition reuses.
     taken
-        Nodes reused from earlier arms.
+        Nodes that the arm reuses from earlier arms.
     """
 
     nodes: tuple[Node, ...] = ()
@@ -178,7 +178,7 @@ def branched(
     inside: set[Node] = set()
     fixed = set(kept)
     arms: dict[Node, Arms] = {}
-    for node in reversed(order):  # the outermost first
+    for node in reversed(order):  # outermost first
         if node in inside or node in arms or graph.nodes[node].op not in _SELECTIONS:
             continue
         truth = graph.nodes[node].args[0]
@@ -211,7 +211,7 @@ def _together(
     users: Mapping[Node, Sequence[Node]],
     kept: Collection[Node],
 ) -> dict[Node, Arms]:
-    """Return the arms of selections with a common condition; none without costly nodes."""
+    """Return the arms of selections with a common condition; empty without costly nodes."""
     pinned = {*kept, *selections}
     cones, pays = [], False
     for place in (1, 2):
@@ -250,7 +250,7 @@ def _arm(graph: Graph, selection: Node, place: int) -> Node | None:
 
 
 def _needs(graph: Graph, end: Node | None, cone: Collection[Node]) -> set[Node]:
-    """Return a cone's nodes on which a value depends."""
+    """Return the nodes of a cone on which a value depends."""
     needs: set[Node] = set()
     stack = [] if end is None else [end]
     while stack:
@@ -264,7 +264,7 @@ def _needs(graph: Graph, end: Node | None, cone: Collection[Node]) -> set[Node]:
 def _read(
     graph: Graph, selection: Node, place: int, computed: Collection[Node], cone: Collection[Node]
 ) -> set[Node]:
-    """Return a cone's nodes in an arm's text, in which truth values appear as their operands."""
+    """Return the nodes of a cone in an arm's text, which contains truth values as expressions."""
     end = _arm(graph, selection, place)
     stack = [a for node in computed for a in graph.arguments(node)]
     stack += [] if end is None else [end]
@@ -279,7 +279,7 @@ def _read(
 
 
 def worth(graph: Graph, cone: Collection[Node]) -> bool:
-    """Return whether nodes cost more than testing whether they are needed."""
+    """Return whether nodes cost more than a test of whether they are needed."""
     if not any(graph.nodes[node].op in COSTLY for node in cone):
         return False
     return sum(cost(graph, node) for node in cone) > _WORTH
@@ -314,7 +314,7 @@ def _cone(
 def branch(
     graph: Graph, node: Node, arms: Arms, lines: tuple[Sequence[str], Sequence[str]], name: Namer
 ) -> list[str]:
-    """Return the statements of a selection whose arms have statements, ``lines``."""
+    """Return the statements of a selection; ``lines``: statements of its arms."""
     truth, value, *other = graph.nodes[node].args
     ends = (as_number(graph, value, name), as_number(graph, other[0], name) if other else "0.0")
     texts = []
@@ -329,10 +329,10 @@ def branch(
     return [*declared, f"if ({test}) {{", *texts[0], "} else {", *texts[1], "}"]
 
 
-# --- Values that depend only on ramps are kept while the ramps are constant
-# A ramp is a linear function of states between two limits, such as the share of a road's second
+# --- Values that depend only on ramps are stored while the ramps are constant
+# A ramp is a linear function of states between two limits, such as the fraction of a road's second
 # surface along the road. It is at a limit nearly all the time. Values that depend only on ramps and
-# parameters, such as an adhesion peak with its logarithm, then need not be recomputed. Results stay
+# parameters, such as peak adhesion with its logarithm, then need not be recomputed. Results stay
 # the same.
 
 _LINEAR = ("add", "sub", "neg", "mul")
@@ -350,7 +350,7 @@ class Remembered:
     values
         Nodes to recompute when a ramp moves, in order.
     read
-        Nodes that are read elsewhere.
+        Nodes that other nodes read.
     """
 
     ramps: tuple[Node, ...]
@@ -365,7 +365,7 @@ def remembered(
     states: Collection[Node],
     level: Levels,
 ) -> tuple[list[Node], tuple[Remembered, ...], list[Node]]:
-    """Split a substep into values worth keeping, their inputs, and the rest.
+    """Split a substep into values worth storing, their inputs, and the rest.
 
     Parameters
     ----------
@@ -383,7 +383,7 @@ def remembered(
     Returns
     -------
     tuple
-        Operations to compute first, in order; then groups to update, in order; and the others.
+        Operations to compute first, groups to update next, and all other operations, each in order.
     """
     follows: dict[Node, frozenset[Node]] = {}
     linear = set(states)
@@ -400,7 +400,7 @@ def remembered(
     for node, ramps in follows.items():
         if node not in ramps:
             groups.setdefault(ramps, []).append(node)
-    # Groups with fewer ramps first: others may depend on them.
+    # Groups with fewer ramps come first, because other groups may depend on them.
     chosen = [(r, groups[r]) for r in sorted(groups, key=len) if worth(graph, groups[r])]
     inside = {node for _, nodes in chosen for node in nodes}
     leading = {r for ramps, _ in chosen for r in ramps}
@@ -443,7 +443,7 @@ def _is_ramp(graph: Graph, node: Node, linear: Collection[Node], level: Levels) 
 def _read_outside(
     graph: Graph, nodes: Sequence[Node], order: Collection[Node], kept: Collection[Node]
 ) -> tuple[Node, ...]:
-    """Return the nodes that are read outside, directly or by truth values written inline."""
+    """Return the nodes that outside code reads, directly or in inline truth values."""
     inside = frozenset(nodes)
     outside = set(kept)
     for node in order:
@@ -459,7 +459,7 @@ def _read_outside(
 
 
 def declarations(groups: Sequence[Remembered], name: Namer) -> list[str]:
-    """Return the declarations of kept values, which are undefined at first."""
+    """Return the declarations of stored values, which are initially invalid."""
     lines = []
     for k, group in enumerate(groups):
         lines.append(f"uint64_t known{k} = 0;")

@@ -1,6 +1,6 @@
-"""C text that kernels start with: elementary functions for one lane and for vectors of lanes.
+"""C text at the start of kernels: elementary functions for one lane and for vectors of lanes.
 
-Both use the same source, so that a case has the same digits alone and in lanes, on every machine.
+Both use the same source. So a case gives bit-identical results alone and in lanes on every machine.
 """
 
 from __future__ import annotations
@@ -11,9 +11,9 @@ _INCLUDES = r"""
 #include <math.h>
 """
 
-# Vectors: V holds one double per lane, I one integer, B one truth value. Arithmetic is the
-# compiler's own on vector types; the rest are macros, with the processor's instructions where
-# a generic formula would be slow.
+# Vectors: V contains one double per lane, I one integer, B one truth value. The compiler provides
+# arithmetic on vector types. Macros provide all other operations, with the processor's instructions
+# where a generic formula would be slow.
 _TYPES = r"""
 #if defined(__AVX512F__)
 #define W 8
@@ -77,9 +77,9 @@ INLINE V bw_fma(V a, V b, V c) { return (V)__builtin_ia32_vfmaddpd512_mask(a, b,
 #define EACH_LANE(l, m) for (int left_ = (m), l; left_ && (l = __builtin_ctz(left_), 1); \
     left_ &= left_ - 1)
 static inline B ONLY(int l) { return (B)(1 << l); }
-/* An estimate of 14 bits and three Newton steps, the last of which rounds as a division does
- * (Markstein, IBM Journal of Research and Development 34, 1990), in less time than it takes but on
- * processors that divide quickly: there a kernel is a tenth slower with it. */
+/* An estimate of 14 bits and three Newton steps. The last step rounds like a division (Markstein,
+ * IBM Journal of Research and Development 34, 1990). This is faster than a division except on
+ * processors that divide quickly, where it makes a kernel 10 % slower. */
 #if defined(__znver3__) || defined(__znver4__) || defined(__znver5__)
 #define INVERSE(a) (1.0 / (a))
 #else
@@ -105,8 +105,8 @@ static inline B ONLY(int l) {
   m[l] = -1;
   return m;
 }
-/* The header of all instructions takes longer to read than a small kernel to compile: GCC's own
- * names, in functions as they stand there, do without it. */
+/* Reading the header of all instructions takes longer than compiling a small kernel. These
+ * functions use GCC's built-in names instead, in the same way as the header. */
 #if defined(__AVX2__) && defined(__GNUC__) && !defined(__clang__) && defined(__has_builtin)
 #if __has_builtin(__builtin_ia32_blendvpd256) && __has_builtin(__builtin_ia32_maxpd256) \
     && __has_builtin(__builtin_ia32_roundpd256) && __has_builtin(__builtin_ia32_sqrtpd256) \
@@ -150,7 +150,7 @@ static inline int ANY(B m) {
 #endif
 #define FABS(a) ((V)((I)(a) & INT64_MAX))
 #define COPYSIGN(a, b) ((V)(((I)(a) & INT64_MAX) | ((I)(b) & INT64_MIN)))
-/* Rare functions, lane by lane. */
+/* Rarely used functions, lane by lane. */
 static inline V each(double (*f)(double), V a) {
   for (int l = 0; l < W; ++l) a[l] = f(a[l]);
   return a;
@@ -161,11 +161,12 @@ static inline V each(double (*f)(double), V a) {
 #define CEIL(a) each(ceil, a)
 """
 
-# exp: x = k ln2 + r, |r| <= ln2/2, a polynomial to r^11 (error below 2 ulp). Each part of it is
-# scaled by the exponent bits: this function is on the critical path, and the scale is ready before
-# the polynomial. The rounding constant 1.5 * 2^52 leaves k in the low bits of the sum.
-# sin, cos: Cody-Waite reduction by multiples of pi/2 in three parts, good to |x| = 1e5; Taylor
-# on |r| <= pi/4 to r^16. Larger arguments, and powers and logarithms near zero, use the library.
+# exp: x = k ln2 + r, |r| <= ln2/2, a polynomial up to r^11 (error below 2 ulp). The exponent bits
+# scale each part of the polynomial, because this function is on the critical path and the scale is
+# ready before the polynomial. The rounding constant 1.5 * 2^52 leaves k in the low bits of the sum.
+# sin, cos: Cody-Waite reduction by multiples of pi/2 in three parts, valid up to |x| = 1e5; Taylor
+# series on |r| <= pi/4 up to r^16. The library computes larger arguments, and powers and logarithms
+# near zero.
 _FUNCTIONS = r"""
 static IN_PLACE V N(exp_within)(V x) {
   const V t = x * 1.4426950408889634 + MAGIC;
@@ -203,8 +204,9 @@ static FUNCTION V N(turned)(V x, int64_t quarter) {
 static FUNCTION V N(sin)(V x) { return BEYOND(sin, LT(SET(1e5), FABS(x)), x, N(turned)(x, 0)); }
 static FUNCTION V N(cos)(V x) { return BEYOND(cos, LT(SET(1e5), FABS(x)), x, N(turned)(x, 1)); }
 
-/* log a, a > 0, as *low + the result: a = m 2^k, m from sqrt(1/2) to sqrt(2), f = m - 1, and with
- * s = f/(2 + f): log m = f - f^2/2 + s (f^2/2 + z p(z)), z = s^2, Taylor of atanh to s^21. */
+/* log a, a > 0, as *low plus the result, with a = m 2^k, m from sqrt(1/2) to sqrt(2), f = m - 1.
+ * With s = f/(2 + f): log m = f - f^2/2 + s (f^2/2 + z p(z)), z = s^2, Taylor series of atanh up to
+ * s^21. */
 static inline V N(log_parts)(V a, V *low) {
   const I e = (BITS(a) - 0x3FE6A09E667F3BCDLL) >> 52;
   const V f = REAL(BITS(a) - (e << 52)) - 1.0;
@@ -226,7 +228,7 @@ static FUNCTION V N(log)(V a) {
 
 static inline V N(upper)(V a) { return REAL(BITS(a) & ~0x7FFFFFFLL); }
 
-/* a^b for a > 0: exp(b log a) with the product to twice the digits. */
+/* a^b for a > 0 as exp(b log a); the product has twice the precision. */
 static FUNCTION V N(pow)(V a, V b) {
   V low;
   const V log = N(log_parts)(a, &low), product = b * log;
@@ -238,7 +240,7 @@ static FUNCTION V N(pow)(V a, V b) {
 }
 """
 
-# One lane: also with the kernel's own functions.
+# Functions for one lane.
 ONE_LANE = (
     r"""
 #define MAGIC 6755399441055744.0
@@ -247,7 +249,7 @@ static inline double real_of(int64_t i) { double x; memcpy(&x, &i, sizeof(x)); r
 static __attribute__((noinline, cold, unused)) double limited(double a, double low, double high) {
   return a > low ? (a < high ? a : high) : low;
 }
-/* A branch that is never taken costs no time; a run would wait for two selections. */
+/* A branch that is never taken costs no time. Two selections would add latency. */
 static inline double within(double a, double low, double high) {
   return __builtin_expect(a >= low && a <= high, 1) ? a : limited(a, low, high);
 }
@@ -321,12 +323,12 @@ static inline V chosen_beyond_of_two(double (*f)(double, double), B c, V a, V b,
 #define LOG(x) lanes_log(x)
 #define POW(a, b) lanes_pow(a, b)
 
-/* c ? exp(x) : 0, skipped where no lane wants it. */
+/* c ? exp(x) : 0, skipped if no lane needs it. */
 static inline V EXP_WHERE(B c, V x) {
   if (!ANY(c)) return SET(0.0);
   return SELECT(c, EXP(x), SET(0.0));
 }
-/* The same where c holds for nothing that the range would change. */
+/* The same if c is false for all arguments outside the function's range. */
 static inline V EXP_DECAYED(B c, V x) {
   if (!ANY(c)) return SET(0.0);
   return SELECT(c, lanes_exp_within(x), SET(0.0));
@@ -334,7 +336,7 @@ static inline V EXP_DECAYED(B c, V x) {
 """
 )
 
-# Declarations for NVRTC, which compiles C++ without headers; mathematical functions are built in.
+# Declarations for NVRTC, which compiles C++ without headers and has built-in math functions.
 CUDA = r"""
 typedef int int32_t;
 typedef long long int64_t;

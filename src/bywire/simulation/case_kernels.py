@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from bywire.simulation.program import Program
 
 PAIRED = 32
-"""minimum number of cases for kernels that alternate two vectors; fewer would leave lanes idle"""
+"""minimum number of cases for kernels that alternate two vectors, because fewer leave lanes idle"""
 
 
 class CaseKernel(Protocol):
@@ -59,19 +59,19 @@ class CaseKernel(Protocol):
         begin: int = 0,
         ends: Ends | None = None,
     ) -> None:
-        """Run frames begin..end of one group; see `LaneKernel.advance`."""
+        """Run the frames from begin to end for one group; see `LaneKernel.advance`."""
         ...
 
 
 class LaneKernel:
     """Compiled kernel for a group of cases and a selection of signals.
 
-    ``signals``: number of recorded outputs. ``ends``: number of the outputs at the end of the list
-    that are recorded only in the first and last rows.
+    ``signals``: number of recorded outputs. ``ends``: number of outputs at the end of the list that
+    the kernel records only in the first and last rows.
     """
 
     ENTRY = "bw_run_lanes"
-    """name of its function in the library"""
+    """name of the kernel's function in the library"""
 
     def __init__(
         self, layout: Layout, library: Path, compiler: Compiler, signals: int, ends: int = 0
@@ -95,8 +95,8 @@ class LaneKernel:
     ) -> LaneKernel:
         """Emit the kernel of a program, and compile it unless it is in the cache.
 
-        ``in_pairs``: whether there are enough cases for two vectors, if these pay off. ``ends``:
-        see `LaneKernel`.
+        ``in_pairs``: whether there are enough cases for two alternating vectors, which the kernel
+        uses only if they save time. ``ends``: see `LaneKernel`.
         """
         from bywire.simulation.emit_lanes import emit_lanes, takes_turns
         from bywire.simulation.stages import build_stages, layout_of
@@ -122,22 +122,22 @@ class LaneKernel:
         begin: int = 0,
         ends: Ends | None = None,
     ) -> None:
-        """Run frames begin..end of one group: update ``vector`` and fill ``rows``.
+        """Run the frames from begin to end for one group; update ``vector`` and fill ``rows``.
 
         Parameters
         ----------
         parameters
             Shape (np, lanes).
         stimulus
-            Shape (rows, nu) shared by all lanes, or (rows, nu, lanes).
+            Shape (rows, nu) for all lanes, or (rows, nu, lanes).
         vector
             State vectors, shape (entries, lanes).
         rows
-            Shape (cases, recorded rows of these frames, signals), of any strides; lanes beyond
-            the cases are not recorded.
+            Shape (cases, recorded rows of these frames, signals), with any strides. Lanes beyond
+            the last case are not recorded.
         ends
-            Destination for the signals that are recorded only in the first and last rows; None for
-            a kernel without such signals, and if these frames contain neither row.
+            Destination for the signals that are recorded only in the first and last rows. None for
+            a kernel without such signals, and if these frames contain neither of the two rows.
         """
         own = stimulus.ndim == 3
         apart = [stride // rows.itemsize for stride in rows.strides]
@@ -182,9 +182,9 @@ def case_kernel(
     schedule: Schedule,
     ends: int = 0,
 ) -> CaseKernel:
-    """Return the kernel for a number of cases that records some outputs, by index.
+    """Return the kernel for a number of cases that records the outputs with these indices.
 
-    ``ends``: see `LaneKernel`; kernels for a graphics processor have none.
+    ``ends``: see `LaneKernel`. Kernels for a graphics processor have no such signals.
 
     Raises
     ------
@@ -202,7 +202,7 @@ def case_kernel(
 
 @built_once
 def cuda_kernel(prepared: Prepared, device: CudaDevice, selection: tuple[int, ...]) -> CudaKernel:
-    """Return a graphics processor's kernel that records some outputs, by index; built once."""
+    """Return a graphics processor's kernel for the outputs with these indices; built only once."""
     from bywire.simulation.cuda import CudaKernel
     from bywire.simulation.stages import build_stages
 
@@ -217,9 +217,9 @@ def lane_kernel(
     in_pairs: bool = False,
     ends: int = 0,
 ) -> LaneKernel:
-    """Return the kernel that records some outputs, by index; built once.
+    """Return the kernel that records the outputs with these indices; built only once.
 
-    A kernel kept by an earlier command is used unchanged. ``in_pairs``, ``ends``: see
+    The function uses a kernel from an earlier command unchanged. ``in_pairs``, ``ends``: see
     `LaneKernel.of`.
     """
     place = None if prepared.place is None else prepared.place.in_lanes(selection, in_pairs, ends)

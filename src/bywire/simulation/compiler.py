@@ -1,10 +1,10 @@
-"""The C compiler, and the folder of compiled kernels: only the user may write there.
+"""The C compiler, and the folder of compiled kernels, to which only the user may write.
 
 bywire executes a file only if the file, its folder and every parent folder belong to the user or to
 root, and nobody else may write to them. A parent folder may also be like ``/tmp``, where users
-cannot replace each other's files. Digests detect damage, not intent: anyone who can write a library
-can also write its digest. On Windows, permissions are not file modes, and bywire does not check the
-user's folders.
+cannot replace each other's files. Digests detect damage but not malice, because anyone who can
+write a library can also write its digest. On Windows, permissions are not file modes, and bywire
+does not check the user's folders.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ def cache_folder() -> Path:
 
 
 def usable_folder() -> Path:
-    """Return an existing, writable folder for kernels that belongs to the user alone.
+    """Return an existing, writable folder for kernels to which only the user may write.
 
     It is the cache folder if possible, otherwise a new temporary folder for this process.
 
@@ -64,7 +64,7 @@ def usable_folder() -> Path:
     try:
         for each in reversed(
             (folder, *folder.parents)
-        ):  # one by one, so that parent folders get the same permissions
+        ):  # one by one, so that each folder gets the same permissions
             each.mkdir(mode=0o700, exist_ok=True)
         with scratch_folder(folder):
             pass
@@ -91,7 +91,7 @@ def _warn_once(text: str) -> None:
 
 
 def open_to_others(path: Path) -> str:
-    """Return the first of a file and the folders above that others may write to, or None.
+    """Return the first of a file and its parent folders to which others may write, or "".
 
     Raises
     ------
@@ -118,7 +118,7 @@ def _is_closed(status: os.stat_result, is_above: bool) -> bool:
 
 
 def _is_private(group: int) -> bool:
-    """Return whether a group is a user's private group, as many systems create it."""
+    """Return whether a group is a user's private group, which many systems create."""
     if sys.platform == "win32":
         return True
     try:
@@ -130,13 +130,13 @@ def _is_private(group: int) -> bool:
 
 
 def keep_text(path: Path, text: str) -> None:
-    """Write a file of the folder completely or not at all."""
+    """Write a complete file in the folder, or nothing."""
     with contextlib.suppress(OSError), replacing(path) as fresh:
         fresh.write_text(text, encoding="utf-8")
 
 
 def is_intact(library: Path, entry: str) -> bool:
-    """Return whether a library is the user's, has a function, and matches its digest.
+    """Return whether a library belongs to the user, has a function, and matches its digest.
 
     Parameters
     ----------
@@ -166,7 +166,7 @@ def _content(path: Path) -> bytes:
 
 
 def _is_whole(content: bytes) -> bool:
-    """Return whether a library has the length in its header; loading others would crash."""
+    """Return whether a library has the length in its header; loading any other would crash."""
     if content[:4] != b"\x7fELF":
         return len(content) > 4  # a format of another system
     if len(content) < 64 or content[4] != 2:
@@ -198,7 +198,7 @@ def load(library: Path, entry: str) -> ctypes.CDLL:
         loaded = ctypes.CDLL(str(library.resolve(strict=True)))
         getattr(loaded, entry)
     except (OSError, AttributeError) as error:
-        text = f"{library} cannot be loaded ({error}): delete it"
+        text = f"bywire cannot load {library} ({error}). Delete this file"
         raise CompilerError(text, name=str(library)) from None
     return loaded
 
@@ -210,9 +210,9 @@ def sha256(path: Path) -> str:
 
 # --- The compiler
 
-# Kernels compare and select all the time: without these flags, maxima become branches. A compiler
-# that fuses products and sums rounds a case in lanes differently from a single run, and differently
-# on another processor. Saving 1 % of the time in lanes does not justify that.
+# Kernels contain many comparisons and selections. Without these flags, maxima become branches. A
+# compiler that fuses products and sums rounds a case in lanes differently from a single run, and
+# differently on another processor. Saving 1 % of the time in lanes does not justify this.
 KERNEL_MATH = (
     "-fno-math-errno",
     "-fno-trapping-math",
@@ -222,30 +222,30 @@ KERNEL_MATH = (
 )
 _STRICT = ("-Werror=implicit-function-declaration",)
 _COMMON = ("-shared", "-fPIC", "-std=c11", *KERNEL_MATH, *_STRICT)
-# Packing a few scalars costs more than it saves. So does computing both arms of a selection that is
-# constant over thousands of substeps: branches make a run a seventh faster.
+# Packing a few scalars costs more than it saves. The same applies to computing both arms of a
+# selection that is constant over thousands of substeps: with branches, a run is a seventh faster.
 _BRANCHES = ("-fno-if-conversion", "-fno-if-conversion2", "-mtune=native")
-# The emitter already shares values across a kernel's branches: searching for more takes an eighth
-# of the compiler's time, and registers.
+# The emitter already shares values across a kernel's branches. A search for more takes an eighth of
+# the compile time, and registers.
 _SHARED = ("-fno-tree-pre", "-fno-gcse")
 PLAIN = ("-O2", "-fno-tree-vectorize", *_BRANCHES, *_SHARED)
 _X86 = platform.machine().lower() in ("x86_64", "amd64")
 _HERE = ("-march=native",)
 _WIDE = (*_HERE, *(("-mprefer-vector-width=512",) if _X86 else ()))
 _SCHEDULED = ("-fschedule-insns", "-fsched-pressure")  # a tenth faster
-# A single run does not use this processor's vectors, but its additional registers, and instructions
-# that keep both operands. Scheduling pays only with these.
+# A single run does not use this processor's vectors, but it uses the additional registers, and
+# instructions that preserve both operands. Scheduling saves time only with them.
 SINGLE = (*PLAIN, *_HERE, *_SCHEDULED)
 VECTOR = ("-O2", "-fopenmp-simd", *_WIDE, *_SCHEDULED)
-# The statements of two alternating vectors are already in the order that hides their latencies:
-# scheduling before register allocation makes them 6 % slower.
+# The statements of two alternating vectors are already in the order that hides their latencies.
+# Scheduling before register allocation would make them 6 % slower.
 IN_TURN = ("-O2", "-fopenmp-simd", *_WIDE)
-# Half the compile time of -O2, and kernels as fast as with -O1. Their rare functions opt out.
+# Half the compile time of -O2, with kernels as fast as -O1. Rare functions are not optimized.
 _QUICK = ("-Og", "-fira-region=one", "-DQUICK")
 _GCC_ONLY = frozenset({*_BRANCHES, *_SHARED, *_SCHEDULED, "-fira-region=one"})
 TIMEOUT = 300.0
 _OTHERWISE = (
-    "set BYWIRE_CC to another C compiler, or to none, which makes runs about 200 times slower"
+    "Set BYWIRE_CC to another C compiler, or to none, which makes runs about 200 times slower"
 )
 
 
@@ -260,8 +260,8 @@ class Compiler:
     label
         Name in messages and recordings, with its version.
     quick
-        Whether to compile in half the time. The kernels run a tenth slower; with GCC, results stay
-        bit for bit the same.
+        Whether to compile in half the time. The kernels run 10 % slower. With GCC, the results are
+        bit-identical.
     """
 
     command: tuple[str, ...]
@@ -279,7 +279,7 @@ class Compiler:
 
 @cache
 def find_compiler() -> Compiler | None:
-    """Return the system's C compiler, else the extra ``bywire[compiler]``'s, else None.
+    """Return the system's C compiler, the one of the extra ``bywire[compiler]``, or None.
 
     ``BYWIRE_CC`` selects another compiler; ``BYWIRE_CC=none`` disables compilation.
     ``BYWIRE_CC_QUICK=1`` makes it compile quickly, for many kernels with short runs.
@@ -292,8 +292,8 @@ def find_compiler() -> Compiler | None:
         if program := find_program(requested):
             return _labeled((program,), is_quick)
         raise CompilerError(
-            f"BYWIRE_CC = {requested!r} is not a program: "
-            "unset it, or set it to a C compiler or 'none'",
+            f"BYWIRE_CC = {requested!r} is not a program. "
+            "Unset it, or set it to a C compiler or 'none'",
             name="BYWIRE_CC",
             value=requested,
             valid="a C compiler or 'none'",
@@ -337,14 +337,14 @@ def _labeled(command: tuple[str, ...], is_quick: bool) -> Compiler:
     try:
         done = run_program([*command, "--version"], 60.0)
     except (OSError, subprocess.TimeoutExpired) as error:
-        reason = getattr(error, "strerror", None) or "it took longer than 60 s"
-        text = f"the C compiler {command[0]} does not start ({reason}): {_OTHERWISE}"
+        reason = getattr(error, "strerror", None) or "no answer after 60 s"
+        text = f"the C compiler {command[0]} does not start ({reason}). {_OTHERWISE}"
         raise CompilerError(text, name=command[0]) from None
     if done.returncode != 0:
-        text = f"the C compiler {command[0]} does not report its version: {_OTHERWISE}"
+        text = f"the C compiler {command[0]} does not report its version. {_OTHERWISE}"
         raise CompilerError(text, name=command[0])
     first = (done.stdout.splitlines() or [Path(command[0]).name])[0].strip()
-    # "quick" is part of the label, which identifies the compiler in cached kernels and recordings.
+    # Include "quick", because the label identifies the compiler in cached kernels and recordings.
     return Compiler(command, f"{first}, quick" if is_quick else first, is_quick)
 
 
@@ -366,7 +366,7 @@ def load_library(
     library = compile_library(source, flags, compiler, entry)
     try:
         return load(library, entry), library
-    except CompilerError:  # from another system, or damaged before its digest was written
+    except CompilerError:  # built on another system, or damaged before its digest was written
         digest_of(library).unlink(missing_ok=True)
     library = compile_library(source, flags, compiler, entry)
     return load(library, entry), library
@@ -384,7 +384,7 @@ def compile_library(
     ----------
     flags
         ``SINGLE``, ``VECTOR`` for kernels that use the processor's vectors, ``PLAIN`` for code
-        for other machines, or others.
+        for other machines, or other flags.
     entry
         Name of a function that the library must have.
 
@@ -454,16 +454,16 @@ def _compile(compiler: Compiler, flags: tuple[str, ...], source: Path, target: P
         done = run_program(command, TIMEOUT)
     except subprocess.TimeoutExpired:
         raise CompilerError(
-            f"{compiler.label} took longer than {TIMEOUT:g} s for a kernel: {_OTHERWISE}",
+            f"{compiler.label} exceeded its limit of {TIMEOUT:g} s for a kernel. {_OTHERWISE}",
             name=compiler.label,
             valid=f"{TIMEOUT:g} s",
         ) from None
     except OSError as error:
         reason = error.strerror or str(error)
-        text = f"{compiler.label} did not run ({reason}): {_OTHERWISE}"
+        text = f"{compiler.label} did not start ({reason}). {_OTHERWISE}"
         raise CompilerError(text, name=compiler.label) from None
     if done.returncode != 0 or not target.exists():
-        message = "\n".join(done.stderr.splitlines()[:6]) or "without a message"
+        message = "\n".join(done.stderr.splitlines()[:6]) or "(no message)"
         raise CompilerError(
             f"{compiler.label} rejected a generated kernel:\n{message}\n{_OTHERWISE}",
             name=compiler.label,

@@ -1,4 +1,4 @@
-"""Unilateral contacts: a small complementarity problem determines closed contacts and forces."""
+"""Unilateral contacts: a small complementarity problem for the closed contacts and their forces."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def _embedded_inverse(C: Any, subset: tuple[int, ...]) -> Any:
 
 
 def _inverse(M: Any) -> Any:
-    """Return the inverse by cofactors: code without branches, for small groups."""
+    """Return the inverse by cofactors, which needs no branches and suits small groups."""
     n = M.shape[0]
     if n == 1:
         return 1.0 / M
@@ -88,16 +88,16 @@ def _largest(cases: list[tuple[Any, Any]]) -> Any:
 
 
 def contact_forces(model: Model, par: ParameterSet, x: Any) -> Any:
-    """Return the forces of all contacts at an instant, for recordings.
+    """Return the forces of all contacts at the time of a recorded row.
 
-    A substep's forces are valid at its midpoint. In a recording, they would be half a substep old.
+    A substep's forces are valid at its midpoint, so they would be half a substep old.
     """
     overlap = gaps(model, par, x, x)
     return stiffness(model, par, overlap, exact=True) @ overlap
 
 
 def _groups(model: Model, par: ParameterSet, exact: bool) -> list[tuple[Any, slice, bool]]:
-    """Return each group's compliances, its place, and whether the pass assumes it open."""
+    """Return each group's compliances, its slice, and whether the pass assumes that it is open."""
     matrices, groups, at = model.compliance(par), [], 0
     rarely = model.usually_open or (False,) * len(matrices)
     for C, rare in zip(matrices, rarely, strict=True):
@@ -184,15 +184,15 @@ def violations(model: Model, par: ParameterSet, d: Any, F: Any, exact: bool) -> 
         closed = rows @ force
         for k in range(overlap.shape[0]):
             lack = overlap[k] - closed[k]
-            # If a force pushes, the remaining overlap is zero except for rounding.
+            # If a force pushes, the remaining overlap is zero to within rounding.
             wrong = ca.if_else(force[k] > 0, 0, ca.fmax(lack, -force[k]))
             violated.append(overlap[k] if is_open else wrong)
     return violated
 
 
 # --- Resolution of contacts: stiff, lightly damped contacts rebound incorrectly at long steps
-# Contact begins and ends with a substep, each time slightly early or late. Consider a contact
-# without damping that oscillates at omega with its bodies. Its rebound is up to 3 % faster or
+# Contact begins and ends at the boundary of a substep, slightly early or late. Consider an undamped
+# contact that oscillates at omega with its bodies. Its rebound is up to 3 % faster or
 # slower than the approach at h omega = 0.5, 11 % at 1, 25 % at 1.5, and 2.2 times faster at 4,
 # although every substep settles. A damping ratio of at least about 0.5 keeps the error bounded.
 
@@ -202,7 +202,7 @@ LOADS = (0.0, *(10.0 ** (0.5 * k) for k in range(-6, 15)))  # N or N m
 
 
 def contact_jacobians(model: Model, par: ParameterSet, x: Any, m: Any, p: Any) -> Any:
-    """Return the function (x, m, p) -> Jacobians of dx/dt, contacts open and all closed.
+    """Return the function (x, m, p) -> Jacobians of dx/dt with all contacts open and all closed.
 
     If the balance is nonlinear in the contact forces, there is one Jacobian for each of ``LOADS``.
     """

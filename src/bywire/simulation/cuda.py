@@ -1,7 +1,7 @@
 """Many cases on a graphics processor, one thread per case: CUDA C, kernels, memory, and errors.
 
-The compiler, NVIDIA's NVRTC library, needs neither a graphics processor nor a driver. bywire caches
-its results with the compiled kernels.
+The compiler, NVIDIA's NVRTC library, needs no graphics processor and no driver. bywire caches its
+output with the compiled kernels.
 """
 
 from __future__ import annotations
@@ -37,8 +37,8 @@ from bywire.simulation.program import Program
 from bywire.simulation.schedule import Layout, Schedule
 from bywire.simulation.stages import Stages, build_stages, layout_of, leaf_count
 
-# Fused products and sums would round differently from the processor's kernels. The source does not
-# declare each function as a device function.
+# Fused products and sums would round differently from the processor's kernels. The second option is
+# necessary because the source does not declare each function as a device function.
 OPTIONS = ("--fmad=false", "--device-as-default-execution-space")
 OTHERWISE = "or use engine = 'auto', which computes on this machine's processor"
 
@@ -49,14 +49,14 @@ def bindings(name: str) -> ModuleType:
     Raises
     ------
     DeviceError
-        When the extra that contains it is not installed; the message contains the command.
+        When the extra with the module is not installed. The message contains the install command.
     """
     try:
         return importlib.import_module(f"cuda.bindings.{name}")
     except ImportError:
         raise DeviceError(
-            "engine 'cuda' needs NVIDIA's bindings and compiler, which are not installed; "
-            f"{how_to_install('gpu')}; {OTHERWISE}",
+            "engine 'cuda' needs NVIDIA's bindings and compiler, which are not installed. Install "
+            f"them ({how_to_install('gpu')}), {OTHERWISE}",
             name="engine",
             value="cuda",
         ) from None
@@ -94,15 +94,16 @@ def cuda_binary(source: str, capability: int, entry: str) -> bytes:
         _, known = nvrtc.nvrtcGetSupportedArchs()
     except RuntimeError:  # the bindings are installed, but the library is not
         raise DeviceError(
-            f"NVIDIA's compiler NVRTC cannot be loaded; {how_to_install('gpu')}; {OTHERWISE}",
+            f"bywire cannot load NVIDIA's compiler NVRTC. Install it ({how_to_install('gpu')}), "
+            f"{OTHERWISE}",
             name="NVRTC",
         ) from None
     target = max((each for each in known if each <= capability), default=0)
     if not target:
         raise DeviceError(
-            f"NVRTC {version[0]}.{version[1]} compiles for graphics processors of compute "
-            f"capability {min(known) / 10:.1f} and later, not for {capability / 10:.1f}. Install "
-            f"an older release of NVRTC, {OTHERWISE}",
+            f"NVRTC {version[0]}.{version[1]} supports graphics processors with compute "
+            f"capability {min(known) / 10:.1f} and later, but this one has "
+            f"{capability / 10:.1f}. Install an older release of NVRTC, {OTHERWISE}",
             name="NVRTC",
             value=f"{capability / 10:.1f}",
             valid=f"{min(known) / 10:.1f} and later",
@@ -136,7 +137,7 @@ def _compiled(nvrtc: Any, text: str, options: tuple[str, ...], is_own: bool) -> 
             log = _text(nvrtc.nvrtcGetProgramLogSize, nvrtc.nvrtcGetProgramLog, program)
             lines = log.rstrip(b"\0").decode(errors="replace").splitlines()
             message = "\n".join(line for line in lines if line.strip())[:2000] or error.name
-            text = f"NVRTC rejected a generated kernel:\n{message}\n{OTHERWISE}"
+            text = f"NVRTC rejected a generated kernel:\n{message}\n{OTHERWISE.capitalize()}"
             raise CompilerError(text, name="NVRTC")
         if is_own:
             return _text(nvrtc.nvrtcGetCUBINSize, nvrtc.nvrtcGetCUBIN, program)
@@ -146,7 +147,7 @@ def _compiled(nvrtc: Any, text: str, options: tuple[str, ...], is_own: bool) -> 
 
 
 def _text(size_of: Any, fill: Any, program: Any) -> bytes:
-    """Return a property of a program; the bindings fill existing bytes."""
+    """Return a text property of a program. The bindings write to an existing buffer."""
     _, size = size_of(program)
     content = bytes(bytearray(size))
     fill(program, content)
@@ -156,7 +157,7 @@ def _text(size_of: Any, fill: Any, program: Any) -> bytes:
 # --- The device and its driver
 
 VARIABLE = "BYWIRE_GPU"
-"""environment variable with the graphics processor's number, if there are several"""
+"""environment variable that selects one of several graphics processors by number"""
 _NO_DRIVER = "the driver's library is missing"
 _OUT_OF_MEMORY = 2  # CUDA_ERROR_OUT_OF_MEMORY
 _MEGA = 1e6
@@ -170,7 +171,7 @@ class CudaDevice:
     driver
         ``cuda.bindings.driver``, after ``cuInit``.
     number
-        Its number, >= 0.
+        Number of the graphics processor, >= 0.
     """
 
     def __init__(self, driver: Any, number: int) -> None:
@@ -209,7 +210,7 @@ class CudaDevice:
 
     @contextmanager
     def working(self) -> Iterator[Memory]:
-        """Reserve the device, with memory that is freed at the end."""
+        """Reserve the device and memory on it; the memory is freed at the end."""
         with self._current():
             memory = Memory(self._driver, self._checked)
             try:
@@ -219,7 +220,7 @@ class CudaDevice:
 
     @contextmanager
     def _current(self) -> Iterator[None]:
-        """Reserve the device for the calling thread; the device has a single queue anyway."""
+        """Reserve the device for the calling thread. This costs no time: it has only one queue."""
         with self._lock:
             self._checked(self._driver.cuCtxSetCurrent(self._context))
             yield
@@ -236,32 +237,33 @@ class CudaDevice:
         if not int(status):
             return values[0] if len(values) == 1 else values
         if int(status) == _OUT_OF_MEMORY:
-            unknown, *sizes = self._driver.cuMemGetInfo()  # it may have no free memory
+            unknown, *sizes = self._driver.cuMemGetInfo()  # this call may also fail
             left = (
                 ""
                 if int(unknown)
-                else "{:.4g} of {:.4g} MB are free: ".format(*(size / _MEGA for size in sizes))
+                else " ({:.4g} of {:.4g} MB are free)".format(*(size / _MEGA for size in sizes))
             )
-            what = f"no room for {size / _MEGA:.3g} MB" if size else "no free memory"
+            need = f"{size / _MEGA:.3g} MB" if size else "memory"
             raise DeviceError(
-                f"{self.label} has {what}: {left}end other programs on it, select another one "
-                f"with {VARIABLE}, {OTHERWISE}",
+                f"{self.label} cannot allocate {need}{left}. End other programs on this graphics "
+                f"processor, select another one with {VARIABLE}, {OTHERWISE}",
                 name=self.label,
+                value=need,
             )
         _, reason = self._driver.cuGetErrorString(status)
         text = (reason or b"").decode(errors="replace") or status.name
         where = getattr(self, "label", "a graphics processor")
-        message = f"{where} failed: {text} ({status.name}); start again, {OTHERWISE}"
+        message = f"{where} failed: {text} ({status.name}). Rerun the command, {OTHERWISE}"
         raise DeviceError(message, name=where, value=status.name)
 
 
 class Memory:
-    """Memory of a graphics processor that is freed together, with operations on it.
+    """Memory blocks on a graphics processor that are freed together, with operations on them.
 
     Parameters
     ----------
     driver, checked
-        The driver, and a function that raises an error for its statuses.
+        The driver, and a function that raises errors for its statuses.
     """
 
     def __init__(self, driver: Any, checked: Callable[..., Any]) -> None:
@@ -291,7 +293,7 @@ class Memory:
             self._checked(self._driver.cuMemcpyDtoH(pointer(array).value, place, array.nbytes))
 
     def run(self, function: Any, blocks: int, threads: int, arguments: Sequence[Any]) -> None:
-        """Run a kernel to its end; its arguments are addresses and floats."""
+        """Run a kernel and wait for its end; the arguments are addresses and floats."""
         values = [
             ctypes.c_double(each) if isinstance(each, float) else ctypes.c_void_p(int(each))
             for each in arguments
@@ -343,8 +345,8 @@ def find_device() -> CudaDevice:
     number = read_count(requested)
     if number is None or number >= count:
         raise ParameterError(
-            f"{VARIABLE} = {quoted(requested)} is not a graphics processor: there "
-            f"{'is one, 0' if count == 1 else f'are {count}, 0 to {count - 1}'}",
+            f"{VARIABLE} = {quoted(requested)} is not valid: it must be "
+            f"{'0' if count == 1 else f'0 to {count - 1}'}, the number of a graphics processor",
             name=VARIABLE,
             value=requested,
             valid="0" if count == 1 else f"0 to {count - 1}",
@@ -353,18 +355,18 @@ def find_device() -> CudaDevice:
 
 
 # --- Kernels of many cases
-# The graphics processor computes cases in batches that fit into its memory, and a batch in pieces
-# of time. The host fetches a piece's rows before the next piece, and no piece blocks a display for
-# long.
+# The graphics processor computes cases in batches that fit into its memory, and each batch in time
+# intervals. The host fetches the rows of each interval before the next interval starts. Intervals
+# are short, so they do not block a display for long.
 #
-# Each number of a case is next to the same number of the next case, so threads that run together
+# Each number of a case is next to the same number of the next case. So threads that run together
 # access adjacent memory. Rows have the layout of the caller's array. Each thread has its own
 # branches and cuts, like a single run.
 
 ENTRY = "bw_run_cases"
 """name of the kernel's function"""
 THREADS = 64
-"""threads per block; they share a multiprocessor's registers, and each uses as many as possible"""
+"""threads per block; few, because each thread uses as many of the shared registers as possible"""
 
 # After `stages.PLAN`: number of cases, whether each has its own stimulus, the first row of the
 # stimulus in memory, and the distances between the entries of two cases, rows and signals.
@@ -396,9 +398,9 @@ _THREADS = Caller(
 
 
 def emit_cuda(stages: Stages) -> str:
-    """Return the CUDA C of the kernel, with its compiler's prologue first.
+    """Return the CUDA C source of the kernel.
 
-    The prologue for NVRTC is ``c_runtime.CUDA``.
+    It does not include the compiler's prologue, which is ``c_runtime.CUDA`` for NVRTC.
     """
     return emit_single(stages, _THREADS)
 
@@ -406,9 +408,9 @@ def emit_cuda(stages: Stages) -> str:
 # --- The kernel
 
 MOST = 2**15
-"""cases of a batch: number of threads that the largest processors hold at a time"""
-_SUBSTEPS = 5000  # substeps per piece of time
-_SHARE = 0.5  # share of the free memory for a batch; threads' stacks and other data also need some
+"""maximum number of cases in a batch: the number of threads that the largest processors can hold"""
+_SUBSTEPS = 5000  # substeps per time interval
+_SHARE = 0.5  # fraction of the free memory for a batch; thread stacks and other data need the rest
 _FLOAT = 8  # bytes
 
 
@@ -424,7 +426,7 @@ class CudaKernel:
     """
 
     at_once = 2
-    """batches at a time: the host prepares or reads one while the device computes another"""
+    """number of batches at a time: the host prepares or reads one while the device computes one"""
 
     def __init__(self, device: CudaDevice, stages: Stages) -> None:
         self.layout: Layout = layout_of(stages)
@@ -447,8 +449,8 @@ class CudaKernel:
         most = min(MOST, int(_SHARE * free) // size)
         if most < 1:
             raise DeviceError(
-                f"{self._device.label} has {free / 1e6:.3g} MB free, of which a case may use half, "
-                f"but a case needs {size / 1e6:.3g} MB. Record fewer signals, or less often",
+                f"{self._device.label} has {free / 1e6:.3g} MB free. A case may use half of it, "
+                f"but needs {size / 1e6:.3g} MB. Record fewer signals, or record them less often",
                 name=self._device.label,
                 value=f"{size / 1e6:.3g} MB",
                 valid=f"{free / 1e6:.3g} MB free",
@@ -459,7 +461,7 @@ class CudaKernel:
         return sized
 
     def rows(self, cases: int, rows: int) -> Array:
-        """Return an array for recorded rows, shape (cases, rows, signals), as on the device."""
+        """Return an array for recorded rows in the device's layout; see `CaseKernel`."""
         return np.empty((rows, self._signals, cases)).transpose(2, 0, 1)
 
     def advance(
@@ -473,14 +475,14 @@ class CudaKernel:
         begin: int = 0,
         ends: Ends | None = None,
     ) -> None:
-        """Run frames begin..end of one batch; see ``case_kernels.LaneKernel.advance``.
+        """Run the frames from begin to end for one batch; see ``case_kernels.LaneKernel.advance``.
 
-        ``ends`` is None: the kernel records all outputs in all rows.
+        ``ends`` is None, because the kernel records all outputs in all rows.
 
         Raises
         ------
         DeviceError
-            When the device fails, or other programs have taken its memory meanwhile.
+            When the device fails, or other programs have allocated its memory in the meantime.
         """
         own = int(stimulus.ndim == 3)
         with self._device.working() as memory:
@@ -509,7 +511,7 @@ class CudaKernel:
             memory.get(state, vector)
 
     def _size(self, schedule: Schedule) -> int:
-        """Return the bytes of a case with its own stimulus."""
+        """Return the size in bytes of a case with its own stimulus."""
         parameters, inputs = self._inputs
         stimulus = inputs * _stimulus_rows(schedule)
         recorded = self._signals * _most_rows(schedule)
@@ -517,15 +519,15 @@ class CudaKernel:
 
 
 def _frames(schedule: Schedule) -> int:
-    """Return the number of frames in a piece of time."""
+    """Return the number of frames in a time interval."""
     return max(_SUBSTEPS // schedule.substeps, 1)
 
 
 class _Recording:
-    """Destination of the rows of a piece of time, in the order of the caller's array.
+    """Destination of the rows of a time interval, in the order of the caller's array.
 
-    The rows go directly into the caller's array if the piece fills all of it, else through a
-    buffer.
+    The rows go directly into the caller's array if the interval fills all of it. Otherwise, they go
+    through a buffer.
     """
 
     def __init__(self, rows: Array, lanes: int, most: int) -> None:
@@ -536,7 +538,7 @@ class _Recording:
         self.begin(0)
 
     def begin(self, count: int) -> None:
-        """Make room for more rows."""
+        """Prepare the destination of more rows."""
         shape = self._lanes, count, self._rows.shape[2]
         self._target = self._rows[:, self._at : self._at + count]
         own = self._room[: math.prod(shape)].reshape([shape[axis] for axis in self._order])
@@ -555,39 +557,39 @@ class _Recording:
 
 
 def rows_between(schedule: Schedule, begin: int, end: int) -> int:
-    """Return the number of rows recorded from frame begin to before end, or to the run's end.
+    """Return the number of recorded rows from frame begin up to end, exclusive unless the run ends.
 
-    The kernel counts them the same way, by its plan.
+    The kernel counts them in the same way, using its plan.
     """
     every = schedule.record_frames
     return -(-(end + int(end == schedule.frames)) // every) - -(-begin // every)
 
 
 def _stimulus_rows(schedule: Schedule) -> int:
-    """Return the largest number of stimulus rows that a piece of time reads."""
+    """Return the maximum number of stimulus rows that a time interval reads."""
     return _frames(schedule) // schedule.stimulus_frames + 2
 
 
 def _most_rows(schedule: Schedule) -> int:
-    """Return the largest number of rows that a piece records, including the end's."""
+    """Return the maximum number of rows that a time interval records, including the last row."""
     return _frames(schedule) // schedule.record_frames + 2
 
 
 def _pieces(schedule: Schedule, begin: int, end: int) -> list[tuple[int, int]]:
-    """Return the frames at which pieces begin and end; at a run's end only its row remains."""
+    """Return first and end frame of each time interval; at a run's end, only its row remains."""
     edges = [*range(begin, end, _frames(schedule)), end]
     return list(pairwise(edges)) or [(begin, end)]
 
 
 class CudaEngine:
-    """Single runs on the graphics processor: slow, but bit for bit the same as in a batch."""
+    """Single runs on the graphics processor: slow, but bit-identical to those in a batch."""
 
     def __init__(self, program: Program) -> None:
         self._kernel = CudaKernel(find_device(), build_stages(program))
         self.layout, self.label = self._kernel.layout, self._kernel.label
 
     def advance(self, request: Request, state: Array, begin: int, end: int, rows: Array) -> None:
-        """Run frames begin..end in place; see ``engine.Engine``."""
+        """Run the frames from begin to end in place; see ``engine.Engine``."""
         schedule, vector = request.schedule, state[:, None].copy()
         count = rows_between(schedule, begin, end)
         recorded = self._kernel.rows(1, count)

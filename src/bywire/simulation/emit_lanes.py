@@ -1,7 +1,7 @@
 """Kernel of an ensemble: as many cases side by side as fit into the processor's vectors.
 
-In a short substep, the latency of dependent operations costs as much time as computing. The kernel
-then alternates two vectors, statement by statement: each computes while the other waits.
+In a short substep, the latency of dependent operations takes as much time as the computation. The
+kernel then alternates two vectors, statement by statement. One computes while the other waits.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ from bywire.simulation.stages import (
 
 
 class Lanes:
-    """Statements of every stage for one of the alternating vectors.
+    """Statements of each stage for one of the alternating vectors.
 
-    ``at``: number of this vector among ``turns``.
+    ``at``: index of this vector among the ``turns`` vectors.
     """
 
     def __init__(self, stages: Stages, at: int = 0, turns: int = 1) -> None:
@@ -59,7 +59,7 @@ class Lanes:
         self._later = [n for n in self.mode.rest if n not in judged]
 
     def _read_by(self, roots: Iterable[Node]) -> frozenset[Node]:
-        """Return the operations that roots need, however often they change."""
+        """Return all operations that the roots need, at any level of change."""
         return frozenset(needed(self.graph, roots, lambda _: False))
 
     def _leaf(self, kind: str, index: int) -> str:
@@ -70,11 +70,11 @@ class Lanes:
         return "h" if kind == "h" else f"{kind}{index}{self.mark}"
 
     def row(self, index: int) -> int:
-        """Return the vector in memory that belongs to an entry."""
+        """Return the index of an entry's vector in memory."""
         return index * self.turns + self.at
 
     def marked(self, *names: str) -> list[str]:
-        """Return the names of variables that every vector has separately."""
+        """Return the names of variables that are separate for each vector."""
         return [f"{name}{self.mark}" for name in names]
 
     def _value(self, node: Node) -> str:
@@ -82,7 +82,7 @@ class Lanes:
         return f"{name}{self.mark}"
 
     def block(self, roots: Sequence[Node], below: int) -> list[str]:
-        """Return the statements that results need, without those computed less often."""
+        """Return the statements for results, without those that are computed less often."""
         order = needed(self.graph, roots, lambda n: self.level[n] < below)
         return self.lines(order)
 
@@ -91,7 +91,7 @@ class Lanes:
         return branching_statements(self.graph, order, self.name, "const V ", VECTOR_C, later)
 
     def number(self, node: Node) -> str:
-        """Return the text of a result."""
+        """Return the C text of a result."""
         return as_number(self.graph, node, self.name, VECTOR_C)
 
     def once(self) -> list[str]:
@@ -116,9 +116,9 @@ class Lanes:
         return [*values, *(f"B b{n} = (B){{0}};" for n in self.mode.atoms), "int fresh = 1;"]
 
     def judged(self) -> list[str]:
-        """Return the statements that determine whether one pass suffices for a substep.
+        """Return the statements that determine whether one pass is sufficient for a substep.
 
-        Values that depend on the mode are recomputed with it.
+        They recompute values that depend on the mode when the mode changes.
         """
         mode = self.mode
         rest = self.lines(self._judged, self._later)
@@ -159,7 +159,7 @@ class Lanes:
 
 # --- Lanes whose substep needs more than one ordinary pass
 # These lanes raise a flag, and the kernel settles them one by one. It then computes the remaining
-# results and integrands for all lanes, and replaces those of the settled lanes.
+# results and integrands for all lanes, and replaces the values of the settled lanes.
 
 
 def repeated_lanes(t: Lanes) -> list[str]:
@@ -179,7 +179,7 @@ def repeated_lanes(t: Lanes) -> list[str]:
 def repeated_results(t: Lanes) -> list[str]:
     """Return the statements that use the results of settled lanes.
 
-    For these lanes, they subtract the pass's integrands from the sums again.
+    For these lanes, they restore the sums without the pass's integrands.
     """
     new, before, settled = t.marked("new", "before", "settled")
     return [
@@ -192,8 +192,8 @@ def repeated_results(t: Lanes) -> list[str]:
 def settling_function(t: Lanes) -> str:
     """Return the C function that settles the flagged lanes one by one.
 
-    It works on copies, since a vector with addressed lanes would always stay in memory. For a lane
-    that is not in doubt, the ordinary pass's velocities are valid.
+    It works on copies, because a vector with addressed lanes would always stay in memory. For a
+    lane that is not in doubt, the velocities of the ordinary pass are valid.
     """
     stages, nx = t.stages, t.layout.length["x"]
     targets = {name: k for k, name in enumerate(t.results)}
@@ -224,7 +224,7 @@ def settling_function(t: Lanes) -> str:
 
 
 def _handed_over(t: Lanes) -> list[str]:
-    """Return the statements that hand a substep with flagged lanes to ``settle_lanes``."""
+    """Return the statements that pass a substep with flagged lanes to ``settle_lanes``."""
     old = t.marked(*(f"{kind}{k}" for kind in ("x", "d") for k in range(t.layout.length[kind])))
     flow = t.marked(*_flows(t))
     memory = t.marked(*(f"m{k}" for k in _memory(t)))
@@ -256,7 +256,7 @@ def _memory(t: Lanes) -> list[int]:
 
 
 def _flows(t: Lanes) -> list[str]:
-    """Return the integrals that signals read; the others stay unchanged."""
+    """Return the integrals that signals read; other integrals stay unchanged."""
     read = t.graph.read_by(t.stages.output)
     return [f"q{k}" for k in range(t.layout.length["q"]) if t.graph.leaf("q", k) in read]
 
@@ -283,8 +283,8 @@ PLAN = """const int64_t begin = plan[0], end = plan[1], last = plan[2], substeps
   const int64_t end0 = plan[{at} + 5], end1 = plan[{at} + 6], by_end = plan[{at} + 7];"""
 
 
-# Rows are written eight at a time, so a lane's signal fills a cache line. The lines are on a
-# hundred or more pages, which are written in turn.
+# Rows are written eight at a time, so a lane's signal fills a cache line. The cache lines are on a
+# hundred or more pages, which the kernel writes in turn.
 _PUT = """#define HELD 8
 
 static __attribute__((noinline)) void put_rows(const V *held, int64_t signals, int64_t rows,
@@ -297,7 +297,7 @@ static __attribute__((noinline)) void put_rows(const V *held, int64_t signals, i
 """
 
 
-# Largest number of a substep's operations with two vectors; more do not fit into registers.
+# Maximum number of a substep's operations with two vectors. More would not fit into registers.
 _SHORT = 160
 
 
@@ -311,8 +311,8 @@ def emit_lanes(stages: Stages, in_turn: bool = False, ends: int = 0) -> str:
     """Return the C source of the kernel for one vector of cases, or for two that alternate.
 
     A long call of the kernel ends early and returns the frame at which to continue.
-    ``ends``: number of signals at the end of the list that are recorded only in the first and last
-    rows.
+    ``ends``: number of signals at the end of the list that the kernel records only in the first and
+    last rows.
     """
     t = Lanes(stages)
     turns = [Lanes(stages, at, 2) for at in (0, 1)] if in_turn else [t]
@@ -372,7 +372,7 @@ def emit_lanes(stages: Stages, in_turn: bool = False, ends: int = 0) -> str:
 
 
 def _begin(t: Lanes) -> list[str]:
-    """Return the declarations of every vector's variables, with their initial values."""
+    """Return the declarations of each vector's variables, with their initial values."""
     parameters, m = leaf_count(t.stages, "p"), t.mark
     return [
         f"V U{m}[{max(leaf_count(t.stages, 'u'), 1)}];",
@@ -404,8 +404,8 @@ def _ahead(t: Lanes) -> list[str]:
 def _commit(t: Lanes) -> list[str]:
     """Return the code that commits the results.
 
-    Results on which no flag depends are computed only here. Nothing reads the previous values after
-    this point, so each result can overwrite its own. Earlier, both would have to be kept.
+    Results on which no flag depends are computed only here. After this point, nothing reads the
+    previous values, so each result can overwrite its own. Earlier code would need both values.
     """
     results = [
         *t.finished(),

@@ -1,10 +1,10 @@
 """C code of rare substeps, which need more than one ordinary pass.
 
 The functions are self-contained. For any step length, they compute all values except those that
-depend only on parameters. If a velocity with dry friction changes its sign, the substep is cut at
-the zero crossing, where friction and acceleration jump. Every velocity keeps its sign within each
-part. In the next part, a velocity that has reached zero rests or moves on, depending on its
-bounds.
+depend only on parameters. If a velocity with dry friction changes sign, the functions cut the
+substep at the zero crossing, where friction and acceleration jump. No velocity changes sign within
+a part. In the next part, a velocity that has reached zero stays at zero or changes, depending on
+its bounds.
 """
 
 from __future__ import annotations
@@ -18,10 +18,9 @@ from bywire.simulation.schedule import ATTEMPTS, CAP, CLOSE, EDGE, NEAR, STILL, 
 from bywire.simulation.scheme import FITTING, NEVER, NOTHING, RESIDUAL
 from bywire.simulation.stages import STATE, Stages, indented, leaf_namer, statements
 
-# The same method as ``scheme.project_exact``, which explains it, but as a loop: a tenth of the
-# code.
+# The method of ``scheme.project_exact``, which explains it, but as a loop with a tenth of the code.
 PROJECTION = """
-// Solve S w = b for the moving rows, by elimination on the diagonal; nothing if no row moves.
+// Solve S w = b for the moving rows, by elimination on the diagonal. Rows at rest get w = 0.
 static inline void with_signs(const double *S, const double *c, const double *low,
     const double *high, const int *sign, double *w) {
   double A[SETS][SETS], b[SETS], inverse[SETS];
@@ -49,7 +48,7 @@ static inline void with_signs(const double *S, const double *c, const double *lo
   }
 }
 
-// Return the violation of the conditions by velocities, relative to the sums of their rows.
+// Return by how much velocities violate the conditions, relative to the sums of their rows.
 static inline double misfit(const double *S, const double *c, const double *low,
     const double *high, const double *w) {
   double total = 0.0;
@@ -68,10 +67,10 @@ static inline double misfit(const double *S, const double *c, const double *low,
   return total;
 }
 
-enum { GUESSES = 4 }; // largest number of updates of the signs from the other rows' velocities
+enum { GUESSES = 4 }; // maximum number of updates of the signs from the other rows' velocities
 
-// Iterate on the signs of the rows, and accept them if they fit. Otherwise try every combination,
-// and take the one that fits best. Return whether it fails.
+// Iterate on the signs of the rows, and accept them if they fit. Otherwise, try every combination
+// and use the one that fits best. Return whether this fails.
 static APART int project(const double *posed, double *w, double *force) {
   const double *S = posed, *c = S + SETS * SETS, *low = c + SETS, *high = low + SETS;
   double best = NEVER, tried[SETS];
@@ -102,7 +101,7 @@ static APART int project(const double *posed, double *w, double *force) {
       best = total;
       memcpy(w, tried, sizeof(tried));
     }
-    for (k = SETS - 1; k >= 0; --k) { // 0, 1, -1, the last row first
+    for (k = SETS - 1; k >= 0; --k) { // 0, 1, -1, starting with the last row
       sign[k] = sign[k] ? (sign[k] > 0 ? -1 : 0) : 1;
       if (sign[k]) break;
     }
@@ -119,8 +118,8 @@ static APART int project(const double *posed, double *w, double *force) {
 }
 """
 
-# A pass returns o: x, d, r, q, jump, doubt. If the ordinary pass is in doubt, the exact pass is
-# repeated from its own increment until its contact sets no longer change.
+# A pass returns o: x, d, r, q, jump, doubt. If the ordinary pass is in doubt, the exact pass
+# repeats from its own increment until its contact sets no longer change.
 CUT = """
 static APART int settle(const double *c, double h, const double *m, const double *x, double *d,
     double *o) {
@@ -134,11 +133,11 @@ static APART int settle(const double *c, double h, const double *m, const double
   return 1;
 }
 
-// Cuts of a substep: length of each part except the last, index of the velocity that is zero at its
-// end, and number of tried parts.
+// Cuts of a substep: length of each part except the last, index of the velocity that is zero at the
+// part's end, and number of attempted parts.
 typedef struct { int count, which[CUTS], tries; double length[CUTS]; } cuts;
 
-// Return the first velocity to change its sign within a part, -1 if none does, and the instant.
+// Return the first velocity to change sign within a part, or -1, and the time as a fraction.
 static inline int first_turn(const double *x, const double *o, double *share) {
   int first = -1;
   *share = 1.0;
@@ -152,15 +151,15 @@ static inline int first_turn(const double *x, const double *o, double *share) {
   return first;
 }
 
-// Compute a part of length t; last: half increments of a whole substep h, for its prediction.
+// Compute a part of length t; last: half increments of a whole substep h, for the prediction.
 static inline int part(const double *c, double h, double t, const double *m, const double *x,
     const double *last, double *d, double *o) {
   for (int k = 0; k < NX; ++k) d[k] = last[k] * (t / h);
   return settle(c, t, m, x, d, o);
 }
 
-// Return the zero of a velocity that changes from v to w within a part of length t, on the parabola
-// that also has the mean slope before over an earlier length h.
+// Return the zero of a velocity that changes from v to w within a part of length t. The velocity is
+// approximated by a parabola, whose mean slope over the preceding length h is before.
 static inline double zero_of(double v, double w, double t, double before, double h) {
   const double mean = (w - v) / t, linear = -v / mean;
   const double bend = before != 0.0 ? 2.0 * (mean - before) / (t + h) : 0.0;
@@ -169,10 +168,11 @@ static inline double zero_of(double v, double w, double t, double before, double
   return zero > 0.0 && zero < t ? zero : linear;
 }
 
-// Shorten a part of length *t to the first instant at which a velocity is zero: by the parabola
-// through three lengths, within what is known to lie before and behind. Before, o is that of *t in
-// the velocities, behind in everything. Return which velocity it is, -1 if velocities alone were
-// known and its friction turns out not to jump; failed: that part did not settle.
+// Shorten a part of length *t to the first time at which a velocity is zero. The search uses the
+// parabola through three lengths, and stays between known bounds of the zero. On entry, the
+// velocities in o belong to *t. On return, all of o belongs to *t. Return the index of the
+// velocity, or -1 if only velocities were known and the friction does not jump; failed: the part
+// did not settle.
 static APART int locate(const double *c, double h, double *t, const double *m, const double *x,
     const double *last, int known, double *o, int *failed, int *tries) {
   double d[NX], share, low = 0.0, high = *t;
@@ -187,7 +187,7 @@ static APART int locate(const double *c, double h, double *t, const double *m, c
     ++*tries;
     if (known && o[JUMP + which] == 0.0) return -1;
     const int other = VELOCITIES > 1 ? first_turn(x, o, &share) : -1;
-    if (other >= 0 && other != which && n < ATTEMPTS) { // another velocity is earlier
+    if (other >= 0 && other != which && n < ATTEMPTS) { // another velocity reaches zero earlier
       which = other, turns = velocity[which];
       low = 0.0, high = N;
       P = 0.0, at_P = x[turns], Q = N, at_Q = o[turns], N = N * share;
@@ -204,7 +204,7 @@ static APART int locate(const double *c, double h, double *t, const double *m, c
     const int is_near = fabs(at_N) <= NEAR * change && next > first && next < final;
     if (is_near && before > 0.0) { // continue on the line through two attempts
       const double share = (next - N) / (N - before);
-#ifdef TURNS // lanes: where compilers know what that means
+#ifdef TURNS // only for lanes, whose compilers support this pragma
       #pragma omp simd
 #endif
       for (int k = 0; k < JUMP; ++k) o[k] += share * (o[k] - was[k]);
@@ -220,26 +220,26 @@ static APART int locate(const double *c, double h, double *t, const double *m, c
   return which;
 }
 
-// Return half the increment after a zero, from a before it: reduced by the jump of friction, which
-// opposes the other direction, and zero if friction holds.
+// Return half the increment after a zero, where a is half the increment before the zero. The jump j
+// of the friction reduces it. It is zero if friction holds the body.
 static inline double turned_back(double a, double j) {
   return copysign(fmax(fabs(a) - j, 0.0), a);
 }
 
-// End a part of length t of a cut substep h, from speeds x: set zero velocities in o, and last, the
-// half increments for the prediction of the next part.
+// End a part of length t of a cut substep h, from velocities x. Set zero velocities in o, and set
+// last, the half increments for the prediction of the next part.
 static inline void rest(const double *x, int which, double t, double h, double *o, double *last) {
   for (int k = 0; k < NX; ++k) last[k] = o[NX + k] * (h / t);
   for (int k = 0; k < VELOCITIES; ++k) {
-    const int v = velocity[k]; // equal bodies stop at the same instant
+    const int v = velocity[k]; // equal bodies stop at the same time
     if (k != which && fabs(o[v]) >= STILL * fabs(x[v])) continue;
     o[v] = 0.0;
     last[v] = turned_back(last[v], o[JUMP + k] * (h / t));
   }
 }
 
-// Compute a substep, repeated until it settles, and cut at zeros of velocities. known: o contains
-// velocities of the whole settled substep, from an ordinary pass.
+// Compute a substep. Repeat it until it settles, and cut it at zeros of velocities. known: o
+// contains the velocities of the whole settled substep from an ordinary pass.
 static APART int located(const double *c, double h, const double *m, const double *x,
     const double *d, int known, double *o, cuts *made) {
   double at[NX], last[NX], guess[NX], sum[FLOWS + 1], left = h, share;
@@ -261,7 +261,7 @@ static APART int located(const double *c, double h, const double *m, const doubl
     }
     double t = left;
     const int which = turns ? locate(c, h, &t, m, at, last, known, o, &failed, &made->tries) : -1;
-    if (which < 0) { // then again, without known velocities
+    if (which < 0) { // repeat without known velocities
       --made->count;
       continue;
     }
@@ -282,7 +282,7 @@ static APART int located(const double *c, double h, const double *m, const doubl
 """
 
 
-# --- Code that depends on the model
+# --- Model-dependent code
 
 _TRIES = 200_000
 APART = "__attribute__((noinline))"  # not "cold": compilers optimize cold functions for size
@@ -309,7 +309,7 @@ enum {{ CONSTANTS = {len(slots)}, POSED = {len(stages.posed)} }};
 
 
 def most_tries(stages: Stages) -> int:
-    """Return the number of tried parts of substeps in a call of a kernel: tens of milliseconds.
+    """Return the limit for attempted parts in a call of a kernel, which take tens of milliseconds.
 
     A part takes one or a few exact passes, each of which may try all combinations of signs.
     """
@@ -374,7 +374,7 @@ def _constants_function(graph: Graph, slots: dict[Node, int]) -> str:
 
 
 def _exact(stages: Stages, slots: dict[Node, int]) -> list[str]:
-    """Return the exact pass's statements; it solves for the forces between its two halves."""
+    """Return the statements of the exact pass, which solves for forces between its two halves."""
     posed = _lines(stages, stages.posed, slots, "posed")
     known = frozenset(needed(stages.graph, stages.posed, slots.__contains__))
     after = _lines(stages, rare_results(stages.exact), slots, "o", known)

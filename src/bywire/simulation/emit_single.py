@@ -1,7 +1,7 @@
-"""Kernel of a single run: one function with local scalars only.
+"""Kernel of a single run: one function with only local scalars.
 
-The code around its statements depends on the caller: a run on the processor, or one thread of a
-graphics processor per case.
+The code around its statements depends on the caller, which is a run on the processor, or one thread
+of a graphics processor for each case.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class Caller:
     Parameters
     ----------
     runtime, head
-        Beginning of the source, and the function's head.
+        First part of the source, and the function's head.
     begin
         Statements after the plan, which store the parameters in ``p``.
     stimulus, entry
@@ -60,7 +60,7 @@ class Caller:
     record
         Statements that record the outputs ``o``; ``count``: their number.
     pause, end
-        Statements at the beginning of a frame ``f``, for a pause after ``most`` tried parts of
+        Statements at the beginning of a frame ``f``, which pause after ``most`` attempted parts of
         substeps, and statements after the last frame.
     """
 
@@ -100,7 +100,7 @@ def emit_single(stages: Stages, caller: Caller = ONE_RUN) -> str:
     """Return the C source of the kernel for one run.
 
     The kernel computes values that depend only on parameters once, values that depend on a tick
-    once per frame, and all others in every substep.
+    once per frame, and all other values in every substep.
     """
     graph, level, layout = stages.graph, stages.level(), layout_of(stages)
 
@@ -224,14 +224,14 @@ def emit_single(stages: Stages, caller: Caller = ONE_RUN) -> str:
 
 
 def _mode_state(mode: Modes, name: Namer) -> list[str]:
-    """Return the declarations of values that depend only on the mode, and of an unknown mode."""
+    """Return the declarations of values that depend only on the mode, and of an invalid mode."""
     if not mode.atoms:
         return []
     return [*(f"double {name(n)} = 0.0;" for n in mode.values), "uint64_t mode = 0, fresh = 1;"]
 
 
 def _mode_change(mode: Modes, graph: Graph, name: Namer) -> list[str]:
-    """Return the statements that recompute these values when the mode has changed."""
+    """Return the statements that recompute these values after a change of the mode."""
     if not mode.atoms:
         return []
     bits = [f"(uint64_t){condition(graph, n, name)} << {k}" for k, n in enumerate(mode.atoms)]
@@ -246,7 +246,7 @@ def _mode_change(mode: Modes, graph: Graph, name: Namer) -> list[str]:
 
 
 def _entries(layout: Layout, caller: Caller) -> list[tuple[str, str]]:
-    """Return the name of each entry of the state vector, and its place in memory."""
+    """Return the name of each entry of the state vector, and its location in memory."""
     places = [
         (f"{kind}{k}", layout.start[kind] + k)
         for kind, count in layout.length.items()

@@ -1,8 +1,8 @@
-"""Kernel of a run with exact forward sensitivities: the value once, its tangents in lanes.
+"""Kernel of a run with exact forward sensitivities: scalar values, and their tangents in lanes.
 
-The instant at which a substep is cut depends on the parameters: v(t) = 0 determines t, and the
-lengths of the parts before and after it change with t. Derivatives therefore include the jump of
-the acceleration (saltation), with all computations before and after it.
+The time t of a substep's cut depends on the parameters, because v(t) = 0 determines t. The lengths
+of the parts before and after the cut change with t. Derivatives therefore include the jump of the
+acceleration (saltation), with all computations before and after the cut.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from bywire.simulation.stages import (
 )
 
 _LOCATED = """
-// Compute a part of length t with tangents along parameters, start and length, in lanes.
+// Compute a part of length t, with tangents for parameters, initial state and length in lanes.
 static APART void part_tangents(int lanes, const double *p, const double *c, double t,
     const double *m, const double *x, const double *d, const double *sp, const double *sm,
     const double *sx, const double *sd, const double *st, double *o, double *o_t) {
@@ -46,7 +46,7 @@ static APART void part_tangents(int lanes, const double *p, const double *c, dou
   }
 }
 
-// End a part of length t: add its flows to the sum of the substep h, and scale its increments and
+// End a part of length t: add its flows to the sum of the substep h, and scale the increments and
 // their jumps to the whole substep.
 static inline void part_ends(double t, double h, const double *moved, const double *end,
     double *o_t, double *sum) {
@@ -81,7 +81,7 @@ static APART int located_tangents(const double *p, const double *c, double h, co
     for (int k = 0; k < NX; ++k) guess[k] = last[k] * (t / h);
     for (int k = 0; k < NX * L; ++k) guess_t[k] = last_t[k] * (t / h);
     part_tangents(L, p, c, t, m, at, guess, sp, sm, at_t, guess_t, none, end, o_t);
-    // A separate lane along the length gives the change of the length in all other lanes.
+    // One separate lane for the length gives the change of the length in all other lanes.
     for (int k = 0; k < NX; ++k) guess_t[k * L] = last[k] / h;
     part_tangents(1, p, c, t, m, at, guess, none, none, none, guess_t, one, end, by);
     for (int l = 0; l < L; ++l) moved[l] = -o_t[turns * L + l] / by[turns * L];
@@ -171,7 +171,7 @@ SIGNATURE = """int64_t bw_run_tangents(const double *restrict p, double h, const
 
 
 class _Tangents:
-    """Sorted statements of every stage: first values, then nodes that differ between lanes."""
+    """Sorted statements of each stage: first values, then nodes that differ between lanes."""
 
     def __init__(self, stages: Stages) -> None:
         self.stages, self.graph, self.level = stages, stages.graph, stages.level()
@@ -188,8 +188,8 @@ class _Tangents:
         self.framed = [n for n in framed if self.level[n] == 1]
         hoisted = [n for n in (*self.once, *self.framed) if self.lane[n]]
         self.slot = {node: k for k, node in enumerate(hoisted)}
-        # Compilers do not vectorize nested selections by truth values that all lanes share. In the
-        # substep, each lane therefore has its own copy, as a number.
+        # Compilers do not vectorize nested selections with truth values that all lanes share. In
+        # the substep, each lane therefore has its own copy, stored as a number.
         operations = (self.graph.nodes[n] for n in self.block(self.pass_roots, 2) if self.lane[n])
         truths = [o.args[0] for o in operations if o.op in ("select", "if_else_zero")]
         self.truths = [n for n in dict.fromkeys(truths) if not self.lane[n]]
@@ -217,7 +217,7 @@ class _Tangents:
         return {"p": f"p[{index}]", "u": f"uk[{index}]"}.get(kind, f"{kind}{index}")
 
     def truth_lines(self) -> list[str]:
-        """Return the statements that store a substep's truth values for every lane."""
+        """Return the statements that store a substep's truth values for each lane."""
         if not self.truths:
             return []
         values = [as_number(self.graph, n, self.name) for n in self.truths]
@@ -240,14 +240,14 @@ class _Tangents:
         return lines
 
     def results(self, roots: Sequence[Node], prefix: str) -> list[str]:
-        """Return the declarations of results under separate names."""
+        """Return the declarations of results with separate names."""
         return [
             f"const double {prefix}{k} = {as_number(self.graph, n, self.name)};"
             for k, n in enumerate(roots)
         ]
 
     def block(self, roots: Sequence[Node], below: int) -> list[Node]:
-        """Return the nodes to compute for results, without those that are already hoisted."""
+        """Return the nodes to compute for results, without hoisted nodes."""
         return needed(self.graph, roots, lambda n: self.level[n] < below)
 
 

@@ -1,9 +1,10 @@
 """Programs and kernels of models, built once per structure, and the choice of the engine.
 
-To find a model's compiled kernel, a command would have to build, simplify and emit its whole graph
-again. Each command therefore caches the data that runs need next to the library: its name and
-digest, the layout of the state vector, and the Jacobians for checking the contacts. For kernels in
-lanes there is one entry for every selection of outputs. Everything else is built on demand.
+Without a cache, a command would have to build, simplify and emit the whole graph again to find a
+model's compiled kernel. Each command therefore caches the data for runs next to the library: the
+library's name and digest, the layout of the state vector, and the Jacobians for checking the
+contacts. For kernels in lanes, there is one entry for each selection of outputs. Everything else is
+built on demand.
 
 A stale entry would silently give wrong numbers. bywire therefore caches only kernels of its own
 models, whose files are all in `source_state`. A user's model may depend on unknown files, such as
@@ -72,13 +73,14 @@ class KeptKernel:
     Parameters
     ----------
     library
-        None if that command did not need a kernel for single runs; the model passed its checks.
+        File of the kernel. None if the model passed its checks, but needed no kernel for single
+        runs.
     compiler
-        Label of the compiler that compiled it.
+        Label of the compiler.
     jacobians
         ``Program.contact_jacobians``, serialized by CasADi; empty for lanes.
     digest
-        Digest of the kernel's C; empty for lanes.
+        Digest of the kernel's C code; empty for lanes.
     """
 
     layout: Layout
@@ -100,7 +102,8 @@ class Place:
     Parameters
     ----------
     file
-        File in the folder of compiled kernels, one per structure, so that files do not accumulate.
+        File in the folder of compiled kernels. There is one file per structure, so files do not
+        accumulate.
     state
         Digest of the sources.
     """
@@ -109,7 +112,7 @@ class Place:
     state: str
 
     def in_lanes(self, selection: tuple[int, ...], in_pairs: bool, ends: int) -> Place:
-        """Return the place of the kernel in lanes that records some outputs, by index."""
+        """Return the place of the kernel in lanes that records the outputs with these indices."""
         name = _digest(repr((self.file.name, selection, in_pairs, ends)))[:32]
         return Place(self.file.with_name(f"lanes-{name}.json"), self.state)
 
@@ -135,7 +138,7 @@ class Place:
             return None
 
     def keep(self, kernel: Keepable, contact_jacobians: Any = None, digest: str = "") -> None:
-        """Cache a kernel with its C code's digest, unless a file has changed since loading."""
+        """Cache a kernel and the digest of its C code, unless a source file has changed."""
         self._keep(
             contact_jacobians,
             {
@@ -184,13 +187,13 @@ def place_of(model: Model, structure: tuple[object, ...]) -> Place | None:
 
 
 def _running_state() -> str:
-    """Return the sources' digest if this process certainly runs them; otherwise an empty text."""
+    """Return the digest of the sources, or "" if this process may run other sources."""
     state = source_state()
     return state.digest if state.is_running else ""
 
 
 def _is_ours(kind: type) -> bool:
-    """Return whether a class and its bases in bywire are defined in their ``__module__``."""
+    """Return whether a class and all its bases in bywire are defined in their ``__module__``."""
     for base in kind.__mro__:
         if base.__module__.partition(".")[0] in ("builtins", "typing", "pydantic"):
             continue
@@ -209,7 +212,7 @@ def _types(value: object) -> list[type]:
 
 
 def _without_types(value: object) -> object:
-    """Return a structure without its classes, whose addresses are invalid in other processes."""
+    """Return a structure without classes, whose addresses are invalid in other processes."""
     if isinstance(value, tuple):
         return [_without_types(each) for each in value if not isinstance(each, type)]
     return value
@@ -237,7 +240,7 @@ _T = TypeVar("_T")
 
 
 def built_once(build: Callable[_P, _T]) -> Callable[_P, _T]:
-    """Return a function that builds once per arguments, while other threads wait for the result."""
+    """Return a function that builds once for each set of arguments; other threads wait for it."""
     cached = cache(build)
 
     @wraps(build)
@@ -249,7 +252,7 @@ def built_once(build: Callable[_P, _T]) -> Callable[_P, _T]:
 
 
 def engine_names() -> tuple[str, ...]:
-    """Return the names of all engines: the simulation's engines, then declared engines."""
+    """Return the names of all engines: built-in engines, then declared engines."""
     return ("auto", "compiled", "virtual-machine", CUDA, *declared_engines())
 
 
@@ -267,7 +270,7 @@ class Engine(Protocol):
         end: int,
         rows: NDArray[np.float64],
     ) -> None:
-        """Run frames begin..end in place."""
+        """Run the frames from begin to end in place."""
         ...
 
 
@@ -277,11 +280,11 @@ class Prepared:
     The program is built immediately, so an invalid model fails here. If an earlier command
     cached the kernel, the program is built on demand.
 
-    ``place``: place of this structure's cached kernels; None if they must not be cached.
+    ``place``: place of this structure's cached kernels; None if bywire must not cache them.
     """
 
     def __init__(self, model: Model, par: ParameterSet) -> None:
-        self.model = model  # kept alive while their addresses identify structures
+        self.model = model  # stays alive while its address identifies a structure
         self._par = par
         self._program: Program | None = None
         self._engines: dict[str, Engine] = {}
@@ -320,9 +323,9 @@ class Prepared:
 
     @property
     def digest(self) -> str:
-        """Digest of this structure's equations: the digest of its kernel's C code.
+        """Digest of this structure's equations, computed from its kernel's C code.
 
-        Comments, names and files of the Python source do not affect the C code.
+        Comments, names and file names in the Python source do not affect the C code.
         """
         with _LOCK:
             if not self._digest:
@@ -343,9 +346,9 @@ class Prepared:
         Parameters
         ----------
         kind
-            ``"compiled"``; ``"virtual-machine"``; ``"auto"``: compiled if there is a compiler,
-            otherwise the virtual machine, with a single warning; ``"cuda"``: a graphics processor;
-            or a declared engine (see `core.engines`).
+            ``"compiled"``, ``"virtual-machine"``, ``"cuda"`` (a graphics processor), or a declared
+            engine (see `core.engines`). ``"auto"`` selects the compiled engine if there is a
+            compiler. Otherwise, it selects the virtual machine, with a single warning.
 
         Raises
         ------
@@ -404,7 +407,7 @@ _PREPARED: dict[tuple[object, ...], Prepared] = {}
 
 
 def prepare(model: Model, par: ParameterSet) -> Prepared:
-    """Return program and kernels for a model's structure, whatever the numbers in ``par``."""
+    """Return program and kernels for a model's structure; they apply to any numbers in ``par``."""
     key = structure_of(model, par)
     with _LOCK:
         if key not in _PREPARED:
@@ -413,14 +416,14 @@ def prepare(model: Model, par: ParameterSet) -> Prepared:
 
 
 def structure_of(model: Model, par: ParameterSet) -> tuple[object, ...]:
-    """Return the key of a model's structure: type, own fields, choices."""
+    """Return the key of a model's structure: its type, its own fields, and the choices."""
     return (*_makeup(model), type(par), _in_order(tuple(par.choices().items())))
 
 
 def are_alike(model: Model, par: ParameterSet, like: Model, like_par: ParameterSet) -> bool:
     """Return whether two models have the same structure (`structure_of`), without computing keys.
 
-    This is fast: thousands of cases per second share the model and the choices.
+    This is fast, because thousands of cases per second share the model and the choices.
     """
     is_same = model is like or _makeup(model) == _makeup(like)
     return is_same and type(par) is type(like_par) and par.has_choices_of(like_par)
@@ -438,7 +441,7 @@ def _in_order(choices: tuple[tuple[str, Any], ...]) -> tuple[tuple[str, str], ..
 
 
 def _fingerprint(value: object) -> object:
-    """Return the key of a model's own value: its content or, failing that, its identity."""
+    """Return the key of a model's own value: its content if possible, otherwise its identity."""
     if isinstance(value, np.ndarray):
         return (value.shape, value.dtype.str, value.tobytes())
     if isinstance(value, (str, int, float, bool, type(None))):
@@ -449,13 +452,13 @@ def _fingerprint(value: object) -> object:
         return tuple((str(k), _fingerprint(v)) for k, v in value.items())
     if hasattr(value, "balance") and hasattr(value, "tasks"):  # a nested model
         return _makeup(cast(Model, value))
-    return Identity(id(value))  # kept alive by the model that Prepared holds
+    return Identity(id(value))  # stays alive with the model in Prepared
 
 
 @cache
 def _warn_once() -> None:
     warnings.warn(
-        "no C compiler: runs use the virtual machine, about 200 times slower; "
-        "install one, or the extra bywire[compiler]",
+        "no C compiler was found, so runs use the virtual machine, which is about 200 times "
+        "slower. Install a C compiler or the extra bywire[compiler]",
         stacklevel=2,
     )

@@ -1,7 +1,7 @@
 """Many cases of one model, side by side in lanes on all cores, or on a graphics processor.
 
 An ensemble varies parameters of one run. In a group of runs, each run also has its own initial
-values and stimulus, like the cases of a bench whose equilibrium or set point depends on the varied
+values and stimulus. An example is a bench whose equilibrium or set point depends on the varied
 parameters.
 """
 
@@ -46,15 +46,17 @@ from bywire.simulation.run import (
 )
 from bywire.simulation.schedule import COUNTERS, Schedule
 
-# Between the pieces of a run, progress is reported and interrupts are handled: largest number of
-# pieces, and smallest number of substeps per piece. A piece's overhead equals a hundred substeps.
+# Maximum number of intervals of a run, and minimum number of substeps per interval. Between
+# intervals, the run reports progress and handles interrupts, which takes as long as a hundred
+# substeps.
 _CHUNKS, _SUBSTEPS = 20, 20_000
 
 
 def fit_lanes(runs: Sequence[Run], engine: str = "auto") -> bool:
-    """Return whether runs can be computed side by side: a compiler, one structure, one plan.
+    """Return whether runs can be computed side by side.
 
-    ``engine``: see `bywire.simulation.ensemble.simulate_ensemble`.
+    This needs a compiler, one structure and one plan. ``engine``: see
+    `bywire.simulation.ensemble.simulate_ensemble`.
     """
     if not is_side_by_side(engine) or not runs:
         return False
@@ -80,13 +82,14 @@ class RunGroup(Sequence[Trajectory]):
         Signals, each contiguous over all runs, shape (signals, runs, rows). If runs have changes
         and the stored energy is recorded, the last signal is the work of the changes.
     names
-        Signals, in the order of the first axis.
+        Names of the signals, in the order of the first axis.
     vectors
         State vectors at the end, shape (entries, runs).
     kernel
         Kernel that computed them.
     ends, end_names
-        Signals recorded only in the first and last rows, shape (signals, runs, 2), and their names.
+        Signals that are recorded only in the first and last rows, shape (signals, runs, 2), and
+        their names.
     """
 
     runs: tuple[Run, ...]
@@ -140,25 +143,26 @@ def simulate_group(
     engine: str = "auto",
     ends: Sequence[str] = (),
 ) -> RunGroup:
-    """Compute runs that `fit_lanes`, each with its parameters, initial values and stimulus.
+    """Compute runs side by side, each with its own parameters, initial values and stimulus.
 
     Parameters
     ----------
     runs
-        Runs of one model, of one duration, step, recording interval and set of sample times.
+        Runs of one model with the same duration, step, recording interval and sample times; see
+        `fit_lanes`.
     signals
         Outputs to record. Default: all.
     threads
         Threads to use, >= 1. Default: one per core.
     progress
-        Called with the finished share, 0 to 1, from time to time.
+        Called periodically with the finished fraction, 0 to 1.
     first
-        Number of rows at the beginning that are not recorded, such as those of a settling time.
+        Number of initial rows that are not recorded, such as the rows of a settling phase.
     engine
-        ``auto`` and ``compiled``: in lanes; ``cuda``: on a graphics processor.
+        ``auto`` and ``compiled`` compute the runs in lanes, ``cuda`` on a graphics processor.
     ends
-        Additional outputs for which only the first and last recorded rows are needed. They need
-        runs without changes, in lanes.
+        Additional outputs to record only in the first and last rows. This requires runs in lanes
+        without changes.
 
     Raises
     ------
@@ -177,7 +181,7 @@ def simulate_group(
         raise not_valid("threads", str(threads), ">= 1")
     if not fit_lanes(runs, engine):
         raise ParameterError(
-            "these runs cannot be computed side by side: they need a C compiler and the same "
+            "these runs cannot be computed side by side. This requires a C compiler, and the same "
             "model, structure, duration, step, recording interval and sample times",
             name="runs",
         )
@@ -186,7 +190,8 @@ def simulate_group(
     wanted = names if signals is None else tuple(signals)
     if ends and (engine == CUDA or any(run.changes for run in runs)):
         raise ParameterError(
-            "runs with changes or on a graphics processor record all rows. Omit ends",
+            "ends is not available for runs with changes or on a graphics processor, which record "
+            "all rows. Omit ends",
             name="ends",
         )
     selection = tuple(selected(names, (*wanted, *ends)).tolist())
@@ -223,9 +228,9 @@ def simulate_group(
 
 
 def _edges(schedule: Schedule, first: int, runs: Sequence[Run]) -> list[int]:
-    """Return the frames at which a run's pieces begin and end.
+    """Return the frames at which the intervals of a run begin and end.
 
-    They include the first recorded row and the runs' changes.
+    They include the frame of the first recorded row and those of the runs' changes.
     """
     every = schedule.record_frames
     count = min(_CHUNKS, schedule.frames * schedule.substeps // _SUBSTEPS + 1)
@@ -236,7 +241,7 @@ def _edges(schedule: Schedule, first: int, runs: Sequence[Run]) -> list[int]:
 
 
 class _Watch:
-    """Progress of several threads."""
+    """Common progress of several threads."""
 
     def __init__(self, pieces: int, progress: Callable[[float], None] | None) -> None:
         self._pieces, self._done = pieces, 0
@@ -262,7 +267,7 @@ def _stimuli(group: Sequence[Run], schedule: Schedule, width: int) -> Array:
     )
     if not is_usual:
         for run in group:
-            sampled_stimulus(run, schedule)  # raises the error with the signal and the time
+            sampled_stimulus(run, schedule)  # raises an error with the signal and the time
     is_shared = all(np.array_equal(signals[0], other) for other in signals[1:])
     return (signals[0].T if is_shared else signals.transpose(2, 1, 0)).copy()
 
@@ -270,7 +275,7 @@ def _stimuli(group: Sequence[Run], schedule: Schedule, width: int) -> Array:
 class _Carried:
     """Runs that advance side by side.
 
-    ``jumping``: energies among the signals that jump at changes, by balance; see `energies`.
+    ``jumping``: the signals that are energies and jump at changes, by balance; see `energies`.
     """
 
     def __init__(
@@ -293,7 +298,7 @@ class _Carried:
     def to_the_end(
         self, values: Array, edges: Sequence[int], skipped: int, watch: _Watch, ends: Ends | None
     ) -> Array:
-        """Advance the runs to their end: fill ``values``, and return the state vectors."""
+        """Advance the runs to their end; fill ``values`` and return the state vectors."""
         schedule, every = self._schedule, self._schedule.record_frames
         silent = replace(schedule, record_frames=schedule.frames + 1)  # except for the first row
         for begin, end in pairwise(edges):
@@ -317,7 +322,7 @@ class _Carried:
         return self._vector
 
     def _change(self, begin: int, rows: Array) -> None:
-        """Set the parameters from a frame on, and record the work of the change."""
+        """Set the parameters that apply from a frame, and record the work of the change."""
         here = self._changes.get(begin, ())
         if not here:
             return
@@ -352,8 +357,8 @@ Variations = Mapping[str, Array | Sequence[float]]
 def case_matrix(run: Run, variations: Variations) -> Array:
     """Return the parameter vectors of all cases, shape (parameters, cases).
 
-    The function checks ranges for every value, rules within a group of parameters for every case,
-    and rules across groups at the extremes of each parameter.
+    The function checks the range of each value, the rules within a group of parameters for each
+    case, and the rules across groups at the extremes of each parameter.
 
     Raises
     ------
@@ -371,7 +376,7 @@ def case_matrix(run: Run, variations: Variations) -> Array:
     lengths = {name: array.size for name, array in arrays.items()}
     if not arrays or len(set(lengths.values())) != 1 or 0 in lengths.values():
         raise ParameterError(
-            f"variations must all have the same length >= 1, got {lengths}",
+            f"the lengths of variations are {lengths}, but all must be equal and >= 1",
             name="variations",
             value=str(lengths),
         )
@@ -394,12 +399,12 @@ def _check_extremes(run: Run, name: str, array: Array) -> None:
         changed = run.par.replace({name: value})
         if [task.period for task in run.model.tasks(changed)] != periods:
             raise ParameterError(
-                f"{name} is a sample time, which cannot vary within an ensemble", name=name
+                f"{name} is a sample time, which an ensemble cannot vary", name=name
             )
 
 
 def _check_group(par: ParameterSet, group: str, arrays: Mapping[str, Array], count: int) -> None:
-    """Check the rules between the parameters of a group, if it has any, for every case."""
+    """Check the rules between the parameters of a group, if any, for each case."""
     node: Any = getattr(par, group)
     varied = {
         name.partition(".")[2]: v for name, v in arrays.items() if name.startswith(f"{group}.")
@@ -433,10 +438,10 @@ class Ensemble:
     time, values
         Shapes (rows,) and (cases, rows, signals).
     names
-        Signals, in the order of the last axis.
+        Names of the signals, in the order of the last axis.
     unsettled, repeated
-        Number of substeps per case that hit the cap, and that took more than one pass; shape
-        (cases,).
+        Number of substeps per case that reached the iteration limit, and that took more than one
+        pass, shape (cases,).
     """
 
     time: Array
@@ -465,16 +470,16 @@ def simulate_ensemble(
     run
         Model, parameters, initial values, stimulus, steps.
     variations
-        Dotted name of a parameter -> its value in each case, shape (cases,). Other parameters keep
-        their values. Sample times cannot vary. All cases start from the state and memory of
-        ``run``. If a varied parameter moves the equilibrium, let the run settle first.
+        Values of each varied parameter by dotted name, shape (cases,). Other parameters keep their
+        values. Sample times cannot vary. All cases start from the state and memory of ``run``. If a
+        varied parameter moves the equilibrium, let the run settle first.
     signals
         Outputs to record.
     threads
         Threads to use, >= 1. Default: one per core.
     engine
-        ``auto`` and ``compiled`` compute cases side by side in lanes, ``cuda`` on a graphics
-        processor with a thread per case. Other engines, and ``auto`` without a compiler, compute
+        ``auto`` and ``compiled`` compute the cases side by side in lanes, ``cuda`` on a graphics
+        processor with one thread per case. Other engines, and ``auto`` without a compiler, compute
         the cases one by one.
 
     Returns
@@ -513,7 +518,7 @@ def simulate_ensemble(
     def group(first: int) -> None:
         cases = np.arange(first, first + kernel.lanes)
         vector = np.repeat(start[:, None], kernel.lanes, axis=1)
-        # Lanes beyond the last case repeat it.
+        # Lanes beyond the last case repeat this case.
         columns = np.ascontiguousarray(matrix[:, np.minimum(cases, count - 1)])
         rows = values[cases[0] : cases[-1] + 1]
         kernel.advance(schedule, columns, stimulus, vector, rows, schedule.frames)
@@ -536,7 +541,7 @@ def simulate_ensemble(
 def _one_by_one(
     run: Run, variations: Variations, signals: tuple[str, ...], engine: str
 ) -> Ensemble:
-    """Compute the cases one by one, for engines without lanes, or without a compiler."""
+    """Compute the cases one by one, for engines without lanes or without a compiler."""
     arrays = {name: np.atleast_1d(values) for name, values in variations.items()}
     count = next(iter(arrays.values())).size
     runs = [

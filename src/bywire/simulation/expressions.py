@@ -1,4 +1,4 @@
-"""C text of single operations, for scalars and for vectors, and the order of computation."""
+"""C text of single operations for scalars and vectors, and the order of computation."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ Namer = Callable[[Node], str]
 _INFIX = {"add": "+", "sub": "-", "mul": "*"}
 _LIBRARY = ("sqrt", "fabs", "floor", "ceil", "tan", "atan", "tanh", "copysign")
 OWN = frozenset({"exp", "log", "sin", "cos"})
-COSTLY = OWN | {"pow", "constpow"}  # costly enough for a branch around them
-EXPONENT_RANGE = 708.0  # range of the exponential's argument below zero
+COSTLY = OWN | {"pow", "constpow"}  # operations that justify a branch
+EXPONENT_RANGE = 708.0  # maximum magnitude of a negative argument of the exponential
 
 
 @dataclass(frozen=True)
 class Dialect:
-    """Dialect of C for operations that are not arithmetic.
+    """C dialect for operations other than arithmetic.
 
     Parameters
     ----------
@@ -27,10 +27,10 @@ class Dialect:
     select, compare, both, either, negation, extreme, inverse
         Format strings of selections, comparisons, truth values, maxima and reciprocals.
     exp_where, exp_decayed
-        Format strings of "c ? exp(a) : 0" as a single operation: in general, and if c implies that
-        a, which is <= 0, is within the function's range.
+        Format strings of "c ? exp(a) : 0" as a single operation, in general and for the case that c
+        implies an argument a <= 0 within the function's range.
     kept
-        Condition of a truth value that is stored as a number; empty if it is not.
+        Condition for a truth value that is stored as a number; empty for other truth values.
     """
 
     calls: dict[str, str]
@@ -91,9 +91,9 @@ VECTOR_C = Dialect(
 
 
 def needed(graph: Graph, roots: Iterable[Node], stop: Callable[[Node], bool]) -> list[Node]:
-    """Return the operations that the roots need, arguments first, down to given nodes.
+    """Return the operations that the roots need, arguments first, down to nodes that are excluded.
 
-    The argument that needs the most registers comes first, which keeps lifetimes of values short
+    The argument that needs the most registers comes first. This keeps the lifetimes of values short
     (Sethi and Ullman, Journal of the ACM 17, 1970).
     """
     order: list[Node] = []
@@ -101,7 +101,7 @@ def needed(graph: Graph, roots: Iterable[Node], stop: Callable[[Node], bool]) ->
     stack = list(roots)[::-1]
     while stack:
         node = stack.pop()
-        if node < 0:  # all its arguments are in the order
+        if node < 0:  # all arguments of this node are already in the order
             order.append(~node)
             continue
         if node in seen:
@@ -115,7 +115,7 @@ def needed(graph: Graph, roots: Iterable[Node], stop: Callable[[Node], bool]) ->
 
 
 def text(graph: Graph, node: Node, name: Namer, dialect: Dialect = PLAIN_C) -> str:
-    """Return an operation's C expression; ``name`` returns an argument's."""
+    """Return the C expression of an operation; ``name`` returns the text of an argument."""
     operation = graph.nodes[node]
     op = operation.op
 
@@ -142,7 +142,7 @@ def text(graph: Graph, node: Node, name: Namer, dialect: Dialect = PLAIN_C) -> s
             b=number(other[0]) if other else dialect.zero,
         )
     if op in dialect.extreme:
-        # Constants come second, so compilers use the processor's own maximum.
+        # A constant comes second, so that compilers use the processor's maximum instruction.
         ordered = sorted(operation.args, key=lambda x: graph.nodes[x].op == "const")
         a, b = (number(x) for x in ordered)
         return dialect.extreme[op].format(a=a, b=b)
@@ -150,7 +150,7 @@ def text(graph: Graph, node: Node, name: Namer, dialect: Dialect = PLAIN_C) -> s
 
 
 def _decayed(graph: Graph, truth: Node, argument: Node) -> bool:
-    """Return whether ``truth`` is -argument < b with b within the exponential's range, 0 below."""
+    """Return whether ``truth`` is -argument < b, where b is within the exponential's range."""
     compared, operation = graph.nodes[truth], graph.nodes[argument]
     if compared.op != "lt" or operation.op != "neg" or not graph.intervals[argument].negative:
         return False
@@ -160,7 +160,7 @@ def _decayed(graph: Graph, truth: Node, argument: Node) -> bool:
 
 
 def as_number(graph: Graph, node: Node, name: Namer, dialect: Dialect = PLAIN_C) -> str:
-    """Return the C text of a value, 1 or 0 for a truth value."""
+    """Return the C text of a value as a number; a truth value becomes 1 or 0."""
     if not graph.is_boolean(node):
         return name(node)
     chosen = dialect.select.format(
@@ -170,7 +170,7 @@ def as_number(graph: Graph, node: Node, name: Namer, dialect: Dialect = PLAIN_C)
 
 
 def condition(graph: Graph, node: Node, name: Namer, dialect: Dialect = PLAIN_C) -> str:
-    """Return the C condition of a node, true where it is not zero."""
+    """Return the C condition that a node is not zero."""
     operation = graph.nodes[node]
     op = operation.op
     if kept := dialect.kept(node):

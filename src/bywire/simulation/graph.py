@@ -1,8 +1,8 @@
-"""Expression graph shared by all stages of a kernel: every value once, divisions as products.
+"""Expression graph of all stages of a kernel, with each value only once and without divisions.
 
-The input is CasADi's instruction lists. The graph merges common subexpressions across stages and
-folds constants. It turns a/b into a times a reciprocal that others can share, and merges paired
-selections.
+The input consists of CasADi's instruction lists. The graph merges common subexpressions across
+stages and folds constants. It turns a/b into a product with a reciprocal, which other expressions
+can share, and merges paired selections.
 """
 
 from __future__ import annotations
@@ -21,18 +21,18 @@ COMMUTATIVE = frozenset({"add", "mul", "eq", "ne", "and", "or", "fmin", "fmax"})
 
 
 class Operation(NamedTuple):
-    """Node: a leaf (``args`` = kind and index), a constant, or an operation on nodes."""
+    """Node: a leaf (``args``: kind and index), a constant, or an operation on nodes."""
 
     op: str
     args: tuple[Any, ...]
 
 
-# --- Signs: values that cannot be negative, according to parameter ranges
+# --- Signs: values that cannot be negative because of parameter ranges
 
 
 @dataclass(frozen=True)
 class Interval:
-    """Closed interval that contains a value."""
+    """Closed interval of a value."""
 
     low: float = -math.inf
     high: float = math.inf
@@ -53,10 +53,10 @@ NOT_NEGATIVE = Interval(0.0)
 
 
 def interval_of(op: str, arguments: list[Interval]) -> Interval:
-    """Return an interval for an operation's result; infinite if no bound is known.
+    """Return the interval of an operation's result; infinite if no bound is known.
 
-    Only the signs of the bounds matter. Rounding never changes the sign of a sum whose exact bound
-    is zero.
+    Only the signs of the bounds matter. Rounding never changes the sign of a sum with an exact
+    bound of zero.
     """
     rule = _RULES.get(op)
     return ANYTHING if rule is None else rule(*arguments)
@@ -98,7 +98,7 @@ _RULES: dict[str, Callable[..., Interval]] = {
 }
 
 
-# --- Simplifications: one rule per operation, the simpler node or None
+# --- Simplifications: one rule per operation, which returns the simpler node or None
 
 
 def _assign(graph: Graph, a: Node) -> Node:
@@ -150,7 +150,7 @@ def _add(graph: Graph, a: Node, b: Node) -> Node | None:
 
 
 def _gathered(graph: Graph, op: str, a: Node, b: Node) -> Node | None:
-    """Turn a + (b + x) into (a + b) + x if a and b are fixed and x is not; likewise a b x."""
+    """Turn a + (b + x) into (a + b) + x if a and b are fixed and x is not; same for a b x."""
     for fixed, other in ((a, b), (b, a)):
         inner = graph.nodes[other]
         if not graph.fixed[fixed] or graph.fixed[other] or inner.op != op:
@@ -204,7 +204,7 @@ def _mul(graph: Graph, a: Node, b: Node) -> Node | None:
 
 
 def _of_a_tie(graph: Graph, a: Node, b: Node) -> Node | None:
-    """Turn (x <= y)/((x <= y) + (y <= x)) into 0, 1/2 or 1: slopes of extremes need no division."""
+    """Turn (x <= y)/((x <= y) + (y <= x)), a slope of an extreme, into 0, 1/2 or 1."""
     for factor, other in ((a, b), (b, a)):
         if graph.nodes[factor].op != "le" or graph.nodes[other].op != "inv":
             continue
@@ -278,8 +278,8 @@ def _if_else_zero(graph: Graph, c: Node, a: Node) -> Node | None:
         return graph.constant(0.0)
     operation = graph.nodes[a]
     if operation.op == "mul":
-        # c ? k exp(x) : 0 equals k (c ? exp(x) : 0), whose selection can be shared or become a
-        # branch.
+        # c ? k exp(x) : 0 equals k (c ? exp(x) : 0). Other expressions can share the second
+        # selection, or it can become a branch.
         for factor, costly in (operation.args, operation.args[::-1]):
             if graph.nodes[costly].op == "exp":
                 return graph.apply("mul", factor, graph.apply("if_else_zero", c, costly))
@@ -378,11 +378,11 @@ class Graph:
     ranges
         Ranges of leaves, by kind and index. The graph drops limits that a value cannot reach.
     fixed_leaves
-        Kinds of leaves that change rarely. Values that depend only on these are grouped:
-        a + (b + x) becomes (a + b) + x, so a + b is also computed rarely.
+        Kinds of leaves that change rarely. The graph groups values that depend only on these
+        leaves: a + (b + x) becomes (a + b) + x, so a + b is also computed rarely.
     operands, registers
-        For every node: its arguments, with the one that needs the most registers last, and the
-        number of registers if these are computed first.
+        For each node, its arguments in an order where the argument that needs the most registers is
+        last, and the number of registers if this argument is computed first.
     """
 
     ranges: Mapping[tuple[str, int], Interval] = field(default_factory=dict)
@@ -400,7 +400,7 @@ class Graph:
 
     def constant(self, value: float) -> Node:
         """Return the node of a number."""
-        # repr distinguishes 0.0 and -0.0; dict keys would not.
+        # repr distinguishes 0.0 and -0.0. A number as a key would not.
         return self.intern(Operation("const", (repr(float(value)),)))
 
     def add_function(self, function: Any, inputs: Sequence[Sequence[Node]]) -> list[list[Node]]:
@@ -436,7 +436,7 @@ class Graph:
         return results
 
     def apply(self, op: str, *args: Node) -> Node:
-        """Return the node of an operation, simplified."""
+        """Return the simplified node of an operation."""
         if op in _FOLD and all(self.nodes[a].op == "const" for a in args):
             folded = self._folded(op, [self.value(a) for a in args])
             if folded is not None:
@@ -460,7 +460,7 @@ class Graph:
         return () if operation.op in ("leaf", "const") else operation.args
 
     def read_by(self, roots: Iterable[Node]) -> frozenset[Node]:
-        """Return all nodes, including leaves and constants, on which values depend."""
+        """Return all nodes on which values depend, including leaves and constants."""
         seen: set[Node] = set()
         stack = list(roots)
         while stack:
@@ -471,7 +471,7 @@ class Graph:
         return frozenset(seen)
 
     def intern(self, operation: Operation) -> Node:
-        """Return the node of an operation, not simplified."""
+        """Return the node of an operation without simplification."""
         known = self._known.get(operation)
         if known is None:
             known = len(self.nodes)
@@ -498,7 +498,7 @@ class Graph:
         return interval_of(operation.op, [self.intervals[a] for a in operation.args])
 
     def value(self, node: Node) -> float | None:
-        """Return the number of a constant node; None for others."""
+        """Return the number of a constant node; None for any other node."""
         operation = self.nodes[node]
         return float(operation.args[0]) if operation.op == "const" else None
 
@@ -506,21 +506,21 @@ class Graph:
         try:
             value = _FOLD[op](*values)
         except (ArithmeticError, ValueError):
-            return None  # the run reports it
+            return None  # the run reports the error
         return self.constant(value)
 
 
-# --- Test whether a number that cannot be negative is above zero, without computing it
-# A pass's flag is the maximum of several violations: gaps, distances beyond the ends of tables,
-# products of speeds before and after. A kernel only tests whether the flag is above zero. It uses
-# comparisons, which are independent of each other, in place of differences and maxima.
+# --- Test whether a nonnegative number is above zero, without computing the number
+# A pass's flag is the maximum of several violations: gaps, distances beyond the ends of tables, and
+# products of velocities before and after. A kernel only tests whether the flag is above zero. It
+# uses independent comparisons instead of differences and maxima.
 
 
 def raised(graph: Graph, node: Node) -> Node:
     """Return the truth value of ``node > 0``, or of ``node != 0`` if it may be negative.
 
-    A difference is above zero exactly if its first term is larger, since tiny differences do not
-    underflow to zero.
+    A difference is above zero if and only if its first term is larger, because tiny differences do
+    not underflow to zero.
     """
     if not graph.intervals[node].positive:
         return graph.apply("ne", node, graph.constant(0.0))

@@ -1,4 +1,4 @@
-"""Compiled kernels and CasADi functions, called through raw pointers and buffers."""
+"""Compiled kernels and CasADi functions, called with raw pointers and buffers."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from bywire.simulation.program import Program
 
 CHUNK = 50_000
-"""substeps per call of a kernel, which take tens of milliseconds"""
+"""substeps per call of a kernel; a call takes tens of milliseconds"""
 
 _COMMENT = re.compile(r"/\*.*?\*/|//[^\n]*", re.S)
 
@@ -64,7 +64,7 @@ class Ends:
 
 
 def plan_array(schedule: Schedule, begin: int, end: int, selected: int) -> NDArray[np.int64]:
-    """Return the kernel's plan for frames begin..end, with the last row at the run's end."""
+    """Return the kernel's plan for the frames from begin to end, with the row at the run's end."""
     return np.array(
         [
             begin,
@@ -88,20 +88,20 @@ def run_in_calls(
     call: Callable[[int, int, int], int],
     most: int = CHUNK,
 ) -> None:
-    """Run frames begin..end in calls of a kernel, with a check for interrupts between them.
+    """Run the frames from begin to end in several calls, with a check for interrupts in between.
 
     Parameters
     ----------
     call
-        ``call(first, last, row)`` runs frames, writes rows from ``row`` on, and returns the frame
-        that it reached, which may be before ``last``.
+        ``call(first, last, row)`` runs frames, writes rows starting at ``row``, and returns the
+        frame that it reached, which may be before ``last``.
     most
-        Substeps of a call; a longer frame is a single call.
+        Maximum number of substeps per call. A longer frame is a single call.
 
     Raises
     ------
     KeyboardInterrupt
-        When interrupted, or stopped in a thread.
+        When the user interrupts the run, or stops it in a thread.
     """
     every, size = schedule.record_frames, max(most // schedule.substeps, 1)
     at = begin
@@ -120,7 +120,7 @@ def pointer(array: NDArray[Any]) -> ctypes.c_void_p:
 
 
 def text_digest(text: str) -> str:
-    """Return the digest of a kernel's C without comments."""
+    """Return the digest of a kernel's C code without comments."""
     return hashlib.sha256(_COMMENT.sub("", text).encode()).hexdigest()
 
 
@@ -128,7 +128,7 @@ class SingleKernel:
     """Compiled kernel for one run."""
 
     ENTRY = "bw_run"
-    """its function in the library"""
+    """name of the kernel's function in the library"""
 
     def __init__(self, layout: Layout, library: Path, compiler: Compiler, digest: str = "") -> None:
         self.layout, self.library, self.compiler = layout, library, compiler
@@ -149,7 +149,7 @@ class SingleKernel:
         return cls(layout_of(stages), library, compiler, text_digest(text))
 
     def advance(self, request: Request, state: Array, begin: int, end: int, rows: Array) -> None:
-        """Run frames begin..end: update ``state`` and fill ``rows`` in place.
+        """Run the frames from begin to end; update ``state`` and fill ``rows`` in place.
 
         Parameters
         ----------
@@ -180,7 +180,7 @@ class SingleKernel:
 
 
 class BufferedCall:
-    """Function for a large number of calls by one caller at a time.
+    """Function for many calls by one caller at a time.
 
     Parameters
     ----------
@@ -198,7 +198,7 @@ class BufferedCall:
             self._buffer.set_res(k, memoryview(array.data))
 
     def __call__(self, *arguments: Array) -> list[Array]:
-        """Return the results, column by column; the next call overwrites them."""
+        """Return the results, column by column. The next call overwrites them."""
         for own, given in zip(self._inputs, arguments, strict=True):
             own[:] = given
         self._trigger()

@@ -1,4 +1,4 @@
-"""Symbolic functions of a model, from which kernels are emitted; the virtual machine runs them."""
+"""Symbolic functions of a model, for the generation of kernels and for the virtual machine."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ def check_model(model: Model, par: ParameterSet) -> None:
     Raises
     ------
     ModelError
-        When a part is invalid, with the model, the part, and the valid shape.
+        When a part is invalid. The message contains the model, the part, and the valid shape.
     """
     for part in ("State", "Memory", "Stimulus", "Flow", "Output"):
         _annotated(model, part)
     require_states(model)
     if not model.tasks(par):
         raise ModelError(
-            f"{model.name}: tasks returns none, but at least one task must sample the stimulus: "
-            "Task('source', period, lambda x, m, u, par: Memory(...))",
+            f"{model.name}: tasks returns no task, but at least one task must sample the stimulus. "
+            "Add Task('source', period, lambda x, m, u, par: Memory(...))",
             name="tasks",
             valid="at least one task",
         )
@@ -63,8 +63,8 @@ def _check_equations(model: Model, par: ParameterSet) -> None:
     gaps = _evaluated(model, "gap", x, x, symbolic)
     if [len(g) for g in gaps] != sizes:
         raise ModelError(
-            f"{model.name}: gap has groups of {[len(g) for g in gaps]} overlaps, but compliance "
-            f"has groups of {sizes}: they must match",
+            f"{model.name}: gap returns groups of {[len(g) for g in gaps]} overlaps, but "
+            f"compliance returns groups of {sizes}. The sizes must match",
             name="gap",
             value=str([len(g) for g in gaps]),
             valid=str(sizes),
@@ -72,14 +72,14 @@ def _check_equations(model: Model, par: ParameterSet) -> None:
     bounds = _evaluated(model, "bounds", x, x, m, symbolic, contact)
     _sized(model, "bounds", bounds, len(model.frictions), "one (low, high) per friction")
     for pair in bounds:
-        _sized(model, "bounds", pair, 2, "pairs (low, high); mind the comma in ((low, high),)")
+        _sized(model, "bounds", pair, 2, "pairs (low, high); check the comma in ((low, high),)")
 
 
 def _evaluated(model: Model, part: str, *arguments: Any) -> Any:
     try:
         value = getattr(model, part)(*arguments)
-        if _holds_nan(value):  # raised by math.exp and similar functions of a symbol
-            raise TypeError("a symbol was turned into a number")
+        if _holds_nan(value):  # caused by math.exp and similar functions of a symbol
+            raise TypeError("a symbol was converted to a number")
         return value
     except (AttributeError, NotImplementedError, RuntimeError, TypeError) as error:
         reason = str(error).splitlines()[-1] if str(error) else type(error).__name__
@@ -105,7 +105,8 @@ def _sized(model: Model, part: str, value: Any, count: int, meaning: str) -> Non
     length = value.shape[0] if isinstance(value, ca.SX) else len(value) if value is not None else -1
     if length != count:
         raise ModelError(
-            f"{model.name}: {part} returns {max(length, 0)} values: expected {count} ({meaning})",
+            f"{model.name}: {part} returns {max(length, 0)} values, but must return {count} "
+            f"({meaning})",
             name=part,
             value=str(max(length, 0)),
             valid=str(count),
@@ -135,15 +136,16 @@ class Program:
     Parameters
     ----------
     parameter_ranges
-        Names in the order of the parameter vector, each with its valid range.
+        Names in the order of the parameter vector, with their valid ranges.
     contact_jacobians
         ``(x, m, p)`` -> Jacobians of dx/dt; see ``contacts.contact_jacobians``.
     fast, exact
-        ``(x, d, m, p, h) -> (x, d, reaction, flow, jump, flag, doubt)``, see ``scheme.Pass``; the
+        ``(x, d, m, p, h) -> (x, d, reaction, flow, jump, flag, doubt)``; see ``scheme.Pass``. The
         flag is raised if the pass is in doubt or a velocity reverses.
     before, after
         The exact pass in two parts: ``(x, d, m, p, h) -> (S, c, low, high)``, row by row, and
-        ``(x, d, m, p, h, w, force, failed)`` -> results, with the solution of that problem.
+        ``(x, d, m, p, h, w, force, failed)`` -> results, where the last three arguments are the
+        solution of the problem.
     ticks
         One ``(x, m, u, p) -> m`` per task.
     output
@@ -191,7 +193,7 @@ def build_program(model: Model, par: ParameterSet) -> Program:
     model
         The system.
     par
-        Any parameter set with the structure; its numbers become arguments.
+        Any parameter set with the required structure. Its numbers become arguments.
     """
     check_model(model, par)
     names = tuple(par.leaves())
@@ -266,7 +268,7 @@ def _pass_function(name: str, s: Symbols, result: Pass, further: Sequence[Any] =
 
 
 def _halves(s: Symbols, exact: Pass) -> tuple[Any, Any]:
-    """Return the functions before and after the solution of the set-valued forces."""
+    """Return the functions before and after the solution for the set-valued forces."""
     problem = exact.problem
     assert problem is not None
     found = problem.solution

@@ -1,8 +1,8 @@
 """Integrals of powers: a few running sums in the substep, combined once per frame.
 
-A rate such as the copper loss R i^2 is a coefficient that is constant within a frame, times a
-product that is not. The substep sums the products (i^2, i omega, omega^2, ...), which several rates
-share. At the end of a frame, the sums are multiplied by the coefficients.
+A rate such as the copper loss R i^2 consists of a coefficient that is constant within a frame, and
+a product that is not. The substep sums the products (i^2, i omega, omega^2, ...), which several
+rates share. At the end of a frame, the kernel multiplies the sums by the coefficients.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from bywire.simulation.graph import Graph, Node
 
 Terms = dict[Node | None, Node]  # product (None: the number one) -> coefficient
-_MOST = 4  # largest number of terms of an expanded product
+_MOST = 4  # maximum number of terms of an expanded product
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class Quadrature:
     Parameters
     ----------
     products
-        Nodes that every substep adds up.
+        Nodes that each substep adds to the sums.
     combinations
         Pairs of a coefficient and the index of its product, for each integral.
     """
@@ -33,7 +33,7 @@ class Quadrature:
     combinations: list[list[tuple[Node, int]]]
 
     def of(self, needed: Sequence[bool]) -> Quadrature:
-        """Return the sums for some integrals; the other integrals stay unchanged."""
+        """Return the sums for some of the integrals; the other integrals stay unchanged."""
         chosen = [
             pairs if is_needed else []
             for pairs, is_needed in zip(self.combinations, needed, strict=True)
@@ -55,7 +55,7 @@ def factored(
     rates
         Nodes of the rates.
     computed
-        Nodes that the substep computes anyway; such sums are not expanded.
+        Nodes that the substep computes anyway. Such sums are not expanded.
     level
         How often each node changes, see ``stages.LEVEL``.
     """
@@ -76,7 +76,7 @@ def factored(
 
 
 def collapsed(graph: Graph, roots: Sequence[Node], level: Levels) -> list[Node]:
-    """Return the same values, each as a sum of coefficients times values if that is shorter."""
+    """Return the same values, written as sums of coefficients times values if this is shorter."""
     new = list(roots)
     needs = [_moving(graph, [root], level) for root in roots]
     users = Counter(node for each in needs for node in each)
@@ -84,7 +84,7 @@ def collapsed(graph: Graph, roots: Sequence[Node], level: Levels) -> list[Node]:
         users.subtract(needs[k])
         for node in needs[k]:
             if not users[node]:
-                del users[node]  # the other roots compute the rest
+                del users[node]  # other roots compute the remaining nodes
         if root not in users:
             alone = len(needs[k] - users.keys())
             terms = _Expansion(graph, users, level).terms(root)
@@ -152,7 +152,7 @@ class Levels:
 
 
 class _Expansion:
-    """Rates as sums of coefficient times product."""
+    """Expansion of rates into sums of coefficients times products."""
 
     def __init__(self, graph: Graph, computed: Collection[Node], level: Levels) -> None:
         self._graph, self._computed, self._level = graph, computed, level
@@ -178,7 +178,7 @@ class _Expansion:
         return {node: self._one}
 
     def _separated(self, product: Node) -> Terms:
-        """Return a product as its rarely changing factors times the rest."""
+        """Return a product as its rarely changing factors times the remaining factors."""
         graph, coefficient, rest = self._graph, self._one, self._one
         stack = [product]
         while stack:

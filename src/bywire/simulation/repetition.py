@@ -1,4 +1,4 @@
-"""Periodic excitation: the same window, repeated until the response repeats itself."""
+"""Periodic excitation: the same window again and again until the response repeats."""
 
 from __future__ import annotations
 
@@ -23,13 +23,12 @@ from bywire.simulation.run import Run, initial_vector, selected
 from bywire.simulation.schedule import Layout, Schedule
 
 Stimuli = Callable[[NDArray[np.int64], int, int], Array]
-"""``stimuli(cases, first, last)``: these rows of some cases, shape (cases, last - first, nu)"""
+"""``stimuli(cases, first, last)``: these stimulus rows of some cases, (cases, last - first, nu)"""
 Advance = Callable[[Array, Array, Array, Array, int], None]
-"""``advance(parameters, stimulus, vectors, rows, frames)``: all tasks run at the first instant"""
+"""``advance(parameters, stimulus, vectors, rows, frames)``: all tasks tick in the first frame"""
 
 CHUNK = 10_000
-"""substeps between checks for an interrupt: tens of milliseconds with a compiler, a second
-without"""
+"""substeps between checks for interrupts: tens of milliseconds with a compiler, a second without"""
 
 
 def advance_window(
@@ -40,9 +39,9 @@ def advance_window(
     vector: Array,
     values: Array,
 ) -> None:
-    """Run one window in parts to save memory; update vector and values in place."""
+    """Run one window in parts, which saves memory; update vector and values in place."""
     every, held = schedule.record_frames, schedule.stimulus_frames
-    # All tasks run at the beginning of a part, as at the beginning of a run.
+    # All tasks tick at the beginning of a part, as at the beginning of a run.
     common = math.lcm(every, *schedule.task_frames)
     size = max(CHUNK // (schedule.substeps * common), 1) * common
     for first in range(0, schedule.frames, size):
@@ -53,7 +52,7 @@ def advance_window(
 
 
 def given_rows(stimuli: Array | Stimuli, count: int, schedule: Schedule) -> Stimuli:
-    """Return a function for rows of the stimulus, which are stored or computed.
+    """Return a function for stimulus rows, which are stored or computed on demand.
 
     Raises
     ------
@@ -69,7 +68,7 @@ def given_rows(stimuli: Array | Stimuli, count: int, schedule: Schedule) -> Stim
 
 
 def one_by_one(run: Run, schedule: Schedule, selection: NDArray[np.int32]) -> Advance:
-    """Advance cases without a compiler: one lane, slowly."""
+    """Return a slow function that advances one case at a time, without a compiler."""
     engine = prepare(run.model, run.par).engine("auto")
 
     def advance(p: Array, u: Array, vector: Array, values: Array, frames: int) -> None:
@@ -82,11 +81,11 @@ def one_by_one(run: Run, schedule: Schedule, selection: NDArray[np.int32]) -> Ad
     return advance
 
 
-# --- Cases that share the lanes: when a case has ended, the next case starts in its lane
+# --- Cases in lanes: when a case has ended, the next case starts in its lane
 
 
 class Lanes:
-    """Cases side by side, window after window.
+    """Cases that run side by side, window after window.
 
     Parameters
     ----------
@@ -95,7 +94,7 @@ class Lanes:
     width
         Number of lanes.
     matrix, starts
-        Parameters and state vectors of all cases at their start, shapes (parameters, cases) and
+        Parameters and initial state vectors of all cases, shapes (parameters, cases) and
         (entries, cases).
 
     Attributes
@@ -105,8 +104,8 @@ class Lanes:
     case
         Index of the case in each lane, shape (lanes,).
     seen
-        Figures of all windows, by lane with an unfinished case. Other lanes also run, since vectors
-        have a fixed length, but their results are not used.
+        Figures of all windows for each lane with an unfinished case. Other lanes also run, because
+        vectors have a fixed length, but their results are ignored.
     """
 
     def __init__(self, queue: deque[int], width: int, matrix: Array, starts: Array) -> None:
@@ -120,7 +119,7 @@ class Lanes:
                 self._load(lane, int(self.case[0]))
 
     def passed(self, figures: Complex, tolerance: float, most: int) -> dict[int, bool]:
-        """Add a window's figures; return the lanes with ended cases, and whether each repeats.
+        """Add a window's figures; return the lanes whose case has ended, and whether it repeats.
 
         Parameters
         ----------
@@ -145,7 +144,7 @@ class Lanes:
     def _took(self, lane: int) -> bool:
         try:
             self._load(lane, self._queue.popleft())
-        except IndexError:  # another thread may have taken the last one
+        except IndexError:  # another thread may have taken the last case
             return False
         self.seen[lane] = []
         return True
@@ -156,7 +155,7 @@ class Lanes:
 
 
 def _same(before: Complex, now: Complex, tolerance: float) -> bool:
-    """Return whether a window repeats the previous one; constant signals repeat."""
+    """Return whether a window repeats the previous window; constant signals repeat."""
     return bool(np.linalg.norm(now - before) <= tolerance * np.linalg.norm(now))
 
 
@@ -165,20 +164,20 @@ def _same(before: Complex, now: Complex, tolerance: float) -> bool:
 Figures = Callable[[Array], Complex]
 
 KEPT = 8
-"""number of last windows whose figures are stored"""
+"""number of last windows for which figures are stored"""
 
 
 @dataclass(frozen=True)
 class Repeated:
-    """Last window of every case.
+    """Last window of each case.
 
     Parameters
     ----------
     time, values
-        Shapes (rows,) and (cases, rows, signals); the window's end is not among the rows.
+        Shapes (rows,) and (cases, rows, signals), without a row at the window's end.
     figures
-        Compared figures of the last `KEPT` windows, shape (cases, KEPT, n). If a case had fewer
-        windows, the first entries are NaN.
+        Figures of the last `KEPT` windows, which are compared, shape (cases, KEPT, n). If a case
+        had fewer windows, the first entries are NaN.
     windows
         Number of windows of each case, shape (cases,).
     repeats
@@ -207,35 +206,35 @@ def repeat(
     starts: Sequence[tuple[Sequence[float], Sequence[float]]] | None = None,
     lanes: bool = True,
 ) -> Repeated:
-    """Run every case, window after window, until it repeats.
+    """Run each case, window after window, until it repeats.
 
-    Each case ends independently of all others, and the next one then takes its lane.
+    Each case ends independently of all other cases. The next case then starts in its lane.
 
     Parameters
     ----------
     run
-        Its duration is one window: a multiple of all sample times and of the recording interval.
-        Its stimulus is not used.
+        Run whose duration is one window: a multiple of all sample times and of the recording
+        interval. Its stimulus is ignored.
     matrix
         Parameter vectors, shape (parameters, cases); see ``variations.case_matrix``.
     stimuli
-        One window of each case, shape (cases, rows, nu), rows at ``schedule.stimulus_times``
-        without the end. Or ``stimuli(cases, first, last)``, which returns these rows of some
-        cases, shape (cases, last - first, nu), so that a long window need not fit into memory.
+        One window of each case, shape (cases, rows, nu), with rows at ``schedule.stimulus_times``
+        except the end. A function ``stimuli(cases, first, last)`` avoids storing a long window. It
+        returns these rows of some cases, shape (cases, last - first, nu).
     signals
         Outputs to record.
     figures
-        ``figures(window) -> complex``, shapes (lanes, rows, signals) and (lanes, n): the figures
-        that are compared between windows.
+        ``figures(window) -> complex``, shapes (lanes, rows, signals) and (lanes, n): the figures to
+        compare between windows.
     tolerance
-        A window repeats the previous one if the norm of the difference of their figures is at
-        most this share of the norm of the figures.
+        A window repeats the previous window if the norm of the difference of their figures is at
+        most this fraction of the norm of the figures.
     most
-        Largest number of windows of a case, >= 2.
+        Maximum number of windows of a case, >= 2.
     starts
-        Initial state and memory of each case. Default: those of the run.
+        Initial state and memory of each case. Default: the run's.
     lanes
-        If False, one case after another on one core, as in a simulator without ensembles.
+        If False, run one case after another on one core, like a simulator without ensembles.
 
     Raises
     ------
@@ -246,7 +245,7 @@ def repeat(
     SolverError
         When a value of a trajectory is infinite or NaN.
     KeyboardInterrupt
-        When interrupted, or stopped in a thread.
+        When the user interrupts the run, or stops it in a thread.
     """
     schedule = window_schedule(run)
     count = matrix.shape[1]
@@ -254,7 +253,7 @@ def repeat(
     prepared = prepare(run.model, run.par)
     selection = selected(tuple(prepared.outputs), signals)
     compiler = find_compiler()
-    # Omit the last frame: a window's end is the start of the next window, where the tasks tick.
+    # Omit the last frame, because a window's end is the start of the next window, where tasks tick.
     open_end = replace(schedule, frames=schedule.frames + 1)
     if compiler is None or not lanes:
         advance, width = one_by_one(run, open_end, selection), 1
@@ -294,7 +293,7 @@ def repeat(
         try:
             list(pool.map(turns, range(workers)))
         finally:
-            queue.clear()  # after a failure, waiting cases do not start
+            queue.clear()  # after a failure, the waiting cases do not start
     seen, repeats, unsettled = zip(*(done[k] for k in range(count)), strict=True)
     return Repeated(
         time=np.asarray(np.arange(rows) * schedule.record_frames * schedule.frame, np.float64),
@@ -309,12 +308,12 @@ def repeat(
 def _start_vectors(
     layout: Layout, starts: Sequence[tuple[Sequence[float], Sequence[float]]]
 ) -> Array:
-    """Return the state vectors of all cases at the start, shape (entries, cases)."""
+    """Return the initial state vectors of all cases, shape (entries, cases)."""
     return np.stack([initial_vector(layout, *one) for one in starts], axis=1)
 
 
 def _padded(seen: list[Complex]) -> Complex:
-    """Return the figures of the last windows of a case, shape (KEPT, n)."""
+    """Return the figures of a case's last windows, padded to shape (KEPT, n)."""
     last = seen[-KEPT:]
     missing = np.full((KEPT - len(last), *last[0].shape), np.nan, dtype=np.complex128)
     return np.concatenate([missing, np.array(last)])
@@ -326,7 +325,7 @@ def window_schedule(run: Run) -> Schedule:
     Raises
     ------
     StepError
-        When the window is not a multiple of the sample times and recording intervals.
+        When the window is not a multiple of the sample times and of the recording interval.
     """
     schedule = run.schedule()
     common = math.lcm(schedule.record_frames, *schedule.task_frames)

@@ -1,4 +1,4 @@
-"""Run: a trajectory from initial values and a stimulus."""
+"""Run of a model: its trajectory for initial values and a stimulus."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ Status = Literal["done", "interrupted", "unsettled"]
 
 @dataclass(frozen=True)
 class Run:
-    """A run of a model, to be computed.
+    """Definition of a run of a model.
 
     Parameters
     ----------
@@ -47,14 +47,13 @@ class Run:
     state, memory
         Initial values: the model's State and Memory.
     stimulus
-        ``stimulus(t) -> array``: rows of the model's Stimulus at the times t, shape
-        (len(t), nu).
+        ``stimulus(t) -> array``: rows of the model's Stimulus at the times t, shape (len(t), nu).
     duration, step, record
         Length of the run, substep and recording interval [s].
     changes
         Changes of parameters at certain times, in order of time; see `Change`.
     most_work
-        Work limit, in substeps, beyond which the run fails; see `Trajectory.work`.
+        Work limit in substeps. A run that exceeds it fails; see `Trajectory.work`.
     """
 
     model: Model
@@ -69,7 +68,7 @@ class Run:
     most_work: float = math.inf
 
     def schedule(self) -> Schedule:
-        """Return the run's integer plan."""
+        """Return the run's schedule in integer multiples of the step."""
         return self._schedule
 
     @cached_property
@@ -89,14 +88,14 @@ class Trajectory:
     time, values
         Shapes (rows,) and (rows, signals).
     names
-        Signals, in the order of the columns.
+        Names of the signals, in the order of the columns.
     status
-        ``done``; ``unsettled`` if some substeps hit the contact iteration's limit;
-        ``interrupted`` if the user stopped it (the rows end there).
+        ``done``, ``unsettled`` if some substeps reached the limit of the contact iteration, or
+        ``interrupted`` if the user stopped the run (the rows then end early).
     unsettled, repeated
-        Numbers of substeps that hit the cap, and that took more than one pass.
+        Number of substeps that reached the iteration limit, and that took more than one pass.
     work
-        Computing effort in ordinary substeps, the same on every machine.
+        Computing effort in ordinary substeps, which is the same on every machine.
     vector
         State vector at the end.
     """
@@ -114,7 +113,7 @@ class Trajectory:
 
     @cached_property
     def doubt(self) -> str:
-        """Reason why the result may be wrong although every substep settled; empty if none."""
+        """Reason why the result may be wrong although all substeps settled; empty if none."""
         return doubts_of([self.run])[0]
 
     def __getitem__(self, name: str) -> Array:
@@ -123,7 +122,7 @@ class Trajectory:
 
 
 def initial_vector(layout: Layout, state: Sequence[float], memory: Sequence[float]) -> Array:
-    """Return the state vector of the engine at the start of a run, shape (entries,)."""
+    """Return the engine's state vector at the start of a run, shape (entries,)."""
     return np.asarray(initial_vectors(layout, [state], [memory])[0])
 
 
@@ -136,7 +135,7 @@ def initial_vectors(layout: Layout, states: Sequence[Any], memories: Sequence[An
 
 
 def request_for(run: Run, signals: Sequence[str] | None = None) -> Request:
-    """Return a run's request to a kernel. Default signals: all outputs."""
+    """Return a run's request to a kernel; by default, it records all outputs."""
     names = tuple(prepare(run.model, run.par).outputs)
     schedule = run.schedule()
     return Request(
@@ -165,7 +164,7 @@ def simulate(
     engine
         See ``engine.Prepared.engine``.
     progress
-        Called with the finished share, 0 to 1, from time to time.
+        Called periodically with the finished fraction, 0 to 1.
 
     Returns
     -------
@@ -220,7 +219,7 @@ def simulate(
 def _advanced_in_pieces(
     run: Run, kind: str, request: Request, vector: Array, values: Array, progress: Progress | None
 ) -> tuple[int, Array]:
-    """Advance a run through its changes; return finished frames and the energy of the changes.
+    """Advance a run with changes; return the finished frames and the energy of the changes.
 
     Raises
     ------
@@ -238,7 +237,7 @@ def _advanced_in_pieces(
         if not is_planned or engine.layout.total != vector.size:
             what = "the model's state variables" if is_planned else "a sample time"
             raise ParameterError(
-                f"a change during the run alters {what}: only values and laws may change",
+                f"a change during the run alters {what}. It may alter only values and laws",
                 name="changes",
             )
         here = replace(request, parameters=np.array(list(par.leaves().values())))
@@ -256,7 +255,7 @@ def _advanced_in_pieces(
 
 
 def doubts_of(runs: Sequence[Run]) -> list[str]:
-    """Return reasons why the step may be too long for the contacts, at the start of each run.
+    """Return why the step may be too long for each run's contacts, judged at the run's start.
 
     ``runs``: runs with the same structure and step.
     """
@@ -277,7 +276,7 @@ def doubts_of(runs: Sequence[Run]) -> list[str]:
 
 
 def _matrices(pattern: Any, entries: Array) -> Array:
-    """Return square matrices from entries of a common pattern, shape (count, size, size)."""
+    """Return square matrices from the entries of a common pattern, shape (count, size, size)."""
     rows, columns = pattern.get_triplet()
     matrices = np.zeros((len(entries), *pattern.shape))
     matrices[:, rows, columns] = entries
@@ -290,7 +289,7 @@ def sampled_stimulus(run: Run, schedule: Schedule) -> Array:
     Raises
     ------
     ParameterError
-        When a value is not finite, or outside its signal's range.
+        When a value is not finite or is outside the signal's range.
     """
     rows = np.ascontiguousarray(run.stimulus(schedule.stimulus_times), dtype=np.float64)
     is_finite = np.isfinite(rows)
@@ -298,7 +297,7 @@ def sampled_stimulus(run: Run, schedule: Schedule) -> Array:
         row, signal = np.argwhere(~is_finite)[0]
         raise ParameterError(
             f"the stimulus {run.model.Stimulus._fields[signal]} is {rows[row, signal]} at "
-            f"t = {schedule.stimulus_times[row]:g} s: it must be finite throughout the run",
+            f"t = {schedule.stimulus_times[row]:g} s, but it must be finite throughout the run",
             name=run.model.Stimulus._fields[signal],
             value=str(rows[row, signal]),
             valid="finite",
@@ -313,7 +312,7 @@ def sampled_stimulus(run: Run, schedule: Schedule) -> Array:
             ends += [f"<= {shown(high, unit)}"] * (high < np.inf)
             raise ParameterError(
                 f"the stimulus {name} is {shown(rows[row, signal], unit)} at "
-                f"t = {schedule.stimulus_times[row]:g} s: it must be {' and '.join(ends)}",
+                f"t = {schedule.stimulus_times[row]:g} s, but it must be {' and '.join(ends)}",
                 name=name,
                 value=shown(rows[row, signal], unit),
                 valid=" and ".join(ends),
@@ -322,15 +321,15 @@ def sampled_stimulus(run: Run, schedule: Schedule) -> Array:
 
 
 def stimulus_ranges(model: Model) -> list[tuple[int, float, float]]:
-    """Return index and range of the stimuli with a declared range."""
+    """Return index and range of each stimulus with a declared range."""
     fields = model.Stimulus._fields
     return [(fields.index(n), *ends) for n, ends in ranges_of(model.Stimulus).items()]
 
 
 def put_into(rows: Array, run: Run, t: Array) -> None:
-    """Write the stimulus of a run at times [s] into rows of zeros, shape (len(t), nu).
+    """Write a run's stimulus at times [s] to rows of zeros, shape (len(t), nu).
 
-    A stimulus with a method ``put_into(rows, t)`` may omit signals that are zero.
+    A stimulus with a method ``put_into(rows, t)`` may skip signals that are zero.
     """
     put = getattr(run.stimulus, "put_into", None)
     if put is None:
@@ -340,12 +339,12 @@ def put_into(rows: Array, run: Run, t: Array) -> None:
 
 
 def selected(names: Sequence[str], signals: Sequence[str]) -> NDArray[np.int32]:
-    """Return the indices of signals among the outputs' names.
+    """Return the indices of signals in the list of outputs.
 
     Raises
     ------
     UnknownNameError
-        With the nearest valid names.
+        When a signal is unknown. The message contains the nearest valid names.
     """
     for signal in signals:
         if signal not in names:

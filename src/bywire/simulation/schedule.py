@@ -1,4 +1,4 @@
-"""Steps and sample times of a run, which must divide each other; layout of the state vector."""
+"""Schedule of a run, whose steps must divide the sample times, and layout of the state vector."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from numpy.typing import NDArray
 from bywire.core.errors import StepError, not_valid
 
 _TOLERANCE = 1e-9
-_REST = 1e-6  # of a step: largest deviation of an interval from whole steps
-_MOST = 2**53  # substeps in an interval or a run: floats cannot represent more
+_REST = 1e-6  # maximum deviation of an interval from whole steps, relative to a step
+_MOST = 2**53  # maximum number of substeps in an interval or a run, which floats can represent
 _FRAME = (
-    100_000  # largest number of substeps in a frame: a run checks for interrupts between frames
+    100_000  # maximum number of substeps in a frame, because interrupts are checked between frames
 )
-_TRIALS = 10_000  # number of divisors to try for one with few digits
+_TRIALS = 10_000  # number of divisors to try in the search for one with few digits
 
 
 @dataclass(frozen=True)
 class Schedule:
-    """Integer plan of a run.
+    """Schedule of a run in integer multiples of the step.
 
     A frame is the longest interval that divides all sample times and the recording interval, or a
-    part of that interval if it is very long. A frame has ``substeps`` equal steps.
+    fraction of this interval if it is very long. A frame has ``substeps`` equal steps.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ class Schedule:
     frames
         Frames of the run.
     task_frames
-        Frames per tick of each task, in the tasks' order.
+        Frames per tick of each task, in the order of the tasks.
     record_frames
         Frames per recorded row.
     """
@@ -51,7 +51,7 @@ class Schedule:
 
     @property
     def stimulus_frames(self) -> int:
-        """Frames per row of the stimulus: the common divisor of all tasks' intervals."""
+        """Frames per row of the stimulus: the greatest common divisor of all tasks' intervals."""
         return math.gcd(*self.task_frames)
 
     @property
@@ -87,7 +87,7 @@ def plan(duration: float, step: float, periods: Mapping[str, float], record: flo
     Parameters
     ----------
     duration
-        Length of the run [s]; rounded up to a whole recording interval.
+        Length of the run [s], rounded up to whole recording intervals.
     step
         Substep [s].
     periods
@@ -98,7 +98,7 @@ def plan(duration: float, step: float, periods: Mapping[str, float], record: flo
     Raises
     ------
     StepError
-        When the step does not divide a sample time or the recording interval, or is far too short.
+        When the step does not divide a sample time or the recording interval, or is much too short.
     """
     return _planned(duration, step, tuple(periods.items()), record)
 
@@ -125,7 +125,7 @@ def _planned(
 
 
 def _divided(frame: int) -> int:
-    """Return the largest divisor of a frame's substeps within the limit."""
+    """Return the largest divisor of a frame's number of substeps within the limit."""
     shares = range(-(-frame // _FRAME), math.isqrt(frame) + 1)
     share = next((each for each in shares if frame % each == 0), frame)
     return frame // share
@@ -159,9 +159,9 @@ def _whole(period: float, step: float, name: str) -> int:
 
 
 def _divisor(period: float, step: float) -> float:
-    """Return a step [us] with few digits that divides a period and is at most as long as a step.
+    """Return a step [us] with few digits that divides a period and is not longer than a step.
 
-    It is a whole number of nanoseconds if possible, which then divides a period of whole
+    If possible, the result is a whole number of nanoseconds, which divides a period of whole
     nanoseconds.
     """
     least = max(math.ceil(period / step - _TOLERANCE), 1)
@@ -183,17 +183,18 @@ def _divisor(period: float, step: float) -> float:
 COUNTERS = 3  # at the end of the state vector, see `Layout`
 CAP = 8  # passes through one substep before it counts as unsettled
 JUMP, FLAG, DOUBT = 4, 5, 6  # indices among the results of a pass, after x, d, r, q
-# Search for the instant at which a substep is cut: largest number of attempts; remaining velocity
-# at which the search ends, or is close enough for linear interpolation, as shares of the substep's
-# change of velocity; and the smallest share of a part that is cut off or remains.
+# Search for the time at which a substep is cut: maximum number of attempts; remaining velocity at
+# which the search ends, or is close enough for linear interpolation, relative to the substep's
+# change of velocity; and minimum fraction of a part before and after the cut.
 ATTEMPTS, CLOSE, NEAR, EDGE = 12, 1e-12, 1e-9, 1e-9
-STILL = 1e-9  # share of its initial speed below which another velocity also counts as zero
+STILL = 1e-9  # fraction of its initial value below which another velocity also counts as zero
 
 
 def most_cuts(velocities: int) -> int:
     """Return the number of parts after which a substep counts as unsettled.
 
-    Each velocity with dry friction may reverse, and reverse again after other velocities have.
+    Each velocity with dry friction may reverse, and may reverse again after other velocities have
+    reversed.
     """
     return 2 * velocities + 2
 
@@ -203,7 +204,7 @@ class Layout:
     """Start of each part of the state vector.
 
     The vector contains x, d, r, q, the memory m, and three counters: unsettled substeps, repeated
-    substeps, and the parts that were tried for them.
+    substeps, and attempted parts of these substeps.
     """
 
     start: dict[str, int]

@@ -1,6 +1,6 @@
-"""One substep, symbolically: implicit midpoint rule with set-valued forces at velocity level.
+"""Symbolic substep: implicit midpoint rule with set-valued forces at velocity level.
 
-The state contains the last increment, which predicts the midpoint. At that midpoint the scheme
+The state contains the last increment, which predicts the midpoint. At this midpoint, the scheme
 evaluates friction bounds, geometry and contact sets. It solves linear terms exactly, and nonlinear
 terms with one Newton step. The scheme is of second order in smooth phases and through stick-slip.
 """
@@ -21,22 +21,22 @@ from bywire.simulation.contacts import overlaps, stiffness, violations
 from bywire.simulation.symbols import SX, column, depends, nonlinear, scalars, symbol_tuple
 
 # --- Set-valued forces on a few coupled velocities
-# Given ``S w = c + lambda`` with ``lambda_k = lo_k`` where w_k > 0, ``hi_k`` where w_k < 0 and
-# anything in [lo_k, hi_k] where w_k = 0, find the end-of-step velocities w.
+# Find the velocities w at the end of the step from ``S w = c + lambda``, where ``lambda_k = lo_k``
+# if w_k > 0, ``hi_k`` if w_k < 0, and any value in [lo_k, hi_k] if w_k = 0.
 
 
 NEVER = 1e30  # exceeds every misfit
 NOTHING = 1e-318  # rounds a misfit below 1e-6 to exactly zero
-FITTING = 1e-12  # share of a row's own scale below which guessed signs are accepted
-RESIDUAL = 1e-9  # share of a row's own scale above which a projection counts as failed
+FITTING = 1e-12  # misfit, relative to a row's scale, below which guessed signs are accepted
+RESIDUAL = 1e-9  # misfit, relative to a row's scale, above which a projection counts as failed
 
 
 @dataclass(frozen=True)
 class Projection:
-    """End-of-step velocities and forces, shape (m,) each, and whether they solve the problem.
+    """Final velocities and forces, shape (m,) each, and whether they are a solution.
 
-    ``failed`` is 1.0 if they do not. Forces are clipped to their bounds, so rounding cannot turn an
-    energy loss into a gain.
+    ``failed`` is 1.0 if they are not. Forces are clipped to their bounds, so rounding cannot turn
+    an energy loss into a gain.
     """
 
     w: Any
@@ -73,9 +73,9 @@ def soft(z: Any, a: Any, b: Any) -> Any:
 
 
 def sliding(v: Any, low: Any, high: Any) -> Any:
-    """Return the force on moving rows, whose velocity keeps its sign from the substep's start.
+    """Return the force on moving rows, whose velocities keep their sign during the substep.
 
-    If a velocity would change its sign, the substep is cut.
+    If a velocity would change sign, the substep is cut.
     """
     return ca.if_else(v > 0, low, high)
 
@@ -83,8 +83,9 @@ def sliding(v: Any, low: Any, high: Any) -> Any:
 def project_fast(S: Any, c: Any, low: Any, high: Any, v: list[Any]) -> Projection:
     """Solve with all resting rows at rest, and check that their bounds can hold them.
 
-    A single row is exact. Several rows need one linear solve, whose matrix depends only on which
-    rows rest. If a holding force exceeds its bounds, a body breaks away and ``failed`` is set.
+    The solution of a single row is exact. Several rows need one linear solve, whose matrix depends
+    only on the set of rows at rest. If a holding force exceeds its bounds, a body breaks away, and
+    ``failed`` is set.
 
     Parameters
     ----------
@@ -93,7 +94,7 @@ def project_fast(S: Any, c: Any, low: Any, high: Any, v: list[Any]) -> Projectio
     low, high
         Bounds, shape (m,).
     v
-        Velocities at the start of the substep, one per row: rows with zero velocity rest.
+        Velocity of each row at the start of the substep. Rows with zero velocity are at rest.
     """
     m = c.shape[0]
     if m == 0:
@@ -101,7 +102,7 @@ def project_fast(S: Any, c: Any, low: Any, high: Any, v: list[Any]) -> Projectio
     resting = [speed == 0 for speed in v]
     slide = [sliding(v[k], low[k], high[k]) for k in range(m)]
     if m == 1:
-        # Compilers turn this into a branch: moving bodies skip the computation of holding forces.
+        # Compilers turn this into a branch that skips the holding forces of moving bodies.
         force = ca.if_else(resting[0], _within(-c, low, high), slide[0])
         return Projection((c + force) / S, force, ca.SX(0))
     M, b = ca.SX(S), ca.SX(c)
@@ -116,15 +117,16 @@ def project_fast(S: Any, c: Any, low: Any, high: Any, v: list[Any]) -> Projectio
         beyond = ca.fmax(force[k] - high[k], low[k] - force[k])
         wrong = ca.fmax(wrong, ca.if_else(resting[k], beyond, 0))
         force[k] = ca.if_else(resting[k], _within(force[k], low[k], high[k]), slide[k])
-        # Without this line, a row at rest would be zero only up to rounding.
+        # Without this line, the velocity of a row at rest would be zero only to within rounding.
         w[k] = ca.if_else(resting[k], 0, w[k])
     return Projection(w, force, wrong > 0)
 
 
 def project_exact(S: Any, c: Any, low: Any, high: Any) -> Projection:
-    """Solve by trying every combination of signs, and choose the one that fits best.
+    """Try every combination of signs, and choose the one that fits best.
 
-    There are 3^m combinations; only the rare substeps in which ``project_fast`` fails need them.
+    There are 3^m combinations. They are needed only in the rare substeps where ``project_fast``
+    fails.
     """
     m = c.shape[0]
     if m == 0:
@@ -136,13 +138,13 @@ def project_exact(S: Any, c: Any, low: Any, high: Any) -> Projection:
 def _exact(m: int) -> Any:
     """Return the projection of m rows as a function of S, c, low, high.
 
-    It is cached as a function of symbols, since building all combinations would take half of a
-    model's set-up time.
+    The function of symbols is cached, because building all combinations would take half of a
+    model's setup time.
     """
     S = ca.SX.sym("S", m, m)
     c, low, high = (ca.SX.sym(name, m) for name in ("c", "low", "high"))
     # If both bounds are equal, the force does not jump at zero. A velocity that happens to end at
-    # zero does not rest then, and its derivatives are those of a moving body.
+    # zero is then not at rest, and its derivatives are those of a moving body.
     forced = [ca.if_else(low[k] < high[k], 0, 1) for k in range(m)]
     best, best_misfit = ca.SX.zeros(m), ca.SX(NEVER)
     for signs in product((0, 1, -1), repeat=m):
@@ -153,8 +155,8 @@ def _exact(m: int) -> Any:
         better = misfit < best_misfit
         best = ca.if_else(better, w, best)
         best_misfit = ca.if_else(better, misfit, best_misfit)
-    # NaN forces must not count as rest, but compilers need not compare NaN correctly. The chosen
-    # combination's misfit is NaN for them, and otherwise adds exactly zero.
+    # NaN forces must not count as rest, but compilers may compare NaN incorrectly. For NaN forces,
+    # the misfit of the chosen combination is NaN. Otherwise, it adds exactly zero.
     best = best + _misfit(S, c, low, high, best) * NOTHING
     results = [best, _within(S @ best - c, low, high), best_misfit > RESIDUAL]
     return ca.Function("exact_projection", [S, c, low, high], results)
@@ -177,8 +179,8 @@ def _with_signs(S: Any, c: Any, low: Any, high: Any, signs: tuple[int, ...]) -> 
 
 
 def _misfit(S: Any, c: Any, low: Any, high: Any, w: Any) -> Any:
-    # A row's scale follows from its terms: where forces cancel (a body squeezed from both sides),
-    # the remainder is rounding. It is a sum of magnitudes, because a maximum ignores NaN.
+    # A row's scale depends on its terms: if forces cancel (a body squeezed from both sides), the
+    # remainder is rounding error. The scale is a sum of magnitudes, because a maximum ignores NaN.
     total = ca.SX(0)
     m = c.shape[0]
     for k in range(m):
@@ -189,7 +191,7 @@ def _misfit(S: Any, c: Any, low: Any, high: Any, w: Any) -> Any:
 
 
 def solve_small(M: Any, b: Any) -> Any:
-    """Return M^-1 b by elimination on the diagonal, shape (m,), without branches."""
+    """Return M^-1 b, shape (m,), by elimination on the diagonal without branches."""
     m = b.shape[0]
     M, b = ca.SX(M), ca.SX(b)
     for k in range(m):
@@ -210,10 +212,10 @@ def solve_small(M: Any, b: Any) -> Any:
 
 @dataclass(frozen=True)
 class Form:
-    """``sum_j coefficient_j x_j + rest``.
+    """Linear form ``sum_j coefficient_j x_j + rest``.
 
-    The coefficients stay constant from substep to substep. The kernel therefore hoists them, and
-    the sum needs one product per state.
+    The coefficients are constant over all substeps. The kernel therefore hoists them, and the sum
+    needs one product per state.
 
     Parameters
     ----------
@@ -259,7 +261,7 @@ def forms(f: Any, J: Any, x: Any, changing: Any, curved: list[bool]) -> list[For
     changing
         Symbols that change from substep to substep.
     curved
-        Whether each row is nonlinear in x; nonlinear rows stay unchanged.
+        Whether each row is nonlinear in x. Nonlinear rows stay unchanged.
     """
     at_zero = ca.substitute(f, x, SX.zeros(x.shape[0]))
     rows = []
@@ -286,9 +288,9 @@ Entries = dict[tuple[int, int], Any]
 
 @dataclass(frozen=True)
 class Step:
-    """Eliminated row: entries of the pivot row in the remaining columns, and its reciprocal.
+    """Eliminated row: entries of the pivot row in the remaining columns, and the pivot's inverse.
 
-    In the columns ``alike``, the right-hand side has the same factors with the opposite sign.
+    In the columns ``alike``, the right-hand side has the same factors with opposite sign.
     """
 
     pivot: int
@@ -299,18 +301,19 @@ class Step:
 
 @dataclass(frozen=True)
 class Reduced:
-    """Remaining system of the kept rows, with the data for back substitution.
+    """Remaining equations after the elimination, with the data for back substitution.
 
     Parameters
     ----------
     kept
-        Indices of the kept rows, in the order of ``matrix``.
+        Indices of the remaining rows, in the order of ``matrix``.
     matrix
         Schur complement, shape (m, m).
     right
         Right-hand sides of all rows after the elimination.
     x, changing
-        The states in which the forms are linear; symbols that change from substep to substep.
+        The states in which the forms are linear, and the symbols that change from substep to
+        substep.
     """
 
     kept: tuple[int, ...]
@@ -321,7 +324,7 @@ class Reduced:
     changing: Any
 
     def start(self, row: int, matrix: Any) -> Any:
-        """Return the kept row's right-hand side plus a matrix times the kept states."""
+        """Return a remaining row's right-hand side plus a matrix times the remaining states."""
         form = self.right[self.kept[row]]
         coefficients = dict(form.coefficients)
         for other, index in enumerate(self.kept):
@@ -329,9 +332,9 @@ class Reduced:
         return Form(coefficients, form.rest).value(self.x)
 
     def back_substitute(self, known: dict[int, Any], middle: dict[int, Any]) -> None:
-        """Compute all unknowns from the kept rows' unknowns, and the states plus the unknowns.
+        """Compute all unknowns from the remaining rows' unknowns, and the states plus the unknowns.
 
-        If a state and its unknown have the same factor, their sum is multiplied once.
+        If a state and its unknown have the same factor, the code multiplies their sum once.
         """
         for step in reversed(self.steps):
             value = self.right[step.pivot].times(step.reciprocal, self.x, self.changing)
@@ -348,19 +351,19 @@ class Reduced:
 def eliminate(
     A: Any, right: dict[int, Form], keep: tuple[int, ...], x: Any, changing: Any
 ) -> Reduced:
-    """Eliminate all rows except the kept ones, on the diagonal, in the order of least fill.
+    """Eliminate all rows except some, on the diagonal, in the order of least fill.
 
     Parameters
     ----------
     A, right
         Matrix, shape (n, n), and right-hand sides by row.
     keep
-        Rows that stay.
+        Rows that remain.
     x
         The states.
     changing
-        Symbols that change from substep to substep. Among pivots of equal fill, a pivot that does
-        not depend on them comes first, because its reciprocal can be hoisted.
+        Symbols that change from substep to substep. Among pivots with equal fill, a pivot that does
+        not depend on them comes first, because the kernel can hoist its reciprocal.
     """
     n = A.shape[0]
     entries: Entries = {(i, j): A[i, j] for i in range(n) for j in range(n) if _present(A[i, j])}
@@ -407,7 +410,7 @@ def _pivot(
     for i, below in column.items():
         del entries[i, pivot]
         factor = below * reciprocal
-        sums = not depends(SX(factor), changing)  # otherwise, the form becomes a number
+        sums = not depends(SX(factor), changing)  # otherwise, the form becomes a value
         for j in (row.keys() | right[pivot].coefficients.keys()) - {i}:
             is_free = (i, j) not in entries and j not in right[i].coefficients
             if not (sums and (pivot, j) in alike and (is_free or (i, j) in alike)):
@@ -425,9 +428,10 @@ def _pivot(
 
 @dataclass(frozen=True)
 class Symbols:
-    """Arguments of a substep: state, predicted half increment, memory, parameters, step.
+    """Arguments of a substep: state, predicted half increment, memory, parameters, and step.
 
-    All equations use d, half the state's increment over the substep, so x + d is the midpoint.
+    All equations use d, which is half the state's increment over the substep, so x + d is the
+    midpoint.
     """
 
     x: Any
@@ -450,15 +454,15 @@ class Pass:
     flow
         Rates of the integrals at the midpoint.
     doubt
-        Positive if the pass must be repeated: a contact set changed, a velocity crossed a limit, or
-        the projection of the frictions failed.
+        Positive if the pass must be repeated, because a contact set changed, a velocity crossed a
+        limit, or the projection of the frictions failed.
     jump
-        For each velocity with dry friction: decrease of half its increment after a sign change,
-        due to its own mass, shape (m,).
+        Decrease of half the increment of each velocity with dry friction after a sign change, for
+        the body's own mass, shape (m,).
     turn
-        Positive if a velocity with dry friction reverses: if friction jumps, the substep is cut.
+        Positive if a velocity with dry friction reverses. If friction jumps, the substep is cut.
     problem
-        Problem to solve outside an exact pass; None for other passes.
+        Problem that code outside an exact pass solves; None for other passes.
     """
 
     x: Any
@@ -475,7 +479,7 @@ class Pass:
 class _Linearized:
     """Smooth part of the model and its Jacobian, evaluated for the substep.
 
-    ``rows[i] + J[i, :] d`` is the balance at the midpoint x + d. It is exact in linear rows. In
+    ``rows[i] + J[i, :] d`` is the balance at the midpoint x + d, which is exact in linear rows. In
     other rows, its error is of second order in the error of the predicted midpoint.
     """
 
@@ -491,13 +495,13 @@ def build_pass(model: Model, par: ParameterSet, s: Symbols, exact: bool) -> Pass
     model
         The system.
     par
-        Its parameters, with the entries of ``s.p`` as numbers.
+        The model's parameters, with the entries of ``s.p`` as numbers.
     s
         Arguments of the pass.
     exact
-        If False, the pass of nearly every substep, which only checks one-sided limits and keeps
-        resting bodies at rest. If True, the repeated pass, which enforces limits; the caller tries
-        every combination of signs (see `Problem`).
+        If False, build the pass of nearly every substep, which only checks one-sided limits and
+        keeps resting bodies at rest. If True, build the repeated pass, which enforces limits. Its
+        caller tries every combination of signs (see `Problem`).
     """
     y = s.x + s.d
     changing = ca.vertcat(s.x, s.d)
@@ -536,7 +540,7 @@ def build_pass(model: Model, par: ParameterSet, s: Symbols, exact: bool) -> Pass
     doubts.append(ca.if_else(projection.failed, 1, 0))
     if not exact:
         doubts += [-x[_index(model, name)] for name in model.limits]
-    # A maximum instead of a logical or: compilers do not vectorize selections between truth values.
+    # Use a maximum instead of "or", because compilers do not vectorize selections of truth values.
     doubt = SX(0)
     for one in doubts:
         doubt = ca.fmax(doubt, one)
@@ -545,7 +549,7 @@ def build_pass(model: Model, par: ParameterSet, s: Symbols, exact: bool) -> Pass
 
 
 def _turn(model: Model, start: Any, end: Any) -> Any:
-    """Return values that are positive if a velocity with dry friction changes its sign."""
+    """Return values that are positive if a velocity with dry friction changes sign."""
     turn = SX(0)
     for name in model.frictions:
         k = _index(model, name)
@@ -576,7 +580,7 @@ def _linearize(
     rows = []
     for i, row in enumerate(forms(with_contact, J, x, changing, bent)):
         # Linear rows start from x. Other rows were evaluated at the predicted midpoint of the
-        # states in which they are nonlinear, so this part of J d is subtracted again.
+        # states in which they are nonlinear, so this part of J d must be subtracted.
         point = at if bent[i] else s.x
         rest = ca.substitute(row.rest, ca.vertcat(x, xe), ca.vertcat(point, y))
         if bent[i]:
@@ -588,7 +592,7 @@ def _linearize(
 
 
 def _bounds(model: Model, par: ParameterSet, s: Symbols, y: Any, contact: Any) -> list[Any]:
-    """Return (low, high) of every friction."""
+    """Return (low, high) for each friction."""
     state = symbol_tuple(model.State, y)
     memory = symbol_tuple(model.Memory, s.m)
     pairs = model.bounds(state, state, memory, par, scalars(contact))
@@ -605,7 +609,7 @@ def _index(model: Model, name: str) -> int:
 
 
 def _acting(v: Any, low: Any, high: Any) -> tuple[Any, Any]:
-    """Return the bounds of a friction at rest, where the force counts twice."""
+    """Return the bounds of a friction; at rest, the force counts twice."""
     moving = sliding(v, low, high)
     return ca.if_else(v == 0, low, moving), ca.if_else(v == 0, high, moving)
 
@@ -613,7 +617,7 @@ def _acting(v: Any, low: Any, high: Any) -> tuple[Any, Any]:
 def _project(
     model: Model, s: Symbols, reduced: Reduced, bounds: list[Any], exact: bool
 ) -> tuple[Projection, Any, Problem | None]:
-    """Return end-of-step values of the set-valued states, all reactions, and the open problem."""
+    """Return final values of the set-valued states, all reactions, and the unsolved problem."""
     pairs = bounds
     if exact:
         pairs = [_acting(s.x[k], *pair) for k, pair in zip(reduced.kept, bounds, strict=False)]
@@ -632,7 +636,7 @@ def _project(
         projection = project_fast(half, c, low, high, [s.x[k] for k in reduced.kept])
     reaction = ca.SX(projection.force)
     first = len(model.frictions)
-    for k in range(first, reaction.shape[0]):  # away from its limit, a state is free
+    for k in range(first, reaction.shape[0]):  # a state away from its limit is free
         reaction[k] = ca.if_else(projection.w[k] > 0, 0, ca.fmax(reaction[k], 0))
     if not exact:
         reaction = ca.vertcat(reaction, SX.zeros(len(model.limits)))
@@ -640,7 +644,7 @@ def _project(
 
 
 def _increments(s: Symbols, reduced: Reduced, projection: Projection) -> tuple[Any, Any]:
-    """Return half the increments, and the midpoints as means, which are available earlier."""
+    """Return half the increments, and the midpoints, computed as means to be available earlier."""
     ends = {k: projection.w[a] for a, k in enumerate(reduced.kept)}
     known = {k: 0.5 * (w - s.x[k]) for k, w in ends.items()}
     middle = {k: 0.5 * (s.x[k] + w) for k, w in ends.items()}

@@ -32,11 +32,11 @@ from bywire.simulation.schedule import Layout
 from bywire.simulation.stages import Stages, build_stages, layout_of
 
 DIRECTIONS = 8
-_CHUNK = 5_000  # substeps in a call of the kernel
+_CHUNK = 5_000  # substeps per call of the kernel
 
 
 def rounds(stages: Stages) -> bool:
-    """Return whether a sampled value of the plant is rounded, as by a converter."""
+    """Return whether a sampled value of the plant is rounded, for example by a converter."""
     graph = stages.graph
     moving = stages.varies(frozenset({"x"}))
     order = needed(graph, [n for task in stages.ticks for n in task], lambda _: False)
@@ -63,7 +63,7 @@ class Sensitivity:
     parameters: tuple[str, ...]
 
     def of(self, signal: str, parameter: str) -> Array:
-        """Return one derivative over time, shape (rows,)."""
+        """Return one derivative as a function of time, shape (rows,)."""
         s = self.trajectory.names.index(signal)
         return np.asarray(self.derivatives[:, s, self.parameters.index(parameter)])
 
@@ -93,12 +93,12 @@ class TangentKernel:
         tangents: Array,
         rows_t: Array,
     ) -> None:
-        """Run frames begin..end: update ``state`` and ``tangents``, fill ``rows`` and ``rows_t``.
+        """Run the frames from begin to end; update all arrays in place.
 
         Parameters
         ----------
         seeds
-            Changes along each direction, shape (seeded parameters and stimuli, directions).
+            Changes in each direction, shape (seeded parameters and stimuli, directions).
         tangents
             Derivatives of the state vector, shape (entries, directions).
         rows_t
@@ -134,15 +134,15 @@ def simulate_with_sensitivities(
 ) -> Sensitivity:
     """Compute a run and the derivatives of its signals.
 
-    A direction may also be an initial state, ``initial.omega``, or a constant added to a stimulus,
-    ``stimulus.i_set``. Any other direction, ``start.p``, acts only through the derivatives of the
-    initial values.
+    A direction may also be an initial state, such as ``initial.omega``, or a constant that is added
+    to a stimulus, such as ``stimulus.i_set``. Any other direction, such as ``start.p``, acts only
+    through the derivatives of the initial values.
 
-    The derivatives are exact for the computed run: forward differentiation through every substep,
-    including friction and contact decisions. With stick-slip, instants of breakaway move with the
-    parameters only as finely as sampled inputs change. In this case, let tasks and ideal sources
-    tick at every step. The first slips of a ramp are then within 2 % at 20 us. When a body reverses
-    or stops, the substep is cut at that instant, which moves with the parameters.
+    The derivatives are exact for the computed run. They use forward differentiation of every
+    substep, including friction and contact decisions. With stick-slip, the time of a breakaway
+    moves with the parameters only as finely as sampled inputs change. In this case, let tasks and
+    ideal sources tick at every step. The first slips of a ramp are then within 2 % at 20 us. When a
+    body reverses or stops, the substep is cut at that time, which moves with the parameters.
 
     Parameters
     ----------
@@ -161,8 +161,8 @@ def simulate_with_sensitivities(
     Returns
     -------
     Sensitivity
-        The run's signals in SI units, and their derivatives along each direction, in the signal's
-        unit divided by the direction's unit.
+        The run's signals in SI units, and their derivatives in each direction, in the signal's unit
+        divided by the direction's unit.
 
     Raises
     ------
@@ -194,8 +194,8 @@ def simulate_with_sensitivities(
     kernel = _tangent_kernel(prepared.program, directions.indices, compiler)
     if kernel.rounds:
         warnings.warn(
-            "a sampled value is rounded to whole codes, so its derivatives are zero and closed "
-            "loops look open. Choose the law without rounding (adc.law = 'ideal')",
+            "a sampled value is rounded to whole codes. Its derivatives are therefore zero, and "
+            "closed loops look open. Choose the law without rounding (adc.law = 'ideal')",
             stacklevel=2,
         )
     schedule = run.schedule()
@@ -240,7 +240,7 @@ def simulate_with_sensitivities(
 def _require_shape(name: str, given: Array | None, shape: tuple[int, int]) -> None:
     if given is not None and np.shape(given) != shape:
         raise ParameterError(
-            f"{name} has the shape {np.shape(given)}: it must be {shape}, rows and parameters",
+            f"{name} has the shape {np.shape(given)}, but it must be {shape}, rows and parameters",
             name=name,
             value=str(np.shape(given)),
             valid=str(shape),
@@ -249,12 +249,12 @@ def _require_shape(name: str, given: Array | None, shape: tuple[int, int]) -> No
 
 @dataclass(frozen=True)
 class _Directions:
-    """Changes of initial values, parameters and stimuli along each direction.
+    """Changes of initial values, parameters and stimuli in each direction.
 
     Parameters
     ----------
     indices
-        Parameters of the kernel's seeds.
+        Indices of the parameters with seeds in the kernel.
     seeds
         Shape (seeded parameters and stimuli, directions).
     initial
@@ -272,7 +272,7 @@ def _directions(run: Run, requested: Sequence[str], known: Sequence[str]) -> _Di
     for name in requested:
         if name not in (*known, *states, *stimuli) and not name.startswith("start."):
             raise unknown_name("parameter", name, (*known, *states, *stimuli))
-    own = [name for name in requested if name in known] or [known[0]]  # a kernel has at least one
+    own = [name for name in requested if name in known] or [known[0]]  # a kernel needs at least one
     seeded = [*own, *stimuli]
     seeds = np.array([[float(row == name) for name in requested] for row in seeded])
     initial = np.array([[float(row == name) for name in requested] for row in states])

@@ -1,8 +1,9 @@
 """Program as one expression graph: when to compute each node, and its C code.
 
-A substep is one long chain of dependent operations, whose latency limits the speed. Sums and
-products of three or more operands are therefore reordered so that a late operand passes through as
-few operations as possible. k a + k b becomes k (a + b) if k changes rarely. Only rounding changes.
+A substep is one long chain of dependent operations, whose latency limits the speed. This module
+therefore reorders sums and products of three or more operands, so that a late operand passes
+through as few operations as possible. k a + k b becomes k (a + b) if k changes rarely. This affects
+only rounding.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from bywire.simulation.program import Program
 from bywire.simulation.quadrature import Levels, Quadrature, collapsed, factored
 from bywire.simulation.schedule import Layout
 
-# Cycles from operands to result, approximate for processors of the last ten years.
+# Cycles from operands to result, approximately, for processors of the last ten years.
 _LATENCY = {"inv": 13, "sqrt": 18, "exp": 40, "sin": 50, "cos": 50, "log": 40, "pow": 80}
 _USUAL = 4
 _SUMS = ("add", "sub", "neg")
@@ -66,7 +67,7 @@ class _Balance:
         ]
 
     def _joined(self, parts: list[tuple[int, Node]]) -> list[tuple[int, Node]]:
-        """Return rebuilt summands; equal ones and those with a common rare factor are merged."""
+        """Return rebuilt summands, merging equal summands and those with a common rare factor."""
         groups: dict[Node, list[tuple[int, int, Node, Node]]] = {}
         joined: list[tuple[int, Node]] = []
         for (sign, node), times in Counter(parts).items():
@@ -88,9 +89,9 @@ class _Balance:
         return joined
 
     def _split(self, node: Node) -> tuple[int, Node, Node] | None:
-        """Return a rarely changing factor and the rest of a product that nothing else needs.
+        """Return a rarely changing factor and the rest of a product, if nothing else needs it.
 
-        The factors a - b and b - a count as the same factor, with a change of sign.
+        The factors a - b and b - a count as the same factor with opposite sign.
         """
         nodes, level = self._graph.nodes, self._level
         if nodes[node].op != "mul" or level[node] < 2 or self._uses[node] > 1:
@@ -126,7 +127,7 @@ class _Balance:
         return node if sign > 0 else self._graph.apply("neg", node)
 
     def _time(self, node: Node) -> int:
-        """Return when a node is ready, in cycles after the substep's start."""
+        """Return the time at which a node is ready, in cycles after the substep's start."""
         if node not in self._ready:
             operation = self._graph.nodes[node]
             late = 0
@@ -138,7 +139,7 @@ class _Balance:
 
 
 def balanced(graph: Graph, roots: Sequence[Node], level: Levels) -> list[Node]:
-    """Return nodes with the same values, in an order of operations with less latency."""
+    """Return nodes with the same values but an order of operations with less latency."""
     balance = _Balance(graph, roots, level)
     return [balance.node(root) for root in roots]
 
@@ -153,18 +154,18 @@ STATE = ("x", "d", "r", "q")  # updated in every substep, in the order of the st
 
 @dataclass(frozen=True)
 class Stages:
-    """Result nodes of every stage of a kernel.
+    """Result nodes of each stage of a kernel.
 
     Parameters
     ----------
     fast, exact
-        Nodes per result of a pass: x, d, r (reactions), q (flows), jump, flag, doubt; see
+        Nodes for each result of a pass: x, d, r (reactions), q (flows), jump, flag, doubt; see
         ``Program``. Flag and ``doubtful`` of the fast pass are truth values. The exact pass uses
-        the solution of ``posed``, leaves of kinds w, force and failed.
+        the solution of ``posed``, which are leaves of the kinds w, force and failed.
     posed
         Nodes of S, row by row, c, low and high, for the set-valued forces of the exact pass.
     rows
-        Number of these forces.
+        Number of set-valued forces.
     ticks
         Nodes of the memory after each task.
     output
@@ -174,8 +175,8 @@ class Stages:
     quadrature
         Integrals of the fast pass as combinations of running sums.
     fast_t, exact_t, ticks_t, output_t
-        Tangents along one direction; empty lists without sensitivities. The exact pass also has
-        tangents with respect to the step's length, since the instant of a cut may move.
+        Tangents in one direction; empty lists without sensitivities. The exact pass also has
+        tangents with respect to the step's length, because the time of a cut may move.
     """
 
     graph: Graph
@@ -193,11 +194,11 @@ class Stages:
     output_t: list[Node]
 
     def level(self) -> Levels:
-        """Return for every node how often it must be computed, as in ``LEVEL``."""
+        """Return how often each node must be computed, as in ``LEVEL``."""
         return Levels(self.graph, LEVEL)
 
     def varies(self, kinds: frozenset[str]) -> list[bool]:
-        """Return for every node whether it depends on a leaf of one of the kinds."""
+        """Return whether each node depends on a leaf of one of the kinds."""
         found: list[bool] = []
         for node, operation in enumerate(self.graph.nodes):
             if operation.op == "leaf":
@@ -217,7 +218,7 @@ def build_stages(
     program
         The symbolic functions.
     directions
-        Indices of the parameters along which tangents are computed; empty for none.
+        Indices of the parameters for which to compute tangents; may be empty.
     outputs
         Indices of the signals to compute. Default: all. Integrals that no signal reads stay zero.
     """
@@ -265,7 +266,7 @@ def build_stages(
     substep = frozenset(needed(graph, _all_but(fast, "q"), lambda _: False))
     quadrature = factored(graph, fast["q"], substep, level)
     fast, quadrature = _balanced(graph, fast, quadrature, level)
-    if outputs is not None:  # at this point, so the order of operations stays that of all outputs
+    if outputs is not None:  # here, so that the order of operations is the same as for all outputs
         read = graph.read_by(output)
         is_needed, zero = [leaf in read for leaf in leaves["q"]], graph.constant(0.0)
         quadrature = quadrature.of(is_needed)
@@ -311,7 +312,7 @@ def _balanced(
 def _renewed(graph: Graph, roots: list[Node], known: dict[Node, Node]) -> list[Node]:
     """Return nodes with other arguments.
 
-    Loss rates as written cannot be negative. As sums of products they can, by rounding.
+    The original loss rates cannot be negative. Sums of products can be negative due to rounding.
     """
     new = dict(known)
     for node in needed(graph, roots, known.__contains__):
@@ -323,7 +324,7 @@ def _renewed(graph: Graph, roots: list[Node], known: dict[Node, Node]) -> list[N
 
 
 def _with_tangents(function: Any, kinds: str, directions: Sequence[int], fixed: str) -> Any:
-    """Return the tangents' function: the same arguments, then seeds of all changing arguments."""
+    """Return the tangent function: the same arguments, then seeds of all changing arguments."""
     arguments = function.sx_in()
     seeds, points, extra = [], [], []
     for kind, argument in zip(kinds, arguments, strict=True):
@@ -359,7 +360,7 @@ PLAN = """const int64_t begin = plan[0], end = plan[1], last = plan[2], substeps
 def unread(stages: Stages) -> frozenset[str]:
     """Return the half increments and reactions that no stage reads.
 
-    They need not be stored. A cut substep reads those of velocities with dry friction.
+    The kernel does not store them. A cut substep reads those of velocities with dry friction.
     """
     roots = [
         node for pass_ in (stages.fast, stages.exact) for nodes in pass_.values() for node in nodes
@@ -377,8 +378,8 @@ def unread(stages: Stages) -> frozenset[str]:
 def midpoints(graph: Graph, order: Iterable[Node]) -> dict[Node, int]:
     """Return the nodes that are a state plus its half increment, with the index of the state.
 
-    A kernel passes these from substep to substep, since the next one begins with them. Only cut
-    substeps read half increments on their own.
+    A kernel passes these nodes from substep to substep, because the next substep begins with them.
+    Only cut substeps read the half increments separately.
     """
     chosen = {}
     for node in order:
@@ -415,7 +416,7 @@ def literal(graph: Graph, node: Node) -> str:
 def leaf_namer(
     graph: Graph, leaf: Callable[[str, int], str], other: Namer, constant: str = "{}"
 ) -> Namer:
-    """Return a function that names constants and leaves, and calls another for operations."""
+    """Return a function that names constants and leaves, and calls another one for operations."""
 
     def name(node: Node) -> str:
         operation = graph.nodes[node]
@@ -435,7 +436,7 @@ def statements(
     declare: str,
     dialect: Dialect = PLAIN_C,
 ) -> list[str]:
-    """Return one declaration per operation; truth values are written inline."""
+    """Return one declaration per operation, with truth values inline."""
     return [
         f"{declare}{name(node)} = {text(graph, node, name, dialect)};"
         for node in order
@@ -451,10 +452,10 @@ def branching_statements(
     dialect: Dialect = PLAIN_C,
     later: Iterable[Node] = (),
 ) -> list[str]:
-    """Return declarations with costly functions inside the only branch that needs them.
+    """Return declarations with each costly function inside the only branch that needs it.
 
-    If the condition is false, the processor skips the function. ``later``: other nodes that read
-    these declarations.
+    If the condition is false, the branch skips the function. ``later``: other nodes that read these
+    declarations.
     """
     uses = Counter(a for node in (*order, *later) for a in graph.arguments(node))
     inside = {

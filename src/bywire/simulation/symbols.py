@@ -1,4 +1,4 @@
-"""Thin functions around CasADi's SX, so that the scheme reads like its description."""
+"""Thin wrappers around CasADi's SX that keep the scheme readable."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ SX = ca.SX
 
 
 def column(values: Sequence[Any]) -> Any:
-    """Return scalars as one SX column, which may be empty."""
+    """Return scalars as an SX column, which may be empty."""
     return ca.vertcat(*(SX(v) for v in values)) if values else SX(0, 1)
 
 
@@ -28,11 +28,11 @@ def symbol_tuple(tuple_type: type, vector: Any) -> Any:
 _JUMPS = frozenset(
     (ca.OP_FLOOR, ca.OP_CEIL, ca.OP_SIGN, ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE, ca.OP_NOT)
 )
-"""operations whose derivative is zero wherever it is defined"""
+"""operations whose derivative is zero wherever the derivative exists"""
 
 
 def nonlinear(expression: Any, variables: Any) -> list[bool]:
-    """Return for each variable whether the expression is nonlinear in it, or jumps with it."""
+    """Return whether the expression is nonlinear in each variable, or jumps with it."""
     if expression.shape[0] == 0 or variables.shape[0] == 0:
         return [False] * int(variables.shape[0])
     curved = ca.which_depends(expression, variables, 2, False)
@@ -41,7 +41,7 @@ def nonlinear(expression: Any, variables: Any) -> list[bool]:
 
 
 def _jumping(expression: Any, variables: Any) -> set[int]:
-    """Return the variables with which an expression jumps, which no derivative shows."""
+    """Return the variables with which an expression jumps, although its derivative is zero."""
     known = {each.element_hash() for each in ca.symvar(variables)}
     others = [each for each in ca.symvar(expression) if each.element_hash() not in known]
     function = ca.Function("jumps", [variables, ca.vertcat(*others)], [ca.densify(expression)])

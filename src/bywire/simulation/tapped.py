@@ -1,9 +1,9 @@
-"""Model with falsifiable signals between plant and controllers, and tasks that can miss ticks.
+"""Model with taps that can falsify signals, and with tasks that can miss ticks.
 
 Sensor readings, demands and controller outputs pass through a *tap*. A tap returns ``(1 + gain) y +
-offset``, its last value if it is stuck, or its input some ticks ago. Gains, offsets and the other
-effects are additional signals of the stimulus. If they are zero, the model equals the inner model,
-so runs with and without a fault have the same structure.
+offset``, its last value if it is stuck, or its input a number of ticks ago. Gains, offsets and
+other effects are additional signals of the stimulus. If they are zero, the model equals the inner
+model. So runs with and without a fault have the same structure.
 """
 
 from __future__ import annotations
@@ -19,25 +19,25 @@ from bywire.core.model import Model, Task, Wrapping
 from bywire.core.signals import Signal, ranges_of, signals_of
 
 DEAD = 2.0
-"""value of a task's failure stimulus: the task has lost its memory"""
+"""value of a task's failure stimulus that means that the task has lost its memory"""
 
 
 class Tap(NamedTuple):
-    """Signal that can be falsified.
+    """Tap of a signal, which can falsify the signal.
 
     Parameters
     ----------
     name
-        Prefix of its stimuli; see `controls`.
+        Prefix of the tap's stimuli; see `controls`.
     side
-        ``"reading"``: a state as the tasks read it. ``"demand"``: a field of the stimulus.
-        ``"drive"``: a field of the memory as the plant receives it.
+        ``"reading"``: a state that the tasks read. ``"demand"``: a field of the stimulus.
+        ``"drive"``: a field of the memory that the plant receives.
     field
-        Name of that state or field.
+        Name of the state or field.
     task
-        Task that computes a drive which may be late.
+        Task that computes a drive that may be late.
     late
-        Delay of a drive in ticks of that task, while its stimulus ``late`` is 1.
+        Delay of a drive in ticks of the task, while its stimulus ``late`` is 1.
     """
 
     name: str
@@ -56,20 +56,21 @@ def rests(task: str) -> str:
     """Return the name of the stimulus that makes a task fail.
 
     If it is 1, the task misses its tick, and its outputs hold their values. If it is `DEAD`, all
-    values that the task computes are those at rest: the task loses its memory, and restarts later.
+    values that the task computes are its values at rest. The task loses its memory, and restarts
+    later.
     """
     return f"rest_{task.replace('-', '_')}"
 
 
 class Tapped(Wrapping):
-    """Model with taps, which records a drive as the plant receives it.
+    """Model with taps, which records each drive that the plant receives.
 
     Parameters
     ----------
     inner
         The model without taps.
     taps
-        Signals that can be falsified.
+        Taps of the signals that can be falsified.
     resting
         Names of the tasks that can miss ticks.
     """
@@ -79,19 +80,19 @@ class Tapped(Wrapping):
         self.taps, self.resting = taps, resting
 
     def __getattr__(self, name: str) -> Any:
-        """Return an attribute of the inner model beyond the protocol, such as its parts."""
+        """Return an attribute of the inner model that is not in the protocol, such as its parts."""
         if name.startswith("__") or name == "inner":
             raise AttributeError(name)
         return getattr(self.inner, name)
 
     @property
     def Memory(self) -> type[NamedTuple]:
-        """Memory of the inner model, then the last values of every tap and delayed values."""
+        """Memory of the inner model, then the last value and the delayed values of each tap."""
         return _memory(self.inner.Memory, self.inner.State, self.inner.Stimulus, self.taps)
 
     @property
     def Stimulus(self) -> type[NamedTuple]:
-        """Stimulus of the inner model, then the signals that falsify."""
+        """Stimulus of the inner model, then the signals that control the taps."""
         controls = [
             (name, Signal("1", name.replace("_", " ")))
             for tap in self.taps
@@ -104,7 +105,7 @@ class Tapped(Wrapping):
         return _extended(self.inner.Stimulus, (*controls, *tasks))
 
     def started(self, state: Any, memory: Any) -> Any:
-        """Return the memory at a start, from the memory of the inner model and the state."""
+        """Return the initial memory, from the inner model's memory and the state."""
         last: dict[str, Any] = {}
         for tap in self.taps:
             source = state if tap.side == "reading" else memory
@@ -113,7 +114,7 @@ class Tapped(Wrapping):
         return self.Memory(*memory, **last)
 
     def rest(self, par: Any) -> tuple[Any, Any]:
-        """Return the rest of the inner model."""
+        """Return the inner model's state of rest."""
         state, memory = self.inner.rest(par)
         return state, self.started(state, memory)
 
@@ -122,7 +123,7 @@ class Tapped(Wrapping):
         return self.behind_taps(self.inner.tasks(par))
 
     def behind_taps(self, tasks: Iterable[Task]) -> tuple[Task, ...]:
-        """Return controllers of the inner model, from any source, with their taps."""
+        """Return tasks of the inner model with taps; the tasks may come from any source."""
         return tuple(
             Task(task.name, task.period, partial(self._tick, task.name, task.tick))
             for task in tasks
@@ -149,7 +150,7 @@ class Tapped(Wrapping):
         if name in self.resting:
             fails = getattr(stimulus, rests(name))
             empty = self.inner.rest(par)[1]
-            # Values that a task returns unchanged belong to other tasks.
+            # Other tasks compute the values that a task returns unchanged.
             after = type(after)(
                 *(
                     new if new is old else _failing(fails, old, new, none)
@@ -163,7 +164,7 @@ class Tapped(Wrapping):
         return self.Memory(*after, **{**kept, **last})
 
     def _inside_range(self, field: str, demand: Any) -> Any:
-        """Return a falsified demand, limited to its range: a switch has no third position."""
+        """Return a falsified demand within its range: a switch has only two positions."""
         low, high = ranges_of(self.inner.Stimulus).get(field, (-math.inf, math.inf))
         above = demand if low == -math.inf else ops.fmax(demand, low)
         return above if high == math.inf else ops.fmin(above, high)
@@ -172,7 +173,7 @@ class Tapped(Wrapping):
         return self.inner.Memory._make(memory[: len(self.inner.Memory._fields)])
 
     def memory_inside(self, memory: Any) -> Any:
-        """Return the memory as the plant receives it, with the drives after their taps."""
+        """Return the memory that the plant receives, with the drives after their taps."""
         drives = {
             t.field: getattr(memory, f"last_{t.name}") for t in self.taps if t.side == "drive"
         }
@@ -180,7 +181,7 @@ class Tapped(Wrapping):
 
 
 def _tapped(tap: Tap, source: Any, memory: Any, stimulus: Any, last: dict[str, Any]) -> Any:
-    """Return the output of a tap, and store the values that it keeps."""
+    """Return the output of a tap, and store the values that the tap remembers."""
     control = {kind: getattr(stimulus, name) for kind, name in tap.controls().items()}
     value = getattr(source, tap.field)
     held, *line = _fields(tap)
@@ -198,12 +199,12 @@ def _either(flag: float, old: float, new: float) -> float:
 
 
 def _failing(fails: float, old: float, new: float, none: float) -> float:
-    """Return the memory of a task that runs, misses its tick, or is dead."""
+    """Return a memory value of a task that runs, misses its tick, or is dead."""
     return ops.where(fails > 0.5 * (1.0 + DEAD), none, _either(fails, old, new))
 
 
 def _fields(tap: Tap) -> tuple[str, ...]:
-    """Return the fields of the memory that a tap keeps: its last value, then delayed values."""
+    """Return the memory fields of a tap: its last value, then delayed values."""
     return (f"last_{tap.name}", *(f"late_{tap.name}_{k + 1}" for k in range(tap.late)))
 
 

@@ -1,6 +1,6 @@
 """Fallback without a compiler: CasADi's virtual machine evaluates the same functions.
 
-It cuts a substep at the zero crossing of a velocity, like the C text of ``emit_rare``.
+It cuts a substep at the zero crossing of a velocity, like the C code in ``emit_rare``.
 """
 
 from __future__ import annotations
@@ -37,13 +37,13 @@ Settle = Callable[[Array, Array, Array, Array, float], tuple[list[Array], bool]]
 
 
 class CutSubstep:
-    """One substep, in as many parts as necessary.
+    """One substep with as many parts as necessary.
 
     Parameters
     ----------
     settle
-        Function that computes a step of any length: x, d, r, q, jump, ..., and whether the step did
-        not settle.
+        Function that computes a step of any length. It returns x, d, r, q, jump, ..., and whether
+        the step failed to settle.
     velocities
         Indices of the states with dry friction.
     m, p
@@ -54,7 +54,7 @@ class CutSubstep:
     Attributes
     ----------
     tries
-        Number of tried parts.
+        Number of attempted parts.
     """
 
     def __init__(
@@ -65,7 +65,7 @@ class CutSubstep:
         self.tries = 0
 
     def results(self, x: Array, d: Array) -> tuple[list[Array], bool]:
-        """Return x, d, r, q at the end of the substep, and whether it did not settle."""
+        """Return x, d, r, q at the end of the substep, and whether it failed to settle."""
         h, left, most = self._h, self._h, most_cuts(len(self._velocities))
         flow: Array | float = 0.0
         unsettled = False
@@ -84,7 +84,7 @@ class CutSubstep:
             for k, jump in self._jumps(o):
                 if k == turns or abs(x[k]) < STILL * abs(
                     before[k]
-                ):  # identical bodies stop at the same instant
+                ):  # identical bodies stop at the same time
                     x[k], d[k] = 0.0, _turned_back(float(d[k]), jump * (h / t))
             flow = flow + o[3] * (t / h)
             left -= t
@@ -101,7 +101,7 @@ class CutSubstep:
         return zip(self._velocities, o[JUMP], strict=True)
 
     def _first_turn(self, x: Array, o: list[Array]) -> tuple[int, float]:
-        """Return the first velocity to change its sign, -1 if none, and the instant."""
+        """Return the first velocity to change sign, or -1, and the time as a fraction."""
         first, share = -1, 1.0
         for k, jump in self._jumps(o):
             v, w = float(x[k]), float(o[0][k])
@@ -112,9 +112,10 @@ class CutSubstep:
     def _locate(
         self, x: Array, d: Array, o: list[Array], length: float
     ) -> tuple[list[Array], float, int, bool]:
-        """Return a part that ends at the first zero of a velocity.
+        """Return the part that ends at the first zero of a velocity.
 
-        It has a length, the index of the velocity, and whether it did not settle.
+        The result contains the part's length, the index of the velocity, and whether the part
+        failed to settle.
         """
         first, final = EDGE * length, (1.0 - EDGE) * length
         turns, _ = self._first_turn(x, o)
@@ -142,7 +143,7 @@ class CutSubstep:
             following = t - w / slope
             is_near = abs(w) <= NEAR * change and first < following < final
             if is_near and before is not None:
-                # The remaining search is on the line through two attempts.
+                # The rest of the search uses the line through two attempts.
                 share = (following - t) / (t - before[0])
                 moved = [now + share * (now - was) for now, was in zip(o, before[1], strict=True)]
                 return [*moved[:JUMP], *o[JUMP:]], following, turns, failed
@@ -153,14 +154,14 @@ class CutSubstep:
 
 
 def _turned_back(before: float, jump: float) -> float:
-    """Return half the increment after a zero of the velocity."""
+    """Return half the increment after a zero of the velocity, reduced by the jump of friction."""
     return math.copysign(max(abs(before) - jump, 0.0), before)
 
 
 def _zero_of(v: float, t: float, w: float, before: float, h: float) -> float:
-    """Return the time at which a velocity that changes from v to w within t is zero.
+    """Return the time of the zero of a velocity that changes from v to w within t.
 
-    It is the zero of the parabola that also has the mean slope ``before`` over an earlier length h.
+    This is the zero of a parabola, whose mean slope over the preceding length h is ``before``.
     """
     mean = (w - v) / t
     linear = -v / mean
@@ -170,11 +171,11 @@ def _zero_of(v: float, t: float, w: float, before: float, h: float) -> float:
     return zero if 0.0 < zero < t else linear
 
 
-# --- The machine
+# --- The virtual machine
 
 
 class VirtualMachine:
-    """Kernel with loops in Python and functions in CasADi's virtual machine."""
+    """Kernel whose loops are in Python and whose functions run in CasADi's virtual machine."""
 
     label = "virtual machine (no C compiler)"
 
@@ -195,10 +196,10 @@ class VirtualMachine:
         self._exact = BufferedCall(program.exact)
         self._ticks = [BufferedCall(tick) for tick in program.ticks]
         self._output = BufferedCall(program.output)
-        self._lock = threading.Lock()  # the functions' buffers can serve only one run at a time
+        self._lock = threading.Lock()  # the functions' buffers support only one run at a time
 
     def advance(self, request: Request, state: Array, begin: int, end: int, rows: Array) -> None:
-        """Run frames begin..end: update ``state`` and fill ``rows`` in place."""
+        """Run the frames from begin to end; update ``state`` and fill ``rows`` in place."""
         with self._lock:
             self._advance(request, state, begin, end, rows)
 
@@ -230,7 +231,7 @@ class VirtualMachine:
             cut = CutSubstep(self._settled, self._velocities, part["m"], p, float(h[0]))
             is_known = int(result[DOUBT][0] == 0.0)
             result, failed = cut.results(part["x"].copy(), part["d"].copy())
-            # A settled step's velocities are final, so the kernel does not try it again.
+            # The velocities of a settled step are final, so a compiled kernel does not repeat it.
             part["counters"] += failed, 1.0, cut.tries - is_known
         for kind, value in zip(("x", "d", "r"), result, strict=False):
             part[kind][:] = value
@@ -239,7 +240,7 @@ class VirtualMachine:
     def _settled(
         self, x: Array, d: Array, m: Array, p: Array, h: float
     ) -> tuple[list[Array], bool]:
-        """Return the result of a step of any length, and whether it did not settle."""
+        """Return the result of a step of any length, and whether it failed to settle."""
         guess, step = d, np.array([h])
         result = self._fast(x, guess, m, p, step)
         if result[DOUBT][0] != 0.0:

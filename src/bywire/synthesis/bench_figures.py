@@ -1,17 +1,17 @@
 r"""Figures of gains on the nonlinear bench: sines by amplitude, and the brake's step.
 
-Many sets of gains run side by side, in the lanes of one ensemble. A set is measured in stages, and
+Many sets of gains run in parallel, in the lanes of one ensemble. A set is measured in stages, and
 dropped as soon as it cannot be the best.
 
-Controller and sensor are linear between their limits. What the closed loop G, measured with a sine
-of one amplitude, leaves for the rest P (actuator, friction, dither) follows from the loop's laws
-C_r (set point) and C_y (output, sensor included):
+Controller and sensor are linear between their limits. The closed loop G is measured with a sine of
+one amplitude. The rest of the loop P (actuator, friction, dither) follows from the loop's laws C_r
+(set point) and C_y (output, including the sensor):
 
 .. math:: G = \frac{C_r P}{1 + C_y P}, \quad L = C_y P = \frac{C_y G}{C_r - C_y G}
 
-P is the describing function at that amplitude of the set point, so the margin is one of small and
-middle-sized motion, not a proof of stability in the large. Scheduled gains count as those at the
-operating point: within a blend that is exact for small sines only.
+P is the describing function at this amplitude of the set point. The margin therefore applies to
+small and medium motion and does not prove stability for large motion. Scheduled gains have their
+values at the operating point, which within a blend is exact only for small sines.
 """
 
 from __future__ import annotations
@@ -38,9 +38,9 @@ from bywire.simulation.ensemble import simulate_ensemble
 from bywire.simulation.run import Run
 
 _POINTS = 12
-_BELOW, _ABOVE = 4.0, 3.0  # of the target: the range of frequencies
+_BELOW, _ABOVE = 4.0, 3.0  # range of frequencies, relative to the target
 _LEAST = 3  # periods in a window
-_WINDOWS = 12  # granted to a response: friction and converter may keep it from repeating exactly
+_WINDOWS = 12  # maximum per response, since friction and converter may prevent exact repetition
 _ROUGH_WINDOWS, _ROUGH = 8, 5e-3
 
 
@@ -53,15 +53,15 @@ class Small:
     amplitude
         Amplitude of the sine, in the input's SI unit.
     bandwidth
-        Frequency at which the gain has fallen to -3 dB [Hz]; the highest measured one where it
-        stays above; 0 where the gain is below, or the mechanism is stuck, from the lowest one on.
+        Frequency at which the gain has fallen to -3 dB [Hz]; the highest measured frequency if the
+        gain stays above; 0 if the gain is below, or the mechanism sticks, from the lowest one on.
     least
-        Smallest gain up to the target; 0 for a stuck mechanism.
+        Minimum gain up to the target; 0 for a stuck mechanism.
     phase_margin, crossover
-        Margin and crossover of the describing function [degree, Hz], see
-        `crossings.measured_margin`; NaN where the laws are not known.
+        Margin and crossover of the describing function [degree, Hz] (see
+        `crossings.measured_margin`); NaN if the laws are unknown.
     peak
-        Largest gain.
+        Maximum gain.
     settled
         Whether every response became periodic.
     """
@@ -138,7 +138,7 @@ class Sines:
         self._settled[at] = responses["settled"].values > 0
 
     def first_look(self, k: int) -> tuple[Small, ...]:
-        """Return the figures of a set from the frequencies next to the target: its gain there."""
+        """Return the figures of a set from the frequencies next to the target: the gain there."""
         f, unknown = self._f[self.near], (math.nan,) * 3
         return tuple(
             Small(
@@ -185,8 +185,8 @@ class Sines:
 def _frequencies(run: Run, whole: Sequence[float], target: float) -> list[float]:
     """Return ascending frequencies with few periods in whole sample times and dither periods.
 
-    Several periods are used, each at another phase of the dither. With one period, friction would
-    lock 10 Hz to five periods of 50 Hz, and the result would depend on the initial phase.
+    Each period occurs at a different phase of the dither. With one period, friction would lock
+    10 Hz to five periods of 50 Hz, and the result would depend on the initial phase.
     """
     common = common_interval(run, whole)
     limit = nyquist(run)
@@ -206,7 +206,7 @@ def _frequencies(run: Run, whole: Sequence[float], target: float) -> list[float]
 def loop_gain(
     loop: Loop, par: ParameterSet, value: float, closed: Complex, frequencies: Array
 ) -> Complex | None:
-    """Return the loop gain behind a measured closed response.
+    """Return the loop gain from a measured closed-loop response.
 
     Parameters
     ----------
@@ -245,7 +245,7 @@ STEP_FIGURES = ("overshoot", "settling_time", "steady_state_error")
 
 @dataclass(frozen=True)
 class BenchFigures:
-    """Figures of one set of gains on the nonlinear bench, as far as measured.
+    """Figures of one set of gains on the nonlinear bench, as far as they are measured.
 
     Parameters
     ----------
@@ -253,7 +253,7 @@ class BenchFigures:
         Figures by amplitude.
     step
         Overshoot [%], settling time [s] and steady-state error [% of the step] of the loop's
-        experiment; empty where it has no step response. NaN where not defined.
+        experiment; empty without a step response. NaN if not defined.
     reasons
         Reasons why figures of the step are not defined, by name.
     """
@@ -281,16 +281,16 @@ def bench_figures(
     Parameters
     ----------
     loop, par, value
-        Loop, parameters and operating point, friction, dither and limits on; the loop's
-        ``sustained`` are set for the sines.
+        Loop, parameters and operating point, with friction, dither and limits; the sines use the
+        loop's ``sustained`` parameters.
     amplitudes
         Amplitudes of the sines, SI.
     gains
         Dotted name -> its value in each set [SI].
     bench
-        The experiment with the judged step; None for none.
+        Experiment with the judged step, or None.
     target
-        Center of the measured frequencies [Hz], from a quarter to three times of it.
+        Center of the measured frequencies [Hz], which range from a quarter to three times of it.
     """
     everything = wanted_figures(
         loop, par, value, amplitudes, gains, bench, target, lambda k, known: True
@@ -312,15 +312,15 @@ def wanted_figures(
 ) -> tuple[BenchFigures | None, ...]:
     """Return the figures of several sets of gains, measured as long as they are promising.
 
-    The step is cheap and comes first; then the sines next to the target, which give only the
-    smallest gain so far; then all others.
+    The cheap step comes first, then the sines next to the target, which determine only the minimum
+    gain so far, then all others.
 
     Parameters
     ----------
     loop, par, value, amplitudes, gains, bench, target
         See `bench_figures`.
     worth
-        Called before every stage but the first. Unknown figures are NaN, or missing.
+        Called before every stage except the first. Unknown figures are NaN or missing.
     rough
         Whether settling to 0.5 % is enough, as in a search.
 

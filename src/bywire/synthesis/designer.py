@@ -2,9 +2,9 @@ r"""Gains of a loop from requirements, for a set of models, with the largest wor
 
 .. math:: \max_{x, t} t \quad \text{with} \quad s_{jk}(x) \ge t
 
-for every requirement j and model k: the largest of the smallest slacks, without the kinks of a
-plain minimum. Sequential quadratic programming from several starts, then a simplex search where it
-stopped at a kink of a figure itself.
+for every requirement j and model k: the maximum of the minimum slack, without the kinks of a plain
+minimum. The optimizer uses sequential quadratic programming from several starts, then a simplex
+search if it stopped at a kink of a figure.
 """
 
 from __future__ import annotations
@@ -54,11 +54,11 @@ def suffixed(progress: Progress | None, text: str) -> Progress | None:
 # --- The optimizer
 
 UNSTABLE = -12.0
-"""slack of an unstable loop, before its growth is counted"""
-_LEAST, _LARGEST = -10.0, 3.0  # larger slacks do not count as worse or better
+"""slack of an unstable loop, before subtracting its growth"""
+_LEAST, _LARGEST = -10.0, 3.0  # range of slacks that count as different
 KEPT_MISSED = -1e3
-"""below this, no point of a search meets the requirements to keep"""
-_STEP = 1e-5  # of differences, share of a range
+"""below this slack, no point of a search meets the requirements to keep"""
+_STEP = 1e-5  # of differences, as a fraction of a range
 _SAMPLES, _STARTS = 64, 3
 _ITERATIONS = 40
 _SIMPLEX = 25  # evaluations per gain
@@ -71,8 +71,8 @@ class Problem:
     Parameters
     ----------
     tunables
-        Dotted name -> lowest and highest value [SI]; searched on a logarithmic scale where the
-        lowest is above zero.
+        Dotted name -> minimum and maximum value [SI]; the search uses a logarithmic scale if the
+        minimum is above zero.
     requirements
         Constraints for every case.
     cases
@@ -98,7 +98,7 @@ class Problem:
         return values
 
     def point(self, gains: Mapping[str, float]) -> Array:
-        """Return the point of the unit cube for gains, the nearest where they are outside."""
+        """Return the point of the unit cube for gains, or the nearest if they are outside."""
         shares = []
         for name, (low, high) in self.tunables.items():
             value = min(max(gains[name], low), high)
@@ -109,7 +109,7 @@ class Problem:
     def slacks(self, z: Array, cases: Sequence[int], *, plain: bool = False) -> Array:
         """Return the slack of every requirement for some cases, shape (cases, requirements).
 
-        ``plain``: measures a bandwidth by its frequency, see `linear_case.room`.
+        ``plain``: measures a bandwidth by its frequency (see `linear_case.room`).
         """
         return np.array([self._of(z, k)[int(plain)] for k in cases])
 
@@ -137,7 +137,7 @@ class Problem:
 
 @dataclass
 class Search:
-    """A search for the largest worst slack.
+    """Search for the largest worst slack.
 
     Parameters
     ----------
@@ -148,9 +148,9 @@ class Search:
     wanted
         Requirements whose worst slack is maximized; all by default.
     kept
-        Requirements that must be met meanwhile.
+        Requirements that must be met at the same time.
     best, slack
-        Best point found so far and its worst slack, also after an interrupt.
+        Best point so far and its worst slack, also after an interrupt.
     seen
         Slack and position of every visited point.
     plain
@@ -174,7 +174,7 @@ class Search:
         return self.best
 
     def run(self, starts: Sequence[Array], report: Report = lambda share: None) -> None:
-        """Climb from each start, then from the best with a simplex search and once more.
+        """Climb from each start, then from the best point with a simplex search, then again.
 
         Parameters
         ----------
@@ -195,7 +195,7 @@ class Search:
             [self.best, self.best + 0.04 * np.where(self.best < 0.5, 1, -1) * np.eye(n)]
         )
         options: Any = {"maxfev": _SIMPLEX * n, "initial_simplex": corners, "fatol": 1e-5}
-        climb: Any = minimize  # its stubs tell the methods' starting points apart
+        climb: Any = minimize  # its stubs distinguish the methods' starting points
         known, simplex = len(self.seen), piece(report, len(starts), parts)
         climb(
             lambda z: -self._judged(z),
@@ -241,7 +241,7 @@ class Search:
             wanted = slacks[:, self._chosen()] - v[n]
             return np.concatenate([wanted.ravel(), slacks[:, list(self.kept)].ravel()])
 
-        # Own forward differences: one loop per gain serves all requirements together.
+        # Our own forward differences need one loop per gain for all requirements together.
         def slope(v: Array) -> Array:
             here, columns = excess(v), []
             for k in range(n):
@@ -253,8 +253,8 @@ class Search:
             rate[: len(self.cases) * len(self._chosen())] = -1.0
             return np.column_stack([*columns, rate])
 
-        # The slack is a separate variable (epigraph): smallest slacks have kinks, the constraints
-        # do not.
+        # The slack is a separate variable (epigraph), because the minimum slack has kinks, but the
+        # constraints have none.
         first = self._slacks(start)[:, self._chosen()].min()
         constraints: Any = [{"type": "ineq", "fun": excess, "jac": slope}]
         options: Any = {"maxiter": _ITERATIONS, "ftol": 1e-5}
@@ -273,7 +273,7 @@ class Search:
 
 
 def starts_of(problem: Problem, given: Sequence[Array], seed: int) -> list[Array]:
-    """Return start points: the given ones, and the best of a seeded sample of the cube."""
+    """Return start points: the given points, and the best of a seeded sample of the cube."""
     n = len(problem.tunables)
     sample = qmc.Sobol(n, rng=np.random.default_rng(seed)).random(_SAMPLES)
     worst = [float(problem.slacks(z, [0]).min()) for z in sample]
@@ -282,22 +282,22 @@ def starts_of(problem: Problem, given: Sequence[Array], seed: int) -> list[Array
 
 
 # --- The design
-# Without further constraints, a required bandwidth alone leads to the border of stability, and a
-# phase margin alone to no integral action. The disk margin :math:`\alpha` guarantees (P.
+# Without other constraints, a required bandwidth alone leads to the stability limit, and a phase
+# margin alone to no integral action. The disk margin :math:`\alpha` guarantees (P.
 # Seiler, A. Packard, P. Gahinet, "An Introduction to Disk Margins", IEEE Control Systems Magazine
 # 40(5), 2020, section on disk-based gain and phase margins)
 #
 # .. math:: g_m \ge \frac{2 + \alpha}{2 - \alpha}, \quad
 #     g_l \le \frac{2 - \alpha}{2 + \alpha}, \quad \varphi_m \ge 2 \arctan\frac{\alpha}{2}
 #
-# and by this formula required margins of the user lower it.
+# By this formula, smaller margins that the user requires lower it.
 
 DISK = 0.5
-"""least disk margin: gain by a factor of 1.67, phase by 28 degree"""
+"""minimum disk margin: gain by a factor of 1.67, phase by 28 degree"""
 ERROR = 5.0
 """maximum steady-state error [%]"""
-_WORSE = 1.5  # largest factor by which kept figures of the start may worsen
-_TRACKS = 50.0  # error above which an output does not track the set point by design, %
+_WORSE = 1.5  # maximum factor by which constrained figures of the start may worsen
+_TRACKS = 50.0  # error above which an output intentionally does not track the set point, %
 
 
 def linear_floors(requirements: Sequence[Limit], error: float) -> tuple[Limit, ...]:
@@ -306,10 +306,10 @@ def linear_floors(requirements: Sequence[Limit], error: float) -> tuple[Limit, .
     Parameters
     ----------
     requirements
-        The user's; a required margin below the one guaranteed by `DISK` lowers the constraint, and
-        a requirement of the same figure replaces it.
+        The user's requirements. A required margin below the one that `DISK` guarantees lowers the
+        constraint, and a requirement on the same figure replaces it.
     error
-        The start's largest steady-state error [%]; NaN for an unstable start. An error larger than
+        The start's maximum steady-state error [%]; NaN for an unstable start. An error larger than
         `ERROR` may grow by half; a loop that does not track has no constraint.
     """
     texts = []
@@ -328,7 +328,7 @@ def bench_floors(
     floors: Sequence[Limit],
     trials: Iterable[BenchFigures],
 ) -> tuple[Limit, ...]:
-    """Return constraints for retuned gains from the linear design: floors, and its settled step.
+    """Return constraints for retuned gains: floors, and the linear design's settled step.
 
     Parameters
     ----------
@@ -337,7 +337,7 @@ def bench_floors(
     floors
         See `linear_floors`.
     trials
-        Results of the linear design on the bench, in every trial.
+        Results of the linear design on the bench in every trial.
     """
     steps = [figures.step for figures in trials if figures.step]
     kept = list(floors)
@@ -356,7 +356,7 @@ def bench_floors(
 def _implied(wanted: Limit) -> float:
     """Return the disk margin that guarantees a required margin; infinity for other figures.
 
-    Half of it for an upper limit of the margin.
+    Return half of it for an upper limit of the margin.
     """
     if wanted.figure == "phase_margin":
         disk = 2.0 * math.tan(math.radians(0.5 * wanted.bound))
@@ -377,9 +377,9 @@ def _implied(wanted: Limit) -> float:
 _FINE = 4000  # points of the grid for reported figures
 _BINDS = 0.01  # slacks this close to the worst one bind
 _ROUNDS, _PAIRED = 8, 3
-_CONFIRMED, _ALIKE = 40, 1e-3  # points evaluated again, and their least distance
-_CONFIRMED_FIGURES, _APART = 150, 1e-2  # the same where a figure itself is searched
-_HELD = -1e-3  # slack of kept figures that rounding may leave
+_CONFIRMED, _ALIKE = 40, 1e-3  # number of points evaluated again, and their minimum distance
+_CONFIRMED_FIGURES, _APART = 150, 1e-2  # likewise, in a search by figures
+_HELD = -1e-3  # minimum slack of constrained figures, with rounding
 
 
 def design(
@@ -393,16 +393,16 @@ def design(
 ) -> Design:
     """Choose gains that meet requirements for every model with the largest slack.
 
-    Models are added as they turn out to be the worst; all of them are checked at the end. An
-    interrupt ends the search, and the best gains so far are returned. The constraints of
-    `linear_floors` are also enforced.
+    The search starts with the nominal model and adds the worst other models; all models are checked
+    at the end. An interrupt ends the search, and the function returns the best gains so far. The
+    constraints of `linear_floors` are also enforced.
 
     Parameters
     ----------
     tunables
-        Dotted name -> lowest and highest value [SI].
+        Dotted name -> minimum and maximum value [SI].
     requirements
-        See `requirement.read`.
+        See `linear_case.read`.
     cases
         Models, the nominal one first.
     start
@@ -415,11 +415,11 @@ def design(
     Raises
     ------
     ParameterError
-        When nothing can be tuned, or a bandwidth is beyond half the sampling frequency.
+        When no parameter can be tuned, or a bandwidth is above half the sampling frequency.
     """
     if not tunables:
         raise ParameterError(
-            "all tunable parameters of the loop are set. Set fewer of them", name="parameters"
+            "all tunable parameters of the loop are fixed. Set fewer of them", name="parameters"
         )
     floors = linear_floors(requirements, largest_error(cases, start))
     problem = Problem(tunables, (*requirements, *floors), tuple(cases))
@@ -444,7 +444,7 @@ def design(
 
 
 def largest_error(cases: Sequence[LinearCase], gains: Mapping[str, float]) -> float:
-    """Return the largest steady-state error over some models [%]; NaN where one is unstable."""
+    """Return the maximum steady-state error over some models [%]; NaN if one is unstable."""
     every = [case.figures(gains) for case in cases]
     return max(
         (figures.steady_state_error if figures.is_stable else np.nan for figures in every),
@@ -458,7 +458,7 @@ def _require_sampled(problem: Problem, start: Mapping[str, float]) -> None:
         if wanted.unit == "Hz" and not wanted.is_upper and wanted.bound >= 0.5 / period:
             raise ParameterError(
                 f"requirement {str(wanted)!r} cannot be met because the loop's sample time is "
-                f"{period * 1e3:g} ms. Require < {0.5 / period:g} Hz",
+                f"{period * 1e3:g} ms. Use a limit < {0.5 / period:g} Hz",
                 name=wanted.figure,
                 value=wanted.text,
                 valid=f"< {0.5 / period:g} Hz",
@@ -468,7 +468,7 @@ def _require_sampled(problem: Problem, start: Mapping[str, float]) -> None:
 def _over_all(
     search: Search, starts: Sequence[Array], seed: int, progress: Progress | None
 ) -> None:
-    """Search over the nominal model, and add the worst of the others until none is worse."""
+    """Search over the nominal model, and add the worst other model until none is worse."""
     problem, everything = search.problem, range(len(search.problem.cases))
     begin = starts_of(problem, starts, seed)
     for _ in range(_ROUNDS):
@@ -497,7 +497,7 @@ def _by_figures(search: Search, progress: Progress | None) -> Search:
 def _confirmed(search: Search) -> Array:
     """Return the best point on a finer grid of frequencies, for all models.
 
-    A coarse grid may miss a narrow dip of the closed loop to -3 dB: the best points are where
+    A coarse grid may miss a narrow dip of the closed loop to -3 dB, and the best points are where
     figures jump.
     """
     problem = search.problem
@@ -540,10 +540,10 @@ def _looked_anew(
     gain: float,
     limits: tuple[int, float],
 ) -> Array | None:
-    """Return the visited point that a finer evaluation prefers, the coarsely best ones first.
+    """Return the best visited point by a finer evaluation, which starts with the best coarse ones.
 
-    Ends when the coarse slack is not above ``least`` or cannot improve by ``gain``. The first of
-    the limits is the largest number of evaluated points, and the second their least distance.
+    It ends when the coarse slack is not above ``least`` or cannot improve by ``gain``. The first of
+    the limits is the maximum number of evaluated points, and the second their minimum distance.
     """
     most, apart = limits
     best, place = -np.inf, None
@@ -561,14 +561,14 @@ def _looked_anew(
 
 
 def _conflicts(search: Search, progress: Progress | None) -> tuple[Conflict, ...]:
-    """Return the best value of each requirement that every binding one allows."""
+    """Return the best value of each requirement that every binding requirement allows."""
     problem = search.problem
     if search.best is None:
         return ()
     slacks = problem.slacks(search.best, search.cases, plain=True).min(axis=0)
     bound = [int(k) for k in np.argsort(slacks) if slacks[k] <= slacks.min() + 5 * _BINDS]
     conflicts = []
-    report = stage(progress, "what excludes what")
+    report = stage(progress, "conflicting requirements")
     pairs = list(permutations(bound[:_PAIRED], 2))
     for k, (a, b) in enumerate(pairs):
         pushed = Search(problem, search.cases, wanted=[a], kept=[b], plain=True)
@@ -626,5 +626,5 @@ def _judged(
 
 
 def _size(value: float) -> float:
-    """Return the figure by which models are ranked; a model without it is the worst."""
+    """Return the figure by which models are ranked; a model without the figure is the worst."""
     return -np.inf if np.isnan(value) else value

@@ -35,17 +35,17 @@ _ZERO = 1e-3
 """Value that counts as zero if the limit is zero; all figures that can be zero are in %."""
 
 STEADY = 0.05
-"""Steady-state error that counts as zero if zero is required [%]; converters round."""
+"""Steady-state error that counts as zero if zero is required [%], since converters round."""
 
 _BY_WORD: Mapping[str, LoopFigure] = {
     **{figure.margin: figure for figure in LOOP_FIGURES.values() if figure.margin},
     **LOOP_FIGURES,
 }
-"""figures by their names in requirements, also by those of `bywire margins --json`"""
+"""figures by their names in requirements, including the names in `bywire margins --json`"""
 
 
 def share_left(limit: Limit, value: float) -> float:
-    """Return the margin of a value to its limit, as a share of the limit; NaN has none."""
+    """Return the margin of a value to its limit, as a fraction of the limit; -inf for NaN."""
     bound = limit.bound or (STEADY if limit.figure == "steady_state_error" else _ZERO)
     share = (bound - value if limit.is_upper else value - bound) / bound
     return -math.inf if math.isnan(share) else share
@@ -57,16 +57,16 @@ def read(texts: Sequence[str]) -> tuple[Limit, ...]:
     Parameters
     ----------
     texts
-        Such as ``"bandwidth >= 10 Hz"``; the name of a figure may contain blanks and hyphens, or be
-        a name of `bywire.margins`, such as ``phase``.
+        Texts such as ``"bandwidth >= 10 Hz"``; the name of a figure may contain blanks and hyphens,
+        or be a name from `bywire.margins`, such as ``phase``.
 
     Raises
     ------
     UnknownNameError
         When a figure is unknown.
     ParameterError
-        When a text cannot be read, no loop can meet or miss a limit, or two texts contradict each
-        other.
+        When a text cannot be read, every loop or no loop meets a limit, or two texts contradict
+        each other.
     UnitError
         When a limit's unit has another dimension.
     """
@@ -96,14 +96,14 @@ def _read(text: str) -> Limit:
         raise unknown_name("figure of a loop", word, LOOP_FIGURES)
     figure, is_least = _BY_WORD[word], compare in (">=", ">")
     bound = _bound(written, figure)
-    # A limit at the end of the possible range is met by every loop, or by none.
+    # Every loop, or no loop, meets a limit at the end of the possible range.
     possible = figure.low <= bound <= figure.high and not (is_least and bound >= figure.high)
     if not possible or not math.isfinite(bound) or (is_least and bound <= 0):
         low, high = figure.low, figure.high
         reach = f"above {low:g}" if high == math.inf else f"{low:g} to {high:g}"
         raise ParameterError(
-            f"requirement {quoted(text)} is not valid: {figure.name} is {reach} {figure.unit} for "
-            "every loop. Specify a value in between",
+            f"requirement {quoted(text)} is not valid, because {figure.name} is {reach} "
+            f"{figure.unit} for every loop. Specify a value within this range",
             name=figure.name,
             value=text,
             valid=f"{reach} {figure.unit}",
@@ -179,35 +179,35 @@ class LinearCase:
     at: float | None = None
 
     def figures(self, gains: Mapping[str, float], points: int = 400) -> LoopFigures:
-        """Return the figures of the loop with given gains, see `LoopFigures`."""
-        with interrupts_deferred():  # CasADi would swallow them
+        """Return the figures of the loop with given gains; see `LoopFigures`."""
+        with interrupts_deferred():  # CasADi would ignore them
             return LoopFigures(*self.build(gains), points)
 
 
 def state_of(figures: LoopFigures) -> str:
-    """Return why a model has no figures of a loop; empty if it has them."""
+    """Return the reason why a model has no loop figures; empty if it has them."""
     if not figures.has_loop:
         return NO_LOOP
     return "" if figures.is_stable else "unstable"
 
 
 def values_of(figures: LoopFigures) -> dict[str, float]:
-    """Return every figure that can be required, by name; NaN where it is not defined."""
+    """Return every figure that can be required, by name; NaN if not defined."""
     if not figures.is_stable:
         return dict.fromkeys(LOOP_FIGURES, math.nan)
     return {name: float(getattr(figures, name)) for name in LOOP_FIGURES}
 
 
 def room(figures: LoopFigures, requirement: Limit) -> float:
-    """Return the distance of a figure from its limit, as a share of it."""
+    """Return the distance of a figure from its limit, as a fraction of the limit."""
     return share_left(requirement, float(getattr(figures, requirement.figure)))
 
 
 def slack(figures: LoopFigures, requirement: Limit) -> float:
-    """Return the slack of a requirement, as a share of its limit: the objective of the search.
+    """Return the slack of a requirement, as a fraction of its limit: the objective of the search.
 
-    For a bandwidth it is the margin of the closed loop's magnitude above -3 dB up to the limit,
-    because the frequency itself jumps where a dip touches that level.
+    For a bandwidth, it is the margin of the closed loop's magnitude above -3 dB up to the limit,
+    because the frequency itself jumps when a dip touches this level.
     """
     if requirement.figure != "bandwidth" or requirement.is_upper:
         return room(figures, requirement)
@@ -244,8 +244,8 @@ def cases_of(
     combinations = list(product(*over.values())) if over else []
     if len(combinations) > _MOST:
         raise ParameterError(
-            f"the ranges have {len(combinations)} combinations, but the limit is <= {_MOST}. Use "
-            "fewer values",
+            f"the ranges have {len(combinations)} combinations, but the number must be <= {_MOST}. "
+            "Use fewer values",
             name="ranges",
             value=str(len(combinations)),
             valid=f"<= {_MOST}",
@@ -267,7 +267,7 @@ def require_given(loop: Loop, name: str) -> None:
 
 def _shown(loop: Loop, par: ParameterSet, name: str, value: float) -> str:
     """Return a value of a range in the user's units."""
-    known = leaf_fields(type(par))  # tables have their unit under the name of the table
+    known = leaf_fields(type(par))  # a table's name has the unit of its nodes
     leaf = known.get(name) or known.get(name.rpartition(".")[0])
     unit = loop.at.unit if leaf is None else leaf.unit.symbol
     return f"{name} = {shown(value, unit)}"
@@ -286,7 +286,7 @@ def existing_case(
     Raises
     ------
     ParameterError
-        With its label, when it does not exist.
+        When the model does not exist, with its label.
     """
     try:
         loop.point(par.replace(changes), at)

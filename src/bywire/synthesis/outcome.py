@@ -15,7 +15,7 @@ from bywire.synthesis.linear_case import LinearCase, room, share_left, values_of
 
 Status = Literal["met", "infeasible", "interrupted"]
 MISSED = -1e-3
-"""slack below which a requirement counts as missed, as a share of the limit"""
+"""slack below which a requirement counts as missed, as a fraction of the limit"""
 ROOMY = 0.05
 """slack above which a requirement is not binding"""
 
@@ -29,7 +29,7 @@ class Binding:
     requirement, case
         The requirement, and the label of the model.
     value, slack
-        Achieved value, and its distance from the limit as a share of it.
+        Achieved value, and its distance from the limit as a fraction of the limit.
     """
 
     requirement: Limit
@@ -45,9 +45,9 @@ class Conflict:
     Parameters
     ----------
     wanted, kept
-        The optimized requirement, and the one that was met meanwhile.
+        The optimized requirement, and the requirement that was met at the same time.
     best
-        The best value of the optimized one.
+        The best value of the optimized requirement.
     gains
         Gains with this value.
     """
@@ -59,7 +59,7 @@ class Conflict:
 
     @property
     def excludes(self) -> bool:
-        """Whether the two alone cannot both be met."""
+        """Whether the two requirements alone cannot both be met."""
         return share_left(self.wanted, self.best) < MISSED
 
 
@@ -80,15 +80,16 @@ class Design:
     binding
         Binding requirements, the worst first.
     conflicts
-        For infeasible requirements, the best values of the others that each binding one allows.
+        For infeasible requirements, the best values of the others that each binding requirement
+        allows.
     slack
         The worst normalized slack.
     evaluations
         Number of computed loops.
     kept
-        Constraints that were also enforced, see `floors`.
+        Constraints that were also enforced; see `designer.linear_floors`.
     unsound
-        Models without figures, by label: unstable, or not a loop.
+        Models without figures, by label: unstable, or without a loop.
     """
 
     gains: Mapping[str, float]
@@ -123,9 +124,9 @@ def bench_text(
     title
         Comment at the top.
     experiment
-        Experiment of the bench; empty for a loop without one: then only the section.
+        Experiment of the bench. If empty, the text contains only the section.
     parameters, changes
-        Name of the parameter set, and the user's changes of it, as texts.
+        Name of the parameter set, and the user's changes to it, as texts.
     par
         Any parameters of that class, for the units.
     gains
@@ -175,8 +176,8 @@ class ScheduleDesign:
     Parameters
     ----------
     regions
-        Design of each region, by ascending operating point, where it had free gains; each uses only
-        its own models.
+        Design of each region with free gains, by ascending operating point; each uses only its own
+        models.
     points
         Operating points [SI] for which each region was designed.
     gains
@@ -186,7 +187,7 @@ class ScheduleDesign:
     cases
         Models of the scheduled loop: the nominal one, and those of all points and ranges.
     across
-        The scheduled loop from the lowest to the highest point and across the borders.
+        The scheduled loop from the lowest to the highest point and across the boundaries.
     """
 
     regions: Mapping[str, Design]
@@ -210,25 +211,25 @@ class ScheduleDesign:
         return "met" if {*statuses} == {"met"} and self.worst.slack >= MISSED else "infeasible"
 
 
-# --- Probabilities over models that are drawn, and not designed for
+# --- Probabilities over random models, for which the gains were not designed
 
 
 @dataclass(frozen=True)
 class Judged:
-    """Statistics of requirements over drawn models.
+    """Statistics of requirements over random models.
 
     Parameters
     ----------
     models
-        Number of judged models; one that does not exist, or is unstable, meets no requirement.
+        Number of models; a model that does not exist, or is unstable, meets no requirement.
     unstable
         Number of models that are unstable with the gains, or do not exist.
     met
-        Number of models that meet each requirement, in their order.
+        Number of models that meet each requirement, in the order of the requirements.
     all_met
-        Number of models that meet all of them.
+        Number of models that meet all requirements.
     worst
-        Worst value of each requirement's figure over the stable models, NaN without any.
+        Worst value of each requirement's figure over the stable models; NaN if there are none.
     """
 
     models: int
@@ -249,9 +250,9 @@ def judged_over(
     Parameters
     ----------
     cases
-        Models; None for one that does not exist.
+        Models; None for a model that does not exist.
     requirements
-        See `requirement.read`.
+        See `linear_case.read`.
     gains
         By dotted name [SI].
     progress
@@ -265,7 +266,7 @@ def judged_over(
             rooms[k] = [room(figures, each) for each in requirements]
             known = values_of(figures)
             values[k] = [known[each.figure] for each in requirements]
-        progress("drawn models", (k + 1) / len(cases))
+        progress("random models", (k + 1) / len(cases))
     met = rooms >= MISSED
     lowest = np.where(np.isneginf(rooms), np.inf, rooms).argmin(axis=0)
     worst = tuple(float(values[row, r]) for r, row in enumerate(lowest))

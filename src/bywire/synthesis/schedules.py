@@ -37,7 +37,7 @@ def scheduled(loop: Loop) -> LoopSchedule:
     """
     if loop.schedule is None:
         raise ParameterError(
-            f"loop {loop.name!r} has no gain schedule. Leave out {option('schedule', True)}",
+            f"loop {loop.name!r} has no gain schedule. Remove {option('schedule', True)}",
             name="schedule",
         )
     return loop.schedule
@@ -51,9 +51,9 @@ def points_by_region(
     Parameters
     ----------
     loop, par
-        Loop, and the parameters that contain the borders.
+        Loop, and the parameters that contain the boundaries.
     points
-        At least one in each region; none: the loop's own, if the borders allow them.
+        At least one in each region; if empty, the loop's own points, if the boundaries allow them.
 
     Raises
     ------
@@ -90,35 +90,35 @@ def design_schedule(
     seed: int = 0,
     progress: Progress | None = None,
 ) -> ScheduleDesign:
-    """Design the gains of every region, the main one first, and check the loop across them.
+    """Design the gains of every region, the main region first, and check the loop across them.
 
-    The regions share parameters that only the main one chooses, for example a filter. A region
-    starts with the gains of the main one. Models have frozen gains: they describe small motion
-    about an equilibrium, and slow motion between equilibria.
+    The regions share parameters that only the main region chooses, for example a filter. A region
+    starts with the gains of the main region. Models have frozen gains, so they describe small
+    motion about an equilibrium and slow motion between equilibria.
 
     Parameters
     ----------
     loop, par
         Loop, and parameters with the schedule switched on.
     requirements
-        See `requirement.read`.
+        See `linear_case.read`.
     points
         See `points_by_region`.
     tunables
         Tunable gains by region; empty for a region with fixed gains.
     over
-        Ranges that every region must also serve, see `cases_of`.
+        Ranges for which every region must also meet the requirements; see `cases_of`.
     seed, progress
         See `designer.design`.
 
     Raises
     ------
     ParameterError
-        See `designer.design` and `cases_of`; also when no region has anything to tune.
+        See `designer.design` and `cases_of`; also when no region has tunable gains.
     """
     schedule = scheduled(loop)
     if not any(tunables.values()):
-        raise ParameterError("all gains are set in every region. Set fewer gains", name="gains")
+        raise ParameterError("all gains of every region are fixed. Set fewer of them", name="gains")
     order = [schedule.main, *(name for name in schedule.regions if name != schedule.main)]
     order = [name for name in order if tunables[name]]
     gains: dict[str, float] = {}
@@ -177,7 +177,7 @@ def frozen(
     gains: Mapping[str, float],
     requirements: Sequence[Limit],
 ) -> tuple[Across, ...]:
-    """Return the scheduled loop from the lowest to the highest point and across the borders.
+    """Return the scheduled loop from the lowest to the highest point and across the boundaries.
 
     Parameters
     ----------
@@ -223,7 +223,7 @@ def _ranges(
 
 
 def _between(par: ParameterSet, schedule: LoopSchedule, points: Sequence[float]) -> list[float]:
-    """Return evenly spread operating points, including the designed ones and the borders."""
+    """Return evenly spaced operating points, the designed points and the boundaries."""
     leaves = par.leaves()
     spread = np.linspace(min(points), max(points), _ACROSS)
     borders = [leaves[name] for name in schedule.borders]
@@ -233,13 +233,13 @@ def _between(par: ParameterSet, schedule: LoopSchedule, points: Sequence[float])
 def _start(
     par: ParameterSet, schedule: LoopSchedule, region: str, tunables: Mapping[str, Any]
 ) -> dict[str, float]:
-    """Return initial gains of a region: those of the main one, by their last names."""
+    """Return initial gains of a region: those of the main region, matched by their last names."""
     leaves = par.leaves()
     main = {name.rpartition(".")[2]: leaves[name] for name in schedule.regions[schedule.main]}
     return {name: main[name.rpartition(".")[2]] for name in tunables}
 
 
-# --- On the nonlinear bench: regions retuned there one after the other
+# --- On the nonlinear bench: regions retuned one after the other
 
 Spans = Mapping[str, tuple[float, float]]
 
@@ -256,10 +256,10 @@ def verify_schedule(
 ) -> Verification:
     """Try a schedule on the nonlinear bench at every designed point, and retune it.
 
-    Of several models at a point, the worst linear one is tried. Regions are retuned one after the
-    other, the main one first, each at its own points and in the experiment, which may pass through
-    all of them. The schedule as a whole is then tried again. A search over all gains together has
-    twice the dimensions, and gives worse results at the same expense.
+    Of several models at a point, the worst linear model is tried. Regions are retuned one after the
+    other, the main region first, each at its own points and in the experiment, which may pass
+    through all of them. The schedule as a whole is then tried again. A search over all gains
+    together has twice the dimensions, and finds worse gains at the same cost.
 
     Parameters
     ----------
@@ -270,7 +270,7 @@ def verify_schedule(
     trial
         Trial at the first point of the main region, with the schedule switched on.
     seed, generations, progress
-        See `verification.verify`; generations of each region.
+        See `verification.verify`; generations count for each region.
     """
     spans = {name: span for regional in tunables.values() for name, span in regional.items()}
     corners = _corners(design, requirements, trial)

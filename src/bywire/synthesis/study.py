@@ -1,4 +1,4 @@
-"""A sizing study: many designs of a brake, compared at equal demands, and the best of them."""
+"""Sizing studies: many designs of a brake, compared at equal demands, and the best design."""
 
 from __future__ import annotations
 
@@ -48,10 +48,10 @@ class Map:
     marks
         Designs to mark; the first is the optimum.
     limits
-        Label -> variable, and the level at which it draws the border of the feasible region. Beyond
-        it the variable is larger.
+        Label -> variable, and its level at the boundary of the feasible region, outside which the
+        variable is larger.
     curves
-        Label -> abscissas and ordinates [SI] of a line to compare with, for example a closed form.
+        Label -> abscissas and ordinates [SI] of a line for comparison, for example a closed form.
     """
 
     values: str
@@ -93,15 +93,15 @@ class Findings:
     kpis
         The optimum, and the design for comparison.
     assumptions
-        Constraints and neglected effects, a sentence each.
+        Constraints and neglected effects, one sentence each.
     maps
-        Name -> map, in the order in which they are shown.
+        Name -> map, in display order.
     cuts
         Tables.
     warnings
         Warnings.
     limits
-        Limits of the best design, a sentence each.
+        Limits of the best design, one sentence each.
     """
 
     data: xr.Dataset
@@ -132,7 +132,7 @@ class Study:
     compute
         ``compute(par, options, progress) -> Findings``.
     ruled
-        Parameters, or groups of them, without effect on the study -> advice on what to set.
+        Parameters, or groups of them, without effect on the study -> advice on what to set instead.
     """
 
     name: str
@@ -169,7 +169,7 @@ def variable(values: Any, dims: tuple[str, ...], unit: str, label: str) -> xr.Va
 def variables(
     values: Mapping[str, Any], dims: tuple[str, ...], labels: Mapping[str, tuple[str, str]]
 ) -> dict[str, xr.Variable]:
-    """Return variables over the same dimensions, by name, with the unit and label of each."""
+    """Return variables over the same dimensions, by name, with units and labels."""
     return {name: variable(array, dims, *labels[name]) for name, array in values.items()}
 
 
@@ -185,7 +185,7 @@ def require_ranges(options: ParameterSet, ranges: Iterable[tuple[str, str, str]]
     Raises
     ------
     RuleError
-        With the lower end, for a validator of the options.
+        When a lower end is too high, for a validator of the options.
     """
     for low, high, unit in ranges:
         a, b = getattr(options, low), getattr(options, high)
@@ -196,7 +196,7 @@ def require_ranges(options: ParameterSet, ranges: Iterable[tuple[str, str, str]]
 def edge_warnings(
     name: str, value: float, ends: tuple[float, float], unit: str, within: float = 1e-9
 ) -> tuple[str, ...]:
-    """Return a warning where an optimum is at an end of the compared range.
+    """Return a warning if an optimum is at an end of the compared range.
 
     Parameters
     ----------
@@ -205,7 +205,7 @@ def edge_warnings(
     ends
         Ends of the range.
     within
-        Share of an end that counts as equal.
+        Relative distance from an end that counts as equal.
     """
     return tuple(
         f"the optimum is at the limit {name} = {shown(end, unit)}. Widen the range of {name}"

@@ -1,1 +1,1 @@
-"""Templates of ``bywire new``: a brake, its project files and its tests."""
+"""Templates for ``bywire new``: a brake, its project files and its tests."""

@@ -1,4 +1,4 @@
-"""Tests of the brake starter: it fulfills every contract and reaches its clamp force."""
+"""Tests of the brake starter, which passes every contract and reaches its clamp force."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def known() -> None:
 
 @pytest.fixture(scope="module")
 def recording() -> xr.Dataset:
-    """Return the recording of a braking."""
+    """Return the recording of a brake application."""
     return bywire.run("starter-clamp").recordings["run"]
 
 
@@ -44,5 +44,5 @@ def test_release_opens(recording: xr.Dataset) -> None:
 
 
 def test_loop_has_margins() -> None:
-    """Have at least 45 degrees of phase margin at every usual operating point."""
+    """Have a phase margin of at least 45 degrees at every usual operating point."""
     assert bywire.margins("starter-force").holds

@@ -30,7 +30,7 @@ Exclude = Annotated[
     ),
 ]
 MaxGap = Annotated[str, Ask("Longest pause not treated as a gap, e.g. '50 ms'. Default: 10 steps.")]
-Format = Annotated[str, Ask("Output format, e.g. mat73. Default: from the file name.")]
+Format = Annotated[str, Ask("Output format, e.g. mat73. Default: inferred from the file name.")]
 Force = Annotated[bool, Ask("Overwrite an existing file.")]
 
 
@@ -74,7 +74,7 @@ def convert(
     max_gap
         Longest pause not treated as a gap, for example ``"50 ms"``. Default: 10 steps.
     format
-        Output format, for example ``mat73``. Default: from the file name's suffix.
+        Output format, for example ``mat73``. Default: inferred from the file name's suffix.
     force
         Whether to overwrite an existing file.
     progress

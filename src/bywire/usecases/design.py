@@ -45,7 +45,7 @@ DrawnFrom = Annotated[
 ]
 Drawn = Annotated[int, Ask("Number of models to draw for the design.")]
 Probability = Annotated[
-    str, Ask("Required probability of meeting all requirements, e.g. '99 %'. Needs --vary.")
+    str, Ask("Required probability of meeting all requirements, e.g. '99 %'. Requires --vary.")
 ]
 Seed = Annotated[int, Ask("Random seed of the search.", least=0)]
 

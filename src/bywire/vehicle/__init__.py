@@ -1,10 +1,12 @@
-"""Vehicles around any brake: bodies, slip control, ideal stops, and animations."""
+"""Vehicles with any brake: bodies, slip control, ideal stops, and animations."""
 
 from bywire.vehicle.corner import (
     Corner,
     CornerParameters,
     HotCorner,
     HotCornerParameters,
+    WheelSpeed,
+    rolling_states,
     warm_disc,
 )
 from bywire.vehicle.two_wheeler import (
@@ -23,7 +25,9 @@ __all__ = [
     "HotCornerParameters",
     "TwoWheeler",
     "VehicleParameters",
+    "WheelSpeed",
     "cold_start",
     "rolling_start",
+    "rolling_states",
     "warm_disc",
 ]

@@ -29,7 +29,7 @@ class CornerParameters(ParameterSet):
 
 
 class WheelSpeed(NamedTuple):
-    """Wheel speed [rad/s], as it enters the implicit solve, and as a value only."""
+    """Wheel speed [rad/s]: in the implicit solve, and as a value only."""
 
     x: float
     xe: float
@@ -42,7 +42,7 @@ class Corner(Assembly[ParT, MemoryT]):
     tyre = Part(tyre, par="corner.tyre")
     road = Part(road, par="corner.road")
     E_tyre = Integral(
-        "J", "tyre: slip and deflection", role=Role("sink", "tyre", book=BOOK, returns="taken")
+        "J", "tire: slip and deflection", role=Role("sink", "tire", book=BOOK, returns="taken")
     )
     W_slope = Integral("J", "work of gravity", role=Role("source", "slope", book=BOOK))
     t_locked = Integral("s", "time during which the wheel is locked")
@@ -51,7 +51,7 @@ class Corner(Assembly[ParT, MemoryT]):
     N_x = Wire("N", "load of the wheel", 4e3)
     v_tread = Shown("m/s", "tread speed", 20.0)
     slip = Shown("1", "braking slip", 0.1)
-    sliding = Shown("1", "tyre slides")
+    sliding = Shown("1", "tire slides")
     a = Shown("m/s**2", "deceleration", 10.0)
     E_body = Shown("J", "energy of the body", role=Role("sink", "body", book=BOOK, returns="any"))
 
@@ -104,7 +104,7 @@ def rolling_states(v: float) -> dict[str, Any]:
 
 
 class HotCornerParameters(CornerParameters):
-    """A corner whose brake may warm up."""
+    """Parameters of a corner whose brake may warm up."""
 
     heat: disc_heat.Parameters
 
@@ -129,12 +129,12 @@ class HotCorner(Corner[ParT, MemoryT]):
     E_fluid = Shown("J", "heat in the caliper", role=heat_sink("caliper"))
     E_brake = Shown(
         "J",
-        "energy that the brake takes from the wheel",
+        "energy that the brake removes from the wheel",
         role=Role("sink", "brake", book=BOOK, returns="any"),
     )
 
     def braked(self, w: Self) -> float:
-        """Return the energy that the brake has taken from the wheel [J]."""
+        """Return the energy that the brake has removed from the wheel [J]."""
         raise NotImplementedError
 
     def brake_torque(self, w: Self) -> float:
@@ -146,7 +146,7 @@ class HotCorner(Corner[ParT, MemoryT]):
         return disc_heat.friction(w.disc_heat.xe.T_disc, w.disc_heat.par)
 
     def wire(self, w: Self) -> None:
-        """Connect the brake's heat: friction limit times speed, 0 where the wheel does not turn."""
+        """Connect the brake's heat: friction limit times speed, 0 if the wheel does not turn."""
         super().wire(w)
         torque = self.brake_torque(w)
         w.disc_heat.u = disc_heat.Input(
@@ -169,5 +169,5 @@ class HotCorner(Corner[ParT, MemoryT]):
 
 
 def warm_disc(T: float, par: disc_heat.Parameters) -> disc_heat.State:
-    """Return the brake's state with its disc at a temperature [K] and the rest at the air's."""
+    """Return the brake's state with its disc at a temperature [K], the rest at air temperature."""
     return disc_heat.State(T, par.T_a, par.T_a)

@@ -1,4 +1,4 @@
-"""Ideal stop for road, tires and body: every wheel at its peak, without delay."""
+"""Ideal stop for road, tires and body: every wheel at its peak adhesion, without delay."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ RidingSpeed = Annotated[float, Unit("m/s", 28.0), Field(gt=0, allow_inf_nan=Fals
 
 
 def peak_adhesion(par: VehicleParameters) -> tuple[float, float]:
-    """Return each wheel's largest adhesion on the first stretch of the road."""
+    """Return each wheel's maximum adhesion on the first section of the road."""
     ground = road.surface(0.0, par.road)
     front, rear = (
         float(adhesion.adhesion(adhesion.peak_slip(ground, rubber), ground, rubber))
@@ -25,15 +25,15 @@ def peak_adhesion(par: VehicleParameters) -> tuple[float, float]:
 
 
 def ideal_deceleration(par: VehicleParameters, *, front_only: bool = False) -> float:
-    r"""Return the largest deceleration without air drag [m/s^2].
+    r"""Return the maximum deceleration without air drag [m/s^2].
 
-    Both wheels at their peak, as long as the rear wheel stays on the ground,
+    Both wheels are at their peak adhesion while the rear wheel stays on the ground,
     :math:`a \le g\, l_f/h`:
 
     .. math:: a = g \frac{\mu_f^* (1 - l_f/L) + \mu_r^* l_f/L}{1 - (\mu_f^* - \mu_r^*) h/L}
 
-    which is :math:`\mu^* g` for tires with the same curve. With :math:`\mu_r^* = 0` only the front
-    wheel brakes. On a slope, gravity's share is added.
+    which is :math:`\mu^* g` for tires with the same curve. With :math:`\mu_r^* = 0`, only the front
+    wheel brakes. On a slope, the component of gravity is added.
     """
     body, (mu, rear) = par.body, peak_adhesion(par)
     slope = road.slope(0.0, par.road)

@@ -26,9 +26,9 @@ MomentRate = Annotated[float, Unit("N*m/s", 1e4), Field(gt=0, allow_inf_nan=Fals
 class Parameters(ParameterSet):
     """Sensors and laws of one wheel.
 
-    ``abs``: ``"pi"`` controls the slip; ``"rules"`` build, dump and hold by thresholds; ``"off"``
-    does not change the demand. ``sees``: speed and slip are ``"estimated"`` from pulses and an
-    accelerometer, or ``"known"``, for comparison.
+    ``abs``: ``"pi"`` controls the slip; ``"rules"`` build, dump and hold the pressure by
+    thresholds; ``"off"`` does not change the demand. ``sees``: speed and slip are ``"estimated"``
+    from pulses and an accelerometer, or ``"known"``, for comparison.
     """
 
     T_s: Duration
@@ -38,9 +38,9 @@ class Parameters(ParameterSet):
     sees: Literal["estimated", "known"]
     """whether speed and slip are estimated"""
     M_rate: MomentRate
-    """fastest build-up of a demand"""
+    """maximum build-up rate of the demand"""
     M_least: SomeMoment
-    """lowest moment under slip control, which keeps the pads on the disc"""
+    """minimum moment under slip control, which keeps the pads on the disc"""
     encoder: wheel_encoder.Parameters
     tau_a: TimeConstant
     """time constant of the accelerometer's filter"""
@@ -75,7 +75,7 @@ class Memory(NamedTuple):
 
 
 class Readings(NamedTuple):
-    """Readings at a tick, of vehicle, wheel, slope and brake."""
+    """Readings of vehicle, wheel, slope and brake at a tick."""
 
     v: Annotated[float, Signal("m/s", "vehicle speed", 20.0)]
     v_wheel: Annotated[float, Signal("m/s", "speed of the tread", 20.0)]
@@ -128,7 +128,7 @@ def tick(r: Readings, m: Any, M_set: float, par: Parameters) -> Any:
         m = m._replace(**{f"{name}_x": value for name, value in rules._asdict().items()})
     left = ops.fmax(k * out.p, ops.fmin(par.M_least, m.M_most))
     # Near standstill, the car rocks on its tire, and the motors would follow this slip although the
-    # disc is at rest. The lowered moment therefore stays, unless the demand is lower.
+    # disc is at rest. The lowered moment is therefore kept, unless the demand is lower.
     holds = ops.where(m.v_hat < par.vehicle_speed.v_still, before.abs, 0.0)
     kept = ops.fmin(before.M_left, m.M_most)
     left = ops.where(holds > 0.5, kept, left)
@@ -165,7 +165,7 @@ def _measured(r: Readings, m: Any, par: Parameters) -> Any:
 # --- Remarks on the road's surfaces
 
 FAR = 2.0
-"""lowest ratio of the slip at the largest adhesion to the slip set point that causes a remark"""
+"""minimum ratio of the slip at maximum adhesion to the slip set point that causes a remark"""
 
 
 def far_from_peak(
@@ -181,7 +181,7 @@ def far_from_peak(
     Parameters
     ----------
     place
-        Place of the wheel along the road [m], row by row.
+        Position of the wheel along the road [m], row by row.
     acts
         Whether slip control acts, above 0.5.
     slip_set
@@ -211,6 +211,6 @@ def far_from_peak(
         texts[
             f"slip control uses a slip set point of {slip_set:.3g} ({parameter}), but {surface} "
             f"has its maximum adhesion at {peak:.3g}. The wheel uses {100.0 * held / most:.0f} % "
-            "of it. A larger set point, or rules (abs=rules), brake harder there"
+            "of it. A larger set point, or rules (abs=rules), would brake harder there"
         ] = None
     return list(texts)

@@ -39,7 +39,7 @@ _SPOKES = 5
 
 @dataclass(frozen=True)
 class Wheel:
-    """A wheel, and its signals.
+    """A wheel with its signals.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ class Wheel:
     r
         Radius [m].
     omega, sliding, load, force
-        Signals of its speed, sliding of its tire, load and braking force.
+        Signals of its speed, its tire's sliding, its load and its braking force.
     """
 
     behind: float
@@ -81,15 +81,15 @@ def stop_scene(
     wheels
         The wheels; the first one is at the vehicle's front contact.
     body
-        SVG markup of the body, its origin at the first contact, y downward.
+        SVG markup of the body, with its origin at the first contact and y downward.
     dials
-        Signal, label, unit, factor to that unit, value at a full bar, and color of each bar.
+        Signal, label, unit, factor to this unit, full-scale value, and color of each bar.
     place
         Signal of the first wheel's traveled distance [m].
     weight
-        Force whose arrow is a meter long [N].
+        Force with an arrow of one meter [N].
     pitch
-        Signal of the angle about the first contact [rad], nose down; empty for none.
+        Signal of the angle about the first contact [rad], nose down; empty without pitch.
     """
     frames = frames_of(run)
     gone = over_frames(run, place, frames)

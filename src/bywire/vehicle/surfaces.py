@@ -1,4 +1,4 @@
-"""Surfaces by their names, as parameters of a road."""
+"""Road surfaces by name, as parameters of a road."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from bywire.plant.road import SURFACES, SurfaceName
 
 
 def laid(prefix: str, first: SurfaceName, further: SurfaceName | None = None) -> dict[str, float]:
-    """Return a road's parameters, below a prefix, for a first and a second surface.
+    """Return a road's parameters, under a prefix, for a first and a second surface.
 
-    Default of the second surface: the first. ``"own"`` changes no parameter.
+    By default, the second surface is the first one. ``"own"`` changes no parameter.
     """
     names = {"first": first, "further": first if further is None else further}
     return {
@@ -21,6 +21,6 @@ def laid(prefix: str, first: SurfaceName, further: SurfaceName | None = None) ->
 
 
 def surface_name(place: float, ways: road.Parameters) -> str:
-    """Return the name of the surface at a place [m], without the factor on its adhesion."""
+    """Return the name of the surface at a position [m], ignoring the factor on its adhesion."""
     numbers = adhesion.surface_of(ways.further if road.share(place, ways) > 0.5 else ways.first)
     return next((name for name, known in SURFACES.items() if known == numbers), "own")

@@ -1,4 +1,4 @@
-"""Two-wheeler on a straight road, with brakes of any kind, which may warm up and fade.
+"""Two-wheeler on a straight road, with any brakes, which may warm up and fade.
 
 A vehicle inherits from `TwoWheeler` and from its brakes' assemblies. Its method ``brake_torques``
 returns the torques that the brakes can hold. Standstill needs no special treatment: brake and
@@ -19,7 +19,7 @@ from bywire.core.signals import Role
 from bywire.plant import disc_heat, ground_support, road, road_wheel, two_wheeler_body, tyre
 
 BOOK = "vehicle"
-_CRAWL = 0.05  # share of the tire's low speed below which slip fades to zero
+_CRAWL = 0.05  # fraction of the tire's low speed below which slip fades to zero
 
 
 class VehicleParameters(ParameterSet):
@@ -168,7 +168,7 @@ class TwoWheeler(Assembly[ParT, MemoryT]):
 
 
 def rolling_start(v: float, par: VehicleParameters) -> dict[str, Any]:
-    """Return the states of the vehicle's parts at a speed [m/s], rolling freely on the level."""
+    """Return the states of the vehicle's parts at a speed [m/s], rolling freely on a level road."""
     body = par.body
     N_r = two_wheeler_body.static_load(1.0, body)
     sunk = -N_r / (par.ground.k * body.L)
@@ -213,7 +213,7 @@ def _loads(w: Any, cosine: float, front: tyre.Input, rear: tyre.Input) -> two_wh
 
 
 def _resistances(w: Any) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return the torques that brake and rolling resistance of each wheel can hold [N m]."""
+    """Return the torques that each wheel's brake and rolling resistance can hold [N m]."""
     return (
         (w.T_f, road_wheel.rolling_resistance(w.N_f, w.front.par)),
         (w.T_r, road_wheel.rolling_resistance(w.N_r, w.rear.par)),
@@ -278,7 +278,7 @@ class HotBrakes(TwoWheeler[ParT, MemoryT]):
         )
 
     def wire(self, w: Self) -> None:
-        """Connect the brakes' heat: friction limit times speed, 0 where a wheel does not turn."""
+        """Connect the brakes' heat: friction limit times speed, 0 if a wheel does not turn."""
         super().wire(w)
         for heat, wheel, torque in (
             (w.front_heat, w.front, w.T_f),
@@ -304,7 +304,7 @@ class HotBrakes(TwoWheeler[ParT, MemoryT]):
 
 
 def cold_start(front: disc_heat.Parameters, rear: disc_heat.Parameters) -> dict[str, Any]:
-    """Return both brakes' states at the temperature of the air, by their parts."""
+    """Return both brakes' states at air temperature, by part."""
     return {
         part: disc_heat.State(par.T_a, par.T_a, par.T_a)
         for part, par in (("front_heat", front), ("rear_heat", rear))

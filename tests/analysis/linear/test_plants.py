@@ -46,7 +46,7 @@ def test_every_way_to_give_an_operating_point(name: str) -> None:
         assert np.isfinite(found.response(np.array([1.0]))).all()
         for value in (0.0, -quantity.default):
             with pytest.raises(
-                ParameterError, match=r"no operating point|not an operating point|is not valid"
+                ParameterError, match=r"no operating point|not a valid operating point|is not valid"
             ):
                 plant.model(par, replace(plant.usual, quantity=quantity, value=value))
 

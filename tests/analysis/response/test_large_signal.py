@@ -103,7 +103,7 @@ def test_refusals():
         variants_over(base, "wedge.mu_B", [])
     other = [base.point.run(), Variant(LOOPS.find("position"), par, 0.0).point.run()]
     sweep = Sweep(loop.inputs, loop.output, (5.0,), (1.0,))
-    with pytest.raises(ParameterError, match="number 1"):
+    with pytest.raises(ParameterError, match="variant 1"):
         frequency_response(other[0], sweep, points=other)
 
 

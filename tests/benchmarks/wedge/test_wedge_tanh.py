@@ -73,4 +73,4 @@ def test_results_of_the_benchmark(monkeypatch: pytest.MonkeyPatch) -> None:
         "wedge.single.realtime_factor",
         "wedge.peer.tanh_rk4",
     ]
-    assert "at equal error it is slower still" in found[-1].note
+    assert "tanh of 0.03 rad/s" in found[-1].note

@@ -61,7 +61,7 @@ def test_ramp_is_judged_on_enough_rows_only():
     fine = values(run("moment-ramp"))
     assert fine["ramp_slope"] == pytest.approx(40.0, rel=0.02)
     coarse = {kpi.name: kpi for kpi in run("moment-ramp", record=0.5).kpis}
-    interval = re.search(r"record every ([\d.e-]+) s", coarse["ramp_slope"].note)
+    interval = re.search(r"every ([\d.e-]+) s", coarse["ramp_slope"].note)
     assert math.isnan(coarse["ramp_slope"].value)
     assert interval is not None
     # What the note asks for is enough.
@@ -105,9 +105,9 @@ def test_pads_that_touch_from_the_start():
 # Demands that are not met
 
 UNMET = [
-    ("moment-pulse-950", {"wedge.mu_B": 0.0}, {}, "950 N*m was not reached: the moment is 0 N*m"),
-    ("moment-pulses", {"flywheel.Omega_0": 0.0}, {}, "0 N*m at most, since the disc is at rest"),
-    ("moment-pulses", {}, {"M_high": 5.0}, "parked up to control.moment.M_on = "),
+    ("moment-pulse-950", {"wedge.mu_B": 0.0}, {}, "950 N*m"),
+    ("moment-pulses", {"flywheel.Omega_0": 0.0}, {}, "at rest"),
+    ("moment-pulses", {}, {"M_high": 5.0}, "control.moment.M_on = "),
 ]
 
 
@@ -120,8 +120,7 @@ def test_unmet_demand_is_said_once(name, changes, options, text):
 def test_end_stop_leaves_a_demand_unmet():
     result = run("moment-pulse-950", {"wedge.mu_B": 0.2}, {"M_high": 2000.0})
     most = np.abs(result.recordings["run"]["M_B"].values).max()
-    expected = f"the demand of 2000 N*m was not reached: the moment is {most:.4g} N*m at most"
-    assert expected in result.warnings
+    assert any("2000 N*m" in text and f"{most:.4g} N*m" in text for text in result.warnings)
     assert any("end stop at t = " in text for text in result.warnings)
 
 

@@ -107,10 +107,10 @@ def test_travel_per_angle_is_what_is_passed_on(emb: Any, par: Any) -> None:
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"gear.z_ring_1": 12.0}, "z_ring_1 = 12 must be above z_sun_1 = 16"),
+        ({"gear.z_ring_1": 12.0}, "z_ring_1 = 12 must be > z_sun_1 = 16"),
         ({"friction.T_s": 0.01}, "T_s = 0.01 N*m must be >= C = 0.0304 N*m"),
         ({"caliper.n_max": 3.2e-3}, "must increase up to n_max"),
-        ({"stop.x_end": 1e-3}, "must be beyond the measured curve"),
+        ({"stop.x_end": 1e-3}, "stop.x_end = 0.001 m must be >"),
         ({"ecu.T_current": 3e-4}, "whole multiple"),
         ({"caliper.clearance": -1e-4}, "caliper.clearance"),
     ],

@@ -71,7 +71,7 @@ def test_the_record_that_does_not_fit_and_a_drift_are_named() -> None:
     assert said.count("from the fit to all other") == 1
     slow = (data["time"] - data["time"].where(third).min()) / 40.0
     drift = data.assign(F=data["F"] + 5.0 * third * slow)
-    assert "N over the 4 strokes level_2 outward" in notes(drift)
+    assert "level_2 outward: the force drifts by" in notes(drift)
 
 
 def test_a_value_that_may_be_nothing_is_marked() -> None:

@@ -191,9 +191,7 @@ def test_values_with_units_are_taken_and_an_invalid_field_marks_the_results(tab)
         assert (state["said"], state["isOld"], state["hasNote"]) == ("", False, False)
         assert tab.page.evaluate("() => values['motor.R_m']") == value
     refused = typed(tab, "motor.R_m", "0.4 V")
-    assert refused["said"] == (
-        'motor.R_m must be > 0 ohm, not "0.4 V": type a number in Ω, or with a unit'
-    )
+    assert 'motor.R_m must be > 0 ohm, not "0.4 V"' in refused["said"]
     assert refused["isOld"]
     assert refused["hasNote"]
     assert tab.page.evaluate("() => values['motor.R_m']") == 0.43

@@ -1,9 +1,9 @@
 """Operating points on kinks of a model: the operation, its line, and the side to use.
 
 A minimum, a limit, a dead band or an absolute value has two derivatives where its sides meet.
-There, algorithmic differentiation returns a mean of both, which is the slope of neither side. A
-linear model is therefore compared with those next to its operating point. If they differ, bywire
-names the operations on their kinks, and takes the side that the user states.
+There, algorithmic differentiation returns a mean of both, which is the slope of neither side.
+bywire therefore compares a linear model with those next to its operating point. If they differ,
+bywire lists the operations on their kinks, and uses the side that the user specifies.
 """
 
 from __future__ import annotations
@@ -35,15 +35,15 @@ ABOVE, BELOW = "above", "below"
 """side of the tested quantity: above or below its kink. The tested quantity is the first argument
 of a minimum, a maximum or a comparison minus the second, or the argument of an absolute value"""
 REACH = 1e-9
-"""distance within which a kink counts as at the operating point, relative to the signals' usual
-magnitudes: operating points are solved to 1e-10 of these, so that the side of a nearer kink is
-unknown; and smooth functions hardly change over such a distance"""
-_FINER = 1.0 / 4.0  # smooth functions differ by a quarter at a quarter of the distance
-_LASTING = 0.4  # remaining share of a difference nearby, above which a kink explains it
+"""maximum distance of a kink at the operating point, relative to the signals' usual magnitudes:
+operating points are solved to 1e-10 of these, so the side of a nearer kink is unknown, and smooth
+functions hardly change over such a distance"""
+_FINER = 1.0 / 4.0  # differences of smooth functions fall to a quarter at a quarter of the distance
+_LASTING = 0.4  # remaining fraction of a difference nearby, above which a kink explains it
 _SAME = 1e-6  # of an entry of a Jacobian: smaller differences need no further comparison
-_SMALL = 1e-8  # the same, of the largest entry in its row, scaled by usual magnitudes
+_SMALL = 1e-8  # likewise, of the largest entry in its row, scaled by usual magnitudes
 _EQUAL = 1e-5  # of a response: models with smaller differences are equal
-_ACROSS = 0.02  # of the reach: on either side of a kink
+_ACROSS = 0.02  # of the reach: distance from a kink on both sides
 _TURNS = 8
 _FREQUENCIES = 40
 _OPS_FILE = ops.__file__
@@ -55,7 +55,7 @@ class CornerError(ParameterError):
 
 @dataclass(frozen=True)
 class Sides:
-    """Sides of kinks that a user states.
+    """Sides of kinks that a user specifies.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ class Sides:
     at: Mapping[str, str] = field(default_factory=dict)
 
     def of(self, place: str) -> str:
-        """Return the side of a place; empty if none is stated."""
+        """Return the side of a place; empty if none is specified."""
         for known, side in self.at.items():
             if place == known or place.endswith(f"/{known}"):
                 return side
@@ -129,7 +129,8 @@ class Jacobians:
     Parameters
     ----------
     slopes
-        Derivatives by the free signals, times their usual magnitudes, shape (rows, free).
+        Derivatives with respect to the free signals, times their usual magnitudes, shape (rows,
+        free).
     values
         Rates, outputs and new memory, shape (rows,).
     names
@@ -156,7 +157,7 @@ class Linearization:
     models
         The linear models at a point.
     outputs, ticks
-        Whether outputs, and controllers, are part of it.
+        Whether outputs, and controllers, are part of the model.
     """
 
     point: SmoothPoint
@@ -178,7 +179,7 @@ class Kink:
     excess
         Tested quantity, positive above the kink.
     slope
-        Derivative of the excess by the free signals, in their usual magnitudes.
+        Derivative of the excess with respect to the free signals, times their usual magnitudes.
     corner
         Value of both arguments at the kink.
     order
@@ -217,14 +218,14 @@ def magnitudes(point: SmoothPoint) -> Array:
 
 
 def beside_point(point: SmoothPoint, free: NDArray[np.bool_]) -> Array:
-    """Return the displacements of state, memory and stimulus to leave kinks, in one vector."""
+    """Return displacements of state, memory and stimulus that leave kinks, in one vector."""
     by = np.zeros(free.size)
     by[free] = REACH * _generic(int(free.sum()))[0] * magnitudes(point)[free]
     return by
 
 
 def _generic(count: int) -> Array:
-    """Return two generic directions, along which no kink lies by chance, shape (2, count)."""
+    """Return two random directions, along which kinks do not lie by chance, shape (2, count)."""
     rng = np.random.default_rng(20)
     return np.asarray(rng.uniform(0.5, 1.0, (2, count)) * rng.choice([-1.0, 1.0], (2, count)))
 
@@ -232,7 +233,7 @@ def _generic(count: int) -> Array:
 def kinks_at(
     point: SmoothPoint, free: NDArray[np.bool_], usual: Array, *, outputs: bool, ticks: bool
 ) -> list[Kink]:
-    """Return the operations with a kink that a point's free signals can move to it.
+    """Return the operations that a point's free signals can move to their kink.
 
     Parameters
     ----------
@@ -244,7 +245,7 @@ def kinks_at(
     Returns
     -------
     list
-        Operations in the order of computation; empty for equations that accept floats only.
+        Operations in the order of computation; empty for equations that accept only floats.
     """
     values = np.concatenate([point.state, point.memory, point.stimulus])
     watch = _Watch()
@@ -276,12 +277,12 @@ def _size(slope: Array) -> float:
 
 
 def linear_models(of: Linearization) -> tuple[LinearModel, ...]:
-    """Return the linear models at an operating point, on the stated side of its kinks.
+    """Return the linear models at an operating point, on the specified side of its kinks.
 
     Raises
     ------
     CornerError
-        When the point lies on a kink whose sides have different models, and no side is stated.
+        When the point lies on a kink whose sides have different models, and no side is specified.
     """
     limits = _limits_reached(of)
     if limits and _STATED.get().usual != ABOVE:
@@ -289,7 +290,7 @@ def linear_models(of: Linearization) -> tuple[LinearModel, ...]:
         raise CornerError(
             f"{of.point.model.name}: at the operating point, {names} is at its lower limit and "
             "cannot decrease. Choose another operating point, or use the model for increasing "
-            f"motion: {option('side', 'above')}",
+            f"motion with {option('side', 'above')}",
             name=names,
         )
     corner = _Corner(of)
@@ -324,7 +325,7 @@ class _Corner:
         return self.of.point.moved(by)
 
     def jacobians(self, direction: Array) -> Jacobians:
-        """Return the numbers of the linear model next to the operating point."""
+        """Return the linear model's numbers next to the operating point."""
         key = direction.tobytes()
         if key not in self.known:
             self.known[key] = self.of.jacobians(self.moved(direction))
@@ -377,7 +378,7 @@ class _Corner:
         return tuple(a.names[k] or "an output" for k in np.flatnonzero(jump))
 
     def chosen(self) -> tuple[LinearModel, ...]:
-        """Return the models of the stated side, or the common ones if all sides agree."""
+        """Return the models on the specified side, or the common ones if all sides agree."""
         sides = _STATED.get()
         found: dict[str, Kink] = {}
         for direction in self.generic:
@@ -401,7 +402,7 @@ class _Corner:
         return found if self.differ(first, self.here, self.here) else self.models(self.here)
 
     def taken(self, sides: Sides) -> tuple[LinearModel, ...]:
-        """Return the models on the stated sides; if kinks exclude each other, by the first."""
+        """Return the models on the specified sides; if they contradict, the first kinks count."""
         rows: dict[tuple[str, int], tuple[Array, float, float]] = {}
         direction = self.generic[0]
         for _ in range(_TURNS):
@@ -421,7 +422,7 @@ class _Corner:
         return tuple(replace(model, corners=texts) for model in self.models(direction))
 
     def kinks(self, direction: Array) -> list[Kink]:
-        """Return the operations whose kink changes the models when crossed near a direction."""
+        """Return the operations near a direction whose kink changes the models when crossed."""
         known: dict[tuple[bytes, float], bool] = {}
         return [each for each in self.near(direction) if self._matters(each, direction, known)]
 
@@ -472,21 +473,21 @@ class _Corner:
         if not kinks:
             return (
                 f"{name}: the equations have no unique finite slope at the operating point, and "
-                "bywire cannot find the operation that causes this. Choose another point"
+                "bywire cannot find the operation that causes this. Choose another operating point"
             )
         places = "; ".join(
             f"{each.place}, {quoted(each.source)} (kink at {each.corner:.6g}, SI)" for each in kinks
         )
         return (
             f"{name}: the operating point lies on a kink, and the linear models on both sides "
-            f"differ: {places}. Choose another operating point, or one side: "
+            f"differ: {places}. Choose another operating point, or one side with "
             f"{option('side', 'above')}, {option('side', 'below')}, or "
             f"{option('side', f'{kinks[0].place}=above')}"
         )
 
 
 def _direction(rows: Sequence[tuple[Array, float, float]], generic: Array) -> Array:
-    """Return a direction with given signs of excesses; of the first ones if not all can be met."""
+    """Return a direction in which the excesses have the given signs, or the first of them have."""
     from scipy.optimize import linprog
 
     n, kept = generic.size, np.zeros((0, generic.size))
@@ -502,14 +503,14 @@ def _direction(rows: Sequence[tuple[Array, float, float]], generic: Array) -> Ar
             continue
         *_, least = solution = np.asarray(answer.x)
         if least > 1e-6:
-            # A small share of the generic direction avoids other kinks.
+            # A small fraction of the generic direction avoids other kinks.
             best = solution[:n] + 0.3 * min(float(least), 1.0) * generic
             kept, offsets = tried, beyond
     return np.asarray(best)
 
 
 def _apart(one: LinearModel, other: LinearModel) -> tuple[Array, Array]:
-    """Return the difference of responses and its tolerance; of matrices without a response."""
+    """Return the difference of the responses and its tolerance; without a response, of matrices."""
     if not one.inputs or not one.outputs:
         a, b = (np.hstack([model.A, model.B]) for model in (one, other))
         return np.abs(a - b), _EQUAL * np.maximum(np.abs(a), np.abs(b))
@@ -545,14 +546,14 @@ class _Watch:
         self.count = 0
 
     def see(self, excess: float, slope: Array, corner: float) -> None:
-        """Record an operation whose kink can be reached."""
+        """Record an operation whose kink the free signals can reach."""
         self.count += 1
         if np.isfinite(slope).all() and slope.any():
             self.kinks.append(Kink(*_place(), excess, slope, corner, self.count))
 
 
 def _place() -> tuple[str, str]:
-    """Return the computing line outside elementary functions, and its source code."""
+    """Return the line that computes, outside elementary functions, and its source code."""
     frame = sys._getframe(2)
     while frame.f_back and frame.f_code.co_filename in (__file__, _OPS_FILE):
         frame = frame.f_back
@@ -572,10 +573,10 @@ def _shown_file(name: str) -> str:
 
 
 class _Number:
-    """Number with its derivatives by the free signals."""
+    """Number with its derivatives with respect to the free signals."""
 
     __slots__ = ("slope", "value", "watch")
-    __array_ufunc__ = None  # NumPy's scalars pass operations on to this class
+    __array_ufunc__ = None  # NumPy's scalars delegate operations to this class
 
     def __init__(self, value: float, slope: Array, watch: _Watch) -> None:
         self.value, self.slope, self.watch = float(value), slope, watch

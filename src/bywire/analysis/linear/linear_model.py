@@ -12,8 +12,8 @@ import numpy as np
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.typing import Array, Complex
 
-_ON_BORDER = 1e-6  # poles this close to the border of stability are integrators
-_COUPLED = 1e-9  # of the largest entry of A: below it a dropped state does not act on the others
+_ON_BORDER = 1e-6  # poles this close to the stability limit are integrators
+_COUPLED = 1e-9  # of the largest entry of A: below it, a dropped state does not act on the others
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +39,7 @@ class LinearModel:
     period
         Sample time [s]; 0 for a continuous model.
     corners
-        Side of an operation's kink for which the model holds, if the operating point is on one;
+        Side of an operation's kink for which the model is valid, if the operating point is on one;
         see `bywire.analysis.linear.corners`.
     """
 
@@ -59,10 +59,10 @@ class LinearModel:
     corners: tuple[str, ...] = ()
 
     def state_space(self) -> Any:
-        """Return the model as ``control.StateSpace`` with named signals, for any of its methods.
+        """Return the model as ``control.StateSpace`` with named signals, for all of its methods.
 
-        Uncontrollable and unobservable states are left out: integrators among them would distort
-        margins and steady gains. Each state has its own unit, a power of two of SI, so that entries
+        Uncontrollable and unobservable states are removed, since integrators among them would
+        distort margins and steady gains. Each state is scaled by a power of two, so that entries
         have similar magnitudes.
         """
         import control
@@ -98,12 +98,12 @@ class LinearModel:
         UnknownNameError
             When a name is unknown.
         ParameterError
-            When polynomials cannot hold the model to 0.1 %.
+            When polynomials cannot represent the model to within 0.1 %.
         """
         return self.transfer(input, output).transfer_function()
 
     def transfer(self, input: str = "", output: str = "") -> Transfer:
-        """Return the transfer function of one path, exact cancellations removed.
+        """Return the transfer function of one path, without exact cancellations.
 
         Parameters
         ----------
@@ -144,7 +144,7 @@ class LinearModel:
         """Whether no pole lies outside the unit circle, or right of the imaginary axis.
 
         Integrators that a loop does not move (a disc's angle, memory that is only recorded) have
-        poles on the border and do not count.
+        poles on the stability limit and do not count.
         """
         poles = self.poles()
         if self.period:
@@ -155,13 +155,13 @@ class LinearModel:
 
     @property
     def live(self) -> tuple[str, ...]:
-        """States with any coupling to others: no temperatures while heat is off."""
+        """States that are coupled to others, for example no temperatures while heat is off."""
         A, B, C = (values != 0.0 for values in (self.A, self.B, self.C))
         felt = A.any(axis=0) | A.any(axis=1) | B.any(axis=1) | C.any(axis=0) | (self.rate != 0.0)
         return tuple(name for name, kept in zip(self.states, felt, strict=True) if kept)
 
     def reduced(self, states: Sequence[str], *, held: bool = False) -> LinearModel:
-        """Return the model with some of its states only.
+        """Return the model with only some of its states.
 
         Parameters
         ----------
@@ -203,7 +203,7 @@ class LinearModel:
         )
 
     def channels(self, *, inputs: Sequence[str] = (), outputs: Sequence[str] = ()) -> LinearModel:
-        """Return the model with some of its inputs and outputs, in the order given.
+        """Return the model with some of its inputs and outputs, in the specified order.
 
         Parameters
         ----------
@@ -241,7 +241,7 @@ class LinearModel:
         )
 
     def sampled(self, period: float) -> LinearModel:
-        r"""Return the exact model at sampling instants of inputs that are held between them.
+        r"""Return the exact model at the sample times, for inputs that are held between them.
 
         .. math:: A_d = e^{A T}, \quad B_d = \int_0^T e^{A t} dt \, B
 
@@ -258,7 +258,7 @@ class LinearModel:
         from scipy.linalg import expm
 
         n = len(self.A)
-        acting = np.flatnonzero(self.B.any(axis=0))  # an exponential's cost is that of all columns
+        acting = np.flatnonzero(self.B.any(axis=0))  # the cost of expm grows with all columns
         size = n + acting.size
         whole = np.zeros((size, size))
         # Van Loan: the exponential of [[A, B], [0, 0]] contains both integrals, for any A.
@@ -267,7 +267,7 @@ class LinearModel:
             step = expm(whole * period)
         if not np.isfinite(step).all():
             raise ParameterError(
-                f"the model has no finite numbers with the sample time {period:g} s. Use a shorter "
+                f"the model's numbers overflow with a sample time of {period:g} s. Use a shorter "
                 "sample time",
                 name="sample time",
                 value=f"{period:g} s",
@@ -297,7 +297,7 @@ class LinearModel:
         return np.asarray(self.C[:, k] @ inner + self.D)
 
     def effective(self) -> list[int]:
-        """Return the states that inputs reach and that reach outputs; others only cost time."""
+        """Return the states that inputs affect and that affect outputs."""
         forward, backward = self.B.any(axis=1), self.C.any(axis=0)
         coupled = self.A != 0
         for _ in range(len(self.states)):
@@ -329,8 +329,9 @@ def rates(model: LinearModel) -> Complex:
 
     .. math:: s = \ln(z) / T
 
-    for sampled models; a continuous one has them already. Dead beats are left out. The imaginary
-    part is known up to multiples of the sampling frequency only; the least is returned.
+    for sampled models; the poles of a continuous model are already rates. Deadbeat poles are
+    removed. The imaginary part is ambiguous by multiples of the sampling frequency; the smallest
+    one is returned.
 
     Parameters
     ----------
@@ -372,12 +373,12 @@ class Realization:
     d: float
 
     def dual(self) -> Realization:
-        """Return the model with input and output exchanged, of the same transfer function."""
+        """Return the model with input and output exchanged, and the same transfer function."""
         return Realization(self.A.T, self.c, self.b, self.d)
 
 
 def minimal(system: Realization) -> Realization:
-    """Return a realization without states that the input does not reach or the output not see.
+    """Return a realization whose states are all controllable and observable.
 
     Parameters
     ----------
@@ -386,9 +387,9 @@ def minimal(system: Realization) -> Realization:
 
     Notes
     -----
-    Balanced by a diagonal scaling first, then brought to staircase form from the input and, of
-    what is left, from the output. Orthogonal steps alone: errors stay at rounding times the
-    largest entry. Cancellations are found before there are any poles and zeros to compare.
+    The system is first balanced by a diagonal scaling, then brought to staircase form from the
+    input, and the rest from the output. All steps are orthogonal, so errors are rounding times the
+    largest entry. Cancellations are found without comparing poles and zeros.
 
     References
     ----------
@@ -399,14 +400,14 @@ def minimal(system: Realization) -> Realization:
 
 
 def scaled(system: Realization) -> Realization:
-    """Return it with its states in units of similar weight: powers of two, no rounding."""
+    """Return the system with states of similar weight, scaled by powers of two without rounding."""
     size = state_scale(system.A, system.b[:, None], system.c[None])
     A = system.A * size / size[:, None]
     return Realization(A, system.b / size, system.c * size, system.d)
 
 
 def state_scale(A: Array, B: Array, C: Array) -> Array:
-    """Return units of the states, powers of two, in which the entries of A, B, C are alike.
+    """Return powers of two that scale the states so that entries of A, B, C are similar.
 
     Parameters
     ----------
@@ -430,20 +431,20 @@ def state_scale(A: Array, B: Array, C: Array) -> Array:
 
 
 def zeros(system: Realization) -> tuple[Complex, float]:
-    r"""Return the finite zeros, and the factor k in front of the products.
+    r"""Return the finite zeros, and the factor k before the products.
 
     .. math:: c (sI - A)^{-1} b + d = k \prod_j (s - z_j) / \prod_i (s - \lambda_i)
 
     Parameters
     ----------
     system
-        A minimal realization; a zero for each state that an input does not reach else.
+        A minimal realization; otherwise, each uncontrollable state adds a zero.
 
     Notes
     -----
-    While no input passes straight to the output, the output can only stay zero within the null
-    space of c; there the output's rate takes its place. Each turn loses a state and keeps the
-    zeros, until something passes: then they are the eigenvalues of A - b c / d.
+    Without direct feedthrough, the output can stay zero only within the null space of c, where the
+    output's rate replaces it. Each step removes a state and preserves the zeros, until there is a
+    feedthrough. The zeros are then the eigenvalues of A - b c / d.
 
     References
     ----------
@@ -465,7 +466,7 @@ def zeros(system: Realization) -> tuple[Complex, float]:
 
 
 def _reached(system: Realization) -> Realization:
-    """Return the part that the input reaches: each step adds the direction of A times the last."""
+    """Return the controllable part: each step adds the direction of A times the last one."""
     A, b, c = system.A, system.b, system.c
     n = len(A)
     if n == 0 or not b.any():
@@ -476,7 +477,7 @@ def _reached(system: Realization) -> Realization:
     count = 1
     while count < n:
         step = A @ basis[:, count - 1]
-        for _ in range(2):  # once more: what is left after the first may be rounding alone
+        for _ in range(2):  # twice, since the rest after the first time may be only rounding
             step -= basis[:, :count] @ (basis[:, :count].T @ step)
         size = float(np.linalg.norm(step))
         if size <= least:
@@ -497,16 +498,16 @@ def _complement(row: Array) -> Array:
 
 # --- Transfer functions
 
-_AT_REST = 1e-11  # of the largest pole: what counts as an integrator
+_AT_REST = 1e-11  # of the largest pole: maximum magnitude of an integrator
 
 
 @dataclass(frozen=True, eq=False)
 class Transfer:
-    r"""From one input to one output.
+    r"""Transfer function from one input to one output.
 
     .. math:: G(s) = k \prod_j (s - z_j) / \prod_i (s - \lambda_i)
 
-    or the same of z, with a sample time.
+    or the same in z, with a sample time.
 
     Parameters
     ----------
@@ -517,11 +518,11 @@ class Transfer:
     input_unit, output_unit
         Their SI units.
     zeros, poles
-        Smallest first [rad/s; without unit where sampled].
+        Smallest first [rad/s; without unit if sampled].
     factor
         k, SI.
     period
-        Sample time [s]; 0 for a continuous one.
+        Sample time [s]; 0 for a continuous transfer function.
     """
 
     name: str
@@ -536,12 +537,12 @@ class Transfer:
 
     @property
     def unit(self) -> str:
-        """Unit of its values."""
+        """Unit of the values."""
         return f"({self.output_unit})/({self.input_unit})"
 
     @property
     def static_gain(self) -> float:
-        """Value at rest; infinite where it integrates."""
+        """Value at rest; infinite for an integrator."""
         at = 1.0 if self.period else 0.0
         size = _AT_REST * float(np.max(np.abs(self.poles), initial=0.0))
         if np.any(np.abs(self.poles - at) <= size):
@@ -554,19 +555,20 @@ class Transfer:
         return self._at(np.exp(s * self.period) if self.period else s)
 
     def transfer_function(self, tolerance: float = 1e-3) -> Any:
-        """Return it as ``control.TransferFunction`` with named signals.
+        """Return the transfer function as ``control.TransferFunction`` with named signals.
 
         Parameters
         ----------
         tolerance
-            Largest admissible relative error of its response, from a thousandth of the slowest
-            corner up to the fastest, or of the sampling frequency up to half of it.
+            Maximum relative error of its response, from a thousandth of the slowest corner
+            frequency to the fastest, or from a thousandth to half of the sampling frequency.
 
         Raises
         ------
         ParameterError
-            When coefficients of doubles cannot hold it so well: those of a sampled model of high
-            order, whose poles crowd at z = 1. `response` and ``state_space`` keep all digits.
+            When the coefficients, as doubles, are not that accurate. This affects sampled models
+            of high order, whose poles crowd at z = 1. `response` and ``state_space`` keep all
+            digits.
         """
         import control
 
@@ -594,7 +596,7 @@ class Transfer:
         return system
 
     def _range(self) -> Array:
-        """Return frequencies [Hz] at which polynomials are compared."""
+        """Return the frequencies [Hz] at which polynomials are compared."""
         if self.period:
             return np.geomspace(5e-4, 0.49, 200) / self.period
         corners = np.abs(np.concatenate([self.zeros, self.poles]))
@@ -604,7 +606,7 @@ class Transfer:
         return np.asarray(np.geomspace(1e-3 * corners.min(), corners.max(), 200) / 2.0 / np.pi)
 
     def _at(self, s: Complex) -> Complex:
-        """Return the values; poles and zeros take turns, so that nothing overflows."""
+        """Return the values; poles and zeros alternate, so that nothing overflows."""
         values = np.full(s.shape, self.factor, dtype=complex)
         for k in range(max(len(self.zeros), len(self.poles))):
             if k < len(self.zeros):
@@ -622,18 +624,18 @@ class Transfer:
         output: tuple[str, str],
         period: float,
     ) -> Transfer:
-        """Return the transfer function of a path, exact cancellations removed.
+        """Return the transfer function of a path, without exact cancellations.
 
         Parameters
         ----------
         path
-            From the input to the output, continuous or sampled.
+            Realization from the input to the output, continuous or sampled.
         name
             Name in figures and messages.
         input, output
             Name and SI unit of each.
         period
-            Sample time [s]; 0 for a continuous one.
+            Sample time [s]; 0 for a continuous path.
         """
         least = minimal(path)
         roots, factor = zeros(least)

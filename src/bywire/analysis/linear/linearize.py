@@ -1,4 +1,4 @@
-"""Exact linear models of any model of the protocol: Jacobians by algorithmic differentiation."""
+"""Exact linear models of any model that follows the protocol, by algorithmic differentiation."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def linearize(
     .. math:: m_k(x) \dot x_k = f_k(x, u) \;\Rightarrow\;
         A_{kj} = \partial (f_k / m_k) / \partial x_j
 
-    Valid for small motions in which no contact opens or closes, and off the one-sided limits.
+    Valid for small motions in which no contact opens or closes, away from one-sided limits.
     Closed contacts act with their stiffness and damping. Dry friction is set-valued and has no
     derivative at rest.
 
@@ -60,12 +60,12 @@ def linearize(
     inputs
         Fields of Memory that drive the continuous part, for example ``("i_source",)``.
     outputs
-        Fields of Output or State; if both have the name, that of Output.
+        Fields of Output or State; if both have a field of that name, the one of Output.
     friction
         ``"removed"``: without friction. ``"sliding"``: for motion about steady sliding, the force
-        of the sliding direction with its slope; every friction's velocity must be nonzero.
-        ``"stuck"``: every velocity with friction stays zero. Or one of these by the name of each
-        velocity; friction of other velocities is removed.
+        in the sliding direction with its slope; every velocity with friction must be nonzero.
+        ``"stuck"``: every velocity with friction stays zero. Alternatively, one of these for each
+        velocity, by name; friction of other velocities is removed.
 
     Raises
     ------
@@ -76,11 +76,11 @@ def linearize(
         with ``"stuck"``.
     CornerError
         When the point lies on a kink of an operation (a limit, a dead band, a magnitude)
-        whose sides have different models, and no side is stated; see `corners.taking`.
+        whose sides have different models, and no side is specified; see `corners.taking`.
 
     Notes
     -----
-    The Jacobian is exact: ``x`` and the value-only ``xe`` of the protocol are the same here.
+    The Jacobian is exact, since ``x`` and the protocol's value-only ``xe`` are the same here.
     """
     _require_known("input", inputs, model.Memory._fields)
     require_outputs(model, outputs)
@@ -126,7 +126,7 @@ def smooth_point(
 def free_signals(
     point: SmoothPoint, states: Sequence[str], memory: Sequence[str], stimulus: Sequence[str]
 ) -> NDArray[np.bool_]:
-    """Return which of state, memory and stimulus, in one vector, are named and do not stick."""
+    """Return a mask of the listed fields that do not stick, over state, memory and stimulus."""
     model = point.model
     stuck = [name for name, g in zip(model.frictions, point.moving, strict=True) if not g]
     moving = {*states} - {*stuck}
@@ -141,7 +141,7 @@ def jacobians(
     free: NDArray[np.bool_],
     ticks: Sequence[Sequence[Array]] = (),
 ) -> Jacobians:
-    """Return the matrices of a linear model by its free signals, see `Jacobians`."""
+    """Return the matrices of a linear model with respect to its free signals; see `Jacobians`."""
     model = point.model
     A, B, C, D, rate, y = plant
     C, D = _rows(model, outputs, C, D)
@@ -200,7 +200,7 @@ def _rows(model: Model, outputs: Sequence[str], C: Array, D: Array) -> tuple[Arr
 def _frictions(
     model: Model, state: NamedTuple, friction: Friction | Mapping[str, Friction]
 ) -> tuple[list[float], list[float]]:
-    """Return the direction of every friction, 0 where removed, and 0 for velocities that stick."""
+    """Return every friction's direction (0 if removed), and 0 for each velocity that sticks."""
     if isinstance(friction, str):
         friction = dict.fromkeys(model.frictions, friction)
     _require_known("velocity with friction", tuple(friction), model.frictions)
@@ -219,8 +219,8 @@ def _direction(name: str, state: NamedTuple) -> float:
     speed = float(getattr(state, name))
     if speed == 0.0:
         raise ParameterError(
-            f"{name} = 0 is not valid: friction at rest has no slope. Specify a sliding speed, or "
-            "use friction='removed'",
+            f"{name} = 0 is not valid, because friction at rest has no slope. Specify a sliding "
+            "speed, or use friction='removed'",
             name=name,
             value="0",
             valid="a sliding speed",
@@ -232,7 +232,8 @@ def _require_rest(name: str, state: NamedTuple) -> None:
     speed = float(getattr(state, name))
     if speed != 0.0:
         raise ParameterError(
-            f"{name} = {speed:g} is not valid: a moving state is not stuck. Use friction='sliding'",
+            f"{name} = {speed:g} is not valid, because a moving state is not stuck. Use "
+            "friction='sliding'",
             name=name,
             value=f"{speed:g}",
             valid="0",
@@ -261,24 +262,24 @@ def _stiffness(
 
 
 def closed_contacts(model: Model, par: ParameterSet, state: NamedTuple) -> list[int]:
-    """Return which contacts are closed at a state, all groups in a row.
+    """Return the contacts that are closed at a state, numbered through all groups.
 
     Raises
     ------
     ParameterError
-        When one just touches.
+        When a contact just touches.
     """
     K = _stiffness(model, smooth_functions(model, par), state, vector(par))
     return np.flatnonzero(K.diagonal()).tolist()
 
 
 def _active(C: Array, d: Array) -> tuple[float, Array, Array]:
-    """Return the result of a group's closed contacts: the subset whose least slack is largest.
+    """Return the result for a group's closed contacts: the subset with the largest minimum slack.
 
     Returns
     -------
     tuple
-        Least slack, overlap or gap of each contact [m], and stiffness of the closed contacts.
+        Minimum slack, overlap or gap of each contact [m], and stiffness of the closed contacts.
     """
     stiffness = C.diagonal()
     # Closed contacts must press, open ones gap: the subset that satisfies both has positive slack.
@@ -319,11 +320,11 @@ def _require_known(kind: str, names: Sequence[str], known: Sequence[str]) -> Non
             raise unknown_name(kind, name, known)
 
 
-# --- Operating points at which nothing accelerates, found from a start nearby by Newton's method
+# --- Operating points at which nothing accelerates, by Newton's method from a start nearby
 
 _TURNS = 30
 _SETTLED = 1e-10  # of a signal's usual magnitude: negligible step
-_LEFT = 1e-6  # of the rate that one usual magnitude of anything would make: no equilibrium
+_LEFT = 1e-6  # of the rate that one usual magnitude of any signal causes: above it, no equilibrium
 
 
 def equilibrium(
@@ -347,26 +348,26 @@ def equilibrium(
     state, memory
         Start of the search.
     given
-        States that keep their value and so determine the equilibrium.
+        States that keep their value and therefore determine the equilibrium.
     inputs
         Fields of Memory that may change to hold the system there.
     running
         States that keep their value and may have a rate, for example a disc's angle.
     tied
-        States of one unit that keep their differences, for example two angles with a preload
-        between them.
+        States with the same unit that keep their differences, for example two angles with a
+        preload between them.
     friction
         As in `linearize`.
 
     Raises
     ------
     ParameterError
-        When there is no equilibrium near the start, or a contact just touches on the way.
+        When there is no equilibrium near the start, or a contact just touches during the search.
 
     Notes
     -----
-    If there are several equilibria, the result is the one with the smallest change, every signal
-    scaled by its usual magnitude.
+    If there are several equilibria, the result is the one with the smallest change, where usual
+    magnitudes scale the signals.
     """
     known = signals_of(model.State) | signals_of(model.Memory)
     fixed = (*given, *running, *tied[1:])
@@ -395,8 +396,8 @@ def equilibrium(
     if np.abs(left).max() > _LEFT:
         name = model.State._fields[still[int(np.argmax(np.abs(left)))]]
         raise ParameterError(
-            f"{model.name} has no equilibrium near the operating point: {name} does not come to "
-            "rest. Choose another point",
+            f"{model.name} has no equilibrium near the operating point, because {name} does not "
+            "come to rest. Choose another operating point",
             name=name,
         )
     return state, memory

@@ -29,13 +29,13 @@ from bywire.core.parameters import ParameterSet
 from bywire.core.signals import signals_of
 
 Jacobians = list[Any]
-"""of the new memory by states, memory and inputs"""
-_WHOLE = 1e-9  # of a step: largest deviation of a sample time from a multiple
+"""Jacobians of the new memory with respect to states, memory and inputs"""
+_WHOLE = 1e-9  # of a step: maximum deviation of a sample time from a multiple
 
 
 @dataclass(frozen=True, eq=False)
 class SampledSystem:
-    """System between two instants at which any of its tasks runs.
+    """System between two times at which any of its tasks runs.
 
     Parameters
     ----------
@@ -44,9 +44,9 @@ class SampledSystem:
     names, ticks
         Tasks and their Jacobians, in the order in which they run.
     reads
-        States that each task may read, whatever its gains.
+        States that each task may read, for any gains.
     takes
-        Fields of the Memory that the plant may take, likewise.
+        Fields of the Memory that the plant may read, likewise.
     every
         Frames per tick of each task.
     frame
@@ -71,10 +71,10 @@ class SampledSystem:
         return [k for k, n in enumerate(self.every) if f % n == 0]
 
     def in_a_row(self, tasks: Sequence[int]) -> Jacobians:
-        """Return the Jacobians of tasks that run one after the other at the same instant."""
+        """Return the Jacobians of tasks that run one after the other at the same time."""
         (n_m, n_x), n_u = self.ticks[0][0].shape, self.ticks[0][2].shape[1]
         X, M, U = np.zeros((n_m, n_x)), np.eye(n_m), np.zeros((n_m, n_u))
-        # All read the same plant; each reads what those before it at this instant have written.
+        # All tasks read the same plant. Each also reads the values that earlier tasks have written.
         for M_x, M_m, M_u in (self.ticks[k] for k in tasks):
             X, M, U = M_x + M_m @ X, M_m @ M, M_u + M_m @ U
         return [X, M, U]
@@ -97,7 +97,7 @@ def sampled_models(
     locked: Sequence[str] = (),
     step: float = 0.0,
 ) -> tuple[LinearModel, ...]:
-    """Return linear models of plant and controllers at an operating point; friction is removed.
+    """Return linear models of plant and controllers at an operating point, without friction.
 
     Parameters
     ----------
@@ -165,7 +165,7 @@ def _named(names: Sequence[str], chosen: NDArray[np.bool_]) -> frozenset[str]:
 
 def frames_of(periods: Sequence[float]) -> tuple[float, list[int]]:
     """Return the longest time that divides all periods, and its multiple in each period."""
-    # 0.2 ms and 1 ms are no multiples as floats: the nearest ratios of whole numbers are.
+    # As floats, 1 ms is not a multiple of 0.2 ms. The nearest ratios of whole numbers are.
     exact = [Fraction(period).limit_denominator(10**9) for period in periods]
     whole = math.lcm(*(period.denominator for period in exact))
     ticks = [int(period * whole) for period in exact]
@@ -174,22 +174,22 @@ def frames_of(periods: Sequence[float]) -> tuple[float, list[int]]:
 
 
 def _ticks(point: SmoothPoint, inputs: Sequence[str], kept: Sequence[str]) -> tuple[Jacobians, ...]:
-    """Return the Jacobians of every task's new memory by kept states, memory and inputs."""
+    """Return every task's Jacobians with respect to the kept states, memory and inputs."""
     rows = [point.model.State._fields.index(name) for name in kept]
     columns = [point.model.Stimulus._fields.index(name) for name in inputs]
     return tuple([M_x[:, rows], M_m, M_u[:, columns]] for M_x, M_m, M_u, _ in point.ticks())
 
 
 def stepped(model: LinearModel, period: float, step: float) -> LinearModel:
-    r"""Return the model that the midpoint rule gives for a continuous one with held inputs.
+    r"""Return the midpoint rule's model of a continuous model with held inputs.
 
     .. math:: \begin{pmatrix} x_{k+1} \\ u \end{pmatrix} =
         \left[(I - \tfrac{h}{2} W)^{-1} (I + \tfrac{h}{2} W)\right]^{T/h}
         \begin{pmatrix} x_k \\ u \end{pmatrix}, \quad
         W = \begin{pmatrix} A & B \\ 0 & 0 \end{pmatrix}
 
-    Without friction, limits and changes of contacts, a run of a linear plant follows it to rounding
-    error. Its difference from the exact model is the numerical error of the step.
+    Without friction, limits and changes of contacts, a run of a linear plant follows this model to
+    rounding error. Its difference from the exact model is the step's numerical error.
 
     Parameters
     ----------
@@ -203,7 +203,7 @@ def stepped(model: LinearModel, period: float, step: float) -> LinearModel:
     Raises
     ------
     StepError
-        When it does not.
+        When the substep does not divide the sample time.
     """
     count = round(period / step)
     if count < 1 or abs(count * step - period) > _WHOLE * step:
@@ -223,7 +223,7 @@ def stepped(model: LinearModel, period: float, step: float) -> LinearModel:
     return replace(model, A=whole[:n, :n], B=whole[:n, n:], period=period)
 
 
-# --- Closed: controllers' ticks and continuous plant in one
+# --- Closed: controllers' ticks and continuous plant in one model
 
 
 @checked
@@ -239,21 +239,21 @@ def closed_loop(
     stimulus: NamedTuple | None = None,
     step: float = 0.0,
 ) -> LinearModel:
-    r"""Return a model with its controllers, from one instant at which all of them run to the next.
+    r"""Return a model with its controllers, from one time at which all of them run to the next.
 
-    Between two instants at which any task runs,
+    Between two times at which any task runs,
 
     .. math:: m' = M_x x + M_m m + M_u u, \quad x' = A_d x + B_d m'
 
     with the Jacobians M of the ticks that are due, one after the other, and the exact A_d, B_d of
-    the plant; dry friction is removed. Tasks of different periods are lifted to their common
-    period, over which the input is held. Outputs are those of the instant, memory renewed.
+    the plant; dry friction is removed. Tasks with different periods are lifted to their common
+    period, over which the input is held. Outputs are those at the sample time, with new memory.
 
     Parameters
     ----------
     model, par
-        The system and its parameters. Discontinuous functions (a quantizer, a dither's waveform)
-        have no slope: switch them off.
+        The system and its parameters. Switch off discontinuous functions (a quantizer, a dither's
+        waveform), which have no slope.
     state, memory
         Operating point.
     inputs
@@ -263,11 +263,11 @@ def closed_loop(
     locked
         States held at the operating point, for example angle and speed of a locked rotor.
     stimulus
-        Stimulus at the operating point, needed if a limit of the controller depends on it; zero by
-        default.
+        Stimulus at the operating point, required if a limit of the controller depends on it; zero
+        by default.
     step
-        Substep [s] of the simulation's midpoint rule, which then replaces the exact A_d, B_d;
-        0 for none.
+        Substep [s] of the simulation's midpoint rule, which then replaces the exact A_d, B_d; 0
+        for the exact model.
 
     Raises
     ------
@@ -334,7 +334,7 @@ def open_loop(
     """Return the loop gain L of a sampled loop with its delays, filters and other loops.
 
     The loop is cut where one controller reads a state or writes a value; everything else stays
-    closed. Margins of L (negative feedback: the closed loop has 1 + L) are those of the real loop
+    closed. Margins of L (negative feedback: the closed loop has 1 + L) are the real loop's margins
     at this cut.
 
     Parameters
@@ -348,7 +348,7 @@ def open_loop(
     Returns
     -------
     LinearModel
-        One input and one output, both ``cut``; sampled with the period of its controller.
+        Model with one input and one output, both ``cut``; sampled with its controller's period.
 
     Raises
     ------
@@ -383,13 +383,13 @@ def cut_open(model: Model, system: SampledSystem, cut: str) -> LinearModel:
     size = len(states) + len(fields)
     A, B = np.eye(size), np.zeros((size, 1))
     for f in range(system.common):
-        tick = first  # the input acts only there: its controller runs once in the common period
+        tick = first  # the input acts only here, since its controller runs once per common period
         if f > 0:
             X, M, _ = system.in_a_row(system.due(f))
             tick = [X, M, np.zeros((len(fields), 1))]
         F, G = system.step(tick)
         A, B = F @ A, F @ B + G
-    # Minus: the feedback enters the closed loop with a plus, but margins assume negative feedback.
+    # The minus sign: margins assume negative feedback, but the closed loop adds the feedback.
     held = signals_of(model.Memory)
     unit = (signals_of(model.State) | held)[cut].unit
     return LinearModel(
@@ -410,7 +410,7 @@ def cut_open(model: Model, system: SampledSystem, cut: str) -> LinearModel:
 
 
 def _is_without_gain(system: SampledSystem, cut: str) -> bool:
-    """Return whether a field would be read if gains or openings were not 0."""
+    """Return whether a field is read only if gains or openings are not 0."""
     if cut not in system.plant.inputs:
         is_read = cut in system.plant.states and any(
             X[:, system.plant.states.index(cut)].any() for X, _, _ in system.ticks
@@ -446,7 +446,7 @@ def _nothing(model: Model, cut: str, period: float) -> LinearModel:
 def _cut_reading(system: SampledSystem, column: int, cut: str) -> tuple[Jacobians, Any]:
     """Return the first tick with the input in place of a state, and the row of the state."""
     readers = [k for k, (X, _, _) in enumerate(system.ticks) if X[:, column].any()]
-    owner = _alone(system, readers, f"{cut} cannot be cut: exactly one controller must read it")
+    owner = _alone(system, readers, f"{cut} cannot be cut, because it needs exactly one reader")
     n_m, n_x = system.ticks[0][0].shape
     X, M, U = np.zeros((n_m, n_x)), np.eye(n_m), np.zeros((n_m, 1))
     for k in system.due(0):
@@ -454,7 +454,7 @@ def _cut_reading(system: SampledSystem, column: int, cut: str) -> tuple[Jacobian
         read = np.zeros((n_m, 1))
         if k == owner:
             read, M_x = M_x[:, column : column + 1], M_x.copy()
-            M_x[:, column] = 0.0  # this one reads the input in place of the state, others the state
+            M_x[:, column] = 0.0  # this task reads the input in place of the state
         X, M, U = M_x + M_m @ X, M_m @ M, M_m @ U + read
     row = np.zeros((1, n_x + n_m))
     row[0, column] = 1.0
@@ -462,7 +462,7 @@ def _cut_reading(system: SampledSystem, column: int, cut: str) -> tuple[Jacobian
 
 
 def _cut_writing(system: SampledSystem, row: int, cut: str) -> tuple[Jacobians, Any]:
-    """Return the first tick with the input in place of a field, and the row of what it wrote."""
+    """Return the first tick with the input in place of a field, and the row of its value."""
     kept = np.zeros(system.ticks[0][1].shape[1])
     kept[row] = 1.0
     writers = [
@@ -470,14 +470,14 @@ def _cut_writing(system: SampledSystem, row: int, cut: str) -> tuple[Jacobians, 
         for k, (X, M, _) in enumerate(system.ticks)
         if X[row].any() or not np.array_equal(M[row], kept)
     ]
-    owner = _alone(system, writers, f"{cut} cannot be cut: exactly one controller must write it")
+    owner = _alone(system, writers, f"{cut} cannot be cut, because it needs exactly one writer")
     later = system.due(0)[owner + 1 :]
     taken = system.plant.B[:, row].any() or any(
         np.delete(system.ticks[k][1][:, row], row).any() for k in later
     )
     if not taken:
         raise ParameterError(
-            f"{cut} cannot be cut: neither the plant nor another controller reads it from "
+            f"{cut} cannot be cut, because neither the plant nor another controller reads it from "
             f"{system.names[owner]}. Cut a state that this controller reads",
             name="cut",
             value=cut,
@@ -485,7 +485,7 @@ def _cut_writing(system: SampledSystem, row: int, cut: str) -> tuple[Jacobians, 
     X, M, _ = system.in_a_row(system.due(0)[: owner + 1])
     written = np.concatenate([X[row], M[row]])[None]
     U = np.zeros((M.shape[0], 1))
-    # Later tasks at the same instant already read the input.
+    # Later tasks at the same time already read the input.
     X[row], M[row], U[row] = 0.0, 0.0, 1.0
     for k in later:
         M_x, M_m, _ = system.ticks[k]
@@ -494,15 +494,15 @@ def _cut_writing(system: SampledSystem, row: int, cut: str) -> tuple[Jacobians, 
 
 
 def _alone(system: SampledSystem, tasks: list[int], refusal: str) -> int:
-    """Return the one task of a list, which must run only once in the common period."""
+    """Return the only task of a list, which must run exactly once in the common period."""
     if len(tasks) != 1:
         names = ", ".join(system.names[k] for k in tasks) or "none"
-        raise ParameterError(f"{refusal}, found {names}", name="cut")
+        raise ParameterError(f"{refusal} (found {names})", name="cut")
     (owner,) = tasks
     if system.every[owner] != system.common:
         often = system.common // system.every[owner]
         raise ParameterError(
-            f"{refusal}, and no other controller may run more slowly. {system.names[owner]} runs "
+            f"{refusal}, which must be the slowest controller. {system.names[owner]} runs "
             f"{often} times for each run of the slowest controller",
             name="cut",
         )
@@ -520,8 +520,8 @@ def analog_gain(
 ) -> LinearModel:
     r"""Return the exact gain of a loop cut open at a state, with sampled controllers held.
 
-    With the state :math:`x_c` and all others :math:`x_o`, all readers of the state receive an input
-    u in its place:
+    Let :math:`x_c` be the state and :math:`x_o` all others. All readers of the state receive an
+    input u in its place:
 
     .. math:: \dot x_o = A_{oo} x_o + A_{oc} u, \quad \dot x_c = A_{co} x_o + A_{cc} x_c, \quad
         L = -x_c / u
@@ -536,7 +536,7 @@ def analog_gain(
     Returns
     -------
     LinearModel
-        Continuous; one input and one output, both ``cut``. The closed loop has 1 + L.
+        Continuous model with one input and one output, both ``cut``. The closed loop has 1 + L.
 
     Raises
     ------
@@ -551,20 +551,20 @@ def analog_gain(
     kept = [name for name in whole.live if name not in locked]
     plant = whole.reduced(kept, held=bool(locked))
     if cut in locked:
-        raise ParameterError(f"{cut} cannot be cut: it is locked", name="cut", value=cut)
+        raise ParameterError(f"{cut} cannot be cut, because it is locked", name="cut", value=cut)
     if cut not in plant.states:
         return _nothing(model, cut, 0.0)
     k = plant.states.index(cut)
     A, B = plant.A.copy(), plant.A[:, k : k + 1].copy()
-    B[k] = 0.0  # the state's own decay is not feedback through the controller, so it stays
+    B[k] = 0.0  # the state's own decay stays, since it is not feedback through the controller
     A[:, k] -= B[:, 0]
     if not B.any():
         by = smooth_functions(model, par).driven[0][:, model.State._fields.index(cut)]
         readers = {name for name, reads in zip(model.State._fields, by, strict=True) if reads}
-        if readers - {cut, *locked}:  # it is read, but gains are 0
+        if readers - {cut, *locked}:  # something reads it, but gains are 0
             return _nothing(model, cut, 0.0)
         raise ParameterError(
-            f"{cut} cannot be cut: nothing in {model.name} reads it", name="cut", value=cut
+            f"{cut} cannot be cut, because nothing in {model.name} reads it", name="cut", value=cut
         )
     return replace(
         plant,

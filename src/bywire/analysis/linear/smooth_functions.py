@@ -1,4 +1,4 @@
-"""Smooth part of a model and its controllers as functions of the parameters, built once."""
+"""Smooth part of a model and its controllers as functions of the parameters."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ class SmoothFunctions:
         ``(x, p) -> (C of each group..., all overlaps)``.
     plant
         ``(x, m, p, K, s, g) -> (A, B, C, D, rate, y)`` with the stiffness K of closed contacts,
-        the direction s of each friction (0: removed) and g, 0 for each stuck velocity, else 1;
-        B and D by all of the Memory, C, D and y for all of the Output.
+        the direction s of each friction (0: removed) and g, which is 0 for each stuck velocity and
+        1 otherwise. B and D are for the whole Memory, C, D and y for the whole Output.
     ticks
-        ``(x, m, u, p) -> (by x, by m, by u, renewed)``: each task's new memory and its Jacobians.
+        ``(x, m, u, p) -> (d/dx, d/dm, d/du, new)``: each task's new memory and its Jacobians.
     reads
-        For each task, the states on which its new memory may depend, for any parameters.
+        For each task, the states on which its new memory may depend for any parameters.
     driven
         For the rates of states, the states and fields of the Memory on which they may depend.
     model
@@ -63,7 +63,7 @@ class SmoothFunctions:
 
 
 class _Evaluated:
-    """Function with dense results on arrays; converting CasADi's matrices takes most of a call."""
+    """Function with dense results on arrays, without the slow conversion of CasADi's matrices."""
 
     def __init__(self, function: Any) -> None:
         self._call, self._lock = BufferedCall(function), Lock()
@@ -124,7 +124,7 @@ def _build(model: Model, par: ParameterSet) -> SmoothFunctions:
 def _plant(
     model: Model, par: ParameterSet, symbols: tuple[Any, Any, Any], x: Any, held: Any, gap: Any
 ) -> tuple[Any, tuple[NDArray[np.bool_], NDArray[np.bool_]]]:
-    """Return the function of rates and outputs and their Jacobians, and what rates depend on."""
+    """Return the function of rates, outputs and Jacobians, and the dependencies of the rates."""
     import casadi as ca
 
     require_states(model)
@@ -141,7 +141,7 @@ def _plant(
 
 
 def _pattern(matrix: Any) -> NDArray[np.bool_]:
-    """Return which entries of a symbolic matrix are nonzero."""
+    """Return a mask of the nonzero entries of a symbolic matrix."""
     pattern = np.zeros(matrix.shape, dtype=bool)
     pattern[tuple(matrix.sparsity().get_triplet())] = True
     return pattern
@@ -168,7 +168,7 @@ def equations(
     contact
         Forces of the contacts.
     directions, moving
-        For each friction: its direction, 0 if it is removed; and 0 if its velocity is stuck.
+        For each friction, its direction (0 if it is removed), and 0 if its velocity is stuck.
     outputs
         Whether to compute outputs.
     """
@@ -226,7 +226,7 @@ class SmoothPoint:
     moving: Sequence[float]
 
     def moved(self, by: Array) -> SmoothPoint:
-        """Return the point displaced in state, memory and stimulus, given in one vector."""
+        """Return the point displaced by one vector of state, memory and stimulus."""
         n, m = self.state.size, self.memory.size
         return replace(
             self,
@@ -236,7 +236,7 @@ class SmoothPoint:
         )
 
     def plant(self) -> list[Array]:
-        """Return A, B, C, D, rate and y; by all of the Memory and for all of the Output."""
+        """Return A, B, C, D, rate and y, for the whole Memory and the whole Output."""
         return smooth_functions(self.model, self.par).plant_at(
             self.state,
             self.memory,
@@ -247,6 +247,6 @@ class SmoothPoint:
         )
 
     def ticks(self) -> list[list[Array]]:
-        """Return each task's Jacobians by state, memory and stimulus, and the new memory."""
+        """Return each task's Jacobians for state, memory and stimulus, and the new memory."""
         at = (self.state, self.memory, self.stimulus, vector(self.par))
         return [tick(*at) for tick in smooth_functions(self.model, self.par).ticks_at]

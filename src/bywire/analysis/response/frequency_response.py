@@ -1,4 +1,4 @@
-"""Frequency response of a nonlinear sampled loop, sine by sine or all frequencies at once."""
+"""Frequency response of a nonlinear sampled loop, with single sines or all frequencies at once."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ from bywire.simulation.run import Run
 HARMONICS = 9
 """highest harmonic that counts as distortion"""
 STILL = 1e-12
-"""maximum peak-to-peak value of an output at rest, as a share of its usual magnitude"""
+"""maximum peak-to-peak value of an output at rest, relative to its usual magnitude"""
 
 
 def require_stable(closed: LinearModel) -> None:
@@ -44,15 +44,15 @@ def require_stable(closed: LinearModel) -> None:
     Raises
     ------
     ParameterError
-        With its poles.
+        When the loop is unstable, with its poles.
     """
     if closed.is_stable:
         return
     outside = [z for z in closed.poles() if abs(z) > 1.0]
     rates = ", ".join(f"{math.log(abs(z)) / closed.period:.3g}" for z in outside)
     raise ParameterError(
-        f"{closed.name}: the closed loop is unstable, so it has no frequency response. Growth "
-        f"rates of the unstable poles: {rates} 1/s",
+        f"{closed.name}: the closed loop is unstable, so it has no frequency response. The growth "
+        f"rates of its unstable poles are {rates} 1/s",
         name=closed.name,
     )
 
@@ -70,28 +70,28 @@ def frequency_response(
     Parameters
     ----------
     run
-        The loop: model, parameters, start, and the stimulus whose value at time zero is the mean
-        that the sine is added to. Its duration and recording interval are not used.
+        The loop: model, parameters, start, and the stimulus, whose value at time zero is the mean
+        of the sine. Its duration and recording interval are not used.
     sweep
-        Frequencies, amplitudes, variants.
+        Frequencies, amplitudes and variants.
     progress
         Called with ``"frequency response"`` and the finished share, 0 to 1.
     points
-        Variants with operating points of their own, in place of the sweep's variations: runs of
-        the same model with the same choices and sample times.
+        Variants with their own operating points, instead of the sweep's variations: runs of the
+        same model with the same choices and sample times.
     lanes
-        False: one sine after another on one core, as in a simulator without ensembles.
+        False to run one sine after another on one core, as in a simulator without ensembles.
 
     Returns
     -------
     xarray.Dataset
-        Dimensions ``variant``, ``amplitude``, ``frequency`` [Hz]; variables ``gain`` (output over
-        input, SI), ``phase`` [degree], ``distortion`` (total harmonic, share), ``coherence``
-        (share of the output's power without its mean at the excited line), ``scatter`` (of the
-        complex amplitude, see `spread_of`), ``windows``, ``settled`` (0 or 1), and
-        ``share_FLAG`` for every flag and saturation. Gain and phase are NaN where the output does
-        not move at all, because a stuck mechanism has no gain. If the output never repeats, they
-        are means of the last windows.
+        Dimensions ``variant``, ``amplitude``, ``frequency`` [Hz]; variables ``gain`` (ratio of
+        output to input, SI), ``phase`` [degree], ``distortion`` (total harmonic, as a fraction),
+        ``coherence`` (fraction of the output's power at the excited line, without the mean),
+        ``scatter`` (of the complex amplitude; see `spread_of`), ``windows``, ``settled`` (0 or 1),
+        and ``share_FLAG`` for every flag and saturation. Gain and phase are NaN if the output does
+        not move, because a stuck mechanism has no gain. If the output never repeats, they are
+        means over the last windows.
 
     Raises
     ------
@@ -142,7 +142,7 @@ def _repeated(windowed: Run, sweep: Sweep, cases: Cases, periods: int, lanes: bo
     wave = 2j / rows * np.exp(-2j * math.pi * periods / rows * np.arange(rows))
 
     def figures(window: Array) -> Complex:
-        # A matrix product would start the threads of a linear algebra library within ours.
+        # A matrix product would start a linear algebra library's threads within ours.
         return np.asarray(np.einsum("lr,r->l", window[:, :, 0], wave)[:, None])
 
     return repeat(
@@ -162,7 +162,7 @@ def _measured(repeated: Repeated, sizes: Array, periods: int, least: float) -> d
     """Return the figures of all cases at one frequency, shape (cases,) each."""
     outputs = repeated.values[:, :, 0]
     count = max(min(HARMONICS, outputs.shape[1] // (2 * periods)), 1)
-    # The window contains whole periods: harmonics are lines of its Fourier transform.
+    # The window contains whole periods, so harmonics are lines of its Fourier transform.
     spectrum = np.fft.rfft(outputs, axis=1)[:, periods : count * periods + 1 : periods]
     lines = 2.0 / outputs.shape[1] * spectrum
     moves = np.ptp(outputs, axis=1) > least
@@ -191,27 +191,27 @@ FIGURES = (
     "gain_margin",
     "lower_gain_margin",
 )
-"""figures with an error; phases and margins in degree"""
+"""figures with an error; phases and phase margins are in degrees"""
 
 
 def with_step_errors(response: xr.Dataset, finer: xr.Dataset, share: float) -> xr.Dataset:
-    """Return a measured response with the error that its figures have from the step.
+    """Return a measured response with its figures' errors due to the step.
 
     Parameters
     ----------
     response
         Response with its widths; see `bywire.analysis.response.large_signal.with_widths`.
     finer
-        The same in smaller steps.
+        The same response with smaller steps.
     share
-        Error over the difference of both; see `bywire.bench.step_error.of_difference`.
+        Ratio of the error to the difference of both; see `bywire.bench.step_error.of_difference`.
 
     Returns
     -------
     xarray.Dataset
         Response with ``NAME_step_error`` for each figure, in its unit: NaN if neither response has
-        the figure, infinite if only one has. Responses that never repeat also count, as the gain of
-        a limit cycle differs.
+        the figure, infinite if only one has it. Responses that never repeat also count, since the
+        gain of a limit cycle differs.
     """
     return response.assign(
         {
@@ -226,7 +226,7 @@ def with_step_errors(response: xr.Dataset, finer: xr.Dataset, share: float) -> x
 
 
 def _apart(value: Array, other: Array, name: str) -> Array:
-    """Return distances: phases without whole turns, and 0 if both values are beyond the band."""
+    """Return distances, without whole turns of phases; 0 if both values are beyond the band."""
     with np.errstate(invalid="ignore"):
         apart = np.abs(value - other)
     if name == "phase":
@@ -238,7 +238,7 @@ def _apart(value: Array, other: Array, name: str) -> Array:
 
 
 def largest(response: xr.Dataset) -> str:
-    """Return a sentence on the largest errors from the step; empty without errors."""
+    """Return a sentence on the maximum errors due to the step; empty without errors."""
     if "gain_step_error" not in response:
         return ""
     with np.errstate(invalid="ignore"):
@@ -255,7 +255,7 @@ def largest(response: xr.Dataset) -> str:
 # --- All frequencies at once
 
 MOST = 12
-"""number of windows after which a response is abandoned; windows are long here"""
+"""maximum number of windows of a response, since windows are long here"""
 
 
 @dataclass(frozen=True)
@@ -267,7 +267,7 @@ class Broadband:
     kind
         ``"multisine"``: the requested frequencies with equal amplitudes and random phases.
         ``"chirp"``: a periodic sine whose frequency rises exponentially from the lowest to the
-        highest requested one.
+        highest requested frequency.
     seed
         Seed of the random phases.
     realizations
@@ -297,7 +297,7 @@ def broadband_response(
     .. math:: G_k = \frac{\sum Y_k U_k^*}{\sum |U_k|^2}, \quad
         \gamma_k^2 = \frac{|\sum Y_k U_k^*|^2}{\sum |U_k|^2 \sum |Y_k|^2}
 
-    over the realizations and the last windows. For a nonlinear loop G is the best linear
+    over the realizations and the last windows. For a nonlinear loop, G is the best linear
     approximation for an excitation of this kind and size. It is not the response to a sine of this
     amplitude, because all frequencies share the range within a limit.
 
@@ -306,10 +306,10 @@ def broadband_response(
     run
         As in ``frequency_response``.
     sweep
-        Frequencies, rounded to multiples of one over the window's length; the amplitudes are
-        peaks of the whole excitation, in all realizations.
+        Frequencies, rounded to multiples of the inverse window length; amplitudes are peaks of the
+        whole excitation, in all realizations.
     excitation
-        Its kind.
+        Kind of excitation.
     progress
         Called with ``"frequency response"`` and the finished share, 0 to 1.
     points
@@ -318,17 +318,17 @@ def broadband_response(
     Returns
     -------
     xarray.Dataset
-        As of ``frequency_response``, but ``coherence`` is the above, and ``distortion`` the
-        output's root mean square at the lines within the band that are not excited and lie nearer
-        to this frequency than to others, over that at this frequency; NaN for a chirp, which
-        excites them all. ``scatter`` is over the windows of one realization. What concerns whole
-        runs is the same at all frequencies. Attribute ``rms`` is the excitation's root mean
-        square over its amplitude, ``window`` the window's length [s].
+        As from ``frequency_response``, but ``coherence`` is as above. ``distortion`` is the
+        output's root mean square at the unexcited lines within the band that are nearest to this
+        frequency, relative to that at this frequency; NaN for a chirp, which excites all lines.
+        ``scatter`` is over the windows of one realization. Results of whole runs are the same at
+        all frequencies. The attribute ``rms`` is the ratio of the excitation's root mean square to
+        its amplitude, ``window`` the window's length [s].
 
     Raises
     ------
     InputError
-        As in ``frequency_response``, for frequencies that do not ascend, and without realization.
+        As in ``frequency_response``, and when frequencies do not ascend or there is no realization.
     SolverError
         When a value of a trajectory is infinite or NaN.
     """
@@ -365,7 +365,7 @@ def broadband_response(
 
 
 def _excitations(windowed: Run, lines: list[int], excitation: Broadband) -> Array:
-    """Return excitations of one root mean square and peak 1, shape (realizations, samples)."""
+    """Return excitations with peak 1 and equal root mean square, shape (realizations, samples)."""
     t = windowed.schedule().stimulus_times[:-1]
     if excitation.kind == "chirp":
         return _chirp(t / windowed.duration, lines)[None]
@@ -379,9 +379,9 @@ def _excitations(windowed: Run, lines: list[int], excitation: Broadband) -> Arra
 
 
 def _chirp(share: Array, lines: list[int]) -> Array:
-    """Return a sine over the window whose frequency rises; it ends where it began, with peak 1.
+    """Return a sine with rising frequency over the window, periodic and with peak 1.
 
-    Components outside the band are removed: slow controllers would alias them into the band.
+    Components outside the band are removed, since slow controllers would alias them into it.
     """
     ratio = max(lines[-1] / lines[0], 1.0 + 1e-9)
     turns = lines[0] * (ratio**share - 1.0) / math.log(ratio)
@@ -461,7 +461,7 @@ def _distortion(repeated: Repeated, lines: list[int], shape: tuple[int, int, int
 def _of_runs(
     repeated: Repeated, shares: Mapping[str, Array], shape: tuple[int, int, int], lines: int
 ) -> dict[str, Array]:
-    """Return results of whole runs: the worst of their realizations, and means of shares."""
+    """Return results of whole runs: the worst of their realizations, and means of fractions."""
     known = {
         "windows": repeated.windows.reshape(shape).max(axis=2),
         "settled": repeated.repeats.reshape(shape).min(axis=2),

@@ -1,12 +1,13 @@
-r"""Bandwidth and crossover of a measured loop by amplitude, small and large signal.
+r"""Bandwidth and crossover of a measured loop by amplitude, for small and large signals.
 
-The controller is linear between its limits. Let C_r be its response to the set point, and C_y that
-to the output. The linear closed loop T_0 and loop gain L_0 determine their ratio H, for any effect
-of friction and limits on the rest:
+The controller is linear between its limits. Let C_r be its response to the set point, and C_y its
+response to the output. The linear closed loop T_0 and loop gain L_0 determine their ratio H, for
+any effect of friction and limits on the rest:
 
 .. math:: H = \frac{C_r}{C_y} = T_0 \frac{1 + L_0}{L_0}, \qquad L = \frac{T}{H - T}
 
-with the closed loop T measured by sines of one amplitude: L is the loop gain's describing function.
+with the closed loop T measured with sines of one amplitude. L is the loop gain's describing
+function.
 """
 
 from __future__ import annotations
@@ -45,7 +46,7 @@ class Variant:
     loop, par, value
         Loop, parameters and operating point [SI].
     label
-        Value of the varied quantity [SI]; NaN if none is.
+        Value of the varied quantity [SI]; NaN without variation.
     """
 
     loop: Loop
@@ -64,22 +65,22 @@ class Variant:
 
     @cached_property
     def has_loop(self) -> bool:
-        """Whether anything is fed back, see `LoopFigures`."""
+        """Whether there is feedback; see `LoopFigures`."""
         gain, closed = self.loop.gain_and_closed(self.par, self.value)
         return LoopFigures(gain, closed).has_loop
 
     def gain(self, closed: Complex, frequencies: Array) -> Complex:
-        """Return the loop gain behind a measured closed response, both of shape (n,)."""
+        """Return the loop gain from a measured closed-loop response, both of shape (n,)."""
         if not self.has_loop:
             return np.zeros_like(closed)
         T = self.linear(frequencies)
         L = self.loop.gain(self.par, self.value).response(frequencies)[:, 0, 0]
-        H = T * (1.0 + L) / L  # the plant has dropped out: T = C_r P/(1 + L), L = C_y P
+        H = T * (1.0 + L) / L  # the plant cancels: T = C_r P/(1 + L), L = C_y P
         return np.asarray(closed / (H - closed))
 
 
 def variants_over(base: Variant, name: str, values: Sequence[float]) -> list[Variant]:
-    """Return the cases of a range of one parameter, or of the operating quantity.
+    """Return the cases for the values of one parameter, or of the operating quantity.
 
     Raises
     ------
@@ -101,14 +102,14 @@ class Width:
     Parameters
     ----------
     bandwidth
-        Frequency at which the gain has fallen 3 dB below that of the linear loop at standstill
+        Frequency at which the gain has fallen 3 dB below the linear loop's gain at standstill
         [Hz]; 0 if it is below from the lowest frequency on, infinity beyond the highest.
     crossover, phase_margin
-        Of the loop gain's describing function [Hz, degree]; NaN where the frequencies hold no
-        crossover or more than one controller acts, crossover infinity beyond the highest.
+        Of the loop gain's describing function [Hz, degree]; NaN if the frequencies contain no
+        crossover, or more than one controller acts. The crossover is infinity beyond the highest.
     gain_margin, lower_gain_margin
         Factors by which the gain of the describing function may grow, and to which it may fall;
-        NaN where the frequencies hold no such factor.
+        NaN if the frequencies contain no such factor.
     """
 
     bandwidth: float
@@ -124,7 +125,7 @@ def width(variant: Variant, response: xr.Dataset) -> Width:
     Parameters
     ----------
     variant
-        The measured response.
+        The measured loop.
     response
         Its response over ``frequency``; see ``frequency_response``.
     """
@@ -148,7 +149,7 @@ def width(variant: Variant, response: xr.Dataset) -> Width:
 
 
 def widths(variants: Sequence[Variant], response: xr.Dataset) -> list[list[Width]]:
-    """Return the figures of every variant and, within it, amplitude."""
+    """Return the figures of every variant, by amplitude."""
     return [
         [
             width(variant, response.isel(variant=k, amplitude=j))
@@ -159,7 +160,7 @@ def widths(variants: Sequence[Variant], response: xr.Dataset) -> list[list[Width
 
 
 def with_widths(response: xr.Dataset, figures: Sequence[Sequence[Width]]) -> xr.Dataset:
-    """Return a response with its figures by variant and amplitude, see `Width`."""
+    """Return a response with its figures by variant and amplitude; see `Width`."""
     units = {
         "bandwidth": "Hz",
         "crossover": "Hz",
@@ -174,7 +175,7 @@ def with_widths(response: xr.Dataset, figures: Sequence[Sequence[Width]]) -> xr.
 
 
 def narrowest(response: xr.Dataset, amplitude: int) -> int:
-    """Return the variant with the smallest bandwidth at an amplitude; the first of several."""
+    """Return the first variant with the smallest bandwidth at an amplitude."""
     return int(np.argmin(response["bandwidth"].values[:, amplitude]))
 
 
@@ -184,7 +185,7 @@ if TYPE_CHECKING:
 
 
 def leaving(loop: Loop, par: ParameterSet, value: float, amplitude: float) -> str:
-    """Return why a sine around an operating point leaves the brake's range; empty if it does not.
+    """Return the reason why a sine leaves the brake's range; empty if it stays within the range.
 
     Parameters
     ----------
@@ -195,7 +196,7 @@ def leaving(loop: Loop, par: ParameterSet, value: float, amplitude: float) -> st
 
     Notes
     -----
-    The check applies only to set points of the quantity that defines the operating point: it tries
+    The check applies only to set points of the quantity that defines the operating point. It tries
     both ends of the sine as operating points.
     """
     stimulus = loop.point(par, value).model.Stimulus

@@ -24,7 +24,7 @@ from bywire.simulation.run import Run
 
 
 def amplitudes(t: Array, y: Array, f: float, count: int) -> Complex:
-    """Return the complex amplitudes of the first harmonics, sine phase.
+    """Return the complex amplitudes of the first harmonics, in sine phase.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ def amplitudes(t: Array, y: Array, f: float, count: int) -> Complex:
 
 
 def total_distortion(t: Array, y: Array, f: float, count: int = 9) -> float:
-    r"""Return the total harmonic distortion, a share.
+    r"""Return the total harmonic distortion as a fraction.
 
     .. math:: \mathrm{THD} = \sqrt{\sum_{k=2}^{n} |a_k|^2} \, / \, |a_1|
 
@@ -49,7 +49,7 @@ def total_distortion(t: Array, y: Array, f: float, count: int = 9) -> float:
     t, y, f
         As in `amplitudes`.
     count
-        Highest harmonic n; below half the sampling rate.
+        Highest harmonic n, below half the sampling rate.
     """
     size = np.abs(amplitudes(t, y, f, count))
     return float(np.sqrt(np.sum(size[1:] ** 2)) / size[0])
@@ -76,20 +76,20 @@ class Sweep:
     variations
         Dotted name of a parameter -> one value per variant; empty for the run's own parameters.
     flags
-        Outputs with values 0 or 1, whose share of the time is reported, such as ``"stuck"``.
+        Outputs with values 0 or 1 for which the fraction of time is reported, such as ``"stuck"``.
     saturations
         Limits without such an output of the model, reported likewise.
     least
-        Least number of periods in a window.
+        Minimum number of periods in a window.
     shortest
-        Least length of a window [s].
+        Minimum length of a window [s].
     whole
         Other frequencies [Hz] of which a window contains whole periods, such as that of a dither.
     tolerance
         A response is settled if the complex amplitude of a window differs from that of the previous
-        one by less than this share. An encoder's resolution alone may scatter it by 0.3 %.
+        one by less than this fraction. An encoder's resolution alone may scatter it by 0.3 %.
     most
-        Largest number of windows of a response.
+        Maximum number of windows of a response.
     """
 
     inputs: Sequence[str]
@@ -112,7 +112,7 @@ class Sweep:
         return (self.output, *self.flags, *limited)
 
     def shares(self, values: Array, matrix: Array, names: Sequence[str]) -> dict[str, Array]:
-        """Return the share of the time of every flag and limit, shape (cases,) each.
+        """Return the fraction of time of every flag and limit, shape (cases,) each.
 
         Parameters
         ----------
@@ -166,7 +166,7 @@ def as_dataset(
 
 
 def _unwrapped(phase: Array) -> Array:
-    """Return phases without jumps along frequency; gaps from stiction are left out."""
+    """Return phases without jumps along frequency, ignoring gaps due to stiction."""
     unwrapped = phase.copy()
     for index in np.ndindex(phase.shape[:2]):
         known = np.isfinite(phase[index])
@@ -175,14 +175,14 @@ def _unwrapped(phase: Array) -> Array:
 
 
 def complex_values(response: xr.Dataset) -> Complex:
-    """Return gain and phase of a response as complex numbers, NaN where the output sticks."""
+    """Return gain and phase of a response as complex numbers; NaN if the output sticks."""
     return np.asarray(response["gain"].values * np.exp(1j * np.radians(response["phase"].values)))
 
 
 def response_data(response: xr.Dataset, variant: int = 0, amplitude: int = 0) -> Any:
     """Return one variant and amplitude as ``control.FrequencyResponseData``.
 
-    Frequencies at which the output stuck are left out.
+    The result does not contain frequencies at which the output stuck.
     """
     import control
 
@@ -197,16 +197,16 @@ def response_data(response: xr.Dataset, variant: int = 0, amplitude: int = 0) ->
 
 @dataclass(frozen=True, eq=False)
 class Cases:
-    """Cases that run side by side, amplitudes within variants.
+    """Cases that run in parallel, ordered by variant, then by amplitude.
 
     Parameters
     ----------
     matrix
         Parameter vectors, shape (parameters, cases).
     starts
-        State and memory that each case starts from.
+        State and memory at the start of each case.
     rest
-        Stimulus that the excitation is added to, shape (cases, nu).
+        Stimulus to which the excitation is added, shape (cases, nu).
     sizes
         Amplitudes, SI, shape (cases,).
     shape
@@ -230,12 +230,12 @@ def cases_of(run: Run, sweep: Sweep, points: Sequence[Run] | None) -> Cases:
     sweep
         Amplitudes, and variations of the run's parameters, which keep its operating point.
     points
-        Variants with operating points of their own, in place of variations.
+        Variants with their own operating points, instead of variations.
 
     Raises
     ------
     ParameterError
-        When a variant has other sample times or choices than the run, or both kinds are given.
+        When a variant has other sample times or choices than the run, or both kinds are specified.
     """
     sizes = np.asarray(sweep.amplitudes, dtype=float)
     if points is None:
@@ -266,30 +266,31 @@ def _require_alike(run: Run, sweep: Sweep, points: Sequence[Run]) -> None:
             name="variants",
         )
     if not points:
-        raise ParameterError("variants is empty: at least one is needed", name="variants")
+        raise ParameterError("variants is empty. Specify at least one", name="variants")
     structure, tasks = structure_of(run.model, run.par), run.model.tasks(run.par)
     for k, variant in enumerate(points):
         if structure_of(variant.model, variant.par) != structure:
             raise ParameterError(
-                f"variants: number {k} has a different model or a different choice",
+                f"variant {k} has a different model or a different choice. All variants need the "
+                "same ones",
                 name="variants",
                 value=str(k),
             )
         if [t.period for t in variant.model.tasks(variant.par)] != [t.period for t in tasks]:
             raise ParameterError(
-                f"variants: number {k} has different sample times, which cannot vary in a sweep",
+                f"variant {k} has different sample times, which cannot vary in a sweep",
                 name="variants",
                 value=str(k),
             )
 
 
-# --- Windows over which a periodic response is evaluated: how long, how far they scatter
+# --- Windows over which a periodic response is evaluated: their length and scatter
 
 MOST_SAMPLES = 10_000_000
-"""samples of a window: 160 MB, at a kilohertz the period of a frequency of 0.2 mHz twice"""
-_LOWEST = 10  # periods of the lowest frequency in a window of lines: it is rounded to one of them
+"""maximum samples of a window: 160 MB, or at 1 kHz two periods of 0.2 mHz"""
+_LOWEST = 10  # periods of the lowest frequency in a window of lines, to which it is rounded
 _CHOICES = 24  # numbers of periods tried for a window close to the requested frequency
-_CLOSE = 1e-4  # share that a frequency may be off before a longer window is worth its time
+_CLOSE = 1e-4  # relative deviation of a frequency above which a longer window is worth its time
 
 
 def require_measurable(run: Run, sweep: Sweep) -> None:
@@ -327,22 +328,22 @@ def require_measurable(run: Run, sweep: Sweep) -> None:
 
 
 def nyquist(run: Run) -> float:
-    """Return the slowest controller's Nyquist frequency [Hz]: any may take the input."""
+    """Return the slowest controller's Nyquist frequency [Hz], since any may read the input."""
     return 0.5 / max(task.period for task in run.model.tasks(run.par))
 
 
 def interval(run: Run) -> float:
-    """Return the sample time of the fastest task [s]: the excitation steps with it."""
+    """Return the sample time of the fastest task [s], at which the excitation steps."""
     return min(task.period for task in run.model.tasks(run.par))
 
 
 def common_interval(run: Run, whole: Sequence[float]) -> float:
-    """Return the shortest time [s] that holds whole sample times and periods.
+    """Return the shortest time [s] that contains whole sample times and periods.
 
     Parameters
     ----------
     whole
-        Frequencies [Hz] whose periods count too.
+        Frequencies [Hz] whose periods also count.
     """
     periods = [task.period for task in run.model.tasks(run.par)] + [1.0 / w for w in whole]
     return math.lcm(*(round(period / run.step) for period in periods)) * run.step
@@ -351,9 +352,9 @@ def common_interval(run: Run, whole: Sequence[float]) -> float:
 def sine_window(run: Run, f: float, sweep: Sweep) -> tuple[float, int]:
     """Return length [s] and periods of a window close to a frequency [Hz].
 
-    A measurement is reported at the frequency of its window. Windows within 1e-4 of the requested
-    frequency are equivalent; among those up to twice as long as the shortest, the closest one is
-    chosen. Without such a window, the closest of all is chosen.
+    The response is reported at the frequency of its window. Windows within 1e-4 of the requested
+    frequency are equivalent: of those up to twice as long as the shortest, the function chooses
+    the closest one. Without such a window, it chooses the closest of all.
     """
     common = common_interval(run, sweep.whole)
     least = max(sweep.least, math.ceil(sweep.shortest * f))
@@ -361,7 +362,7 @@ def sine_window(run: Run, f: float, sweep: Sweep) -> tuple[float, int]:
     for n in range(least, least + _CHOICES):
         length = max(round(n / f / common), 1) * common
         whole = max(round(f * length), 1)
-        # Rounded: of windows that fit alike, the shortest.
+        # Rounded, so that of equally close windows the shortest counts.
         choices.append((round(abs(whole / length / f - 1.0), 9), length, whole))
     close = [length for off, length, _ in choices if off <= _CLOSE]
     longest = 2.0 * min(close, default=math.inf)
@@ -377,7 +378,7 @@ def _require_short(run: Run, length: float, f: float, periods: float) -> None:
         lowest = periods / (MOST_SAMPLES * interval(run))
         raise ParameterError(
             f"frequency = {shown(f, 'Hz')} is too low: its window would have {samples:.3g} "
-            f"samples, more than {MOST_SAMPLES:.0e}. Use frequencies "
+            f"samples, but the limit is {MOST_SAMPLES:.0e}. Use frequencies "
             f">= {shown(float(f'{lowest:.2g}'), 'Hz')}, or a lower sample rate",
             name="frequency",
             value=shown(f, "Hz"),
@@ -388,7 +389,7 @@ def _require_short(run: Run, length: float, f: float, periods: float) -> None:
 def line_window(run: Run, sweep: Sweep) -> tuple[float, list[int]]:
     """Return length [s] of a window with a line near every frequency, and their numbers.
 
-    Frequencies are multiples of 1/length; between two of them at least one line is left.
+    Frequencies are multiples of 1/length, with at least one other line between two of them.
 
     Raises
     ------
@@ -401,14 +402,14 @@ def line_window(run: Run, sweep: Sweep) -> tuple[float, list[int]]:
         raise not_valid("frequencies", str(f), "in ascending order")
     common = common_interval(run, sweep.whole)
     wanted = max(max(sweep.least, _LOWEST) / f[0], sweep.shortest, *(2.0 / step for step in apart))
-    # Half a line more: rounded to lines, neighbors keep one between them.
+    # Half a line more, so that after rounding, neighbors still have a line between them.
     _require_short(run, wanted * 1.25, f[0], wanted * 1.25 * f[0])
     length = math.ceil(wanted * 1.25 / common) * common
     return length, [math.floor(frequency * length + 0.5) for frequency in f]
 
 
 def kept(figures: Complex, settled: NDArray[np.bool_]) -> np.ma.MaskedArray[Any, Any]:
-    """Return the windows that count: the last two of a repeating response, else all kept ones.
+    """Return the windows that count: a repeating response's last two, otherwise all stored ones.
 
     Parameters
     ----------
@@ -416,7 +417,7 @@ def kept(figures: Complex, settled: NDArray[np.bool_]) -> np.ma.MaskedArray[Any,
         Complex amplitudes of the last windows, shape (cases, KEPT, lines); see
         ``simulation.repetition``.
     settled
-        Which cases repeat, shape (cases,).
+        Mask of the cases that repeat, shape (cases,).
     """
     old = np.arange(KEPT)[None] < np.where(settled, KEPT - 2, 0)[:, None]
     return np.ma.array(figures, mask=np.isnan(figures) | old[:, :, None])
@@ -433,9 +434,9 @@ def spread_of(figures: Complex, settled: NDArray[np.bool_]) -> tuple[Complex, Ar
     Returns
     -------
     tuple
-        Amplitudes, shape (cases, lines): those of the last window where they repeat, else the
-        mean of the windows that count. Their scatter as a share of that: root mean square of the
-        windows' distance from their mean. A drift counts as scatter.
+        Amplitudes, shape (cases, lines): those of the last window if they repeat, otherwise the
+        mean of the windows that count. Their scatter, relative to the amplitude: root mean square
+        of the windows' distances from their mean. A drift counts as scatter.
     """
     seen = kept(figures, settled)
     mean = seen.mean(axis=1)

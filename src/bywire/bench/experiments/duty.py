@@ -34,7 +34,7 @@ class Options(ParameterSet):
     share: Share
     """fraction of the period in which the input is applied; 1 applies it continuously"""
     duration: Duration
-    """length of the recording"""
+    """duration of the recording"""
     record: Duration
     """recording interval"""
     settle: TimeConstant

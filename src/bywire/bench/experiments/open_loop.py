@@ -18,11 +18,11 @@ class Options(ParameterSet):
     output: str
     """judged signal of the recording (default: the first one with the input's unit)"""
     duration: Duration
-    """length of the run"""
+    """duration of the run"""
     record: Duration
     """recording interval"""
     settle: TimeConstant
-    """time before zero, at the stimulus's first value"""
+    """time before time zero, at the stimulus's first value"""
 
 
 def build(tested: TestedModel) -> Experiment:

@@ -46,7 +46,7 @@ class Options(ParameterSet):
     settle: TimeConstant
     """time before the ramp, at its first level"""
     smoothing: TimeConstant
-    """averaging time for the loop's key figures, 0 for the raw signals"""
+    """averaging time for the loop's key figures; 0 for the raw signals"""
 
 
 def build(tested: TestedModel) -> Experiment:
@@ -88,7 +88,7 @@ def build(tested: TestedModel) -> Experiment:
 
 GENERIC = GenericExperiment(
     name="ramp",
-    summary="slow ramp of any input up and down: the hysteresis loop of any output",
+    summary="slow ramp of any input up and back down: hysteresis loop of any output",
     options=Options,
     signals={"input": "stimulus", "output": "recording", "drive": "input or recording"},
     defaults={

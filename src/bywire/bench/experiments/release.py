@@ -35,15 +35,15 @@ class Options(ParameterSet):
     end: InputLevel
     """input after the release"""
     t_ramp: TimeConstant
-    """time in which the input falls, 0 for a step"""
+    """time for the input to fall; 0 for a step"""
     empty: OutputLevel
     """level below which the output counts as released"""
     duration: Duration
-    """length of the recording from the beginning of the release"""
+    """duration of the recording after the start of the release"""
     record: Duration
     """recording interval"""
     settle: TimeConstant
-    """time before the release, in which the output builds up"""
+    """time before the release for the output to build up"""
 
 
 def build(tested: TestedModel) -> Experiment:

@@ -25,7 +25,7 @@ from bywire.core.typing import Array
 
 Count = Annotated[int, Unit("1", 5.0), Field(ge=1, le=1000)]
 
-_LEAST_ROWS = 8  # smallest number of rows in the shortest period
+_LEAST_ROWS = 8  # minimum number of rows in the shortest period
 InputAmplitude = Annotated[float, Unit("input"), Field(gt=0, allow_inf_nan=False)]
 
 

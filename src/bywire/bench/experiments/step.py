@@ -26,13 +26,13 @@ class Options(ParameterSet):
     end: InputLevel
     """input after the step"""
     duration: Duration
-    """length of the recording after the step"""
+    """duration of the recording after the step"""
     record: Duration
     """recording interval"""
     settle: TimeConstant
     """time before the step, at its first level"""
     smoothing: TimeConstant
-    """averaging time for the step's key figures, 0 for the raw output"""
+    """averaging time for the step's key figures; 0 for the raw output"""
 
 
 def build(tested: TestedModel) -> Experiment:

@@ -1,7 +1,7 @@
-"""Stribeck curve: dry friction of a model against speed, at several values of another state.
+"""Stribeck curve: dry friction of a model versus speed, at several values of another state.
 
-Nothing is simulated: the bounds of the friction are evaluated with the model at rest, with contact
-forces from its overlaps.
+The experiment simulates nothing. It evaluates the friction's bounds with the model at rest, with
+contact forces from its overlaps.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ Levels = Annotated[
 ]
 
 _FORCES = {"rad/s": "N*m", "m/s": "N", "m**3/s": "Pa"}
-"""unit of the force against a velocity: their product is a power"""
+"""unit of the force that opposes a velocity: their product is a power"""
 _SIDE = 401  # number of speeds in each direction
-_SWEEPS, _SETTLED = 500, 1e-12  # largest number of sweeps; relative change of settled forces
+_SWEEPS, _SETTLED = 500, 1e-12  # maximum number of sweeps; relative change of settled forces
 
 
 class Options(ParameterSet):
@@ -39,11 +39,12 @@ class Options(ParameterSet):
     friction: str
     """velocity with dry friction (default: the model's first)"""
     along: str
-    """state that affects the friction, with one curve per level; the velocity itself: one curve"""
+    """state that affects the friction, with one curve per level; the velocity itself for one
+    curve"""
     levels: Levels
     """levels of that state"""
     speed_max: Speed
-    """maximum speed, both directions"""
+    """maximum speed in both directions"""
 
 
 def build(tested: TestedModel) -> Experiment:
@@ -87,7 +88,7 @@ def build(tested: TestedModel) -> Experiment:
         return {"curve": curve}
 
     def judge(recordings: Recordings, options: Any) -> tuple[Kpi, ...]:
-        """Return the breakaway friction in both directions, and the smallest friction in motion."""
+        """Return the breakaway friction in both directions, and the minimum friction in motion."""
         friction = recordings["curve"]["friction"].values
         forward, backward = friction[:, _SIDE:], -friction[:, _SIDE - 1 :: -1]
         return figures(
@@ -158,7 +159,7 @@ def contact_forces(model: Model, x: Any, par: Any) -> tuple[float, ...]:
 
 GENERIC = GenericExperiment(
     name="stribeck",
-    summary="dry friction of a model against speed, at levels of a state that affects it",
+    summary="dry friction of a model versus speed, at several levels of a state that affects it",
     options=Options,
     signals={"friction": "friction", "along": "state"},
     defaults={"levels": (0.0,), "speed_max": 1.0},

@@ -19,15 +19,15 @@ class Options(ParameterSet):
     input: str
     """set point: stimulus of the model that [stimulus] drives (default: its only stimulus)"""
     output: str
-    """recorded signal that follows, in the same unit (default: the first one in that unit)"""
+    """recorded signal that follows the set point (default: the first one in the same unit)"""
     duration: Duration
-    """length of the run"""
+    """duration of the run"""
     record: Duration
     """recording interval"""
     settle: TimeConstant
-    """time before zero, at the stimulus's first value"""
+    """time before time zero, at the stimulus's first value"""
     smoothing: TimeConstant
-    """averaging time for the tracking's key figures, 0 for the raw output"""
+    """averaging time for the key figures of tracking; 0 for the raw output"""
 
 
 def build(tested: TestedModel) -> Experiment:

@@ -25,7 +25,7 @@ Share = Annotated[float, Unit("1", 0.5), Field(gt=0, le=1, allow_inf_nan=False)]
 STAGES = 50  # number of steps in which a parameter follows a ramp
 MOST = 10_000
 """maximum number of an intermittent fault's periods in a run"""
-_EDGE = 1e-9  # s, within which an instant counts as reached
+_EDGE = 1e-9  # s, tolerance within which a time counts as reached
 
 
 class Course(ParameterSet):
@@ -36,7 +36,7 @@ class Course(ParameterSet):
     lasts: TimeConstant
     """duration; 0: permanent"""
     ramp: TimeConstant
-    """time in which the fault grows to its full size, and in which it disappears; 0: immediately"""
+    """time for the fault to grow to its full size, and to disappear; 0: immediately"""
     every: TimeConstant
     """period of an intermittent fault; 0: not intermittent"""
     share: Share
@@ -47,7 +47,7 @@ class Course(ParameterSet):
         if self.every > 0 and self.ramp > 0:
             raise ValueError("ramp and every contradict each other. Set only one of them")
         if self.share < 1 and not self.every > 0:
-            raise ValueError("share needs the period of the fault: also set every")
+            raise ValueError("share needs the period of the fault. Also set every")
         return self
 
     @property
@@ -69,7 +69,7 @@ class Course(ParameterSet):
         return there.astype(float)
 
     def size(self, t: Array) -> Array:
-        """Return the share of its full size, 0 to 1, at times [s]."""
+        """Return the fraction of its full size, 0 to 1, at times [s]."""
         there = self.is_there(t)
         if not self.ramp > 0:
             return there
@@ -164,7 +164,7 @@ def from_text(text: str) -> dict[str, Any]:
 
 
 def numbers_as_text(section: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a section with plain numbers as texts, which are rejected where a unit is needed."""
+    """Return a section with plain numbers as texts, which are invalid where a unit is needed."""
     return {
         key: numbers_as_text(value)
         if isinstance(value, Mapping)
@@ -183,7 +183,7 @@ def injections(
     Raises
     ------
     InputError
-        When a section names an unknown fault, or values that are not valid.
+        When a section contains an unknown fault, or values that are not valid.
     """
     modes = modes_of(model, par) if sections else {}
     return tuple(_read(k, section, modes, par) for k, section in enumerate(sections))

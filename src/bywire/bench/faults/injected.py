@@ -220,7 +220,7 @@ def _require_apart(faults: Sequence[Injection], par: ParameterSet) -> None:
 
 
 def touched(mode: Mode, value: float, par: ParameterSet) -> set[str]:
-    """Return phrases for the objects that a fault changes; no two simultaneous faults share one."""
+    """Return phrases for the objects that a fault changes; simultaneous faults must share none."""
     signal = set() if mode.channel is None else {f"the signal {mode.channel.name}"}
     task = {f"the task {mode.task}"} if mode.task else set()
     return signal | task | ({*mode.changes(par, value)} if mode.changes is not None else set())

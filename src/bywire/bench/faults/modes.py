@@ -128,7 +128,7 @@ def _every(model: Model, par: ParameterSet) -> Iterator[Mode]:
     for place, node in _groups(par):
         element = sys.modules[type(node).__module__]
         if getattr(element, "Parameters", None) is not type(node):
-            continue  # the brake's own group; its module declares the brake's faults
+            continue  # the brake's own group, whose module declares the brake's faults
         for fault in getattr(element, "FAULTS", ()):
             yield _of_element(place, fault, par)
     tasks = model.tasks(par)
@@ -217,7 +217,7 @@ def falsify(
     mode, value
         Failure mode and its value in SI.
     size, since
-        Share of its full size and time since its onset [s] at every row.
+        Fraction of its full size and time since its onset [s] at every row.
     par
         Parameters of the run.
     draws

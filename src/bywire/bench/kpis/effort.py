@@ -19,8 +19,8 @@ class Setting:
     power
         Electrical power drawn [W].
     energy
-        Energy drawn since the start [J]. Without it, the power is integrated over the samples,
-        which misses changes between them.
+        Energy drawn since the start [J]. Without this signal, the power is integrated over the
+        samples, which misses changes between samples.
     """
 
     current: str = "i"
@@ -43,7 +43,7 @@ def peak_current(current: Samples | None) -> float | Undefined:
 def mean_current(t: Samples, current: Samples | None) -> float | Undefined:
     """Time average of the motor current's magnitude.
 
-    Trapezoidal rule over the samples. Dither counts in full, even where it reverses the current.
+    Trapezoidal rule over the samples. Dither counts fully, even if it reverses the current.
     """
     if current is None:
         return Undefined("no current is recorded")

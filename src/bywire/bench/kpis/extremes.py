@@ -1,4 +1,4 @@
-"""Maximum and smallest value of a signal."""
+"""Maximum and minimum value of a signal."""
 
 from __future__ import annotations
 

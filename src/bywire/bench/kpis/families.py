@@ -64,7 +64,7 @@ def _declared(module: ModuleType) -> Iterator[Family]:
             )
         loops = None if select else LoopFamily(module)
         if loops is not None and not module.__name__.startswith("bywire.bench."):
-            # A brake's author then gets the error in the first run, not in the first study.
+            # So a brake's author gets the error in the first run, not in the first study.
             loops.translate()
         yield Family(name, summary, module.Setting, figures, select, loops)
 
@@ -100,7 +100,7 @@ def units_of(*names: str, resolved: Mapping[str, str] = MappingProxyType({})) ->
 
 
 def recorded(name: str, setting: Any, signals: Collection[str]) -> dict[str, str]:
-    """Return the unit of every figure of a family whose signals are recorded, by name.
+    """Return the unit of every figure of a family with recorded signals, by name.
 
     Parameters
     ----------
@@ -126,14 +126,14 @@ def evaluate(name: str, recording: xr.Dataset, setting: Any) -> dict[str, Kpi]:
     name
         Name of the family.
     recording
-        A recording with the dimension ``time`` alone.
+        A recording with only the dimension ``time``.
     setting
         The family's ``Setting``.
 
     Raises
     ------
     UnknownNameError
-        When the family, or a signal that the setting names, is unknown.
+        When the family, or a signal in the setting, is unknown.
     ParameterError
         When a signal has more dimensions than time.
     """
@@ -174,14 +174,14 @@ def _by_loops(family: LoopFamily, recording: xr.Dataset, setting: Any) -> dict[s
 class FamilyJudge:
     """Judge of an experiment with one run whose key figures come from families.
 
-    It judges many cases at once, from the needed signals alone.
+    It judges many cases at once, from only the needed signals.
 
     Parameters
     ----------
     settings
         ``settings(options)``: the ``Setting`` of each family by its name.
     left_out
-        Figures of these families to leave out.
+        Figures of these families to omit.
     levels
         ``levels(run, options)``: values of settings that depend on the parameters of a run, by the
         family's name and the setting's field; None if there are none.
@@ -269,7 +269,7 @@ def evaluate_cases(name: str, rows: Rows, settings: Sequence[Any]) -> dict[str, 
     Raises
     ------
     UnknownNameError
-        When the family, or a signal that a setting names, is unknown.
+        When the family, or a signal in a setting, is unknown.
     """
     chosen = FAMILIES.find(name)
     if chosen.loops is not None:

@@ -1,9 +1,9 @@
-r"""Hysteresis of a brake: its loop of drive (current) and response (pressure).
+r"""Hysteresis of a brake: the loop of drive (current) and response (pressure).
 
 The loop is one slow cycle of the drive, for example the ramp of eq. (17) of Dardanelli, Alli,
-Savaresi (2010). Its *apply* branch runs from the smallest to the largest response, its *release*
-branch back. At a given response the width is the drive of the apply branch minus that of the
-release branch: twice the friction, as a current. Widths and area are positive when friction
+Savaresi (2010). Its *apply* branch runs from the minimum to the maximum response, and its *release*
+branch runs back. At any response, the width is the drive of the apply branch minus that of the
+release branch, which is twice the friction as a current. Widths and area are positive when friction
 dissipates, and negative for a loop in the opposite direction.
 """
 
@@ -24,8 +24,8 @@ from bywire.core.quantities import readable_unit
 from bywire.core.typing import Array
 from bywire.core.units import shown
 
-_OPEN = 0.05  # of the drive's range: largest distance between both ends of a closed loop
-_LEFT = 0.01  # of the response's range: smallest residual at the end that a note mentions
+_OPEN = 0.05  # of the drive's range: maximum distance between both ends of a closed loop
+_LEFT = 0.01  # of the response's range: minimum residual at the end that a note mentions
 _LEVELS = 401  # number of levels at which the width is computed, excluding both extremes
 
 
@@ -126,7 +126,7 @@ class Loop:
         first = int(np.argmin(self.response))
         x, y = np.roll(self.drive, -first), np.roll(self.response, -first)
         top = int(np.argmax(y))
-        closing = slice(0, 1 if first else 0)  # a loop from its minimum may stay open
+        closing = slice(0, 1 if first else 0)  # a loop from its minimum may remain open
         x_release, y_release = (np.append(s[top:], s[closing]) for s in (x, y))
         return (x[: top + 1], y[: top + 1]), (x_release, y_release)
 
@@ -150,9 +150,9 @@ def select(recording: xr.Dataset, setting: Setting) -> Loop:
 def loop_width_mid(loop: Loop) -> float | Undefined:
     """Width of the loop, in units of the drive, at the middle of the response's range.
 
-    Mean drive of the apply branch's crossings of that level minus the mean of the release
-    branch's, each interpolated between samples. Ripple makes a branch cross several times. The
-    mean over the crossings keeps the effect of ripple small; `smoothed` removes it.
+    Mean drive at the apply branch's crossings of that level minus the mean at the release branch's
+    crossings, each interpolated between samples. Ripple makes a branch cross several times. The
+    mean over the crossings reduces the effect of ripple; `smoothed` removes it.
     """
     middle = 0.5 * float(np.min(loop.response) + np.max(loop.response))
     width = float(widths(loop, np.array([middle]))[0])
@@ -176,7 +176,7 @@ def loop_width_max(loop: Loop) -> float | Undefined:
 
 @measure("drive*response")
 def loop_area(loop: Loop) -> float | Undefined:
-    r"""Area of the closed loop of the drive against the response.
+    r"""Area of the closed loop of drive versus response.
 
     .. math:: W = \oint i \, dp = \sum_k \tfrac12 (i_k + i_{k+1}) (p_{k+1} - p_k)
 
@@ -193,7 +193,7 @@ def widths(loop: Loop, levels: Array) -> Array:
     Parameters
     ----------
     loop
-        The loop, averaged over the dither if it has one.
+        The loop, averaged over any dither.
     levels
         Levels of the response, ascending, shape (n,).
 
@@ -214,7 +214,7 @@ def closed_above(loop: Loop, width: float, levels: Array) -> float:
     loop
         The loop.
     width
-        Largest width that counts as closed, in the unit of the drive.
+        Maximum width that counts as closed, in the unit of the drive.
     levels
         Levels to check, ascending; levels that the loop does not cross are left out.
 

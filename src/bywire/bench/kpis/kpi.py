@@ -3,12 +3,12 @@
 A family (one file) has a data class ``Setting`` with the inputs of its figures, and one function
 per figure, declared with `measure`. A figure that is undefined for a recording is NaN with a reason
 in its note, never an exception, and never a number with another meaning. If the recording does not
-determine the figure (nothing moves, or the signal still moves at the end), the figure is *open*: a
-requirement on it is undecided, neither met nor missed.
+determine the figure (nothing moves, or the signal still moves at the end), the figure is *open*. A
+requirement on an open figure is undecided, neither met nor missed.
 
-The functions take samples (`bywire.bench.kpis.loop_family`), and are then translated to C as well,
-for the many cases of a study and for pages. Or the family has a function ``select(recording,
-setting)``, and its functions take the resulting `Data`: for figures that need NumPy or SciPy.
+The functions either accept samples (`bywire.bench.kpis.loop_family`), and are then also translated
+to C for the many cases of a study and for pages. Or the family has a function ``select(recording,
+setting)``, and its functions accept the resulting `Data`, for figures that need NumPy or SciPy.
 """
 
 from __future__ import annotations
@@ -41,14 +41,14 @@ class Kpi(EqualWhereUndefined):
     definition
         One line for listings.
     note
-        Reason why it is undefined, or treatment of the data.
+        Reason why the figure is undefined, or treatment of the data.
     error
-        Estimated numerical error in ``unit``; infinite where runs in other steps do not determine
-        it, NaN where it was not estimated.
+        Estimated numerical error in ``unit``; infinite if runs with other steps do not determine
+        the error, NaN if it was not estimated.
     is_open
-        Whether it is undefined because the recording does not determine it.
+        Whether the figure is undefined because the recording does not determine it.
     converges
-        Whether runs in several steps show the order of the scheme; otherwise ``error`` is only a
+        Whether runs with several steps show the order of the scheme. Otherwise, ``error`` is only a
         scale.
     """
 
@@ -203,8 +203,8 @@ class Measure:
         Returns the value, or an `Undefined`. Its name and the first line of its docstring are the
         figure's name and definition.
     needs
-        Fields of the family's setting that name signals, of which the figure needs at least one;
-        empty if the family needs them all. For a loop over samples, its signature determines
+        Fields of the family's setting that specify signals, of which the figure needs at least one;
+        empty if the family needs all of them. For a loop over samples, its signature determines
         them: ``Samples | None``.
     """
 

@@ -3,13 +3,13 @@
 The names of a function's parameters determine its arguments:
 
 * ``t``: the times [s];
-* a field of the family's ``Setting`` that names a signal: its samples, or None if the annotation
-  is ``Samples | None`` and the signal is not recorded;
+* a field of the family's ``Setting`` that specifies a signal: its samples, or None if the
+  annotation is ``Samples | None`` and the signal is not recorded;
 * ``setting``: the ``Setting``, from which the function reads numbers;
 * another function of the file: its result, which is computed once for all figures of a case. If it
-  is undefined, so is the figure.
+  is undefined, the figure is undefined, too.
 
-Functions get valid samples only: at least two finite numbers over increasing times. A result that
+Functions receive only valid samples: at least two finite numbers at increasing times. A result that
 is not finite, and a division by zero, leave the figure undefined.
 """
 
@@ -51,7 +51,7 @@ from bywire.simulation.compiler import find_compiler, load_library
 NO_NUMBER = "its value is not a finite number"
 _NO_FIGURE = Undefined(NO_NUMBER)
 _FLAGS = ("-O3", "-march=native")  # vectorizes loops over samples, without reordering sums
-_FEW = 100_000  # rows: Python evaluates so many in a third of the time that compiling takes
+_FEW = 100_000  # rows: Python evaluates this many in a third of the compilation time
 _NEGATIVE_ZERO = re.compile(r"-0(?![.\d])")
 _HEADER = Path(__file__).with_name("loops.h")
 _PACKED = (FLOAT, INT, BOOL, PAIR)
@@ -353,7 +353,7 @@ void {self.entry}(int64_t cases, int64_t n, const double *times, const bw_signal
         return self._function is not None
 
     def is_worth_c(self, rows: int) -> bool:
-        """Return whether to compute another run in C, as compiling pays off after many rows."""
+        """Return whether to compute another run in C: compiling pays off after many rows."""
         self._looked_at += rows
         return self._looked_at > _FEW and self.is_compiled
 
@@ -402,7 +402,7 @@ void {self.entry}(int64_t cases, int64_t n, const double *times, const bw_signal
         text, is_open = self.reasons[reason - 1]
         return Undefined(text.format(*numbers), is_open)
 
-    # what functions take
+    # arguments of functions
 
     @property
     def _called(self) -> list[Callable[..., Any]]:
@@ -412,7 +412,7 @@ void {self.entry}(int64_t cases, int64_t n, const double *times, const bw_signal
         return list(inspect.signature(function).parameters)
 
     def _take(self, function: Callable[..., Any], *above: object) -> None:
-        """Add the signals and functions that a function takes; ``above``: its callers."""
+        """Add the signals and functions that are a function's arguments; ``above``: its callers."""
         hints = typing.get_type_hints(function)
         settings = typing.get_type_hints(self.setting_class)
         for name in self._parameters(function):

@@ -1,4 +1,4 @@
-"""Fraction of the time that a brake spends in a mode: stuck, or at a limit of its controller."""
+"""Fraction of time that a brake spends in a mode: stuck, or at a limit of its controller."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Setting:
 
 @measure("1")
 def share_stuck(t: Samples, t_stuck: Samples | None, stuck: Samples | None) -> float | Undefined:
-    """Fraction of the time during which the shaft is stuck.
+    """Fraction of time during which the shaft is stuck.
 
     The engine integrates the time stuck, so short sticking between two samples counts. Recordings
     without this time use the samples of the mode, as in `share_sat_current`.
@@ -44,7 +44,7 @@ def share_stuck(t: Samples, t_stuck: Samples | None, stuck: Samples | None) -> f
 
 @measure("1")
 def share_sat_current(t: Samples, sat_current: Samples | None) -> float | Undefined:
-    """Fraction of the time during which the current demand is saturated.
+    """Fraction of time during which the current demand is saturated.
 
     Trapezoidal mean of the mode's samples: a change counts as halfway between two samples.
     """
@@ -57,7 +57,7 @@ def share_sat_current(t: Samples, sat_current: Samples | None) -> float | Undefi
 
 @measure("1")
 def share_sat_duty(t: Samples, sat_duty: Samples | None) -> float | Undefined:
-    """Fraction of the time during which the duty cycle is saturated.
+    """Fraction of time during which the duty cycle is saturated.
 
     Trapezoidal mean of the mode's samples: a change counts as halfway between two samples.
     """

@@ -23,7 +23,7 @@ Samples = list[float]
 
 
 def total(y: Samples) -> float:
-    """Sum of the samples in the order of time: Python's `sum` differs between its versions."""
+    """Sum of the samples in the order of time, because Python's `sum` differs between versions."""
     whole = 0.0
     for x in y:
         whole += x
@@ -31,7 +31,7 @@ def total(y: Samples) -> float:
 
 
 def integral(t: Samples, y: Samples) -> float:
-    """Integral over time by the trapezoidal rule, exact for straight pieces."""
+    """Integral over time by the trapezoidal rule, which is exact for straight segments."""
     whole = 0.0
     for k in range(1, len(t)):
         whole += 0.5 * (y[k] + y[k - 1]) * (t[k] - t[k - 1])
@@ -39,7 +39,7 @@ def integral(t: Samples, y: Samples) -> float:
 
 
 def value_at(t: Samples, y: Samples, instant: float) -> float:
-    """Signal at an instant, linear between samples, and constant beyond the ends."""
+    """Signal at a time, linear between samples and constant beyond the ends."""
     k = bisect_right(t, instant) - 1
     if k < 0:
         return y[0]
@@ -123,8 +123,8 @@ def signal(recording: xr.Dataset, name: str) -> tuple[Array, str]:
     variable = recording[name]
     if variable.dims != ("time",):
         raise ParameterError(
-            f"signal {name!r} has the dimensions {variable.dims}, but key figures need the "
-            "dimension time alone. Select one case first, for example recording.isel(case=0)",
+            f"signal {name!r} has the dimensions {variable.dims}, but key figures need "
+            "only the dimension time. Select one case first, for example recording.isel(case=0)",
             name=name,
             value=str(variable.dims),
             valid="time",

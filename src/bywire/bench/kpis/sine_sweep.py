@@ -1,7 +1,7 @@
-r"""Gain and phase of an output in response to sines of a drive, one frequency after the other.
+r"""Gain and phase of an output in response to sines of a drive, one frequency at a time.
 
-At each frequency f both signals are projected on :math:`e^{-j 2 \pi f t}` over whole periods; the
-response is the quotient. Components of the output at other frequencies do not count.
+At each frequency f, both signals are projected on :math:`e^{-j 2 \pi f t}` over whole periods. The
+response is their quotient. Components of the output at other frequencies do not count.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from bywire.bench.kpis.samples import defect, signal
 from bywire.core.typing import Array
 
 _HALF_POWER = math.sqrt(0.5)
-_ROUNDED = 1e-12  # of the output's largest magnitude: smaller motion is rounding error
+_ROUNDED = 1e-12  # of the output's maximum magnitude: smaller motion is rounding error
 _STILL = Undefined("the output does not move at the lowest frequency", is_open=True)
 
 
@@ -34,7 +34,7 @@ class Setting:
     drive, response
         Names of the signals in the recording.
     windows
-        Frequency [Hz], and beginning and end [s] of whole periods of the settled response.
+        Frequency [Hz], and start and end [s] of whole periods of the settled response.
     """
 
     drive: str

@@ -23,13 +23,13 @@ class Setting:
     signal
         Name of the response in the recording.
     t_step
-        Instant of the step [s].
+        Time of the step [s].
     drive
         Height of the step [``unit``].
     unit
         SI unit of the step.
     window
-        Beginning and end [s] of the steady state; None for the last 20 % after the step.
+        Start and end [s] of the steady state; None for the last 20 % after the step.
     smoothing
         Averaging time [s]; 0 for the raw signal.
     """

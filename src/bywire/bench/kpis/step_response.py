@@ -6,9 +6,9 @@ last crossings late, by up to its amplitude over the local slope, and adds to th
 setting's ``smoothing`` averages first, and every note mentions it.
 
 A signal that stays within 5 % of the step height of its first level does not respond. Of these
-figures, only its steady-state error is defined. A response that still moves in the steady-state
-window has no overshoot, steady-state error or ripple, because its final level is unknown. Without a
-set point, such a response has none of these figures.
+figures, only the steady-state error is then defined. A response that still moves in the
+steady-state window has no overshoot, steady-state error or ripple, because its final level is
+unknown. Without a set point, such a response has none of these figures.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from bywire.bench.kpis.samples import Samples, integral, moving_average, total, 
 _DEAD, _BAND = 0.05, 0.02  # of the step height: end of the dead time; half settling band
 _MOVING = 0.02  # of the step height, between both halves of the steady-state window
 _LAST = 0.2  # of the time after the step: default steady-state window
-_SETTLED = 0.1  # of the time after the step: shortest time in the band that counts as settled
+_SETTLED = 0.1  # of the time after the step: minimum time in the band that counts as settled
 
 
 @dataclass(frozen=True)
@@ -36,12 +36,12 @@ class Setting:
     signal
         Name of the response in the recording.
     t_step
-        Instant of the step [s].
+        Time of the step [s].
     start, end
         Set point before and after the step, in the signal's SI unit. None in an open loop, for the
         response's mean before the step and its mean in the window.
     window
-        Beginning and end [s] of the steady state; None for the last 20 % after the step.
+        Start and end [s] of the steady state; None for the last 20 % after the step.
     smoothing
         Averaging time [s], usually one dither period; 0 for the raw signal.
     set_point
@@ -65,8 +65,8 @@ class Setting:
 class Response(NamedTuple):
     """Response from the step on.
 
-    ``t`` and ``z``: times from the instant of the step, and the response with 0 at ``start`` and 1
-    at ``end``; ``most``: its largest distance from its first level. Its mean, its peak-to-peak
+    ``t`` and ``z``: times since the step, and the response with 0 at ``start`` and 1 at ``end``;
+    ``most``: its maximum distance from its first level. Its mean, its peak-to-peak
     value, and its drift are those in the steady-state window, ``low`` to ``high``.
     """
 
@@ -119,7 +119,7 @@ def response_from(
     here = bisect_right(t, t_step) - 1
     times = list(t[here:])
     levels = list(y[here:])
-    times[0] = t_step  # the instant of the step replaces the sample before it
+    times[0] = t_step  # the time of the step replaces the sample before it
     levels[0] = value_at(t, y, t_step)
     low = last - _LAST * (last - t_step) if window is None else window[0]
     high = last if window is None else window[1]
@@ -213,7 +213,7 @@ def settling_time(response: Response) -> float | Undefined:
 def overshoot(response: Response) -> float | Undefined:
     """Maximum excess of the response over the end level, in % of the step height.
 
-    The largest sample counts. The figure is 0 if the response never exceeds the end level. If the
+    The maximum sample counts. The figure is 0 if the response never exceeds the end level. If the
     response does not settle, it is unknown whether it would overshoot.
     """
     unseen = why_unseen(response)
@@ -253,7 +253,7 @@ def steady_state_error(response: Response) -> float | Undefined:
 def ripple(response: Response) -> float | Undefined:
     """Peak-to-peak value of the response in the steady-state window.
 
-    Largest minus smallest sample. Smoothing also removes ripple of its own period from this figure.
+    Maximum minus minimum sample. Smoothing also removes ripple of its own period from this figure.
     """
     if not response.has_window:
         return _without_window(response.low, response.high)

@@ -14,7 +14,7 @@ from bywire.bench.kpis.samples import defect, signal, smoothed, treatment
 from bywire.core.typing import Array
 
 _LONGEST_LAG = 0.3  # s: upper limit of the search
-_STILL = 0.05  # of the set point's range: smallest motion of a signal that follows
+_STILL = 0.05  # of the set point's range: minimum motion of a signal that follows
 
 
 @dataclass(frozen=True)
@@ -45,9 +45,9 @@ class Tracking:
     y, demand
         Signal and set point, shape ``(n,)`` each.
     unit
-        Their SI unit.
+        SI unit of both.
     note
-        How the samples were treated.
+        Treatment of the samples.
     """
 
     t: Array

@@ -7,9 +7,9 @@ translator supports the following:
   ``| None`` and ``| Undefined``;
 * ``for`` over a range or samples, ``while``, ``if``, ``break``, ``continue``, ``return``;
 * arithmetic, comparisons, slices, lists with one number per sample;
-* other functions of this kind, and some of Python's.
+* other functions of this kind, and some Python functions.
 
-Any other code in a function raises an error that names its line.
+Any other code in a function raises an error with its line.
 
 C and Python return the same bits, except for signs of zero. The translator keeps every operation as
 written, and compilers may not regroup operations. The translator therefore also rejects functions
@@ -146,7 +146,7 @@ class Unit:
         Raises
         ------
         ModelError
-            When the function cannot be translated; the message names the line.
+            When the function cannot be translated. The message contains the line.
         """
         if not isinstance(function, FunctionType):
             raise ModelError(f"{function!r} is not a function in a source file")

@@ -29,7 +29,7 @@ class Setting:
     ideal
         Ideal stopping distance [m].
     peak_slip
-        Slip of largest adhesion.
+        Slip at maximum adhesion.
     """
 
     ideal: float = math.nan
@@ -99,7 +99,7 @@ def stopping_time(stop: Stop) -> float | Undefined:
 
 @measure("%")
 def braking_efficiency(stop: Stop, x: Samples, setting: Setting) -> float | Undefined:
-    """Ideal stopping distance on this road, relative to the actual one."""
+    """Ideal stopping distance on this road, relative to the actual distance."""
     if not stop.does_stop:
         return Undefined(_NO_STOP)
     if not isfinite(setting.ideal):
@@ -124,7 +124,7 @@ def mean_deceleration(stop: Stop, x: Samples) -> float | Undefined:
 
 @measure("m/s**3")
 def jerk(stop: Stop, a: Samples) -> float:
-    """Largest slope of the deceleration (0.02 s average), after 0.3 s, at speeds above 2.5 m/s."""
+    """Maximum slope of the deceleration (0.02 s average), after 0.3 s, above 2.5 m/s."""
     t = stop.t
     mean = moving_average(t, a, _FILTER)
     last = len(t) - 1

@@ -38,8 +38,8 @@ def sample(t: NDArray[np.float64], par: Parameters) -> NDArray[np.float64]:
     .. math:: u = \bar u + \hat u \sin\left(2 \pi \int_{t_0}^{t} f \, d\tau\right)
 
     with :math:`f = f_0 + (f_1 - f_0) s` (linear) or :math:`f = f_0 (f_1/f_0)^s` (logarithmic),
-    :math:`s` the elapsed share of the sweep. The phase is the exact integral of the frequency,
-    so the signal has no jump, neither inside nor at the end of the sweep.
+    where :math:`s` is the elapsed fraction of the sweep. The phase is the exact integral of the
+    frequency, so the signal has no jump, either within the sweep or at its end.
     """
     elapsed = np.maximum(t - par.t_start, 0.0)
     within = np.minimum(elapsed, par.t_sweep)

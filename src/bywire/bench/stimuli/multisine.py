@@ -44,8 +44,9 @@ def sample(t: NDArray[np.float64], par: Parameters) -> NDArray[np.float64]:
 
     .. math:: u = \bar u + \hat u \sum_{k=1}^{n} \cos(2 \pi k f_b (t - t_0) - \pi k (k - 1) / n)
 
-    The same parameters always give the same signal, as there are no random numbers. The RMS value
-    is :math:`\hat u \sqrt{n / 2}`. For many harmonics, the peak is about 1.7 times the RMS value.
+    The same parameters always give the same signal, because it contains no random numbers. The RMS
+    value is :math:`\hat u \sqrt{n / 2}`. For many harmonics, the peak is about 1.7 times the RMS
+    value.
 
     References
     ----------

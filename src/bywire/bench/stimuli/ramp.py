@@ -1,4 +1,4 @@
-"""A ramp from one level to another, a hold there, and optionally a ramp back."""
+"""A ramp from one level to another, a hold, and an optional ramp back."""
 
 from __future__ import annotations
 

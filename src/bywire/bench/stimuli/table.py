@@ -22,7 +22,7 @@ class Parameters(ParameterSet):
     times: Annotated[Numbers, Unit("s")]
     """times of the nodes, in increasing order"""
     values: Annotated[Numbers, Unit("level")]
-    """values at these instants"""
+    """values at these times"""
     between: Literal["linear", "hold"]
     """interpolation between two nodes: a straight line, or hold the earlier value"""
 

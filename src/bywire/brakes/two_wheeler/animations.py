@@ -35,7 +35,7 @@ def _stop(run: xr.Dataset) -> Scene:
 
 
 def _body(par: VehicleParameters) -> str:
-    """Return frame, fork and rider, from the front contact; a cross for the center of gravity."""
+    """Return frame, fork and rider relative to the front contact, with the center of gravity."""
     L, l_f, h = (SCALE * each for each in (par.body.L, par.body.l_f, par.body.h))
     front, rear = SCALE * par.front_wheel.r, SCALE * par.rear_wheel.r
     bars, seat = (-0.25 * L, -0.68 * L), (-0.72 * L, -0.55 * L)

@@ -1,4 +1,4 @@
-"""Fault campaign of the two-wheeler: an emergency stop on wet asphalt with slip control."""
+"""Fault campaign of the two-wheeler, an emergency stop on wet asphalt with slip control."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from bywire.campaigns.residual import DeclaredCampaign
 
 CAMPAIGN = DeclaredCampaign(
     "two-wheeler",
-    "every failure of the two-wheeler during an emergency stop on wet asphalt",
+    "every fault of the two-wheeler during an emergency stop on wet asphalt",
     {
         "bench": "straight-stop",
         "set": {"options.surface": "wet-asphalt", "options.duration": "6 s"},

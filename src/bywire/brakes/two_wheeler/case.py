@@ -1,4 +1,4 @@
-"""Shared parts of the two-wheeler's experiments: rolling starts, and the judge of a stop."""
+"""Shared parts of the two-wheeler's experiments: rolling starts, and the evaluation of a stop."""
 
 from __future__ import annotations
 
@@ -38,16 +38,16 @@ def rolling_case(
     heat: Mapping[str, Any] | None = None,
     vehicle: Vehicle = (TwoWheelerByWire, at_speed),
 ) -> Case:
-    """Return a run that starts rolling at a speed [m/s]; the rider brakes from t = 0 on.
+    """Return a run that starts rolling at a speed [m/s]. The rider brakes from t = 0 on.
 
     Parameters
     ----------
     demands
-        Pressure demand [Pa] by name of the stimulus, constant or over time [s].
+        Pressure demand [Pa] by stimulus name, constant or as a function of time [s].
     changes
         Parameters that the experiment sets.
     heat
-        Initial temperatures of the brakes, by their parts. Default: cold.
+        Initial brake temperatures by part. Default: cold.
     vehicle
         Vehicle model, and its ``at_speed(v, par, heat)``.
     """
@@ -74,12 +74,12 @@ def rolling_case(
 
 
 def on_surface(first: SurfaceName, further: SurfaceName | None = None) -> dict[str, float]:
-    """Return the parameters of a road with one or two surfaces; "own" changes no parameter."""
+    """Return the parameters of a road with one or two surfaces. "own" changes no parameter."""
     return laid("vehicle.road", first, further)
 
 
 def vehicle_of(run: xr.Dataset) -> VehicleParameters:
-    """Return the vehicle parameters of a recording, for any kind of brakes."""
+    """Return the vehicle parameters of a recording, for any type of brake."""
     par = getattr(run, "par", None)
     if par is not None:
         vehicle: VehicleParameters = par.vehicle
@@ -96,4 +96,4 @@ def _levels(run: xr.Dataset, options: Any) -> dict[str, dict[str, float]]:
 
 
 JUDGE = FamilyJudge(lambda _: {"vehicle_stop": vehicle_stop.Setting()}, levels=_levels)
-"""the judge of a stop from the speed ``options.v_0``"""
+"""evaluation of a stop from the speed ``options.v_0``"""

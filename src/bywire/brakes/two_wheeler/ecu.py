@@ -1,6 +1,6 @@
 """The ECU of the two-wheeler: wheel speeds, reference speed, slip and lift control.
 
-Controllers never raise the rider's demand; they only lower it.
+The controllers only reduce the rider's demand. They never increase it.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from bywire.core.signals import Limited, Signal
 
 
 class Stimulus(NamedTuple):
-    """Demands of the rider."""
+    """Rider demands."""
 
     p_f_set: Annotated[float, Signal("Pa", "rider's front pressure demand", 2e6), Ge(0)]
     p_r_set: Annotated[float, Signal("Pa", "rider's rear pressure demand", 2e6), Ge(0)]
@@ -42,8 +42,8 @@ class Memory(NamedTuple):
         Signal("Pa", "rear pressure set point", 2e6, set_point_of="p_r"),
         Limited("p_r_set"),
     ]
-    p_f_most: Annotated[float, Signal("Pa", "front demand, build-up limited", 2e6)]
-    p_r_most: Annotated[float, Signal("Pa", "rear demand, build-up limited", 2e6)]
+    p_f_most: Annotated[float, Signal("Pa", "front demand with limited build-up rate", 2e6)]
+    p_r_most: Annotated[float, Signal("Pa", "rear demand with limited build-up rate", 2e6)]
     v_hat: Annotated[float, Signal("m/s", "reference speed", 20.0, set_point_of="v")]
     slip_f_hat: Annotated[float, Signal("1", "front slip estimated by the ECU", 0.1)]
     slip_r_hat: Annotated[float, Signal("1", "rear slip estimated by the ECU", 0.1)]
@@ -53,8 +53,8 @@ class Memory(NamedTuple):
     lift: Annotated[float, Signal("1", "lift control acts")]
     tread_f: Annotated[float, Signal("m/s", "measured speed of the front tread", 20.0)]
     tread_r: Annotated[float, Signal("m/s", "measured speed of the rear tread", 20.0)]
-    eta_f: Annotated[float, Signal("1", "front wheel's deceleration over gravity", 1.0)]
-    eta_r: Annotated[float, Signal("1", "rear wheel's deceleration over gravity", 1.0)]
+    eta_f: Annotated[float, Signal("1", "front wheel deceleration in units of g", 1.0)]
+    eta_r: Annotated[float, Signal("1", "rear wheel deceleration in units of g", 1.0)]
     omega_f_hat: Annotated[float, Signal("rad/s", "measured front wheel speed", 60.0)]
     omega_r_hat: Annotated[float, Signal("rad/s", "measured rear wheel speed", 60.0)]
     edge_f: Annotated[float, Signal("rad", "angle of the last front edge", 100.0)]
@@ -69,24 +69,24 @@ class Memory(NamedTuple):
     phase_r: Annotated[float, Signal("1", "phase of the rear rules", 3.0)]
     since_f: Annotated[float, Signal("s", "time since the front rules' last phase or step", 0.1)]
     since_r: Annotated[float, Signal("s", "time since the rear rules' last phase or step", 0.1)]
-    p_left_f: Annotated[float, Signal("Pa", "remaining front demand after the rules", 2e6)]
-    p_left_r: Annotated[float, Signal("Pa", "remaining rear demand after the rules", 2e6)]
+    p_left_f: Annotated[float, Signal("Pa", "front demand after the rules", 2e6)]
+    p_left_r: Annotated[float, Signal("Pa", "rear demand after the rules", 2e6)]
     p_hat_f: Annotated[float, Signal("Pa", "front pressure estimated by the rules", 2e6)]
     p_hat_r: Annotated[float, Signal("Pa", "rear pressure estimated by the rules", 2e6)]
     p_held_f: Annotated[
-        float, Signal("Pa", "last pressure that the front wheel's road could hold", 2e6)
+        float, Signal("Pa", "last pressure that the road could hold at the front wheel", 2e6)
     ]
     p_held_r: Annotated[
-        float, Signal("Pa", "last pressure that the rear wheel's road could hold", 2e6)
+        float, Signal("Pa", "last pressure that the road could hold at the rear wheel", 2e6)
     ]
     rise_f: Annotated[float, Signal("Pa", "next step of the front pressure", 1e5)]
     rise_r: Annotated[float, Signal("Pa", "next step of the rear pressure", 1e5)]
-    slowing_f: Annotated[float, Signal("m/s**2", "front wheel's deceleration, filtered", 10.0)]
-    slowing_r: Annotated[float, Signal("m/s**2", "rear wheel's deceleration, filtered", 10.0)]
+    slowing_f: Annotated[float, Signal("m/s**2", "front wheel deceleration, filtered", 10.0)]
+    slowing_r: Annotated[float, Signal("m/s**2", "rear wheel deceleration, filtered", 10.0)]
 
 
 class Readings(NamedTuple):
-    """Readings at a tick."""
+    """Sensor readings at one tick."""
 
     v: Annotated[float, Signal("m/s", "vehicle speed", 20.0)]
     sine: Annotated[float, Signal("1", "sine of the slope", 0.05)]
@@ -99,7 +99,7 @@ class Readings(NamedTuple):
 
 
 def tick(r: Readings, m: Memory, u: Stimulus, par: Par) -> Memory:
-    """Run the ECU once: measure, limit the build-up, then let the controllers lower the demand."""
+    """Run the ECU once: measure, limit the build-up rate, then let the controllers reduce it."""
     before, m = m, _measured(r, m, par)
     rise = par.ecu.p_rate * par.ecu.T_s
     m = m._replace(
@@ -127,7 +127,7 @@ def tick(r: Readings, m: Memory, u: Stimulus, par: Par) -> Memory:
             abs_r=on_rear.acts,
         )
     if par.ecu.lift == "pi":
-        # Last, because it needs the demand that it lowers: the road's adhesion may rise soon.
+        # Lift control is last, because it must know the demand after slip control.
         seen = lift_pi.Input(m.a_hat, u.p_f_set, p_f, before.p_f_most)
         lift, out = lift_pi.output(
             lift_pi.State(m.lift_integral), seen, par.ecu.T_s, par.ecu.front_lift
@@ -161,9 +161,9 @@ class _Lowered(NamedTuple):
 def _lowered(
     wheel: _Wheel, v: float, demands: _Demands, gains: slip_pi.Parameters, par: Par
 ) -> _Lowered:
-    """Return the rider's demand, lowered by slip control.
+    """Return the rider's demand after slip control.
 
-    ``demands``: whole demand, the part that slip control may lower, and that part one tick before.
+    ``demands``: whole demand, the part that slip control may reduce, and that part one tick before.
     """
     mix, seen = mixed_slip.output(
         mixed_slip.State(wheel.tread_before, wheel.eta),
@@ -183,7 +183,7 @@ def _lowered(
 def _by_rules(
     side: str, p_most: float, m: Memory, before: Memory, wheel: slip_pi.Parameters, par: Par
 ) -> tuple[float, Memory]:
-    """Return the demand of a wheel, "f" or "r", lowered by rules, and the new memory."""
+    """Return the demand on a wheel, "f" or "r", after the rules, and the new memory."""
     seen = abs_rules.Input(
         v=m.v_hat,
         a=m.a_hat,

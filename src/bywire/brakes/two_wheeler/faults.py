@@ -1,6 +1,6 @@
 """Failures of the two-wheeler in addition to those of its elements.
 
-A whole rear brake adds its declared failures, with its path as a prefix.
+A whole rear brake adds its declared failures with its path as a prefix.
 """
 
 from __future__ import annotations

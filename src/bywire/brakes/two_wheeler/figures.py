@@ -1,4 +1,4 @@
-"""Figure: speeds along the road, its surfaces, and tire marks."""
+"""Figure of the speeds along the road, with its surfaces and tire marks."""
 
 from __future__ import annotations
 
@@ -30,18 +30,18 @@ _LOADED = 1.0  # N; an unloaded wheel leaves no mark
 
 
 def road_marks(run: xr.Dataset, par: VehicleParameters) -> Figure:
-    """Draw the speeds of a two-wheeler and of its treads over the road, and the marks on it.
+    """Draw the speeds of a two-wheeler and its treads along the road, and the tire marks.
 
-    Surfaces are bands with their names. A sliding tire leaves a mark at its contact, black for a
-    locked wheel. The x axis is the front wheel's position, which is zero at t = 0. On a single
-    surface, the figure also shows the end of the ideal stop.
+    Surfaces are bands with their names. A sliding tire leaves a mark where it touches the road,
+    black for a locked wheel. The x axis is the front wheel's position, which is zero at t = 0. On a
+    single surface, the figure also shows the end of the ideal stop.
 
     Parameters
     ----------
     run
         Recording of a vehicle with the signals of `TwoWheeler`.
     par
-        Parameters of the vehicle.
+        Vehicle parameters.
     """
     figure, (upper, lower) = style.new_figure(3.6, (1.6, 1.0))
     front = np.maximum.accumulate(run["x"].values)
@@ -61,7 +61,7 @@ def road_marks(run: xr.Dataset, par: VehicleParameters) -> Figure:
     for row, (place, wheel) in enumerate(lanes.values()):
         _draw_marks(lower, run, place, wheel, row)
     ideal = ideal_distance(float(np.interp(0.0, run["time"], run["v"])), par)
-    if span[0] < ideal < min(span[1], par.road.x_change):  # of a single surface
+    if span[0] < ideal < min(span[1], par.road.x_change):  # the ideal stop is on one surface
         for axes in (upper, lower):
             axes.axvline(
                 ideal,
@@ -83,7 +83,7 @@ def road_marks(run: xr.Dataset, par: VehicleParameters) -> Figure:
 
 
 def _draw_surfaces(axes: Axes, par: VehicleParameters, span: tuple[float, float]) -> None:
-    """Fill the visible stretches of the road, with their names."""
+    """Fill the visible surfaces of the road, with their names."""
     ways = par.road
     edges = (span[0], ways.x_change, ways.x_back, span[1])
     drawn: set[str] = set()
@@ -109,7 +109,7 @@ def _draw_marks(axes: Axes, run: xr.Dataset, place: Array, wheel: str, row: int)
     slides = (run[f"sliding_{wheel}"].values > 0.5) & (run[f"N_{wheel}"].values > _LOADED)
     stands = slides & (run[f"omega_{wheel}"].values == 0)
     marks = (
-        ("tyre slides", slides, style.VERMILLION, _LANE, 2.0),
+        ("tire slides", slides, style.VERMILLION, _LANE, 2.0),
         ("wheel locked", stands, style.BLACK, 0.5 * _LANE, 2.1),
     )
     for label, flags, color, width, order in marks:
@@ -131,7 +131,7 @@ def _of_runs(result: Result) -> list[Shown]:
         Shown(
             f"road-marks-{label}" if several else "road-marks",
             road_marks(run, vehicle_of(run)),
-            f"The road{f', {label}' if several else ''}, and where tires slide on it.",
+            f"Speeds along the road{f', {label}' if several else ''}, and where the tires slide.",
         )
         for label, run in result.recordings.items()
     ]

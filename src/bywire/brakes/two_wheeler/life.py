@@ -1,7 +1,7 @@
 """Pad life of the front brake: pads wear, and fluid from the reservoir replaces their volume.
 
 The seals retract the pistons by the same travel after every stop. The clearance is therefore
-constant, and wear draws fluid through the compensating port. See `bywire.life`.
+constant, and wear draws fluid through the compensating port (see `bywire.life`).
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from bywire.plant import pad_wear
 
 
 class WearParameters(ParameterSet):
-    """The front axle's pads, its discs, and the fluid that follows the pads."""
+    """Pads and discs of the front axle, and the fluid that follows the pads."""
 
     pads: pad_wear.Parameters
     disc: warm_stops.Parameters
     h_new: Length
-    """thickness of a new pad's lining"""
+    """lining thickness of a new pad"""
     h_min: Length
     """thickness at which pads are replaced"""
     V_new: Volume
@@ -39,7 +39,7 @@ def begin(par: TwoWheelerParameters, wear: WearParameters) -> Values:
 
 
 def follows(z: Values, par: TwoWheelerParameters, wear: WearParameters) -> Mapping[str, float]:
-    """Return no changes, since a controlled pressure does not depend on the pads."""
+    """Return no changes, because a controlled pressure does not depend on the pads."""
     return {}
 
 
@@ -50,7 +50,7 @@ def effects(
     par: TwoWheelerParameters,
     wear: WearParameters,
 ) -> Effects:
-    """Return the wear of each stop, and the fluid that follows the pistons of all faces."""
+    """Return the wear of each stop, and the fluid that follows all pistons."""
     work = figures["disc_energy"] * figures["disc_share_front"] / 100.0
     before, after = warm_stops.temperatures(work, stops["pause"], stops["T_air"], wear.disc)
     thinned = warm_stops.thinned(work, before, after, wear.pads)
@@ -72,17 +72,17 @@ TWO_WHEELER_PADS = Life(
         **{f"pads.{name}": value for name, value in warm_stops.ORGANIC_LINING.items()},
         "pads.n_pads": chosen(4.0, "two discs"),
         "pads.A_pad": chosen(20e-4, "front pads of a sport motorcycle"),
-        "disc.C_d": derived(1.36e3, "60 K per stop from 100 km/h, 80 % of the energy in front"),
+        "disc.C_d": derived(1.36e3, "60 K per stop from 100 km/h, 80 % of the energy at the front"),
         "disc.tau_d": chosen(60.0, "from 80 to 57 degC in 30 s of driving"),
-        "h_new": chosen(4.5e-3, "lining of a sport motorcycle's pad"),
-        "h_min": chosen(0.5e-3, "4 mm to wear"),
+        "h_new": chosen(4.5e-3, "lining of a sport motorcycle pad"),
+        "h_min": chosen(0.5e-3, "4 mm of usable lining"),
         "V_new": chosen(35e-6, "reservoir of a radial master cylinder"),
         "V_min": chosen(10e-6, "mark on the sight glass"),
     },
     states={
         "h_pad": Slow("m", "pad thickness"),
         "V_reservoir": Slow("m**3", "fluid in the reservoir"),
-        "work": Slow("J", "friction work in front", is_drawn=False),
+        "work": Slow("J", "friction work at the front", is_drawn=False),
     },
     limits={"lining": Slow("m", "remaining lining"), "fluid": Slow("m**3", "remaining fluid")},
     begin=begin,

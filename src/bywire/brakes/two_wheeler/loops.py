@@ -1,4 +1,4 @@
-"""Slip loop of a wheel, around the pressure loop of its brake."""
+"""Slip loop of a wheel, around the pressure loop of the brake."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ def point(par: ParameterSet, value: float) -> Point:
     Raises
     ------
     ParameterError
-        When the speed is not positive, or the slip is beyond the peak, where it is unstable without
-        control.
+        If the speed is not positive, or if the slip is beyond the peak, where the wheel is unstable
+        without control.
     """
     SPEED.require_positive(value)
     at = cast(WheelOnDrumParameters, par.replace({"drum.v": value}))
@@ -34,7 +34,7 @@ def point(par: ParameterSet, value: float) -> Point:
     surface = adhesion.surface_of(at.drum.surface)
     peak = adhesion.peak_slip(surface, at.tyre)
     if not slip < peak:
-        valid, advice = f"< {peak:.3g}", "the slip of the largest adhesion"
+        valid, advice = f"< {peak:.3g}", "the slip at maximum adhesion"
         raise not_valid("slip.slip_set", f"{slip:g}", valid, advice)
     v_wheel = value * (1.0 - slip)
     force = at.drum.N * adhesion.adhesion(slip, surface, at.tyre)
@@ -52,7 +52,7 @@ def point(par: ParameterSet, value: float) -> Point:
 LOOP = Loop(
     name="slip",
     assembly="wheel-on-drum",
-    summary="slip control of a wheel around its brake's pressure loop, 1 kHz",
+    summary="slip control of a wheel at 1 kHz, around the pressure loop of its brake",
     at=SPEED,
     inputs=("slip_set",),
     output="slip",

@@ -18,7 +18,7 @@ Par = TwoWheelerParameters
 
 
 class TwoWheelerByWire(HotBrakes[TwoWheelerParameters, ecu.Memory]):
-    """A vehicle whose brakes follow their demands as second-order loops."""
+    """A vehicle with brakes that follow their demands like second-order loops."""
 
     name: ClassVar[str] = "two-wheeler-by-wire"
     Memory: ClassVar = ecu.Memory
@@ -96,7 +96,7 @@ class TwoWheelerByWire(HotBrakes[TwoWheelerParameters, ecu.Memory]):
     )
 
     def cold_torques(self, w: Self) -> tuple[float, float]:
-        """Return the torques that cold discs hold at the pressures of both circuits."""
+        """Return the torques that cold discs can hold at the circuit pressures."""
         w.front_circuit.u = pressure_loop.Input(w.m.p_f_ref)
         w.rear_circuit.u = pressure_loop.Input(w.m.p_r_ref)
         w.front_encoder.u = wheel_encoder.Input(w.front.x.omega)
@@ -113,7 +113,7 @@ class TwoWheelerByWire(HotBrakes[TwoWheelerParameters, ecu.Memory]):
         return (Task("ecu", par.ecu.T_s, tick),)
 
     def remarks(self, recording: Any, par: Par) -> list[str]:
-        """Return remarks on a slip far below the slip of the maximum adhesion."""
+        """Return remarks on a slip far below the slip at maximum adhesion."""
         if par.ecu.abs != "pi" or par.ecu.mix.alpha < 1.0:
             return []
         ways, x = par.vehicle.road, recording["x"].values
@@ -143,9 +143,9 @@ class TwoWheelerByWire(HotBrakes[TwoWheelerParameters, ecu.Memory]):
 
 
 def at_speed(v: float, par: Par, heat: Mapping[str, Any] | None = None) -> tuple[Any, ecu.Memory]:
-    """Return the vehicle rolling at a speed [m/s], brakes open, ECU running.
+    """Return the vehicle rolling at a speed [m/s], with open brakes and a running ECU.
 
-    ``heat``: temperatures of the brakes by their parts, see `cold_start`, which is the default.
+    ``heat``: brake temperatures by part; default: `cold_start`.
     """
     brakes = cold_start(par.front.heat, par.rear.heat) if heat is None else heat
     state = TwoWheelerByWire.state(**rolling_start(v, par.vehicle), **brakes)
@@ -153,7 +153,7 @@ def at_speed(v: float, par: Par, heat: Mapping[str, Any] | None = None) -> tuple
 
 
 def awake(v: float, vehicle: VehicleParameters, T_s: float) -> ecu.Memory:
-    """Return the memory of a running ECU with a sample time [s], at a vehicle speed [m/s]."""
+    """Return the memory of a running ECU with a sample time [s] at a vehicle speed [m/s]."""
     front, rear = v / vehicle.front_wheel.r, v / vehicle.rear_wheel.r
     return zeros(ecu.Memory)._replace(
         v_hat=v,
@@ -168,7 +168,7 @@ def awake(v: float, vehicle: VehicleParameters, T_s: float) -> ecu.Memory:
 
 
 def tick(x: Any, m: ecu.Memory, u: ecu.Stimulus, par: Par) -> ecu.Memory:
-    """Run the ECU once, with the readings of its sensors."""
+    """Run the ECU once, with its sensor readings."""
     front, rear = par.vehicle.front_wheel, par.vehicle.rear_wheel
     edges = [
         wheel_encoder.reading(

@@ -1,4 +1,4 @@
-"""Parameters of the vehicle, of its two brakes, and of its ECU."""
+"""Parameters of the vehicle, its two brakes and its ECU."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Acceleration = Annotated[float, Unit("m/s**2", 0.1), Field(allow_inf_nan=False)]
 
 
 class BrakeParameters(ParameterSet):
-    """One brake: its pressure loop and its discs."""
+    """One brake with its pressure loop and its discs."""
 
     circuit: pressure_loop.Parameters
     disc: brake_disc.Parameters
@@ -31,35 +31,35 @@ class HotBrakeParameters(BrakeParameters):
 
 
 class SensorParameters(ParameterSet):
-    """Sensors other than those of the brakes."""
+    """Sensors that do not belong to the brakes."""
 
     encoder: wheel_encoder.Parameters
     a_offset: Acceleration
-    """offset of the accelerometer, positive for too much deceleration"""
+    """accelerometer offset, positive if it measures too much deceleration"""
     tau_a: TimeConstant
-    """time constant of the accelerometer's filter"""
+    """time constant of the accelerometer filter"""
 
 
 class EcuParameters(ParameterSet):
-    """The ECU: sample time and controllers.
+    """Sample time and controllers of the ECU.
 
-    ``abs``: ``"pi"`` controls the slip of both wheels; ``"rules"`` build, dump and hold their
-    pressures by thresholds; with ``"off"``, the rider controls the pressures.
+    ``abs``: ``"pi"`` controls the slip of both wheels. ``"rules"`` builds, dumps and holds the
+    pressures by thresholds. With ``"off"``, the rider controls the pressures.
     ``lift``: ``"pi"`` keeps the rear wheel on the ground.
-    ``sees``: the controllers use speed and slip ``"estimated"`` from the sensors, or ``"known"``
-    exactly, for comparison.
+    ``sees``: the controllers use speed and slip ``"estimated"`` from the sensors, or the exact
+    (``"known"``) values for comparison.
     """
 
     T_s: Duration
     """sample time"""
     abs: Literal["off", "pi", "rules"]
-    """control of the wheels' slip"""
+    """wheel slip control"""
     lift: Literal["off", "pi"]
-    """control of the rear wheel's lift"""
+    """rear wheel lift control"""
     sees: Literal["estimated", "known"]
     """source of speed and slip: estimated from the sensors, or known exactly"""
     p_rate: PressureRate
-    """fastest build-up of a demand"""
+    """maximum build-up rate of a demand"""
     wheel_speed: wheel_speed.Parameters
     vehicle_speed: vehicle_speed.Parameters
     mix: mixed_slip.Parameters
@@ -80,7 +80,7 @@ class TwoWheelerParameters(ParameterSet):
 
 
 class WholeBrakeParameters(ParameterSet):
-    """A brake with its whole actuator, its disc, and its heat."""
+    """A brake with its whole actuator, its disc and its heat."""
 
     actuator: MotorcycleParameters
     disc: brake_disc.Parameters
@@ -88,7 +88,7 @@ class WholeBrakeParameters(ParameterSet):
 
 
 class WholeRearParameters(ParameterSet):
-    """The vehicle with the whole brake by wire at its rear wheel."""
+    """The vehicle with a whole brake by wire at its rear wheel."""
 
     vehicle: VehicleParameters
     front: HotBrakeParameters

@@ -1,7 +1,7 @@
-"""Residuals with which the two-wheeler's ECU can detect failures of encoders and accelerometer.
+"""Residuals with which the two-wheeler's ECU can detect encoder and accelerometer failures.
 
-A locked wheel, or a speed that is impossible for the vehicle, is either a short slip that the
-controller ends, or a wrong reading.
+If a wheel seems to lock, or the vehicle speed is physically impossible, the cause is either a short
+slip that the controller ends, or a wrong reading.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from bywire.core.typing import Array
 
 VEHICLES = (TwoWheelerByWire.name, TwoWheelerWholeRear.name)
 Signals = Mapping[str, Array]
-_SPAN = 0.1  # s, over which both speeds are compared
+_SPAN = 0.1  # s: comparison window of both speeds
 
 
 def _fast(signals: Signals, par: Any, values: Array) -> Array:
@@ -27,7 +27,7 @@ def _fast(signals: Signals, par: Any, values: Array) -> Array:
 
 
 def _slip(side: str) -> Callable[[Signals, Any, float], Array]:
-    """Return the residual of a wheel, "f" or "r": its slip, which control keeps small."""
+    """Return the slip of a wheel, "f" or "r", as its residual, because control keeps it small."""
 
     def compute(signals: Signals, par: Any, dt: float) -> Array:
         return _fast(signals, par, np.abs(signals[f"slip_{side}_hat"]))
@@ -36,7 +36,7 @@ def _slip(side: str) -> Callable[[Signals, Any, float], Array]:
 
 
 def _speed(signals: Signals, par: Any, dt: float) -> Array:
-    """Return the deviation of the estimated speed's change from the accelerometer's."""
+    """Return the change in estimated speed minus the change measured by the accelerometer."""
     rows, v = round(_SPAN / dt), signals["v_hat"]
     lost = np.concatenate((np.broadcast_to(v[:, :1], (len(v), rows)), v[:, :-rows]), axis=1) - v
     shown = mean_of_the_last(signals["a_hat"], rows) * rows * dt

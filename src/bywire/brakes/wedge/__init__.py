@@ -3,5 +3,5 @@
 from bywire.core.brake import Brake
 
 BRAKE = Brake(
-    "wedge", "two motors with roller screws, brake heart, wedge, caliper; and its rigs", __name__
+    "wedge", "two motors with roller screws, brake heart, wedge, caliper, and test rigs", __name__
 )

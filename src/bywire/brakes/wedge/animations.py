@@ -16,7 +16,7 @@ _DIALS = (
     ("M_B", "brake moment", "N m", 1.0, 1500.0, style.VERMILLION),
     ("x", "wedge travel", "mm", 1e3, 3.0, style.PURPLE),
     ("F_N", "normal force", "kN", 1e-3, 20.0, style.PURPLE),
-    ("i_1", "current of motor 1", "A", 1.0, 20.0, style.GREEN),
+    ("i_1", "motor 1 current", "A", 1.0, 20.0, style.GREEN),
     ("a", "deceleration", "m/s²", 1.0, 12.0, style.BLUE),
 )
 

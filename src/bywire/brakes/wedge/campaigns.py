@@ -1,4 +1,4 @@
-"""Fault campaign of the wedge brake: hold a moment, reduce it, then ramp it up."""
+"""Fault campaign of the wedge brake, which holds a moment, reduces it, then ramps it up."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from bywire.campaigns.residual import DeclaredCampaign
 
 CAMPAIGN = DeclaredCampaign(
     "wedge",
-    "every failure of the wedge brake while it holds a moment, at four onsets",
+    "every fault of the wedge brake while it holds a moment, at four onset times",
     {
         "bench": "moment-ramp",
         "vary": {

@@ -1,4 +1,4 @@
-"""Shared parts of the wedge brake's experiments: starts, readings, figures, on brake and rigs."""
+"""Shared parts of the wedge brake's experiments: starts, readings, key figures."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def case_from_parked(
     label: str = "run",
     **timing: float,
 ) -> Case:
-    """Return the run of an experiment that starts parked, preloaded, without current.
+    """Return an experiment's run that starts parked, preloaded, without current.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def case_from_parked(
 
 
 def steps(t: Array, levels: Mapping[float, float]) -> Array:
-    """Return a signal with each level from its time [s] on, and zero before the first."""
+    """Return a signal with each level from its time [s] on, and zero before the first level."""
     y = np.zeros(t.shape)
     for begin, level in sorted(levels.items()):
         y = np.where(t >= begin - 1e-9, level, y)
@@ -80,7 +80,7 @@ def release_time(run: xr.Dataset, begin: float, name: str = "release_time") -> K
     pressing = np.flatnonzero(after["F_N"].values > 0)
     value, note = math.nan, ""
     if not after.sizes["time"]:
-        note = "the recording has no row after the demand"
+        note = "the recording has no row after the end of the demand"
     elif not pressing.size:
         note = "the pads are not applied when the demand falls"
     elif pressing[-1] + 1 == after.sizes["time"]:
@@ -114,25 +114,25 @@ def first(run: xr.Dataset, name: str, level: float) -> float:
 
 
 def mean(run: xr.Dataset, name: str, begin: float, end: float) -> float:
-    """Return the mean of a signal between two times [s]; NaN without a row in between."""
+    """Return the mean of a signal between two times [s], NaN without a row in between."""
     values = run[name].sel(time=slice(begin - 1e-9, end + 1e-9)).values
     return float(values.mean()) if values.size else math.nan
 
 
 def swing(run: xr.Dataset, name: str, begin: float, end: float) -> float:
-    """Return the peak-to-peak value of a signal between two times [s]; NaN without a row."""
+    """Return the peak-to-peak value of a signal between two times [s], NaN without a row."""
     values = run[name].sel(time=slice(begin - 1e-9, end + 1e-9)).values
     return float(np.ptp(values)) if values.size else math.nan
 
 
-# --- Reading recordings: the disc's direction, its revolutions, and their rows
+# --- Reading recordings: direction of the disc
 
 
 def along_disc(run: xr.Dataset) -> xr.Dataset:
-    """Return a recording with moments and speed positive in the disc's first direction."""
+    """Return a recording with moments and speed positive in the disc's initial direction."""
     if not float(run["Omega"].values[0]) < 0:
         return run
-    # Subtraction instead of negation, which would give negative zeros.
+    # Subtract instead of negating, which would give negative zeros.
     return run.assign({name: 0.0 - run[name] for name in ("M_B", "y_M", "Omega")})
 
 
@@ -150,14 +150,14 @@ FRICTIONLESS = {
     "wedge_friction.mu_R": 0.0,
     "encoder.law": "ideal",
 }
-"""changes that remove all dry friction except between pads and disc; the encoder is ideal, since
-without friction its counts would keep the shafts moving"""
+"""overrides that remove all dry friction except between pads and disc. The encoder is ideal,
+because without friction its counts would keep the shafts moving"""
 
 
 def distinct(
     name: Callable[[float], str], unit: str = ""
 ) -> Callable[[tuple[float, ...]], tuple[float, ...]]:
-    """Return a validator of values that need different names in labels."""
+    """Return a validator that requires a different label for each value."""
 
     def check(values: tuple[float, ...]) -> tuple[float, ...]:
         names = [name(value) for value in values]
@@ -186,16 +186,16 @@ Coefficients = Annotated[
     Field(min_length=1, max_length=100),
     AfterValidator(distinct(tag)),
 ]
-"""friction coefficients of the pads, in any order, without repetition"""
+"""pad friction coefficients, in any order, without repetition"""
 
 
 def with_friction(par: WedgeParameters, mu_B: float, known: bool) -> dict[str, Any]:
-    """Return the changes that set the pads' friction coefficient.
+    """Return the overrides that set the pad friction coefficient.
 
     Parameters
     ----------
     known
-        Whether the moment controller uses the slope that corresponds to the coefficient. That slope
+        Whether the moment controller uses the slope that corresponds to the coefficient. This slope
         keeps its ratio to the brake's slope, so an existing mismatch remains.
     """
     slope = par.control.moment.slope_hat
@@ -217,9 +217,9 @@ def shaft_case(
     changes: Mapping[str, Any],
     **timing: float,
 ) -> Case:
-    """Return a run of the single motor's rig, from rest at the angle zero.
+    """Return a run of the rig with one motor, from rest at angle zero.
 
-    ``changes``: parameters that the experiment sets, the rig's modes among them; ``timing``:
+    ``changes``: parameters that the experiment sets, including the rig's modes; ``timing``:
     ``settle``, ``keep`` and ``record`` of the case [s].
     """
     return _case(label, ShaftRig(), par.replace(changes), stimulus, duration, timing)
@@ -233,7 +233,7 @@ def screw_case(
     changes: Mapping[str, Any],
     **timing: float,
 ) -> Case:
-    """Return a run of the two motors' rig, from rest without force; see :func:`shaft_case`."""
+    """Return a run of the rig with two motors, from rest without force (see `shaft_case`)."""
     return _case(label, ScrewRig(), par.replace(changes), stimulus, duration, timing)
 
 
@@ -260,23 +260,23 @@ def _case(
 
 
 def check_current(name: str, i: float, par: WedgeParameters) -> None:
-    """Require a current that the drives can give.
+    """Require a current that the drives can supply.
 
     ``name``: option with the current; ``i``: its value [A].
 
     Raises
     ------
     ParameterError
-        When it is above the drives' limit.
+        If the current exceeds the drives' limit.
     """
     limit = par.drive.i_max
     if i > limit:
-        valid, advice = f"<= {limit:g} A", "the largest current of the drives (drive.i_max)"
+        valid, advice = f"<= {limit:g} A", "the maximum current of the drives (drive.i_max)"
         raise not_valid(f"options.{name}", f"{i:g} A", valid, advice)
 
 
 def slope_of(par: WedgeParameters) -> float:
-    """Return the travel per angle [m/rad] by the screw's lead."""
+    """Return the screw's travel per angle [m/rad]."""
     return roller_screw.slope(par.screw)
 
 
@@ -286,22 +286,22 @@ def torque_constant_of(par: WedgeParameters) -> float:
 
 
 def peak(run: xr.Dataset, name: str) -> float:
-    """Return the largest magnitude of a signal after t = 0."""
+    """Return the maximum magnitude of a signal after t = 0."""
     return float(np.abs(run[name].sel(time=slice(-1e-9, None)).values).max())
 
 
-# --- Runs of the rigs and the brake from another angle of the shafts
+# --- Runs of the rigs and the brake from other shaft angles
 
 _ANGLES = ("theta_", "last_")
 
 
 def turned(case: Case, angle: float) -> Case:
-    """Return a rig's run from another angle of the shafts that is otherwise equal.
+    """Return an equal run that starts from other shaft angles.
 
-    Encoder counts and cogging then have other phases, as on a bench from day to day.
+    Encoder counts and cogging then have other phases, as on a real bench from day to day.
 
-    ``case``: of a rig, or of the wedge brake, whose wedge moves along; ``angle``: added to every
-    shaft's angle [rad].
+    ``case``: run of a rig, or of the wedge brake, whose wedge moves with the shafts; ``angle``:
+    angle to add to each shaft [rad].
     """
 
     def shifted(row: Any) -> Any:
@@ -312,7 +312,7 @@ def turned(case: Case, angle: float) -> Case:
         return row
 
     def stimulus(t: Array) -> dict[str, Array]:
-        given = dict(case.stimulus(t))
-        return given | {n: v + angle for n, v in given.items() if n.startswith(_ANGLES)}
+        demands = dict(case.stimulus(t))
+        return demands | {n: v + angle for n, v in demands.items() if n.startswith(_ANGLES)}
 
     return replace(case, state=shifted(case.state), memory=shifted(case.memory), stimulus=stimulus)

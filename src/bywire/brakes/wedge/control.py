@@ -1,4 +1,4 @@
-"""Controllers of the wedge brake at their sampling instants: moment at 1 kHz, position at 5 kHz.
+"""Sampled controllers of the wedge brake: moment at 1 kHz, position at 5 kHz.
 
 A brake may also have an adjuster, which turns between two applications.
 """
@@ -19,7 +19,7 @@ _MOST = Limited("control.position.i_max")
 
 
 class Stimulus(NamedTuple):
-    """External inputs; ``command.mode`` determines which of them act."""
+    """External inputs. ``command.mode`` determines which of them act."""
 
     M_set: Annotated[float, Signal("N*m", "moment demand", 300.0)]
     theta_1_set: Annotated[float, Signal("rad", "demanded angle 1", 3.0)]
@@ -30,7 +30,7 @@ class Stimulus(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """Memory of the controllers between their sampling instants."""
+    """Memory of the controllers between their samples."""
 
     on: Annotated[float, Signal("1", "power stages on")]
     M_set: Annotated[float, Signal("N*m", "moment demand", 300.0)]
@@ -58,16 +58,16 @@ class Memory(NamedTuple):
     derated: Annotated[float, Signal("1", "motors derated")]
     adjusting: Annotated[float, Signal("1", "adjuster: 0 waits, 1 brake applied, 2 turns", 2.0)]
     click_rate: Annotated[float, Signal("1/s", "teeth that the adjuster turns per second", 50.0)]
-    meant_rate: Annotated[float, Signal("1/s", "teeth that it intends to turn per second", 50.0)]
+    meant_rate: Annotated[float, Signal("1/s", "teeth commanded to the adjuster per second", 50.0)]
     clicks: Annotated[float, Signal("1", "teeth turned by the adjuster", 3.0)]
     gap_hat: Annotated[float, Signal("m", "clearance estimated by the adjuster", 2e-4)]
     applied: Annotated[float, Signal("1", "the brake was applied since it was last parked")]
     wide: Annotated[float, Signal("1", "applications in a row with too much gap; < 0: too little")]
-    teeth: Annotated[float, Signal("1", "teeth turned, by the adjuster's count", 3.0)]
+    teeth: Annotated[float, Signal("1", "teeth turned, as counted by the adjuster", 3.0)]
 
 
 class Readings(NamedTuple):
-    """Readings of the sensors at a sampling instant."""
+    """Sensor readings at one sample."""
 
     theta_1: Annotated[float, Signal("rad", "encoder 1", 3.0)]
     theta_2: Annotated[float, Signal("rad", "encoder 2", 3.0)]
@@ -76,7 +76,7 @@ class Readings(NamedTuple):
 
 
 def moment_tick(r: Readings, m: Memory, u: Stimulus, par: WedgeParameters) -> Memory:
-    """Run the moment control once: its output is the speed of the common angle reference."""
+    """Run the moment control once. Its output is the speed of the common angle reference."""
     control, T = par.control.moment, par.control.T_slow
     if par.adjuster.law != "none":
         contact = gap_adjusting.contact(m.theta_c, m.meant_rate, T, par.control.adjuster)
@@ -138,7 +138,7 @@ def position_tick(r: Readings, m: Memory, u: Stimulus, par: WedgeParameters) -> 
 
 
 def adjuster_tick(m: Memory, u: Stimulus, par: WedgeParameters) -> Memory:
-    """Run the adjuster once: a turn takes one sample, and the moment control follows."""
+    """Run the adjuster once. A turn takes one sample, and the moment control follows."""
     law = par.control.adjuster
     braking = ops.where(u.M_set > par.control.moment.M_on, 1.0, 0.0)
     x, out = gap_adjusting.output(
@@ -166,10 +166,9 @@ def current_tick(m: Memory, u: Stimulus, par: WedgeParameters) -> Memory:
 
 
 def _derated(m: Memory, par: WedgeParameters) -> Memory:
-    """Return the memory with the limit of both currents, from the hotter motor.
+    """Return the memory with the limit for both currents, from the hotter motor.
 
-    The controllers do not measure the currents. They use the demands instead, which the drives
-    follow.
+    The controllers do not measure the currents. They use the demands, which the drives follow.
     """
     control, T = par.control.derating, par.control.T_fast
     if control.law == "off":
@@ -202,7 +201,7 @@ def _position(m: Memory, par: WedgeParameters) -> position_pd.Parameters:
     control = par.control.position
     if par.control.derating.law == "off":
         return control
-    # Not validated: the limit may be a symbol, and it can only be smaller.
+    # Skip validation, because the limit may be a symbol and can only be smaller.
     return position_pd.Parameters.model_construct(**{**dict(control), "i_max": m.i_most})
 
 
@@ -211,7 +210,7 @@ def _references(m: Memory, r: Readings, u: Stimulus, par: WedgeParameters) -> Me
     if par.command.mode == "position":
         return m._replace(theta_1_ref=u.theta_1_set, theta_2_ref=u.theta_2_set)
     advanced = m.theta_ref + _allowed(m, par) * par.control.T_fast
-    # While the power is off, the reference follows the shafts for a bumpless return.
+    # While the power is off, the reference follows the shafts for a bumpless restart.
     common = ops.where(m.on > 0.5, advanced, 0.5 * (r.theta_1 + r.theta_2))
     position, offset = par.control.position, par.control.offset
     F_M = position.K_hat * (m.i_1_ref + m.i_2_ref) / offset.k_hat
@@ -224,9 +223,9 @@ def _references(m: Memory, r: Readings, u: Stimulus, par: WedgeParameters) -> Me
 
 
 def _allowed(m: Memory, par: WedgeParameters) -> float:
-    """Return the speed of the common reference [rad/s]: 0 if both motors are at their limit.
+    """Return the speed of the common reference [rad/s], 0 if both motors are at their limit.
 
-    This is an anti-windup: a reference that moved on would have to return first at a release.
+    This is the anti-windup. A reference that moved on would have to return first at a release.
     """
     limit, speed = _position(m, par).i_max, m.direction * m.rate
     push = ops.where(speed < 0, -1.0, 1.0)

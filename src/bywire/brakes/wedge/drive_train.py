@@ -1,4 +1,4 @@
-"""Drive train of one motor: current drive, motor, bearings and screw, wherever it is mounted."""
+"""Drive train of one motor in the brake or on a rig: current drive, motor, bearings and screw."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Command(NamedTuple):
 
 
 class Demand(NamedTuple):
-    """A rig operator's demands on one motor; its mode selects the active one."""
+    """A rig operator's demands on one motor. The motor's mode selects the active demand."""
 
     theta: Annotated[float, Signal("rad", "demanded angle", 3.0)]
     i: Annotated[float, Signal("A", "demanded current", 5.0)]
@@ -52,7 +52,7 @@ def power(motor: Motor) -> float:
 
 
 def measured_power(drive: Drive, motor: Motor, i_ref: float, on: float) -> float:
-    """Return the electrical power into a motor [W] as a value only, for measurements."""
+    """Return the electrical power into a motor [W] for measurements, from predicted values."""
     emf = servo_motor.torque_constant(motor.par) * motor.xe.omega
     u = current_drive.Input(i_ref=i_ref, i=motor.xe.i, emf=emf, on=on)
     return current_drive.output(drive.xe, u, drive.par).v * motor.xe.i
@@ -64,10 +64,10 @@ def torque(motor: Motor) -> float:
 
 
 def bounds(omega: float, torque: float, force: float, par: Par) -> Bounds:
-    """Return the limits [N m] of the dry friction of bearings and screw on one shaft.
+    """Return the limits [N m] of the dry friction in bearings and screw on one shaft.
 
-    ``omega``, ``torque``, ``force``: speed of the shaft [rad/s], torque of its motor [N m], axial
-    force on its screw [N].
+    ``omega``, ``torque``, ``force``: shaft speed [rad/s], motor torque [N m], axial force on the
+    screw [N].
     """
     bearing = bearing_friction(omega, force, par)
     screw = screw_friction(torque, force, par)
@@ -89,8 +89,8 @@ def command(
 ) -> Command:
     """Run the real-time computer once for one motor of a rig.
 
-    ``mode``: "position" controls the motor's position, "current" passes the demanded current to
-    its drive; ``theta``: reading of the encoder [rad].
+    ``mode``: "position" controls the motor position, "current" passes the demanded current to
+    the drive; ``theta``: encoder reading [rad].
     """
     x, out = position_pd.output(
         position_pd.State(held.last, held.speed),

@@ -18,14 +18,14 @@ _SIGNALS = (
     Channel("power", "power-stage switch", "1", "power_off", "demand", stuck=1.0),
 )
 
-_NOTHING = 1e-6  # share of a torque constant, which must be positive
+_NOTHING = 1e-6  # fraction of a torque constant, which must stay positive
 
 BRAKE_CHANNELS = Channels(WedgeBrake.name, _SIGNALS)
 CORNER_CHANNELS = Channels(WedgeCorner.name, _SIGNALS)
 
 
 def _jammed(motor: str) -> Any:
-    """Return the changes that jam a screw: a large damping of its motor."""
+    """Return the overrides that jam a screw, modeled as large motor damping."""
 
     def changes(par: Any, value: float) -> Mapping[str, Any]:
         return {f"{motor}.D_M": value}
@@ -34,7 +34,7 @@ def _jammed(motor: str) -> Any:
 
 
 def _shorted(motor: str) -> Any:
-    """Return the changes that short a winding: no torque, but a drag K^2/R."""
+    """Return the overrides that short a winding, which has no torque, but drag K^2/R."""
 
     def changes(par: Any, value: float) -> Mapping[str, Any]:
         healthy = getattr(par, motor)
@@ -48,7 +48,7 @@ FAULTS = (
     *(
         Fault(
             f"screw_{number}.jammed",
-            f"screw {number} jams in its position, modeled as damping",
+            f"screw {number} jams in place, modeled as damping",
             _jammed(f"motor_{number}"),
             WedgeBrake.name,
             "N*m*s/rad",
@@ -59,7 +59,7 @@ FAULTS = (
     *(
         Fault(
             f"motor_{number}.shorted",
-            f"shorted winding of motor {number}: no torque, but drag",
+            f"shorted winding in motor {number}, with drag but no torque",
             _shorted(f"motor_{number}"),
             WedgeBrake.name,
         )

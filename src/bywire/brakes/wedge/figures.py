@@ -1,4 +1,4 @@
-"""Figure: actuation force and brake factor of a wedge over the friction of its pads."""
+"""Figure of a wedge's actuation force and brake factor versus pad friction."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FARTHEST = 60.0
-"""maximum brake factor on the y axis; the factor is unbounded at the neutral point"""
+"""maximum brake factor on the y axis, because the factor is unbounded at the neutral point"""
 
 
 @dataclass(frozen=True)
 class WedgeForces:
-    """Actuation force over normal force at some friction coefficients.
+    """Ratio of actuation force to normal force at several friction coefficients.
 
-    ``mu_B``: friction coefficients of the pads, ascending; ``free``: force ratio at rest without
-    friction in the brake; ``rising``, ``falling``: the same with friction, while the moment rises
-    and falls slowly.
+    ``mu_B``: pad friction coefficients, ascending; ``free``: force ratio at rest without friction
+    in the brake; ``rising``, ``falling``: force ratio with friction, while the moment rises and
+    falls slowly.
     """
 
     mu_B: Sequence[float]
@@ -43,7 +43,7 @@ class WedgeForces:
         if sizes == {0} or len(sizes) != 1:
             raise ParameterError(
                 "WedgeForces: mu_B, free, rising and falling have "
-                f"{', '.join(str(len(column)) for column in columns)} entries: they need the same "
+                f"{', '.join(str(len(column)) for column in columns)} entries. They need the same "
                 "number of entries, at least one",
                 name="WedgeForces",
                 value=", ".join(str(len(column)) for column in columns),
@@ -51,10 +51,10 @@ class WedgeForces:
 
 
 def brake_factor(forces: WedgeForces, tan_alpha: float) -> Figure:
-    """Draw force ratio and brake factor C* over the friction coefficient.
+    """Draw force ratio and brake factor C* versus the friction coefficient.
 
-    ``forces``: computed forces; ``tan_alpha``: tangent of the wedge's angle, where the closed form
-    changes its sign.
+    ``forces``: computed forces; ``tan_alpha``: tangent of the wedge angle, where the closed form
+    changes sign.
     """
     mu = np.asarray(forces.mu_B, dtype=np.float64)
     figure, (upper, lower) = style.new_figure(5.0, (1.0, 1.0))
@@ -87,16 +87,16 @@ def brake_factor(forces: WedgeForces, tan_alpha: float) -> Figure:
         )
         axes.axhline(0.0, color=style.GRAY, linewidth=0.6, zorder=1)
     lower.set_ylim(-1.05 * FARTHEST, 1.05 * FARTHEST)
-    upper.set_ylabel(style.axis_label("actuation over normal force", "1", "\n"))
+    upper.set_ylabel(style.axis_label("actuation / normal force", "1", "\n"))
     lower.set_ylabel(style.axis_label("brake factor C*", "1", "\n"))
-    lower.set_xlabel(style.axis_label("friction coefficient of the pads", "1"))
+    lower.set_xlabel(style.axis_label("pad friction coefficient", "1"))
     style.legend_above(upper)
     figure.align_ylabels([upper, lower])
     return figure
 
 
 def _shown(mu: Array, ratio: Array, over: bool) -> Array:
-    """Return the force ratio, or the brake factor within the ordinate."""
+    """Return the force ratio, or the brake factor where it is within the y axis."""
     if not over:
         return ratio
     with np.errstate(divide="ignore"):
@@ -105,7 +105,7 @@ def _shown(mu: Array, ratio: Array, over: bool) -> Array:
 
 
 def _of_static_test(result: Result) -> list[Shown]:
-    """Return the figure of a static test of the wedge brake, from its key figures."""
+    """Return the figure of the wedge brake's static test, from its key figures."""
     kpis = {kpi.name: kpi.value for kpi in result.kpis}
     tried = sorted(result.bench.chosen_options.flat()["mu_B"])
     r_B = result.bench.par.flat()["caliper.r_B"]
@@ -115,7 +115,7 @@ def _of_static_test(result: Result) -> list[Shown]:
         for name in ("F_M", "F_M_rising", "F_M_falling")
     )
     figure = brake_factor(WedgeForces(tried, free, rising, falling), kpis["neutral_mu_closed"])
-    caption = "Actuation force over normal force, and brake factor, against pad friction."
+    caption = "Ratio of actuation force to normal force, and brake factor, versus pad friction."
     return [Shown("brake-factor", figure, caption)]
 
 

@@ -27,7 +27,7 @@ from bywire.plant import pad_wear, roller_screw
 class WearParameters(ParameterSet):
     """Pads, disc heating, adjuster, and wear limits.
 
-    ``mechanism``: ``"teeth"`` is an adjuster; with ``"none"``, the clearance grows.
+    ``mechanism``: with ``"teeth"``, an adjuster works; with ``"none"``, the clearance grows.
     """
 
     pads: pad_wear.Parameters
@@ -36,7 +36,7 @@ class WearParameters(ParameterSet):
     """mechanism that restores the clearance"""
     adjuster: wear_adjuster.Parameters
     h_new: Length
-    """thickness of a new pad; the bench's stiffness belongs to new pads"""
+    """thickness of a new pad; the bench's stiffness applies to new pads"""
     h_min: Length
     """thickness at which pads are replaced"""
     M_full: SomeMoment
@@ -57,7 +57,7 @@ def begin(par: WedgeCornerParameters, wear: WearParameters) -> Values:
 
 
 def follows(z: Values, par: WedgeCornerParameters, wear: WearParameters) -> Mapping[str, float]:
-    """Return clearance and stiffness of the caliper with worn pads."""
+    """Return clearance and caliper stiffness with worn pads."""
     return {"caliper.clearance": z["clearance"], "caliper.K_cal": z["K_cal"]}
 
 
@@ -68,10 +68,10 @@ def effects(
     par: WedgeCornerParameters,
     wear: WearParameters,
 ) -> Effects:
-    """Return the wear of each stop: both pads wear equally, and the clearance grows by both.
+    """Return the wear of each stop. Both pads wear equally, and both increase the clearance.
 
-    The readings between stops are the travel to contact that the moment control estimates, minus
-    the clearance, and the disc temperature at the start of a stop.
+    There are two readings between stops: the travel to contact that the moment control estimates,
+    minus the clearance, and the disc temperature at the start of a stop.
     """
     work = figures["energy_braked"]
     before, after = warm_stops.temperatures(work, stops["pause"], stops["T_air"], wear.disc)
@@ -86,7 +86,7 @@ def effects(
 def between(
     z: Values, readings: Mapping[str, float], par: WedgeCornerParameters, wear: WearParameters
 ) -> Values:
-    """Return the slow states with the stiffness of the worn pads, after the adjuster has turned."""
+    """Return the slow states after the adjuster has turned, with the worn pads' stiffness."""
     worn = wear.h_new - z["h_pad"]
     z = {**z, "K_cal": pad_wear.stiffness(par.caliper.K_cal, worn, wear.pads)}
     if wear.mechanism == "none":
@@ -112,7 +112,7 @@ def left(z: Values, par: WedgeCornerParameters, wear: WearParameters) -> Values:
 
     .. math:: x_{stop} \tan\alpha - c - F_N/K_{CAL}
 
-    is the remaining travel, with the normal force of the moment M_full.
+    is the remaining travel, with the normal force at the moment M_full.
     """
     F_N = wear.M_full / (2.0 * par.wedge.mu_B * par.caliper.r_B)
     reach = par.wedge.x_stop * wedge.slope(par.wedge)
@@ -135,13 +135,13 @@ WEDGE_PADS = Life(
         "disc.C_d": chosen(3.4e3, "7 kg of cast iron"),
         "disc.tau_d": chosen(300.0, "a few minutes in the air stream"),
         "mechanism": chosen(
-            "teeth", "without an adjuster, the travel is used up after about 280 stops"
+            "teeth", "without an adjuster the travel is used up after about 280 stops"
         ),
         **{f"adjuster.{name}": value for name, value in ADJUSTER.items()},
         "adjuster.ways": chosen("closing", "only wear changes the clearance"),
         "h_new": chosen(10e-3, "front pads of a mid-size car"),
         "h_min": chosen(2e-3, "usual wear limit"),
-        "M_full": chosen(950.0, "the largest moment in the paper"),
+        "M_full": chosen(950.0, "the highest moment in the paper"),
     },
     states={
         "h_pad": Slow("m", "pad thickness"),

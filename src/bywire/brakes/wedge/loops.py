@@ -61,17 +61,17 @@ def beyond(name: str, value: str, need: str, limit: str) -> InputError:
     name, value
         Quantity that defines the operating point, and its value with its unit.
     need
-        Quantity that the brake would need, with its unit.
+        Amount that the brake would need, with its unit.
     limit
-        Parameter that limits it, with its value.
+        Parameter that limits this amount, with its value.
     """
-    return not_valid(name, value, f"small enough for {limit}", f"and needs {need}")
+    return not_valid(name, value, f"small enough for {limit}", f"but needs {need}")
 
 
 # --- Moment loop, around position and current loops
 
 MOMENT = Quantity("moment", "N*m", 200.0)
-COUNTED = ", positive against the disc's rotation in either direction"
+COUNTED = " (a braking moment is positive in either direction of rotation)"
 """remark on a moment that is not positive"""
 
 
@@ -84,12 +84,12 @@ def moment_point(par: ParameterSet, value: float) -> Point:
     Raises
     ------
     ParameterError
-        When the moment is not positive, beyond the wedge's travel or the drives' current, or
-        when the disc is at rest.
+        If the moment is not positive, if it exceeds the wedge's travel or the drives' current, or
+        if the disc is at rest.
 
     Notes
     -----
-    The wedge is on the side in the disc's direction, in which the moment is positive.
+    The wedge is on the side of the disc's direction of rotation, where the moment is positive.
     """
     closed = cast(WedgeParameters, par.replace({"command.mode": "moment"}))
     _require_braking(value, closed)
@@ -107,7 +107,7 @@ def moment_point(par: ParameterSet, value: float) -> Point:
 def _require_braking(value: float, par: WedgeParameters) -> None:
     MOMENT.require_positive(value, COUNTED)
     if not ops.is_symbol(par.flywheel.Omega_0) and par.flywheel.Omega_0 == 0.0:
-        speed, advice = "the speed at which the loop works", "since a disc at rest has no moment"
+        speed, advice = "the speed at which the loop works", "because a disc at rest has no moment"
         raise not_valid("flywheel.Omega_0", "0 rad/s", speed, advice)
 
 
@@ -128,7 +128,7 @@ def _require_travel_and_current(value: float, x: float, par: WedgeParameters) ->
 MOMENT_LOOP = Loop(
     name="moment",
     assembly="wedge-brake",
-    summary="moment control, 1 kHz around 5 kHz",
+    summary="moment control at 1 kHz around position control at 5 kHz",
     at=MOMENT,
     inputs=("M_set",),
     output="y_M",
@@ -137,7 +137,7 @@ MOMENT_LOOP = Loop(
     causes=_CAUSES,
     band=(0.5, 100.0),
     amplitudes=(0.5, 20.0),
-    # The law depends only on f_c/slope_hat, so only one of the two is varied.
+    # The law depends only on f_c/slope_hat, so the design varies only one of the two.
     tunables={"control.moment.f_c": (0.3, 60.0)},
     sustained=_CAUSES["run-out, disc slowing"],
     proof="moment-pulses",
@@ -155,7 +155,7 @@ _TUNABLES: Mapping[str, tuple[float, float]] = {
     "control.position.zeta": (0.2, 4.0),
     "control.position.c": (0.0, 1.0),
 }
-"""gains of the law -> range of the search"""
+"""gains of the law -> search range"""
 
 
 def _two_motor_loop(
@@ -195,7 +195,7 @@ def position_point(par: ParameterSet, value: float) -> Point:
     Raises
     ------
     ParameterError
-        When the pads would touch the disc.
+        If the pads would touch the disc.
     """
     closed = cast(WedgeParameters, par.replace({"command.mode": "position"}))
     free = min(travel_for(0.0, closed), closed.wedge.x_stop)
@@ -211,7 +211,7 @@ def position_point(par: ParameterSet, value: float) -> Point:
 
 POSITION_LOOP = _two_motor_loop(
     name="position",
-    summary="position control of the assembled wedge in its clearance, 5 kHz",
+    summary="position control of the assembled wedge within its clearance, at 5 kHz",
     at=Quantity("wedge travel", "m", 0.0),
     point=position_point,
     causes=_CAUSES,
@@ -239,7 +239,7 @@ def screw_position_point(par: ParameterSet, value: float) -> Point:
 SCREW_POSITION_LOOP = Loop(
     name="screw-position",
     assembly="wedge-brake",
-    summary="position control of one motor on a preloaded screw, 5 kHz (Figs. 5 and 6)",
+    summary="position control of one motor on a preloaded screw, at 5 kHz (Figs. 5 and 6)",
     at=Quantity("motor angle", "rad", 0.0),
     inputs=("theta_1_set",),
     output="theta_1",
@@ -265,7 +265,7 @@ def force_point(par: ParameterSet, value: float) -> Point:
     Raises
     ------
     ParameterError
-        When the drives cannot hold the force.
+        If the drives cannot hold the force.
     """
     rig = cast(WedgeParameters, par.replace({"rig.mode_1": "position", "rig.mode_2": "position"}))
     k = roller_screw.slope(rig.screw)
@@ -317,7 +317,7 @@ _FORCE = Quantity("force", "N", 0.0)
 
 FORCE_FIGHT = _two_motor_loop(
     name="force-fight",
-    summary="position control of two motors on one reference, with a force sensor between, 5 kHz",
+    summary="position control of two motors on one reference, pushing on a force sensor, at 5 kHz",
     at=_FORCE,
     point=force_point,
     causes=_DRIVE_TRAIN,
@@ -327,7 +327,7 @@ FORCE_FIGHT = _two_motor_loop(
 FORCE_AGAINST = Loop(
     name="force-against",
     assembly="wedge-brake",
-    summary="force between two motors, one excited while the other holds, 5 kHz",
+    summary="force between two motors, one excited while the other holds, at 5 kHz",
     at=_FORCE,
     inputs=("theta_1_set",),
     output="F",
@@ -342,7 +342,7 @@ FORCE_AGAINST = Loop(
 )
 
 
-# --- Current loop of the drives, the shaft clamped
+# --- Current loop of the drives, with a clamped shaft
 
 _SAMPLE = 20e-6  # sample time of the demand [s]; the analog drive itself does not sample
 _STEP = 5e-6  # substep [s]
@@ -354,8 +354,7 @@ def current_point(par: ParameterSet, value: float) -> Point:
     Raises
     ------
     ParameterError
-        When the current is beyond the drive's limit, its voltage beyond the supply, or its
-        torque beyond the clamp.
+        If the current exceeds the drive's limit, its voltage the supply, or its torque the clamp.
     """
     clamped = cast(
         WedgeParameters,

@@ -52,8 +52,9 @@ _DISC = Role(
 class WedgeBrake(Assembly[WedgeParameters, control.Memory]):
     """Model of the brake.
 
-    Four dry frictions: both shafts (bearings and screw), the wedge, the pads on the disc. Six
-    contacts: three coupled ones in the heart, the caliper, two end stops of the wedge.
+    It has four dry frictions: two shafts (bearings and screw), the wedge, and the pads on the disc.
+    It has six contacts: three coupled contacts in the heart, the caliper, and the wedge's two end
+    stops.
     """
 
     name: ClassVar[str] = "wedge-brake"
@@ -98,24 +99,24 @@ class WedgeBrake(Assembly[WedgeParameters, control.Memory]):
     F_1 = Wire("N", "axial force on screw 1", 400.0)
     F_2 = Wire("N", "axial force on screw 2", 400.0)
     squeeze = Wire("N", "sum of the forces on the wedge", 800.0)
-    turning = Wire("1", "direction of the disc")
+    turning = Wire("1", "disc direction")
     M_B = Wire("N*m", "braking moment", 300.0)
     voltage_1 = Shown("V", "motor voltage 1", 10.0)
     voltage_2 = Shown("V", "motor voltage 2", 10.0)
-    F_end = Shown("N", "load of the end stops", 100.0)
+    F_end = Shown("N", "force on the end stops", 100.0)
     T_fr_1 = Shown("N*m", "friction torque 1", 0.1)
     T_fr_2 = Shown("N*m", "friction torque 2", 0.1)
     F_fr = Shown("N", "friction on the wedge", 50.0)
-    contacts = Shown("1", "closed contacts of the heart: sum of 1, 2, 4", 4.0)
+    contacts = Shown("1", "closed contacts in the heart, sum of 1, 2, 4", 4.0)
     stuck = Shown("1", "shafts and wedge stuck")
     P_in = Shown("W", "power at the drives' input", 50.0)
     P_meas = Shown("W", "power at the drives' input, filtered", 50.0)
-    E_source = Shown("J", "energy in: electrical, disc on wedge, runout")
-    U_caliper = Shown("J", "energy of the caliper")
-    clearance = Shown("m", "clearance of both pads, wedge centered", 2e-4)
-    E_warming = Shown("J", "copper loss of the motors that warm up", role=motor_heat.COPPER)
-    E_winding = Shown("J", "heat in the motors' windings", role=motor_heat.WINDING)
-    E_housing = Shown("J", "heat in the motors' housings", role=motor_heat.HOUSING)
+    E_source = Shown("J", "energy input: electrical, disc on wedge, runout")
+    U_caliper = Shown("J", "energy stored in the caliper")
+    clearance = Shown("m", "total clearance of both pads, wedge centered", 2e-4)
+    E_warming = Shown("J", "copper loss that warms the motors", role=motor_heat.COPPER)
+    E_winding = Shown("J", "heat in the motor windings", role=motor_heat.WINDING)
+    E_housing = Shown("J", "heat in the motor housings", role=motor_heat.HOUSING)
 
     records: ClassVar[tuple[str, ...]] = (
         "M_set",
@@ -191,7 +192,7 @@ class WedgeBrake(Assembly[WedgeParameters, control.Memory]):
     )
 
     def wire(self, w: Self) -> None:
-        """Connect all parts: forces of the contacts, shafts, wedge, disc, measurements."""
+        """Connect all parts: contact forces, shafts, wedge, disc, measurements."""
         par, forces = w.par, brake_heart.output(w.heart.f)
         w.F_1, w.F_2, w.squeeze = forces.F_1, forces.F_2, forces.squeeze
         w.turning = flywheel.turning(w.disc.xe, par.flywheel)
@@ -232,11 +233,11 @@ class WedgeBrake(Assembly[WedgeParameters, control.Memory]):
         )
 
     def disc_torque(self, w: Self) -> float:
-        """Return the torque on the disc other than its drive's [N m]: none on the test stand."""
+        """Return the disc torque [N m] other than its drive's, which is zero on the test stand."""
         return 0.0
 
     def friction(self, w: Self) -> tuple[Bounds, ...]:
-        """Return the limits of the frictions on both shafts, on the wedge and on the disc."""
+        """Return the friction limits on both shafts, on the wedge and on the disc."""
         par = w.par
         shafts = (
             drive_train.bounds(motor.x.omega, drive_train.torque(motor), force, par)
@@ -269,9 +270,9 @@ class WedgeBrake(Assembly[WedgeParameters, control.Memory]):
         motors = drive_train.power(w.motor_1) + drive_train.power(w.motor_2)
         heat_1 = motor_heat.stored(w.heat_1.x, w.heat_1.par)
         heat_2 = motor_heat.stored(w.heat_2.x, w.heat_2.par)
-        # Without the heat model no operation is needed: cold motors have zero heat to the air.
+        # Without the heat model no operation is needed, because cold motors lose no heat to air.
         cold, none = w.par.motor_heat.law == "off", w.flow.E_motor_air
-        given = w.flow.W_electric + w.flow.W_disc + w.flow.W_runout
+        supplied = w.flow.W_electric + w.flow.W_disc + w.flow.W_runout
         adjusts = w.par.adjuster.law != "none"
         return {
             "voltage_1": w.motor_1.u.v,
@@ -284,7 +285,7 @@ class WedgeBrake(Assembly[WedgeParameters, control.Memory]):
             "stuck": _stuck(w),
             "P_in": drive_supply.power(motors, w.supply.par),
             "P_meas": w.supply.x.P,
-            "E_source": given + w.flow.W_adjuster if adjusts else given,
+            "E_source": supplied + w.flow.W_adjuster if adjusts else supplied,
             "W_adjuster": w.flow.W_adjuster if adjusts else 0.0,
             "clearance": w.caliper.par.clearance - w.caliper.u.taken,
             "U_caliper": wedge_caliper.energy(w.caliper.u, w.caliper.par),
@@ -319,7 +320,7 @@ class WedgeBrake(Assembly[WedgeParameters, control.Memory]):
         return control.current_tick(m, u, par)
 
     def rest(self, par: Par) -> tuple[Any, control.Memory]:
-        """Return the brake parked: the wedge in its middle, preloaded, without current."""
+        """Return the parked brake, with the wedge in its middle, preloaded, without current."""
         return state_at(0.0, par), memory_at(0.0, par)
 
     def watch(self, recording: Any, par: Any) -> list[str]:
@@ -328,7 +329,7 @@ class WedgeBrake(Assembly[WedgeParameters, control.Memory]):
 
 
 def state_at(x: float, par: Par) -> Any:
-    """Return the state at rest with the wedge at a travel [m], both screws offset from it."""
+    """Return the state at rest at a wedge travel [m], with both screws offset from the wedge."""
     k = roller_screw.slope(par.screw)
     apart = par.control.offset.delta_preload / k
     return WedgeBrake.state(
@@ -353,7 +354,7 @@ def readings(x: Any, par: Par) -> control.Readings:
 
 
 def _stuck(w: WedgeBrake) -> float:
-    """Return 1 while shafts and wedge are at rest, else 0."""
+    """Return 1 if shafts and wedge are at rest, else 0."""
     shafts = ops.fabs(w.motor_1.x.omega) + ops.fabs(w.motor_2.x.omega)
     return ops.where(shafts == 0, 1.0, 0.0) * ops.where(w.body.x.v == 0, 1.0, 0.0)
 
@@ -383,7 +384,7 @@ def contact_angle(par: Par) -> float:
 
 
 def memory_at(x: float, par: Par) -> Memory:
-    """Return the controllers' memory with the references at this travel [m]."""
+    """Return the controllers' memory with the references at a wedge travel [m]."""
     k = roller_screw.slope(par.screw)
     delta = par.control.offset.delta_preload
     both = screw_offset.output(x / k, delta, par.control.offset)

@@ -1,4 +1,4 @@
-"""Panels and sliders of the wedge brake and its rigs, and signals compared over runs."""
+"""Panels and sliders of the wedge brake and its rigs, and signals that runs compare."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ BRAKING = Panels(
         *_ADJUSTER,
     ),
 )
-"""moment, speed, current and power as in Figs. 7 to 9 of Roberts et al. (2003), and more"""
+"""moment, speed, current and power as in Figs. 7 to 9 of Roberts et al. (2003), and others"""
 
 CORNER = Panels(
     "wedge-corner",
@@ -66,7 +66,7 @@ CORNER = Panels(
         *_ADJUSTER,
     ),
 )
-"""the vehicle above, its brake below"""
+"""vehicle at the top, brake below"""
 
 DRIVES = Panels(
     "wedge-drives",
@@ -98,7 +98,7 @@ DRIVES = Panels(
 COMPARED: Mapping[str, str] = MappingProxyType(
     {"y_M": "moment", "theta": "angle", "F_M": "force", "i_2": "current 2", "P_meas": "power"}
 )
-"""signals that overlaid traces compare, with their names in low panels"""
+"""signals that overlaid traces compare, with short names for low panels"""
 
 SLIDERS = Sliders(
     "wedge",

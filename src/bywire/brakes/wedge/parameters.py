@@ -28,18 +28,18 @@ from bywire.plant import (
 
 
 class RigParameters(ParameterSet):
-    """Fixtures and operating modes of the rigs; the assembled brake does not have them."""
+    """Fixtures and operating modes of the rigs. The assembled brake does not have them."""
 
     mode_1: Literal["position", "current"]
     """quantity of motor 1 that the operator commands"""
     mode_2: Literal["position", "current"]
     """quantity of motor 2 that the operator commands"""
     load: Literal["dummy", "screw"]
-    """load of a single motor: a solid dummy shaft, or a preloaded screw"""
+    """load on a single motor: a solid dummy shaft, or a preloaded screw"""
     clamp: Literal["open", "closed"]
     """whether a single motor's shaft is clamped"""
     J_dummy: Inertia
-    """inertia that the dummy shaft adds"""
+    """inertia of the dummy shaft"""
     F_0: Force
     """preload between the two halves of a single screw's nut"""
     T_clamp: Torque
@@ -53,8 +53,8 @@ class RigParameters(ParameterSet):
 class CommandParameters(ParameterSet):
     """Quantity that the stimulus commands.
 
-    ``moment`` closes moment and position loops; ``position`` gives each motor's position loop its
-    reference; ``current`` gives each drive its current demand.
+    ``moment`` closes moment and position loops. ``position`` sends each position loop its
+    reference. ``current`` sends each drive its current demand.
     """
 
     mode: Literal["moment", "position", "current"]
@@ -62,7 +62,7 @@ class CommandParameters(ParameterSet):
 
 
 class ControlParameters(ParameterSet):
-    """The real-time computer: sample times and controllers."""
+    """Sample times and controllers of the real-time computer."""
 
     T_fast: Duration
     """sample time of position control"""
@@ -76,7 +76,7 @@ class ControlParameters(ParameterSet):
 
 
 class WedgeParameters(ParameterSet):
-    """The whole wedge brake: two motors that may differ, equal drives, screws and bearings."""
+    """The whole wedge brake. Its two motors may differ; drives, screws and bearings are equal."""
 
     supply: drive_supply.Parameters
     drive: current_drive.Parameters
@@ -106,6 +106,6 @@ class WedgeParameters(ParameterSet):
                 "control.adjuster.T_adjust",
                 f"{T:g} s",
                 f"a whole multiple of control.T_slow = {slow:g} s",
-                "the moment control follows the adjuster's turns",
+                "because the moment control follows the adjuster's turns",
             )
         return self

@@ -1,4 +1,4 @@
-"""The wedge brake's plant as linear models: whole, mechanical, rigid, from the same Jacobians."""
+"""Linear models of the wedge brake: whole, mechanical, rigid, all from the same Jacobians."""
 
 from __future__ import annotations
 
@@ -34,8 +34,8 @@ SMOOTH: dict[str, Any] = {
     "flywheel.runout": 0.0,
     "flywheel.law": "driven",
 }
-"""parameters without torques and travels that alternate within small motions, which a linear model
-neglects"""
+"""overrides that remove torques and travels that alternate within small motions, because a linear
+model neglects them"""
 _FREE = 1e3
 _RECORDING = ("phi", "y_P")  # states for display only
 
@@ -46,17 +46,17 @@ def point(par: Par, F_N: float, speed: float = 0.0) -> Point:
     Parameters
     ----------
     par
-        Parameters; the model neglects cogging and runout, and the disc keeps its speed.
+        Parameters. The model neglects cogging and runout, and the disc keeps its speed.
     F_N
-        Normal force [N], > 0; the wedge is on the side to which the disc turns.
+        Normal force [N], > 0. The wedge is on the side to which the disc turns.
     speed
-        Speed of both motors [rad/s], positive toward clamping: a moment of steady motion.
+        Speed of both motors [rad/s] in steady motion, positive toward clamping.
 
     Raises
     ------
     ParameterError
-        When the force is not positive, the travel is beyond the end stop, the currents are
-        beyond the drives' limit, or there is no equilibrium.
+        If the force is not positive, if the travel exceeds the end stop, if the currents exceed
+        the drives' limit, or if there is no equilibrium.
     """
     smooth = par.replace({**SMOOTH, "command.mode": "current"})
     x = travel_for(F_N, smooth)
@@ -66,7 +66,7 @@ def point(par: Par, F_N: float, speed: float = 0.0) -> Point:
         limit = f"wedge.x_stop = {smooth.wedge.x_stop * 1e3:g} mm"
         raise beyond("normal force", f"{F_N:g} N", f"{x * 1e3:.3g} mm of wedge travel", limit)
     turning = -1.0 if smooth.flywheel.Omega_0 < 0.0 else 1.0
-    # Beyond the limit the drives do not respond: the search finds the required currents.
+    # Beyond the limit the drives do not respond, so the search for the currents uses no limit.
     free = smooth.replace({"drive.i_max": _FREE * smooth.drive.i_max})
     state, memory = equilibrium(
         WedgeBrake(),
@@ -96,14 +96,14 @@ def force_for_current(i: float, par: Par) -> float:
     Raises
     ------
     ParameterError
-        At the neutral point, where no current is needed, and for currents of the wrong sign.
+        At the neutral point, where no current is needed, and for currents with the wrong sign.
     """
     tan, mu_B = wedge.slope(par.wedge), par.wedge.mu_B
     need = tan - mu_B if par.flywheel.Omega_0 else tan
     per = 2.0 * par.motor_1.K_ref / roller_screw.slope(par.screw)
     if need == 0.0 or not i / need > 0.0:
         valid = "0 A at every force" if need == 0.0 else f"{'>' if need > 0 else '<'} 0 A"
-        advice = f"since tan(alpha) - mu_B = {need:.3g}. Specify the normal force or the moment"
+        advice = f"because tan(alpha) - mu_B = {need:.3g}. Specify the normal force or the moment"
         raise not_valid("current", f"{i:g} A", valid, advice)
     return per * i / need
 
@@ -116,13 +116,13 @@ def full(par: Par, F_N: float, friction: Friction = "removed", speed: float = 0.
     par, F_N, speed
         As in `point`.
     friction
-        As in `linearize`; the pads always slide on the turning disc.
+        As in `linearize`. The pads always slide on the turning disc.
 
     Returns
     -------
     LinearModel
-        Inputs: both current demands; outputs: normal force, travels, braking moment, and the
-        moment by the sensor.
+        The inputs are both current demands. The outputs are normal force, travels, braking moment,
+        and measured moment.
     """
     at = point(par, F_N, speed)
     kinds: dict[str, Friction] = dict.fromkeys(WedgeBrake.frictions, friction)
@@ -149,12 +149,12 @@ def mechanical(whole: LinearModel, *, corrected: bool = False) -> LinearModel:
         From `full`.
     corrected
         Whether to include the drives' first lag behind the rotors. The integral part has to follow
-        the back-EMF, which acts like an inertia :math:`K_T^2/(V_{dc} k_i)` of each rotor.
+        the back-EMF, which acts like an inertia :math:`K_T^2/(V_{dc} k_i)` on each rotor.
 
     Returns
     -------
     LinearModel
-        States `MECHANICAL_STATES`, outputs `OUTPUTS`; the disc keeps its speed.
+        Model with states `MECHANICAL_STATES` and outputs `OUTPUTS`. The disc keeps its speed.
     """
     kept = tuple(name for name in whole.states if name not in (*_RECORDING, "Omega", "y_M"))
     moving = whole.channels(outputs=OUTPUTS).reduced(kept, held=True)
@@ -163,14 +163,14 @@ def mechanical(whole: LinearModel, *, corrected: bool = False) -> LinearModel:
 
 
 def rigid(mechanical: LinearModel, par: Par) -> LinearModel:
-    r"""Return rotors and wedge as one body: stiff screws and interfaces.
+    r"""Return rotors and wedge as one body, with rigid screws and interfaces.
 
     .. math:: A_r = (T^T M T)^{-1} T^T M A T, \quad
         (\theta_1, \omega_1, \theta_2, \omega_2, x, v) = T (x, v)
 
     The forces between the bodies do no work on this motion and drop out.
 
-    ``mechanical``: from `mechanical`; ``par``: the same parameters.
+    ``mechanical``: result of `mechanical`; ``par``: the same parameters.
 
     Notes
     -----
@@ -190,7 +190,7 @@ def rigid(mechanical: LinearModel, par: Par) -> LinearModel:
         1.0,
         par.wedge.M_W,
     ]
-    # Travel and velocity are projected separately: a length has no mass.
+    # Project travel and velocity separately, because a length has no mass.
     split = np.zeros((2, 6))
     for row, columns in ((0, [0, 2, 4]), (1, [1, 3, 5])):
         split[row, columns] = T[columns, row] * np.array(masses)[columns]
@@ -208,7 +208,7 @@ def rigid(mechanical: LinearModel, par: Par) -> LinearModel:
 
 
 def rigid_rate(par: Par) -> complex:
-    """Return the closed form of the rigid model's growth rate [1/s]: real above neutral."""
+    """Return the rigid model's growth rate [1/s] in closed form, real above neutral."""
     tan, k = wedge.slope(par.wedge), roller_screw.slope(par.screw)
     M = par.wedge.M_W + (par.motor_1.J_M + par.motor_2.J_M) / k**2
     square = par.caliper.K_cal * tan * (par.wedge.mu_B - tan) / M
@@ -224,12 +224,12 @@ _AT = (MOMENT, _FORCE, _CURRENT)
 
 
 def whole(par: ParameterSet, at: PlantPoint) -> LinearModel:
-    """Return the whole plant at an operating point, see `full`.
+    """Return the whole plant at an operating point (see `full`).
 
     Raises
     ------
     ParameterError
-        When the point does not exist.
+        If the point does not exist.
     """
     brake = cast(WedgeParameters, par)
     if at.quantity is _CURRENT:
@@ -247,7 +247,7 @@ def whole(par: ParameterSet, at: PlantPoint) -> LinearModel:
 
 
 def mechanical_model(par: ParameterSet, at: PlantPoint) -> LinearModel:
-    """Return the model of six states, with the drives' apparent inertia on the rotors."""
+    """Return the model with six states and the drives' apparent inertia on the rotors."""
     return mechanical(whole(par, at), corrected=True)
 
 
@@ -257,7 +257,7 @@ def with_its_outputs(par: ParameterSet, at: PlantPoint) -> LinearModel:
 
 
 def rigid_model(par: ParameterSet, at: PlantPoint) -> LinearModel:
-    """Return the model of two states, travel and velocity of the wedge; both motors act as one."""
+    """Return the model with two states, wedge travel and velocity. Both motors act as one."""
     body = rigid(mechanical(whole(par, at)), cast(WedgeParameters, par))
     return body.together(INPUTS)
 
@@ -278,7 +278,7 @@ WHOLE = Plant(
 MECHANICAL = Plant(
     name="wedge-mechanical",
     assembly="wedge-brake",
-    summary="only rotors and wedge: quasi-static drives with their apparent inertia",
+    summary="only rotors and wedge, with quasi-static drives and their apparent inertia",
     at=_AT,
     model=mechanical_model,
     band=150.0,
@@ -287,7 +287,7 @@ MECHANICAL = Plant(
 RIGID = Plant(
     name="wedge-rigid",
     assembly="wedge-brake",
-    summary="rotors and wedge as one body: ideal drives, rigid screws and interfaces",
+    summary="rotors and wedge as one body, with ideal drives, rigid screws and interfaces",
     at=_AT,
     model=rigid_model,
     band=150.0,

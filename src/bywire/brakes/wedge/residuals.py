@@ -1,7 +1,7 @@
 """Residuals with which the wedge brake's real-time computer can detect a failure.
 
-They count only while the demanded moment is steady. Even without a fault, all residuals are large
-during gap crossing and ramps.
+They count only while the demanded moment is steady, because during gap crossing and ramps all
+residuals are large even without a fault.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ from bywire.core.typing import Array
 
 NAME = WedgeBrake.name
 Signals = Mapping[str, Array]
-_STEADY = 0.1  # s: length of the transient after a step of the demand
+_STEADY = 0.1  # s: length of the transient after a demand step
 _AVERAGE = 10e-3  # s: averaging window for contacts and free play
-_TURN = 0.1  # s, about a turn of the disc, whose runout is in the moment
-_IN_MOMENT = 0.2  # s: length of a moment's build-up
+_TURN = 0.1  # s: about one turn of the disc, whose runout affects the moment
+_IN_MOMENT = 0.2  # s: length of the moment build-up
 
 
 def _steady(signals: Signals, dt: float, values: Array) -> Array:
@@ -42,7 +42,7 @@ def _moment(signals: Signals, par: Any, dt: float) -> Array:
 
 
 def _difference(signals: Signals, par: Any, dt: float) -> Array:
-    """Return the difference of both demands: the motors work against each other."""
+    """Return the difference between both demands, by which the motors work against each other."""
     return _steady(signals, dt, np.abs(signals["i_1_ref"] - signals["i_2_ref"]))
 
 
@@ -51,7 +51,7 @@ def _effort(signals: Signals, par: Any, dt: float) -> Array:
 
 
 def _in_moment(signals: Signals, dt: float, values: Array) -> Array:
-    """Return a residual while the moment has been controlled for some time, otherwise none."""
+    """Return a residual after some time under moment control, otherwise none."""
     rows, error = round(_IN_MOMENT / dt), np.abs(signals["mode"] - MOMENT)
     return np.where(largest_of_the_last(error, rows) < 0.5, values, NEVER)
 
@@ -64,7 +64,7 @@ def _stiffness(signals: Signals, par: Any, dt: float) -> Array:
 
 
 def _still(signals: Signals, par: Any, dt: float) -> Array:
-    """Return the negative ripple of the moment over a turn: zero if the sensor is stuck."""
+    """Return the negative ripple of the moment over a turn, zero if the sensor is stuck."""
     rows, M = round(_TURN / dt), signals["M_meas"]
     return _in_moment(signals, dt, least_of_the_last(M, rows) - largest_of_the_last(M, rows))
 
@@ -90,7 +90,7 @@ RESIDUALS = (
     ),
     Residual(
         "still-moment",
-        "ripple of the runout in the measured moment",
+        "ripple due to runout in the measured moment",
         NAME,
         "N*m",
         ("M_meas", "mode"),

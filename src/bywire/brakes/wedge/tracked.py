@@ -1,4 +1,4 @@
-"""Relations of the wedge brake that are linear in drifting parameters: friction, clearance."""
+"""Relations of the wedge brake that are linear in drifting parameters (friction, clearance)."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from bywire.core.typing import Array
 from bywire.data.recursive_filter import filtered
 from bywire.identification.tracking import Relation, Rows
 
-_PRESSED = 0.1  # share of the largest force below which the relation is imprecise
-_STEADY = 0.02  # largest change per sensor time constant, over the largest force
-_SMOOTHED = 10.0  # smoothing over that time constant, against noise
+_PRESSED = 0.1  # fraction of the maximum force below which the relation is imprecise
+_STEADY = 0.02  # maximum change per sensor time constant, relative to the maximum force
+_SMOOTHED = 10.0  # smoothing window against noise, in sensor time constants
 
 
 def _steady(data: xr.Dataset, force: str, par: WedgeParameters) -> NDArray[np.bool_]:
@@ -38,7 +38,7 @@ def _lagged(F: Array, data: xr.Dataset, par: WedgeParameters) -> Array:
     keep = float(np.exp(-2.0 * np.pi * par.moment_sensor.f_M * (t[1] - t[0])))
     there = np.isfinite(F)
     filled = np.interp(t, t[there], F[there]) if there.any() else F
-    # Response of the lag to a force that is linear from sample to sample.
+    # This is the lag's response to a force that is linear from sample to sample.
     slope = (1.0 - keep) / -np.log(keep)
     numerator = [1.0 - slope, slope - keep]
     late = filtered(numerator, [1.0, -keep], filled, settled=True)
@@ -50,9 +50,9 @@ def _rows(y: Array, phi: Array, used: NDArray[np.bool_]) -> Rows:
 
 
 def _from_normal_force(data: xr.Dataset, par: WedgeParameters) -> Rows:
-    """Return M = mu_B 2 r_B F_N, both pads (2003, section "Wedge and calliper").
+    """Return M = mu_B 2 r_B F_N for both pads (2003, section "Wedge and calliper").
 
-    The force passes the moment sensor's lag, so that both signals have the same delay.
+    The force passes through the moment sensor's lag, so both signals have the same delay.
     """
     used = _steady(data, "F_N", par)
     phi = 2.0 * par.caliper.r_B * _lagged(np.abs(data["F_N"].values), data, par)
@@ -60,7 +60,7 @@ def _from_normal_force(data: xr.Dataset, par: WedgeParameters) -> Rows:
 
 
 def _from_actuation_force(data: xr.Dataset, par: WedgeParameters) -> Rows:
-    """Return M tan(alpha) = mu_B (M + 2 r_B F_M): the wedge at rest, F_N eliminated."""
+    """Return M tan(alpha) = mu_B (M + 2 r_B F_M), for a wedge at rest with F_N eliminated."""
     used = _steady(data, "y_M", par)
     M, sense = np.abs(data["y_M"].values), np.sign(data["y_M"].values)
     phi = M + 2.0 * par.caliper.r_B * sense * data["F_M"].values
@@ -68,7 +68,7 @@ def _from_actuation_force(data: xr.Dataset, par: WedgeParameters) -> Rows:
 
 
 def _from_travel(data: xr.Dataset, par: WedgeParameters) -> Rows:
-    """Return |x| tan(alpha) = c + F_N / K_cal: the caliper as a spring, in contact."""
+    """Return |x| tan(alpha) = c + F_N / K_cal, for the caliper as a spring in contact."""
     if par.caliper.law != "linear":
         raise not_valid(
             "caliper.law", repr(par.caliper.law), "'linear'", "to track caliper.clearance"
@@ -97,8 +97,8 @@ RELATIONS: tuple[Relation, ...] = (
         {"y_M": "N*m", "F_M": "N"},
         _from_actuation_force,
         lambda par: np.array([par.wedge.mu_B]),
-        "wedge at rest without internal friction, which biases the estimate by up to its ratio to "
-        "the normal force, in opposite directions while applying and releasing",
+        "wedge at rest, neglecting internal friction, which biases the estimate by up to its ratio "
+        "to the normal force, in opposite directions while applying and releasing",
     ),
     Relation(
         "clearance from the travel",
@@ -108,7 +108,7 @@ RELATIONS: tuple[Relation, ...] = (
         {"x": "m", "F_N": "N"},
         _from_travel,
         lambda par: np.array([par.caliper.clearance, 1.0 / par.caliper.K_cal]),
-        "caliper as a spring; the disc's runout counts as noise",
+        "caliper as a spring; disc runout counts as noise",
     ),
 )
-"""relations in order of preference: bywire uses the first whose signals are measured"""
+"""relations in order of preference. bywire uses the first one whose signals are measured"""

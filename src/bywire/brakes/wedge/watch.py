@@ -1,4 +1,4 @@
-"""Warnings about a recording of the wedge brake: stops, limits, self-locking screws."""
+"""Warnings about a recording of the wedge brake: end stops, limits, self-locking screws."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from bywire.core.parameters import ParameterSet
 
 Rows = NDArray[np.bool_]
 
-_REACHED = 0.95  # share of the demanded moment
+_REACHED = 0.95  # fraction of the demanded moment that counts as reached
 _LONG = 0.05  # time [s] at the current limit after which a moment counts as out of reach
 _SWINGS = 10  # reversals between current limits, at most _LONG apart; a step has fewer
 
 
 def warnings_of(recording: xr.Dataset, par: ParameterSet) -> list[str]:
-    """Return the warnings about a recording with rows; none without the brake's signals."""
+    """Return the warnings about a recording with rows, none without the brake's signals."""
     values = par.flat()
     if not {"F_end", "M_set", "i_1_ref", "i_2_ref"} <= set(recording):
         return []
@@ -39,12 +39,12 @@ def _end_stop(recording: xr.Dataset) -> list[str]:
     when, x = _when(recording, k), 1e3 * float(recording["x"].values[k])
     return [
         f"the wedge reached its end stop {when}, x = {x:.3g} mm, and pressed on it with "
-        f"up to {force.max():.3g} N: the stop limits the braking moment"
+        f"up to {force.max():.3g} N. The stop limits the braking moment"
     ]
 
 
 def _when(recording: xr.Dataset, k: int) -> str:
-    """Return the time of row ``k`` in words; an event in the first row began earlier."""
+    """Return the time of row ``k`` in words. An event in the first row began earlier."""
     t = float(recording["time"].values[k])
     return "before the recording starts" if k == 0 else f"at t = {t:.4g} s"
 
@@ -69,25 +69,28 @@ def _out_of_reach(recording: xr.Dataset, values: Mapping[str, Any]) -> list[str]
     if t[end] - t[begin] < _LONG or most >= _REACHED * demanded or _swings(recording, values):
         return []
     return [
-        f"the motors cannot reach the demanded {demanded:.4g} N*m: at the current limit of "
-        f"{_limit(values):.4g} A from t = {t[begin]:.4g} s to {t[end]:.4g} s, the moment stays at "
-        f"{most:.4g} N*m at most"
+        f"the motors cannot reach the demanded {demanded:.4g} N*m. At the current limit of "
+        f"{_limit(values):.4g} A, from t = {t[begin]:.4g} s to {t[end]:.4g} s, the maximum moment "
+        f"is {most:.4g} N*m"
     ]
 
 
 def _not_reached(recording: xr.Dataset, values: Mapping[str, Any]) -> list[str]:
-    """Warn that the moment never reached the largest demand, for any reason."""
+    """Warn that the moment never reached the maximum demand, for any reason."""
     demanded = float(recording["M_set"].values.max())
     most = float(np.abs(recording["M_B"].values).max())
     sparse = np.diff(recording["time"].values).max(initial=0.0) > _LONG  # may miss the peak
     if sparse or most >= _REACHED * demanded:
         return []
-    text = f"the demand of {demanded:.4g} N*m was not reached: the moment is {most:.4g} N*m at most"
+    text = (
+        f"the brake did not reach the demand of {demanded:.4g} N*m. The maximum moment is "
+        f"{most:.4g} N*m"
+    )
     M_on, speed = values["control.moment.M_on"], np.abs(recording["Omega"].values).max()
     if demanded <= M_on:
-        text += f", since the brake stays parked up to control.moment.M_on = {M_on:.4g} N*m"
+        text += f", because the brake stays parked up to control.moment.M_on = {M_on:.4g} N*m"
     elif speed < values["control.moment.Omega_still"]:
-        text += ", since the disc is at rest"
+        text += ", because the disc is at rest"
     return [text]
 
 
@@ -101,7 +104,7 @@ def _limits(recording: xr.Dataset, values: Mapping[str, Any]) -> list[str]:
         begin, end, number = swings
         return [
             f"the demanded current swings between its limits of -{limit:.4g} A and {limit:.4g} A, "
-            f"{number} times from t = {begin:.4g} s to {end:.4g} s: a loop is likely unstable "
+            f"{number} times from t = {begin:.4g} s to {end:.4g} s. A loop is probably unstable "
             "(see 'bywire margins position' and 'bywire margins moment')"
         ]
     k = int(np.argmax(limited))
@@ -109,7 +112,7 @@ def _limits(recording: xr.Dataset, values: Mapping[str, Any]) -> list[str]:
 
 
 def _swings(recording: xr.Dataset, values: Mapping[str, Any]) -> tuple[float, float, int] | None:
-    """Return begin and end [s] of the longest swing between both limits, and its reversals."""
+    """Return start and end [s] of the longest swing between both limits, and its reversals."""
     t, limit, begin = recording["time"].values, _limit(values) * (1.0 - 1e-9), None
     for name in ("i_1_ref", "i_2_ref"):
         current = recording[name].values
@@ -122,7 +125,7 @@ def _swings(recording: xr.Dataset, values: Mapping[str, Any]) -> tuple[float, fl
 
 
 def _short_of(recording: xr.Dataset, values: Mapping[str, Any]) -> Rows:
-    """Return the rows in which a moment is controlled on a turning disc, below its demand."""
+    """Return the rows with moment control on a turning disc and a moment below the demand."""
     turning = np.abs(recording["Omega"].values) > values["control.moment.Omega_still"]
     demanded = _REACHED * recording["M_set"].values
     below = np.abs(recording["y_M"].values) < demanded
@@ -130,7 +133,7 @@ def _short_of(recording: xr.Dataset, values: Mapping[str, Any]) -> Rows:
 
 
 def _longest(rows: Rows) -> tuple[int, int]:
-    """Return first and last index of the longest stretch of rows; (0, 0) where there is none."""
+    """Return first and last index of the longest stretch of rows, (0, 0) without any."""
     edges = np.flatnonzero(np.diff(rows.astype(np.int8), prepend=0, append=0))
     if not edges.size:
         return 0, 0
@@ -143,6 +146,6 @@ def _holding_screw(values: Mapping[str, Any]) -> list[str]:
     if values["screw.law"] != "load" or values["screw.eta_b"] != 0.0:
         return []
     return [
-        "screw.eta_b = 0: no load drives these screws back, so the brake keeps its moment "
-        "after power off"
+        "screw.eta_b = 0: no load can drive these screws back, so the brake keeps its moment "
+        "after power-off"
     ]

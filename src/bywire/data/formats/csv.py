@@ -1,6 +1,6 @@
-"""CSV: text tables, read in blocks; only the chosen columns are kept.
+"""CSV: text tables, read in blocks, of which only the chosen columns are stored.
 
-The end of a table is also checked, to detect a truncated last number.
+It also checks the end of a table, to detect a truncated last number.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ _LOOKED_AT = 1 << 16
 
 _LAST = 100  # rows before the last one that are checked
 _FEWEST = 10
-_RARE = 0.05  # of them: as many numbers may be as short as one that counts as cut
+_RARE = 0.05  # of them: maximum fraction of numbers that are as short as a truncated one
 _NUMBER = re.compile(r"[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]+)?")
 
 
@@ -93,7 +93,7 @@ class _Seen:
 def _strict_columns(
     path: Path, block: bytes, first_line: int, dialect: Dialect, indices: Sequence[int], seen: _Seen
 ) -> list[NDArray[np.float64]]:
-    """Return columns of a block of lines; blank cells become NaN, blank lines are skipped.
+    """Return columns of a block of lines; blank cells become NaN, and blank lines are skipped.
 
     Parameters
     ----------
@@ -108,12 +108,13 @@ def _strict_columns(
     indices
         Columns to read.
     seen
-        Other content is added to it.
+        Receives the other content.
 
     Raises
     ------
     FileError
-        For a row of another length, or a cell that is not a number, with line and column.
+        For a row with another number of cells, or a cell that is not a number, with line and
+        column.
     """
     try:
         text, encoding = decoded(block)
@@ -221,9 +222,9 @@ def _number(path: Path, line: int, cell: str, column: int, dialect: Dialect, see
 def _require_whole_end(path: Path, block: bytes, last_line: int, dialect: Dialect) -> None:
     """Reject a table that seems to end within its last number.
 
-    Many programs write no line end after a table, so a cut there is not obvious. It is detected if
-    hardly any number above in that column is as short, by decimals if their count is constant,
-    otherwise by characters.
+    Many programs write no line ending after a table, so a truncation there is not obvious. The
+    last number counts as truncated if hardly any number above it in that column is as short: in
+    decimals if their count is constant, otherwise in characters.
 
     Parameters
     ----------
@@ -271,14 +272,14 @@ def _require_whole_end(path: Path, block: bytes, last_line: int, dialect: Dialec
 # --- Reading in blocks
 
 _BLOCK = 1 << 24  # bytes
-_PIECE = 1 << 18  # bytes of a flawed block to parse together, since cells take much memory
-_ROWS = 1 << 16  # that are written at a time
+_PIECE = 1 << 18  # bytes of a flawed block to parse together, since cells need much memory
+_ROWS = 1 << 16  # rows to write at a time
 _QUOTED = rb'(?m)(?:^|%s) *"[^"\r\n]*"(?=%s|\r?$)'  # a cell, separators around it
 _COMMENTS = tuple(mark.encode() for mark in COMMENTS)
 _STAMPS = (CLOCK, MOMENT, DAY)
 
 _RASTER = "X_Value"
-"""LabVIEW's name of instants that a file defines by start and step only"""
+"""LabVIEW's name for times that a file defines by start and step only"""
 
 
 class TextSource:
@@ -364,7 +365,7 @@ class TextSource:
             if columns is None:
                 columns = _careful(self._path, block, line, dialect, indices, self._seen)
             done += len(block)
-            if not growing.rows:  # estimated from bytes, plus one per cent
+            if not growing.rows:  # estimated from the number of bytes, plus one per cent
                 expected = 1.01 * len(columns[0]) * max(size - dialect.start, 0) / len(block)
                 growing = GrowingColumns(len(indices), int(expected) + 1)
             growing.append(columns)
@@ -401,7 +402,7 @@ class TextSource:
         return ""
 
     def _remark(self) -> None:
-        """Note cells that counted as missing, and skipped rows."""
+        """Add notes on cells that mark missing values, and on skipped rows."""
         by_column: dict[int, Counter[str]] = {}
         for (column, mark), count in self._seen.marks.items():
             by_column.setdefault(column, Counter())[mark] += count
@@ -420,7 +421,7 @@ class TextSource:
 
 
 def _names(dialect: Dialect) -> list[str]:
-    """Return the name of every column; a repeated title gets its number."""
+    """Return the name of every column; repeated titles get the column number."""
     names: list[str] = []
     for k in range(dialect.width):
         title = dialect.titles[k] if k < len(dialect.titles) else ""
@@ -489,7 +490,7 @@ def _fast(
     stamps = [k for k in indices if dialect.kinds[k] in _STAMPS]
     options: dict[str, Any] = {"float_precision": "round_trip"}
     if tuple(map(int, pd.__version__.split(".")[:2])) >= (3, 1):
-        options = {}  # rounds right by default, and warns of the option
+        options = {}  # rounds correctly by default, and warns about the option
     try:
         frame = pd.read_csv(
             io.BytesIO(block),
@@ -684,7 +685,7 @@ class GrowingColumns:
         end = self._rows + len(blocks[0])
         for array, block in zip(self._arrays, blocks, strict=True):
             if end > len(array):
-                # The system moves the pages, so that there is never a second copy of the column.
+                # The system moves the pages, so there is never a second copy of the column.
                 array.resize(max(end, int(_GROWTH * len(array))), refcheck=False)
             array[self._rows : end] = block
         self._rows = end

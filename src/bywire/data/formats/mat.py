@@ -1,4 +1,4 @@
-"""MAT files of level 5 (MATLAB's versions 5 to 7), read and written by SciPy."""
+"""MAT files of level 5 (MATLAB versions 5 to 7), read and written by SciPy."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 
 _LARGEST = 2**31 - 2**16  # largest size of a variable in the format, bytes
 _LONGEST = 4096  # characters of a unit or label
-_DEEPEST = 8  # structs in structs
-_MOST_STRUCTS = 1000  # in an array of structs
+_DEEPEST = 8  # maximum depth of nested structs
+_MOST_STRUCTS = 1000  # maximum size of an array of structs
 _OPAQUE = ("MatlabOpaque", "MatlabObject", "MatlabFunction")  # classes of SciPy
 _REASONS = {
     "cell": "it is an array of cells",
@@ -31,7 +31,7 @@ _REASONS = {
     "sparse": "it is a sparse matrix",
     "function": "it is a function",
 }
-_VALUES = 1 << 22  # that are handed over at a time
+_VALUES = 1 << 22  # numbers per piece
 _NUMBERS = {
     "double",
     "single",
@@ -77,7 +77,8 @@ class MatSource:
             numbers = self._inner[array] if array in self._inner else self._variable(array)
             if numbers.dtype.kind not in "iufb":
                 raise FileError(
-                    f"{self._path}: {quoted(array)} does not contain real numbers. Leave it out",
+                    f"{self._path}: {quoted(array)} does not contain real numbers. Do not select "
+                    "it",
                     name=array,
                 )
             for name in names:
@@ -106,7 +107,7 @@ class MatSource:
     def _walk(self, name: str, struct: NDArray[Any], found: Found, depth: int) -> None:
         """Collect arrays and texts in a struct, or in each struct of an array."""
         if depth > _DEEPEST or struct.size > _MOST_STRUCTS:
-            found.left_out[name] = "it has too many structs, or too deeply nested ones"
+            found.left_out[name] = "it has too many structs, or they are nested too deeply"
             return
         for k, element in enumerate(struct.reshape(-1), 1):
             of_element = name if struct.size == 1 else f"{name}({k})"
@@ -147,8 +148,8 @@ def _write(dataset: xr.Dataset, path: Path, progress: Progress) -> None:
     large = next((n for n, v in content.items() if v.nbytes > _LARGEST), None)
     if large is not None:
         raise FileError(
-            f"cannot write {path}: {large!r} has {content[large].nbytes} bytes, more than this "
-            "format allows. Use the format mat73",
+            f"cannot write {path}: {large!r} has {content[large].nbytes} bytes, which is more than "
+            "this format allows. Use the format mat73",
             name=large,
         )
     progress(f"writing {path.name}", 0.0)

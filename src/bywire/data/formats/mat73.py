@@ -25,9 +25,9 @@ if TYPE_CHECKING:
     from _typeshed import WriteableBuffer
 
 
-_VALUES = 1 << 22  # that are read at a time
-_DEEPEST, _MOST = 8, 10_000  # groups in groups; objects in a file
-_MOST_STRUCTS = 1000  # in an array of structs
+_VALUES = 1 << 22  # numbers per piece
+_DEEPEST, _MOST = 8, 10_000  # maximum depth of nested groups; maximum objects in a file
+_MOST_STRUCTS = 1000  # maximum size of an array of structs
 _MOST_ROWS = 64
 _LONGEST = 1000  # characters of a text
 _USER_BLOCK = 512
@@ -71,12 +71,12 @@ class Mat73Source:
             if name.startswith("#"):
                 continue
             if not isinstance(group.get(name, getlink=True), h5py.HardLink):
-                found.left_out[f"{prefix}{name}"] = "it is a link, and links are not followed"
+                found.left_out[f"{prefix}{name}"] = "it is a link, and bywire does not follow links"
                 continue
             self._take(group[name], f"{prefix}{name}", depth, found)
 
     def _take(self, item: Any, name: str, depth: int, found: Found) -> None:
-        """Collect an array, a text, the arrays of a group, or those of an array of structs."""
+        """Collect an array, a text, or the arrays of a group or of an array of structs."""
         import h5py
 
         if len(self._arrays) + len(found.texts) + len(found.scalars) > _MOST:
@@ -136,7 +136,7 @@ class Mat73Source:
         return replace(column, unit=unit, label=label)
 
     def _shape(self, array: Any) -> tuple[int, ...]:
-        """Return the shape in MATLAB, which has the reverse order."""
+        """Return the shape in MATLAB, which has the opposite order."""
         return tuple(array.shape[::-1]) if self._is_matlab else tuple(array.shape)
 
     def _index(self, array: Any, part: Part, piece: slice) -> tuple[Any, ...]:
@@ -147,7 +147,7 @@ class Mat73Source:
         return tuple(piece if axis == long else 0 for axis in range(array.ndim))
 
     def _require_whole(self, name: str, array: Any) -> None:
-        """Reject numbers that are not in the file, which the library would read as zeros."""
+        """Reject numbers that are not in the file, since the library would read them as zeros."""
         if array.is_virtual or array.external:
             raise FileError(
                 f"{self._path}: {name!r} is stored in other files, which bywire does not open. "
@@ -213,7 +213,7 @@ def _write(dataset: xr.Dataset, path: Path, progress: Progress) -> None:
 
 
 def _write_text(group: Any, name: str, text: str, codes: NDArray[np.uint16]) -> None:
-    """Write a text in MATLAB's form: one number for each character, in a column."""
+    """Write a text as MATLAB does: a column with one number for each character."""
     if not text:
         written = group.create_dataset(name, data=np.array([0, 0], dtype=np.uint64))
         written.attrs["MATLAB_empty"] = np.uint8(1)
@@ -237,10 +237,10 @@ FORMAT = FileFormat(
 
 
 class FailingStream(io.RawIOBase):
-    """A file that stores its first error and then writes nothing more.
+    """A file that stores its first error and then stops writing.
 
-    The HDF library does not survive a failed write: it writes its buffers at the end of the
-    process, which then crashes.
+    The HDF library does not survive a failed write: it writes its buffers again when the process
+    ends, which crashes the process.
 
     Parameters
     ----------
@@ -280,7 +280,7 @@ class FailingStream(io.RawIOBase):
         return len(wanted)
 
     def seek(self, offset: int, whence: int = io.SEEK_SET, /) -> int:
-        """Go to a place."""
+        """Move to a position."""
         return self._stream.seek(offset, whence)
 
 
@@ -291,7 +291,7 @@ def kept(path: Path) -> Iterator[FailingStream]:
     Raises
     ------
     OSError
-        At the end, the first error of writing.
+        The first error of writing, when the file is closed.
     """
     with FileIO(path, "w+") as stream:
         failing = FailingStream(stream)

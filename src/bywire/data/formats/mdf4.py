@@ -1,4 +1,4 @@
-"""ASAM MDF 4: groups of channels with common instants, read and written by asammdf."""
+"""ASAM MDF 4: groups of channels with common times, read and written by asammdf."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from bywire.data.file_format import Column, FileFormat, ReadOptions, library
 if TYPE_CHECKING:
     import xarray as xr
 
-_NUMBERS = range(6)  # data types: integers and reals, either byte order
+_NUMBERS = range(6)  # data types: integers and reals, in both byte orders
 _VALUE, _MASTER, _VIRTUAL_MASTER, _VIRTUAL = 0, 2, 3, 6
 _TEXTS = range(7, 12)  # conversions to and from texts
 _FORMULA = 3  # conversion
@@ -26,9 +26,9 @@ _CODES, _RANGES = 7, 8  # conversions with texts for single numbers, and for ran
 _NO_QUANTITY = ("", "-", "1", "enum", "state", "bool")  # units of states
 _NO_STATE = frozenset({"sna", "snv", "na", "n/a", "not available", "signal not available"})
 _TIME = 1  # kinds of master channels
-# A file given by path is mapped into memory: fast, but too much for large files.
+# asammdf maps a file into memory if it receives the path. This is fast, but large files do not fit.
 _MAPPED = 2**29  # bytes
-_RECORDS = 1 << 20  # that are read at a time from a larger one
+_RECORDS = 1 << 20  # records per piece of a larger file
 _WHAT = "MDF files"
 
 
@@ -99,12 +99,12 @@ class Mdf4Source:
     def _read(
         self, group: int, names: Sequence[str], begin: int, size: int
     ) -> Iterator[tuple[str, NDArray[Any]]]:
-        """Yield numbers of one group's channels, or of their instants, from a record on."""
+        """Yield numbers of one group's channels, or of their times, from a record on."""
         master = self._file.masters_db[group]
         indices = [self._places[name][1] for name in names]
         for index in {master, *indices}:
             self._require_inside(group, index)
-        # Reading a channel also returns the instants; alone, they are a channel like any other.
+        # Reading a channel also returns its times. Alone, they are read like any other channel.
         values = [index for index in indices if index != master]
         signals: dict[int, Any] = {}
         for coded in (False, True):
@@ -117,7 +117,7 @@ class Mdf4Source:
             numbers = instants if signal is None else signal.samples
             if numbers.ndim != 1 or numbers.dtype.kind not in "iufb":
                 raise FileError(
-                    f"{self._path}: channel {name!r} does not contain numbers. Leave it out",
+                    f"{self._path}: channel {name!r} does not contain numbers. Do not select it",
                     name=name,
                 )
             channel = self._channel(group, index)
@@ -138,7 +138,7 @@ class Mdf4Source:
     ) -> dict[int, Any]:
         """Return some records of channels, raw or converted."""
         self._records_read = 0
-        # With a number of records, the library is a third slower.
+        # The library is a third slower if the number of records is limited.
         signals = self._file.select(
             [(None, group, index) for index in indices],
             record_offset=begin,
@@ -173,7 +173,7 @@ class Mdf4Source:
             self._missing.setdefault(name, Counter())[why] += count
 
     def _require_inside(self, group: int, index: int) -> None:
-        """Reject a channel beyond the end of its record, where the library reads other data."""
+        """Reject a channel beyond the end of its record, since it would contain other data."""
         place = self._file.groups[group]
         channel, size = place.channels[index], place.channel_group.samples_byte_nr
         end = channel.byte_offset + (channel.bit_offset + channel.bit_count + 7) // 8
@@ -188,7 +188,7 @@ class Mdf4Source:
     def count_records(self) -> None:
         """Count the records that were read, since the library does not report missing ones.
 
-        It stops at a truncated block or one that it cannot inflate, and leaves arbitrary numbers.
+        The library stops at a truncated or corrupt block, and leaves arbitrary numbers.
         """
         inner = self._file._mdf
         plain = inner._yield_selected_signals
@@ -238,7 +238,7 @@ def _has_codes(channel: Any) -> bool:
 def _is_quantity(channel: Any) -> bool:
     """Return whether a channel whose conversion has texts also contains measured values.
 
-    It does if there is a factor for the other numbers, or a unit and no text for other numbers.
+    It does if the conversion has a factor for the other numbers, or a unit and no default text.
     """
     inner = _blocks(channel.conversion)
     if any(not isinstance(block, bytes) and _is_numeric(block) for block in inner):
@@ -262,7 +262,7 @@ def _blocks(conversion: Any) -> list[Any]:
 def _converted(
     conversion: Any, raw: NDArray[Any], texts: dict[str, NDArray[np.bool_]]
 ) -> NDArray[np.float64]:
-    """Return converted numbers, and for each text the places that it represents."""
+    """Return converted numbers, and for each text the samples that it represents."""
     kind = getattr(conversion, "conversion_type", None)
     if kind not in (_CODES, _RANGES):
         plain = conversion.convert(raw, ignore_value2text_conversions=True) if conversion else raw
@@ -278,7 +278,7 @@ def _converted(
 
 
 def _entries(conversion: Any, kind: int, raw: NDArray[Any]) -> Iterator[NDArray[np.bool_]]:
-    """Yield the places of raw numbers for each entry of a conversion."""
+    """Yield a mask of the raw numbers that belong to each entry of a conversion."""
     if kind == _CODES:
         for k in range(conversion.val_param_nr):
             yield raw == conversion[f"val_{k}"]
@@ -296,7 +296,7 @@ def _fill(
     numbers: NDArray[np.float64],
     texts: dict[str, NDArray[np.bool_]],
 ) -> None:
-    """Convert the numbers of one entry, or note the places of its text."""
+    """Convert the numbers of one entry, or record the samples of its text."""
     if not block or not where.any():
         return
     if isinstance(block, bytes):
@@ -373,5 +373,5 @@ FORMAT = FileFormat(
     has_many_axes=True,
     libraries=("asammdf",),
     counts=("record", 0),
-    opening=60.0,  # of thousands of channels it reads every description
+    opening=60.0,  # asammdf reads the description of every channel, possibly thousands
 )

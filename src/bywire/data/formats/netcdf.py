@@ -19,13 +19,13 @@ from bywire.data.file_format import Column, FileFormat, ReadOptions
 if TYPE_CHECKING:
     import xarray as xr
 
-_VALUES = 1 << 22  # that are read at a time
+_VALUES = 1 << 22  # numbers per piece
 _CLASSIC = ("NETCDF3_CLASSIC", "NETCDF3_64BIT_OFFSET", "NETCDF3_64BIT")
 _MAGICS = (b"CDF\x01", b"CDF\x02", b"CDF\x05", b"\x89HDF\r\n\x1a\n")
 
 
 class NetcdfSource:
-    """An open NetCDF file; only variables of one dimension are read, not groups and tables."""
+    """An open NetCDF file, of which bywire reads one-dimensional variables, but no groups."""
 
     def __init__(self, path: Path, file: Any) -> None:
         self._path = path
@@ -70,7 +70,7 @@ def _require_whole(path: Path, file: Any) -> None:
         from scipy.io import netcdf_file
 
         netcdf_file(path, mmap=True).close()  # maps every variable, so each must be complete
-    elif file.data_model.startswith("NETCDF3"):  # with 64-bit sizes, which SciPy does not know
+    elif file.data_model.startswith("NETCDF3"):  # 64-bit sizes, which SciPy does not support
         size = sum(math.prod(v.shape) * v.dtype.itemsize for v in file.variables.values())
         if size > path.stat().st_size:
             raise FileError(
@@ -84,7 +84,7 @@ def _write(dataset: xr.Dataset, path: Path, progress: Progress) -> None:
     names = [*dataset.data_vars, *dataset.coords]
     packed = {"zlib": True, "complevel": 1, "_FillValue": None}
     progress(f"writing {path.name}", 0.0)
-    with interrupts_deferred():  # within xarray's locks, Ctrl-C would leave one locked
+    with interrupts_deferred():  # Ctrl-C could otherwise leave one of xarray's locks locked
         dataset.to_netcdf(path, engine="netcdf4", encoding={str(name): packed for name in names})
     progress(f"writing {path.name}", 1.0)
 

@@ -16,8 +16,8 @@ from bywire.data.file_format import Column, FileFormat, ReadOptions, library
 if TYPE_CHECKING:
     import xarray as xr
 
-_ROWS = 1 << 17  # that are read or written at a time
-_LARGEST_FOOTER = 100 * 2**20  # bytes: of text in the file's description
+_ROWS = 1 << 17  # rows per piece
+_LARGEST_FOOTER = 100 * 2**20  # bytes of text in the file's description
 _UNIT, _LABEL = b"unit", b"label"
 _WHAT = "Parquet files"
 
@@ -44,14 +44,14 @@ class ParquetSource:
             begin += batch.num_rows
 
     def _numbers(self, name: str, column: Any) -> NDArray[Any]:
-        """Return the numbers of a batch; instants as counts of their unit from the first one."""
+        """Return the numbers of a batch; time stamps count in their unit from the first one."""
         import pyarrow as pa
         import pyarrow.compute as pc
 
         if pa.types.is_timestamp(column.type) or pa.types.is_duration(column.type):
             column = column.cast(pa.int64())
         if name in self._instants and column.null_count < len(column):
-            # Nanoseconds since 1970 are too many for a float, which would lose the last digits.
+            # A float would lose the last digits of nanoseconds since 1970.
             first = self._origins.setdefault(name, column.drop_null()[0].as_py())
             column = pc.subtract(column, first)
         if column.null_count:
@@ -124,6 +124,6 @@ FORMAT = FileFormat(
     lambda head: head[:4] == b"PAR1",
     _open,
     _write,
-    # The last one is loaded by pyarrow's first numbers; here once, not for each file.
+    # pyarrow loads pandas with the first numbers; importing it here loads it once, not per file.
     libraries=("pyarrow.parquet", "pyarrow.compute", "pandas"),
 )

@@ -1,7 +1,7 @@
 """A plant in model exchange: modes between events, variables, and its equations as C text.
 
-Set-valued forces become modes that only events change. A body with dry friction slides forward or
-backward, or sticks until the applied force exceeds the friction bounds. A state with a limit is
+Set-valued forces become modes that change only at events. A body with dry friction slides forward
+or backward, or sticks until the applied force exceeds the friction bounds. A state with a limit is
 similar: its force is any push away from the limit. A contact is closed or open.
 """
 
@@ -54,8 +54,8 @@ class Continuous:
         ``(x, p) -> closed``: 1 for each closed contact, else 0.
     equations
         ``(x, m, p, closed) -> (balance, mass, low, high, pressed, lack)``: right-hand sides without
-        set-valued forces and factors of the derivatives, (nx,) each; bounds of the set-valued
-        forces; for each contact its force if it alone were closed, and its overlap minus its
+        set-valued forces, and factors of the derivatives, (nx,) each; bounds of the set-valued
+        forces; each contact's force if only this contact were closed; and its overlap minus its
         elastic deflection.
     output
         ``(x, m, p, closed, reaction, flow) -> o``: recorded signals; ``flow``: integrals.
@@ -76,7 +76,7 @@ def build_continuous(model: Model, par: ParameterSet) -> Continuous:
     model
         The system.
     par
-        Any parameter set with the required structure; its numbers become arguments.
+        Any parameter set with the required structure. Its numbers become arguments.
     """
     names = tuple(par.leaves())
     p, x = SX.sym("p", len(names)), SX.sym("x", len(model.State._fields))

@@ -26,8 +26,8 @@ from bywire.identification.method import Check, Curve, Effort, Identified, Metho
 from bywire.identification.model_choice import Candidate, Choice, choose
 from bywire.identification.unknown import Unknown
 
-_APART = 1.2  # ratio of pressures from which on friction per unit pressure can be told
-_LEAST = 20  # samples each way
+_APART = 1.2  # minimum ratio of pressures that determines friction per unit pressure
+_LEAST = 20  # samples in each direction
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Law:
     name
         Name of the law.
     viscous, stribeck, asymmetric, pressure
-        Whether friction grows with speed; falls after breaking away; depends on the direction;
+        Whether friction grows with speed, falls after breakaway, depends on the direction, and
         depends on the pressure.
     """
 
@@ -92,7 +92,7 @@ class Law:
         return size * factor + viscous, np.hstack(slopes)
 
     def candidate(self) -> Candidate:
-        """Return it as a candidate of a model choice."""
+        """Return the law as a candidate for a model choice."""
         return Candidate(self.name, self.unknowns, self.predict)
 
 
@@ -109,7 +109,7 @@ LAWS = (
 
 
 def _laws_for(data: xr.Dataset) -> Sequence[Law]:
-    """Return the laws that a record can separate; laws with pressure only if it varies enough."""
+    """Return the laws that a record can separate: with pressure only if pressure varies enough."""
     if "pressure" in data:
         p = data["pressure"].values
         if float(np.max(p)) > _APART * max(float(np.min(p)), 0.0):
@@ -132,14 +132,14 @@ def _sliding(records: Mapping[str, xr.Dataset], slowest: float) -> dict[str, xr.
     Parameters
     ----------
     records
-        ``friction``, ``speed`` and, where measured, ``pressure`` over ``time``; NaN in gaps.
+        ``friction``, ``speed`` and, if measured, ``pressure`` over ``time``; NaN in gaps.
     slowest
-        Lower limit of the speed of used samples, as a share of the record's fastest speed.
+        Minimum speed of used samples, as a fraction of the record's maximum speed.
 
     Raises
     ------
     ParameterError
-        When too few slide forward or backward, or the friction drives the motion.
+        When too few samples slide forward or backward, or the friction drives the motion.
     """
     names = ("friction", "speed", "pressure")
     samples = {}
@@ -160,12 +160,12 @@ def _require_both_ways(sliding: Mapping[str, xr.Dataset], slowest: float) -> Non
     counts = {"forward": int(np.sum(v > 0)), "backward": int(np.sum(v < 0))}
     short = [way for way, count in counts.items() if count < _LEAST]
     if short:
-        said = ", ".join(f"{count} {way}" for way, count in counts.items())
+        each = ", ".join(f"{count} {way}" for way, count in counts.items())
         raise ParameterError(
-            f"too few samples slide {' and '.join(short)} ({said}, but at least {_LEAST} each way "
-            "are needed). Record motion in both directions, or reduce "
+            f"too few samples slide {' and '.join(short)} ({each}). At least {_LEAST} samples in "
+            "each direction are needed. Record motion in both directions, or reduce "
             f"{option('options')} slowest, which "
-            f"excludes samples slower than {100 * slowest:g} % of a record's fastest speed",
+            f"excludes samples below {100 * slowest:g} % of a record's maximum speed",
             name="slowest",
             value=f"{slowest:g}",
         )
@@ -180,7 +180,7 @@ def _require_braking(sliding: Mapping[str, xr.Dataset]) -> None:
     along = float(F @ v / np.sqrt((F @ F) * (v @ v))) if F.any() else 0.0
     if along < 0.0:
         raise wrong_sign(
-            "friction", "speed", f"cosine {along:.2f}, so friction would drive the motion"
+            "friction", "speed", f"cosine {along:.2f}, but it must be > 0, as for passive friction"
         )
 
 
@@ -224,13 +224,13 @@ class Options(ParameterSet):
         "stribeck-asymmetric",
         "stribeck-pressure",
     ]
-    """one of the laws, or a comparison of all on held-out data"""
+    """one of the laws, or 'choose' for a comparison of all on held-out data"""
     slowest: Share
-    """fraction of the fastest speed; slower samples stick or reverse, and are not used"""
+    """fraction of the maximum speed; slower samples stick or reverse, and are not used"""
     pressures: Annotated[Nodes, Unit("Pa", 2e6), Field(min_length=1)]
     """pressures of simulated records, one per record"""
     v_max: Annotated[float, Unit("m/s", 0.1), Field(gt=0)]
-    """fastest speed of simulated records"""
+    """maximum speed of simulated records"""
     f_motion: Frequency
     """frequency of the motion in simulated records"""
     duration: Duration
@@ -246,14 +246,14 @@ def identify(data: xr.Dataset, par: None, options: Options, effort: Effort) -> I
     Parameters
     ----------
     data
-        ``friction``: force or torque, friction alone, of the motion's sign; ``speed``; where it
-        is measured ``pressure`` [Pa]. With several records, whole ones are held out.
+        ``friction``: force or torque of friction alone, positive along the motion; ``speed``;
+        ``pressure`` [Pa] if it is measured. With several records, whole records are held out.
 
     Raises
     ------
     ParameterError
-        When too few samples slide both ways, friction drives, or the chosen law needs a pressure
-        that varies.
+        When too few samples slide in one direction, friction drives the motion, or the chosen law
+        needs a pressure that varies.
 
     References
     ----------
@@ -288,16 +288,16 @@ def identify(data: xr.Dataset, par: None, options: Options, effort: Effort) -> I
                 _misfit(whole, predicted),
                 limit=_MISFIT,
                 note="mean residual at a speed or a pressure, relative to the friction",
-                next_step="find where the residual occurs in the curve. At low speed, record "
-                "slower strokes. If it depends on pressure, also provide p. If it differs from "
-                "record to record, identify each record separately",
+                next_step="find where the residual occurs in the curve. If it occurs at low speed, "
+                "record slower strokes. If it depends on pressure, also provide pressure. If it "
+                "differs from record to record, identify each record separately",
             ),
             Check(
                 "validation_over_training",
                 best.validation_error / best.training_error,
                 limit=1.5,
                 note="error on held-out data, relative to the error on fitted data",
-                next_step="measure more records, or the same speeds and pressures in each",
+                next_step="record more data, or the same speeds and pressures in each record",
             ),
             _driving(best.estimate),
         ),
@@ -310,18 +310,20 @@ def identify(data: xr.Dataset, par: None, options: Options, effort: Effort) -> I
 
 
 def _driving(fit: Estimate) -> Check:
-    """Check that no part of the law drives: its 95 % interval would be below zero."""
+    """Check that no term of the law drives the motion, with a 95 % interval below zero."""
     highest = dict(zip(fit.names, fit.intervals()[:, 1], strict=True))
     below = [n for n, high in highest.items() if high < 0.0]
     unit = {u.label: u.unit for u in fit.unknowns}
-    said = "; ".join(f"{n} = {shown(float(f'{fit[n]:.3g}'), unit[n])} drives" for n in below)
+    driving = "; ".join(
+        f"{n} = {shown(float(f'{fit[n]:.3g}'), unit[n])} drives the motion" for n in below
+    )
     return Check(
         "terms_that_drive",
         float(len(below)),
         limit=0.0,
-        note=said or "the signs of all parts of the law are possible for friction",
+        note=driving or "no term of the law drives the motion",
         next_step="check the signs of friction and speed, and whether speeds and pressures "
-        "vary enough to separate the parts of the law",
+        "vary enough to separate the terms of the law",
     )
 
 
@@ -339,7 +341,7 @@ def _figures(choice: Choice, unit: str) -> dict[str, tuple[float, str]]:
 def _misfit(whole: xr.Dataset, predicted: Array) -> float:
     """Return the RMS of the residual's class means, relative to the RMS of the friction.
 
-    Classes of speed each way, and of pressure each way; the larger of both.
+    Classes of speed and classes of pressure, each by direction; the larger result counts.
     """
     F, v = whole["friction"].values, whole["speed"].values
     keys = [np.abs(v)] + ([whole["pressure"].values] if "pressure" in whole else [])
@@ -374,7 +376,7 @@ def _curve(records: Mapping[str, xr.Dataset], whole: xr.Dataset, predicted: Arra
 
 
 def synthetic(par: None, options: Options, seed: int) -> xr.Dataset:
-    """Return a sine of the speed at each pressure, with the friction of the truth and noise."""
+    """Simulate a sinusoidal speed at each pressure, with the true friction and noise."""
     random, truth = np.random.default_rng(seed), options.truth
     t = np.arange(0.0, options.duration, options.interval)
     v = options.v_max * np.sin(2.0 * np.pi * options.f_motion * t + 0.1)
@@ -404,7 +406,7 @@ def _known_values(par: None, options: Options) -> dict[str, float]:
 METHOD = Method(
     name="friction-model",
     assembly="",
-    summary=f"choice among {len(LAWS)} friction laws for a record, judged on held-out data",
+    summary=f"choice among {len(LAWS)} friction laws by their error on held-out data",
     experiment="",
     signals={"friction": "", "speed": ""},
     options=Options,

@@ -33,18 +33,18 @@ def simulated(bench: Bench, question: Question, options: Options, seed: int) -> 
     Parameters
     ----------
     bench
-        With the true values.
+        Bench with the true values.
     question
         Names of outputs and inputs, and the noise of the outputs.
     options
-        Noise of outputs for which the question gives none.
+        Noise of outputs for which the question specifies none.
     seed
         Seed of the noise.
 
     Returns
     -------
     xarray.Dataset
-        Over ``time`` [s], as far before zero as the experiment records.
+        Over ``time`` [s]; it starts before zero if the experiment's recording does.
     """
     bench = replace(bench, seed=seed)
     number = [begun.label for begun in bench.cases()].index(case_of(bench, question.case).label)
@@ -91,7 +91,7 @@ def on(bench: Bench, question: Question) -> Method:
     Raises
     ------
     InputError
-        When the question names something that does not exist or is not valid.
+        When a name in the question does not exist, or a text is not valid.
 
     References
     ----------
@@ -129,7 +129,7 @@ def on(bench: Bench, question: Question) -> Method:
 
 @dataclass(frozen=True)
 class _Simulation:
-    """The experiment with given parameters, simulated."""
+    """Simulation of the experiment with given parameters."""
 
     fit: BenchFit
 
@@ -142,8 +142,8 @@ def _require_known(case: Case, question: Question) -> None:
     outputs, stimuli = signals_of(case.model.Output), signals_of(case.model.Stimulus)
     if not question.noise:
         raise ParameterError(
-            f"there is no output. Add {option('outputs')} SIGNAL for each output of the model in "
-            f"the record, for example {', '.join(list(outputs)[:6])}",
+            f"there is no output. Add {option('outputs')} SIGNAL for each recorded output of the "
+            f"model, for example {', '.join(list(outputs)[:6])}",
             name="outputs",
             valid=", ".join(outputs),
         )

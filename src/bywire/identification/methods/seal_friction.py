@@ -28,15 +28,15 @@ from bywire.identification.method import Check, Curve, Effort, Identified, Metho
 from bywire.identification.output_error import even_interval
 from bywire.identification.unknown import Unknown
 
-_CROSSED = 0.8  # of the stretch that a stroke has to cross
-_LEVEL = 0.01  # of a false alarm
-_FEWEST_STROKES = 4  # that tell a drift
-_APART = 1.2  # least ratio of the highest to the lowest pressure
+_CROSSED = 0.8  # fraction of the evaluated travel that a stroke must cross
+_LEVEL = 0.01  # probability of a false alarm
+_FEWEST_STROKES = 4  # minimum number that shows a drift
+_APART = 1.2  # minimum ratio of the highest to the lowest pressure
 
 
 @dataclass(frozen=True)
 class Stroke:
-    """One stroke through the stretch of travel.
+    """One stroke through the evaluated travel.
 
     Parameters
     ----------
@@ -51,14 +51,14 @@ class Stroke:
 
 
 def velocity(x: Array, interval: float, cutoff: float) -> Array:
-    """Return the velocity of a measured travel, low-passed; gaps are bridged straight.
+    """Return the low-passed velocity of a measured travel; gaps are interpolated linearly.
 
     Parameters
     ----------
     x
         Travel [m], shape (n,); NaN in gaps.
     interval, cutoff
-        Sample time [s] and corner frequency [Hz].
+        Sample time [s] and cutoff frequency [Hz].
     """
     there = np.isfinite(x)
     at = np.arange(x.size)
@@ -67,16 +67,16 @@ def velocity(x: Array, interval: float, cutoff: float) -> Array:
 
 
 def _find_strokes(x: Array, v: Array, low: float, high: float, slowest: float) -> list[Stroke]:
-    """Return the strokes through a stretch of travel.
+    """Return the strokes through a range of travel.
 
     Parameters
     ----------
     x, v
         Travel [m] and velocity [m/s], shape (n,).
     low, high
-        The stretch [m].
+        Ends of the range [m].
     slowest
-        Slower samples stick, creep or turn round, and do not count [m/s].
+        Minimum speed [m/s]; slower samples stick, creep or reverse, and do not count.
     """
     inside = np.isfinite(x) & (x > low) & (x < high)
     edges = np.flatnonzero(np.diff(np.concatenate(([0], inside.astype(int), [0]))))
@@ -107,7 +107,7 @@ class Group:
     strokes
         Means of each stroke, in their order: time [s], p, F; shape (count, 3).
     record
-        Label of the record; empty where there is one alone.
+        Label of the record; empty if there is only one.
     """
 
     direction: int
@@ -134,13 +134,13 @@ def _grouped(
     record
         ``x`` [m], ``p`` [Pa] and ``F`` [N] over ``time`` [s], evenly spaced.
     stretch
-        Travels between which strokes count [m].
+        Ends of the evaluated travel [m].
     slowest
         Speed above which the piston slides [m/s].
     cutoff
         Cutoff of the low-pass filter applied to the travel before differentiation [Hz].
     label
-        Of the record.
+        Label of the record.
     """
     time = record["time"].values
     x, p, F = (record[name].values for name in ("x", "p", "F"))
@@ -168,7 +168,7 @@ def _require_told(groups: Sequence[Group]) -> None:
     Raises
     ------
     ParameterError
-        When there are none, in one direction alone, or at one pressure alone.
+        When there are no strokes, or only strokes in one direction or at one pressure.
     """
     if not groups:
         raise ParameterError(
@@ -178,15 +178,16 @@ def _require_told(groups: Sequence[Group]) -> None:
         )
     if len({g.direction for g in groups}) < 2:
         raise ParameterError(
-            "F_0 and f need strokes in both directions, because only friction changes its sign",
+            "F_0 and f need strokes in both directions, because only friction changes its sign. "
+            "Record strokes in both directions",
             name="F_0",
         )
     levels = [g.p for g in groups]
     if max(levels) < _APART * min(levels) or len(groups) < 4:
         raise ParameterError(
-            f"f cannot be separated from F_0: all strokes were made at {min(levels) / 1e5:.3g} to "
-            f"{max(levels) / 1e5:.3g} bar. Provide one record per pressure, at two or more "
-            "pressures",
+            f"f cannot be separated from F_0, because all strokes were made at "
+            f"{min(levels) / 1e5:.3g} to {max(levels) / 1e5:.3g} bar. Provide one record per "
+            "pressure, at two or more pressures",
             name="f",
         )
 
@@ -204,17 +205,17 @@ def _require_signs(A: float, friction: float) -> None:
     Raises
     ------
     ParameterError
-        When a signal has the wrong sign: the force pushes against the pressure, and more of it
+        When a signal has the wrong sign. The force acts against the pressure, and is larger
         outward than inward.
     """
     if A < 0.0:
-        raise wrong_sign("F", "p", f"area {shown(float(f'{A:.4g}'), 'm**2')}")
+        raise wrong_sign("F", "p", f"area {shown(float(f'{A:.4g}'), 'm**2')}, but it must be > 0")
     if friction < 0.0:
-        raise wrong_sign("F", "x", f"mean friction {friction:.3g} N, which would drive the motion")
+        raise wrong_sign("F", "x", f"mean friction {friction:.3g} N, but it must be > 0 N")
 
 
 def _half_widths(groups: Sequence[Group]) -> tuple[Array, Array]:
-    """Return mean pressure and half the loop's height of neighboring groups up and down."""
+    """Return mean pressure and half the loop height of neighboring outward and inward groups."""
     pairs = [(a, b) for a, b in pairwise(groups) if a.direction == 1 and b.direction == -1]
     p = np.array([0.5 * (a.p + b.p) for a, b in pairs])
     return p, np.array([0.5 * (a.F - b.F) for a, b in pairs])
@@ -232,7 +233,7 @@ def _drifting(groups: Sequence[Group], area: float) -> tuple[str, ...]:
     Parameters
     ----------
     groups
-        Of all records.
+        Groups of all records.
     area
         Force over pressure [m^2], to exclude the drift of the pressure itself.
     """
@@ -247,7 +248,7 @@ def _drifting(groups: Sequence[Group], area: float) -> tuple[str, ...]:
         if line.pvalue < _LEVEL / len(groups):
             change = float(line.slope * np.ptp(time))
             texts.append(
-                f"the force drifts by {change:.2g} N over the {time.size} strokes {group.label}. "
+                f"{group.label}: the force drifts by {change:.2g} N over {time.size} strokes. "
                 "Run the seal in first, or trim the record"
             )
     return tuple(texts)
@@ -256,7 +257,7 @@ def _drifting(groups: Sequence[Group], area: float) -> tuple[str, ...]:
 def _misfits(groups: Sequence[Group], W: Array, F: Array) -> tuple[str, ...]:
     """Return the records that deviate from the fit of all others, with the deviation.
 
-    The mean forces of each record are compared with what the fit without it predicts.
+    The mean forces of each record are compared with the prediction of the fit without it.
 
     Parameters
     ----------
@@ -285,7 +286,7 @@ def _misfits(groups: Sequence[Group], W: Array, F: Array) -> tuple[str, ...]:
         if ratio > stats.f.isf(_LEVEL / len(groups), count, freedom):
             texts.append(
                 f"{label or 'the record'} deviates by {float(np.abs(off).max()):.2g} N from the "
-                "fit to all other records. Check its zeros, its pressure and its run-in"
+                "fit to all other records. Check its sensor zeros, its pressure and its run-in"
             )
     return tuple(texts)
 
@@ -312,7 +313,7 @@ def _friction_line(fit: Estimate, groups: Sequence[Group]) -> Curve:
     }
     return Curve(
         "friction",
-        "Friction against pressure with its 95 % band; one point per record and direction.",
+        "Friction versus pressure with its 95 % band; one point per record and direction.",
         over(("p", p, "Pa", "pressure"), columns, "N", "friction"),
         "p",
     )
@@ -351,7 +352,7 @@ def _force_over_travel(
     axis = {"x": ("x", x, {"units": "m", "long_name": "travel"})}
     return Curve(
         "loops",
-        "Force against travel while the piston slides; a loop's height is twice the friction.",
+        "Force versus travel while the piston slides; a loop's height is twice the friction.",
         _beside(pairs, axis, "x"),
         "x",
     )
@@ -382,7 +383,7 @@ def _beside(pairs: Sequence[tuple[Array, Array]], axis: Any, dim: str = "time") 
 ForcePerPressure = Annotated[float, Unit("N/Pa", 1e-5), Field(ge=0, allow_inf_nan=False)]
 
 _MISFIT = 0.1
-_OFF_BORE = 0.1  # of the area: sensors' gains are off by a few hundredths, wrong units by far more
+_OFF_BORE = 0.1  # of the area: gain errors of sensors are a few per cent, those of wrong units more
 
 
 class Truth(ParameterSet):
@@ -395,7 +396,7 @@ class Truth(ParameterSet):
     f: ForcePerPressure
     """friction per unit pressure"""
     sigma_group: Force
-    """scatter of the force from record to record and direction to direction"""
+    """scatter of the force between records and directions"""
     sigma_stroke: Force
     """scatter from stroke to stroke"""
     sigma_F: Force
@@ -431,8 +432,8 @@ def identify(data: xr.Dataset, par: None, options: Options, effort: Effort) -> I
         F = A p + s\,(F_0 + f p) + F_{off}, \qquad s = \mathrm{sgn}(v)
 
     The mean force of all strokes of a record in one direction is one measured value, since
-    the strokes of a record are not independent. The pressure is that of each
-    direction: a regulator holds it higher while the piston moves against it.
+    the strokes of a record are not independent. Each direction has its own pressure, because a
+    regulator keeps the pressure higher while the piston moves against it.
 
     Parameters
     ----------
@@ -443,7 +444,7 @@ def identify(data: xr.Dataset, par: None, options: Options, effort: Effort) -> I
     Raises
     ------
     ParameterError
-        When there are no strokes, one direction alone, one pressure alone, or a wrong sign.
+        When there are no strokes, only one direction or pressure, or a signal has the wrong sign.
 
     References
     ----------
@@ -497,7 +498,7 @@ def identify(data: xr.Dataset, par: None, options: Options, effort: Effort) -> I
             _force_over_travel(records, fit, *how),
         ),
         notes=(
-            f"{sum(len(g.strokes) for g in groups)} strokes in {len(groups)} groups of record "
+            f"{sum(len(g.strokes) for g in groups)} strokes in {len(groups)} groups by record "
             "and direction",
             "loop half widths neglect the pressure difference between the directions",
             *(f"{label} {reason}" for label, reason in fit.vague().items()),
@@ -517,7 +518,7 @@ def _unchecked() -> str:
 
 def _advice() -> str:
     return (
-        "check 'pressure_between_directions' and the curve of each record. If one record is off, "
+        "check 'pressure_between_directions' and the curve of each record. If one record deviates, "
         "identify without it. If all forces are shifted, use "
         f"{option('options', {'zero': 'free'})}. If friction depends on speed, or nonlinearly on "
         "pressure, run 'bywire identify friction-model' on friction, speed and pressure to "
@@ -555,7 +556,7 @@ def _misfit(W: Array, F: Array) -> float:
 
 
 def synthetic(par: None, options: Options, seed: int) -> xr.Dataset:
-    """Simulate strokes to and fro at each pressure, with the scatter of real seals."""
+    """Simulate strokes in both directions at each pressure, with the scatter of real seals."""
     random, truth = np.random.default_rng(seed), options.truth
     t = np.arange(0.0, 40.0, options.interval)
     low, high = options.x_low, options.x_high

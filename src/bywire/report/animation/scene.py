@@ -1,4 +1,4 @@
-"""Scenes that move as a recording does, and the self-contained page that plays one."""
+"""Scenes that move like a recording, and the self-contained page that plays a scene."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Move:
 
 @dataclass(frozen=True)
 class Dial:
-    """A bar beside the drawing.
+    """A bar next to the drawing.
 
     Parameters
     ----------

@@ -1,10 +1,10 @@
-/* The page: values of parameters in, curves out, the latest value first. */
+/* The page: parameter values in, curves out, the latest value first. */
 
 const read = (id) => JSON.parse(document.getElementById(id).textContent);
 const bench = read("bench");
 const { description, digest, panels, chosen, judged, loops } = bench;
 const REST = 150; // ms without a move, after which loops and hidden panels are updated: sliders come first
-let longest = 20000; // ms that a run may take: then its worker is stopped
+let longest = 20000; // ms that a run may take before its worker is stopped
 const parameters = description.parameters.filter(({ used }) => used);
 const values = Object.fromEntries(parameters.map(({ name, start }) => [name, start]));
 const kept = [];
@@ -61,11 +61,11 @@ function address() {
   history.replaceState(null, "", isChanged ? `#${linkOf(digest, made)}` : location.pathname + location.search);
 }
 
-/** Return a run's key figure; without a value where the changes would change an option of it. */
+/** Return a run's key figure, without a value if the changes affect one of its options. */
 function figureOf({ figures, followed }, { name }) {
   const isFollowing = judged.families.some((each) => each.name === "step_response" && each.figures.includes(name));
   if (!followed.length || !isFollowing) return figures[name];
-  return { value: NaN, reason: `an option depends on ${followed}: save the bench file and run it`, open: true };
+  return { value: NaN, reason: `an option depends on ${followed}. Save the bench file and run it`, open: true };
 }
 
 /** Return the cells of a run's key figure: its value, and with a limit the verdict. */
@@ -77,7 +77,7 @@ function cellsOf(computed, figure) {
   return { value: element("td", { class: "number", title: reason }, text), outcome, mark, reason };
 }
 
-/* Key figures of the run, judged by their limits, beside those of kept runs. */
+/* Key figures of the run, judged by their limits, next to those of kept runs. */
 function judge() {
   place("figures").hidden = !judged;
   place("unjudged").hidden = Boolean(judged);
@@ -104,7 +104,7 @@ function judge() {
   }));
 }
 
-/* One run at a time: a new request replaces the one that waits. */
+/* One run at a time: a new request replaces a waiting one. */
 function ask() {
   wanted = { ...values };
   clearTimeout(resting);
@@ -146,7 +146,7 @@ function show({ time, table, figures, settled }) {
   if (loops.length) resting = setTimeout(() => worker.postMessage({ isAboutLoops: true }), REST);
 }
 
-/* A figure that cannot be drawn fails a moment after the request: remove all of it. */
+/* A figure that cannot be drawn fails shortly after the request: remove it completely. */
 addEventListener("error", (event) => {
   event.preventDefault();
   [plots, ...views].forEach((each) => each.forget()); // half of a figure may be drawn
@@ -236,11 +236,11 @@ function take(link) {
   describe();
 }
 
-/* Otherwise a browser leaves the page for a file that is dropped on it. */
+/* Otherwise a browser leaves the page when a file is dropped on it. */
 addEventListener("dragover", (event) => event.preventDefault());
 addEventListener("drop", (event) => {
   event.preventDefault();
-  complain("this page cannot open files: set the values above or by a link; to run a bench file, use bywire run");
+  complain("this page cannot open files. Set the values above or with a link. To run a bench file, use bywire run");
 });
 
 const rows = parameterPanel(place("parameters"), parameters, bench.units, chosen, changed, complain);
@@ -256,7 +256,7 @@ matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
   again();
 });
 if (typeof WebAssembly === "undefined" || typeof Worker === "undefined") {
-  complain("this browser cannot run WebAssembly in workers, which compute the bench: use a current browser");
+  complain("this browser cannot run WebAssembly in workers, which the bench needs. Use a current browser");
 } else {
   begin();
   take(location.hash.slice(1));

@@ -1,8 +1,8 @@
 /* Bode diagrams of the bench's loops with their margins, drawn when the sliders rest. */
 
-const LEAST = { decibel: -80, phase: -450 }; // below, no margin is read
+const LEAST = { decibel: -80, phase: -450 }; // no margin is determined below
 
-/** Return the margins in words, or why there are none; `shown`: name, title, unit and factor of each. */
+/** Return the margins in words, or the reason for their absence; `shown`: name, title, unit and factor of each. */
 function marginText({ reason, margins }, shown) {
   if (reason) return reason;
   if (margins.hasLoop === false) return "no closed loop with these values: the loop gain is 0 at all frequencies";

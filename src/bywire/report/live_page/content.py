@@ -1,7 +1,7 @@
 """Text of the live page: kernel, scripts and styles inside, and a strict policy.
 
-Everything that a browser runs or styles is in the page with its digest in the policy; data are JSON
-in which no tag can begin.
+The page contains everything that a browser runs or styles, with its digest in the policy. Data are
+JSON in which no tag can begin.
 """
 
 from __future__ import annotations
@@ -51,9 +51,9 @@ from bywire.simulation.c_runtime import SCALAR
 if TYPE_CHECKING:
     import xarray as xr
 
-_SHARE = 1e-3  # relative change of a value, to find what depends on it
+_SHARE = 1e-3  # relative change of a value that reveals its effects
 _TIMES = 101  # number of times at which stimuli are compared
-_SAME = 1e-12  # largest difference of equal states, relative to each
+_SAME = 1e-12  # maximum difference of equal states, relative to each
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ class Dependence:
     driving
         Parameters that change the stimulus, the duration, or the times of recording; those that
         change the initial state in a way that the page cannot compute; those that the experiment
-        itself sets; and nodes of tables, which only make sense together.
+        itself sets; and nodes of tables, which are only meaningful together.
     judging
         Parameters that change options for key figures.
     """
@@ -75,9 +75,10 @@ class Dependence:
 
 
 def dependence(bench: Bench, number: int, names: Collection[str]) -> Dependence:
-    """Return what depends on the parameters of a bench in one of its runs.
+    """Return the dependencies on a bench's parameters in one of its runs.
 
-    Each is changed by a thousandth, up or else down; one that allows neither counts as driving.
+    Each parameter changes by a thousandth, up or else down. A parameter that allows neither counts
+    as driving.
     """
     case, values = _case(bench, number), bench.par.leaves()
     driving, judging = set(), set()
@@ -102,7 +103,7 @@ def _is_driven_alike(bench: Bench, case: Case, other: Case) -> bool:
 
 
 def _case(bench: Bench, number: int) -> Case:
-    """Return a run with its stimulus; if that needs earlier runs, with that of its preview."""
+    """Return a run with its stimulus, or with its preview's if the stimulus needs earlier runs."""
     made = bench.cases_with(bench.par, bench.chosen_options, bench.definition.preview)[number]
     return made.aligned(bench.step, bench.record)
 
@@ -134,7 +135,7 @@ def _rows(case: Case) -> Array:
     return np.array([given.get(name, np.zeros(_TIMES)) for name in names], dtype=float)
 
 
-# --- Loops shown beside the run: those that the bench's experiment is the proof of
+# --- Loops shown next to the run: those that the bench's experiment proves
 
 
 def loops_of(made: Exported) -> list[LoopSource]:
@@ -210,7 +211,7 @@ _UNITS = (
     ("V*s", (1, 2, -2, -1, 0, 0), "Wb"),
     ("A*s", (0, 0, 1, 1, 0, 0), "C"),
 )
-"""units whose products a field accepts; `bywire.core.units` decides which of them it reads"""
+"""units whose products a field accepts, if `bywire.core.units` reads them"""
 _SIZES = {
     "deg": math.pi / 180,
     "°": math.pi / 180,
@@ -243,7 +244,7 @@ def page_text(
     result
         Result of the bench itself: labels and units of signals, definitions of key figures.
     chosen
-        Parameters at the top; none: the bench's own choice.
+        Parameters at the top. If empty, the bench's own choice.
 
     Raises
     ------
@@ -272,7 +273,7 @@ def page_text(
         "'wasm-unsafe-eval'; "
         f"style-src {admitted(style)}; worker-src blob:; base-uri 'none'; form-action 'none'"
     )
-    # The kernel comes first: among text, a compressed page would be 1.5 kB larger.
+    # The kernel comes first. Between texts, it would make a compressed page 1.5 kB larger.
     return Template(_text("page.html")).substitute(
         kernel=_block("kernel", _packed(module[f"{_NAME}.wasm"])),
         policy=policy,
@@ -324,12 +325,12 @@ def _data(
 
 
 def _settings(made: Exported) -> Mapping[str, Any] | None:
-    """Return the settings of the families of key figures on the page; None where it has none."""
+    """Return the settings of the families of key figures on the page; None if it has none."""
     definition = made.bench.definition
     if not isinstance(definition.judge, FamilyJudge) or definition.finish is not None:
         return None
     if definition.judge.levels is not None or definition.judge.further is not None:
-        # a page has no Python to compute these
+        # a page has no Python to compute them
         return None
     settings = definition.judge.settings(made.bench.chosen_options)
     is_whole = all(FAMILIES.find(name).loops is not None for name in settings)
@@ -356,7 +357,7 @@ def _family(name: str, setting: Any, recording: xr.Dataset) -> dict[str, Any]:
 
 
 def _judged(made: Exported, result: Result, followed: Sequence[str]) -> dict[str, Any] | None:
-    """Return the data by which the page judges its run; None where it cannot."""
+    """Return the data with which the page judges its run; None if it cannot."""
     bench, settings = made.bench, _settings(made)
     if settings is None:
         return None
@@ -502,9 +503,9 @@ def _footer(made: Exported) -> str:
     noise = any(name.startswith("noise_") for name in made.run.model.Stimulus._fields)
     begins = made.bench.definition.preview is not None
     return (
-        f"bywire {__version__}. The page computes the bench's own kernel, in steps of "
-        f"{1e6 * made.schedule.step:g} us{', without the noise of its sensors' if noise else ''}. "
-        f"{'It begins as the bench does with its own values. ' if begins else ''}"
+        f"bywire {__version__}. This page runs the bench's own kernel with a step of "
+        f"{1e6 * made.schedule.step:g} us{', without sensor noise' if noise else ''}. "
+        f"{'Every run starts as the unchanged bench does. ' if begins else ''}"
         f"Parameters: {cited.source}. Curves by uPlot (MIT license, in the page)."
     )
 
@@ -519,7 +520,7 @@ def _script(name: str) -> str:
 
 
 def _packed(module: bytes) -> str:
-    """Return a module as text; compressed first, as servers cannot compress base 64 well."""
+    """Return a module as compressed text, because servers cannot compress base 64 well."""
     return base64.b64encode(zlib.compress(module, 9)).decode()
 
 

@@ -1,13 +1,13 @@
-/* Panels of curves over one time axis, the current run above those that were kept. */
+/* Panels of curves over one time axis, the current run above the kept runs. */
 
 const HEIGHT = 150; // px of a panel of height 1
-const NEAR = 0.5; // share of a limit from which its lines are drawn
+const NEAR = 0.5; // fraction of a limit above which its lines are drawn
 const OFF = 0.25; // px by which a drawn line may be off a point
 const DENSE = 4; // points in a column of pixels from which their extremes are drawn
 const KEPT_DASHES = [[8, 3, 2, 3], [2, 3], [12, 4], [6, 3, 2, 3, 2, 3]]; // of kept runs, in their order
 const DASHES = { "set point": [6, 4], limit: [2, 4], stated: [7, 3] };
 
-/** Return the colors of the page as they are: they change with its theme. */
+/** Return the page's current colors, which change with its theme. */
 function palette() {
   const style = getComputedStyle(document.documentElement);
   const color = (name) => style.getPropertyValue(`--${name}`).trim();
@@ -38,7 +38,7 @@ function bendsOf(x, y, from, to, off) {
   return bends;
 }
 
-/** Return a line as uPlot takes it, through its bends alone: a stroke takes as long as it has corners. */
+/** Return a line for uPlot through its bends only, because the time of a stroke depends on its number of corners. */
 function lineOf(plot, series, from, to) {
   const { bbox, scales, data } = plot;
   if (to - from > DENSE * bbox.width) return uPlot.paths.linear()(plot, series, from, to);
@@ -73,7 +73,7 @@ function numbersOf(panel, run, kept) {
     ...kept.map((each) => column(panel.traces[0], each))];
 }
 
-/** Return the levels below a panel's curves: values that a source states, and the limit that the curves approach. */
+/** Return the levels below a panel's curves: values stated by a source, and the limit that the curves approach. */
 function marksOf(panel, largest, values) {
   const at = (value) => shownOf(value, panel), bound = panel.limit && at(values[panel.limit]);
   const limits = panel.limit && largest > NEAR * bound ? [bound, -bound] : [];
@@ -173,7 +173,7 @@ function curves(place, panels) {
         scales: { x: { time: false }, y: { range: ({ series, data }, low, high) => {
           if (low === null) return [null, null];
           const [first, last] = series[0].idxs, isWhole = first === 0 && last === data[0].length - 1;
-          const shown = isWhole ? ends() : []; // in a part of the time, the curves alone
+          const shown = isWhole ? ends() : []; // for a part of the time, only the curves
           return uPlot.rangeNum(Math.min(low, ...shown), Math.max(high, ...shown), 0.1, true);
         } } },
         legend: { live: true, markers: { dash: ({ series }, k) => (series[k].dash ? "dashed" : "solid") } },
@@ -191,7 +191,7 @@ function curves(place, panels) {
       named(plot, [...panel.stated.map(({ label }) => ({ label, role: "stated" })), ...limit], color);
       return plot;
     });
-    place.append(element("p", { class: "meaning zoom" }, "Drag over a plot to zoom in time. Double-click shows the whole run."));
+    place.append(element("p", { class: "meaning zoom" }, "Drag over a plot to zoom in on a time range. Double-click to show the whole run."));
   }
   function draw(run, kept, values) {
     current = run;
@@ -208,7 +208,7 @@ function curves(place, panels) {
         if (zoom) plot.setScale("x", zoom); // new values keep the zoom
       });
     }]));
-    show(inSight); // the others when sliders rest, or they come into sight
+    show(inSight); // the others when sliders rest or the plots become visible
     clearTimeout(later);
     later = setTimeout(() => show(), REST);
   }

@@ -1,6 +1,6 @@
-/* Key figures of a run, by the C of their families, which the module contains beside the kernel. */
+/* Key figures of a run, from the C code of their families, which the module contains next to the kernel. */
 
-/** Return the recorded part of a run: from the end of settling on, plus the time kept before it. */
+/** Return the recorded part of a run: after settling, plus the time kept before it. */
 function recordingOf({ time, table }, settle, keep) {
   const begin = time.findIndex((t) => t >= settle - keep - 1e-9);
   const since = time.slice(begin).map((t) => Math.round((t - settle) * 1e12) / 1e12);
@@ -14,13 +14,13 @@ function formatted(number, spec) {
   return kind === "e" ? number.toExponential(digits) : String(Number(number.toPrecision(digits)));
 }
 
-/** Return why a figure has no value, with the numbers in the text. */
+/** Return the reason why a figure has no value, with the numbers in the text. */
 function reasonOf({ text }, numbers) {
   let next = 0;
   return text.replace(/\{:([^}]*)\}/g, (_, spec) => formatted(numbers[next++], spec));
 }
 
-/** Return all figures of a family by name: a number, or why there is none. */
+/** Return all figures of a family by name: a number, or the reason for its absence. */
 function familyOf({ memory, room, ...functions }, { time, table }, names, family) {
   const count = time.length, columns = family.signals.map((name) => names.indexOf(name));
   const here = columns.filter((k) => k >= 0).length, figures = family.figures.length;

@@ -1,9 +1,9 @@
-/* Loops as they are sampled, or analog, from the Jacobians that the module computes: response and margins.
+/* Sampled or analog loops from the Jacobians that the module computes: response and margins.
  * The definitions are those of bywire.margins. Matrices are arrays of rows. */
 
 const TOUCH = 1e-12; // m, below which a contact counts as neither closed nor open
-const LOWEST = 1e-2, NYQUIST = 0.998, POINTS = 2000; // Hz, share of half the sampling frequency
-const ON_BORDER = 1e-6; // growth in a sample that still counts as an integrator
+const LOWEST = 1e-2, NYQUIST = 0.998, POINTS = 2000; // Hz, fraction of half the sampling frequency
+const ON_BORDER = 1e-6; // growth per sample that still counts as an integrator
 
 const zeros = (rows, columns) => Array.from({ length: rows }, () => new Float64Array(columns));
 const eye = (n) => zeros(n, n).map((row, k) => ((row[k] = 1), row));
@@ -18,7 +18,7 @@ function times(X, Y) {
   return product;
 }
 
-/** Return powers of two by which rows are divided and columns multiplied to be of like size. */
+/** Return powers of two that divide rows and multiply columns so that both have similar magnitudes. */
 function scales(X) {
   const scale = new Float64Array(X.length).fill(1);
   for (let isDone = false, round = 0; !isDone && round < 50; ++round) {
@@ -94,7 +94,7 @@ function unlike(one, other) {
   return false;
 }
 
-/** Return what tasks at the same instant make of memory X x + M m + U u, in a row. */
+/** Return the effect of successive tasks at the same time on memory X x + M m + U u. */
 const after = ({ X, M, U }, tick) => ({
   X: plus(tick.X, times(tick.M, X)), M: times(tick.M, M), U: times(tick.M, U),
 });

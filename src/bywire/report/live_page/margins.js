@@ -1,6 +1,6 @@
 /* Margins of a loop gain L, negative feedback not counted; definitions as in bywire.margins. */
 
-const NO_LOOP = 1e-9, LEAST_FACTOR = 1e-9; // loop gain that counts as zero; least factor, at a pole on the border
+const NO_LOOP = 1e-9, LEAST_FACTOR = 1e-9; // loop gain that counts as zero; minimum factor, at a pole on the stability limit
 const SLOWEST = 1e-6, SLOW_POINTS = 40; // below the diagram, where the loop gain is real, Hz
 const DEGREE = 180 / Math.PI;
 const wrapped = (angle) => angle - 360 * Math.floor((angle + 180) / 360);
@@ -40,7 +40,7 @@ function crossingsOf(model, { frequency, size, margin }) {
   return found;
 }
 
-/** Return the factors by which the gain may grow, and to which it may fall, and where they are read [Hz]. */
+/** Return the factors by which the gain may increase and decrease, and their frequencies [Hz]. */
 function gainMargins({ frequency, L }, model) {
   const slow = Array.from({ length: SLOW_POINTS }, (_, k) => SLOWEST * (LOWEST / SLOWEST) ** (k / SLOW_POINTS));
   const f = [...slow, ...frequency], values = [...slow.map((at) => responseAt(model, at)), ...L], found = [];
@@ -88,12 +88,12 @@ function marginsOf(model, bode) {
   };
 }
 
-/** Return Bode diagram and margins of a loop at the module's parameters, or why there are none. */
+/** Return Bode diagram and margins of a loop at the module's parameters, or the reason for their absence. */
 function loopAt(exported, loop) {
   const model = modelOf(exported, loop);
-  if (model === "corner") return { reason: "the operating point lies on a kink of the model, whose sides have different loop gains: " +
-    `run bywire margins ${loop.name} to see the operation` };
-  if (!model) return { reason: "no operating point with these values: a contact opens or closes there" };
+  if (model === "corner") return { reason: "the operating point is at a kink of the model, where the loop gain differs between the two sides. " +
+    `Run bywire margins ${loop.name} to see the operation` };
+  if (!model) return { reason: "no operating point with these values, because a contact opens or closes there" };
   const bode = bodeOf(model);
   return { frequency: bode.frequency, decibel: bode.size.map((size) => 20 * Math.log10(size)),
     phase: bode.margin.map((margin) => margin - 180), margins: marginsOf(model, bode) };

@@ -1,4 +1,4 @@
-/* Values of parameters: as shown and in SI, in links, files and messages. No page is needed. */
+/* Parameter values: as shown and in SI, in links, files and messages. They need no page. */
 
 /** Return a quantity in the unit in which it is shown, and back. */
 const shownOf = (value, { factor, offset }) => value * factor + offset;
@@ -22,7 +22,7 @@ function reading(value, unit, levels = []) {
   return levels.length ? levels[value] ?? String(value) : withUnit(value, unit);
 }
 
-/** Return the ends of a slider [SI], and whether it goes by factors; null where it makes no sense. */
+/** Return the ends of a slider [SI], and whether it moves by factors; null if a slider makes no sense. */
 function sliderOf({ start, low, high }) {
   if (start === 0 && (low === null || high === null)) return null;
   const byFactors = start > 0 && !(low === 0 && high === 1);
@@ -33,7 +33,7 @@ function sliderOf({ start, low, high }) {
   return to > from ? { from, to, byFactors } : null;
 }
 
-/** Return the value at a share of a slider's way, 0 to 1, and the share of a value. */
+/** Return the value at a fraction of a slider's travel, 0 to 1, and the fraction of a value. */
 const valueAt = ({ from, to, byFactors }, share) =>
   byFactors ? from * (to / from) ** share : from + (to - from) * share;
 const shareOf = ({ from, to, byFactors }, value) => Math.min(1, Math.max(0,
@@ -46,7 +46,7 @@ function objection({ name, unit, shownUnit, low, high, range }, value, text = ""
   if (isWithin) return "";
   if (Number.isFinite(value)) return `${name} must be ${range}, not ${value}${unit === "1" ? "" : ` ${unit}`}`;
   const typed = text.length > 40 ? `"${text.slice(0, 40)} …"` : text ? `"${text}"` : "empty";
-  return `${name} must be ${range}, not ${typed}: type a number${shownUnit ? ` in ${shownUnit}, or with a unit` : ""}`;
+  return `${name} must be ${range}, not ${typed}. Type a number${shownUnit ? ` in ${shownUnit}, or with a unit` : ""}`;
 }
 
 const RAISED = "⁰¹²³⁴⁵⁶⁷⁸⁹";
@@ -125,8 +125,8 @@ function changesOf(link, digest, parameters) {
   if (!link) return changes;
   const asked = new URLSearchParams(link);
   if (asked.get("bench") !== digest)
-    throw new RangeError("this link belongs to another bench or version: " +
-      "the page ignores its values");
+    throw new RangeError("this link belongs to another bench or version. " +
+      "The page ignores its values");
   asked.delete("bench");
   for (const [name, text] of asked) {
     const parameter = parameters.find((each) => each.name === name);
@@ -139,7 +139,7 @@ function changesOf(link, digest, parameters) {
   return changes;
 }
 
-/** Return a bench file with further parameters set. */
+/** Return a bench file with additional parameters set. */
 function benchFile(text, changes, parameters) {
   const lines = text.trimEnd().split("\n");
   let at = lines.indexOf("[set]");
@@ -161,7 +161,7 @@ function isMet({ value }, { compare, bound }) {
     : compare === "<" ? value < bound : value > bound;
 }
 
-/** Return signals by name, each taken out of a table of rows when it is first asked for. */
+/** Return signals by name, each read from a table of rows on first use. */
 function columnsOf(table, time, names) {
   const signals = {};
   names.forEach((name, k) => Object.defineProperty(signals, name, { enumerable: true, configurable: true, get() {
@@ -172,7 +172,7 @@ function columnsOf(table, time, names) {
   return signals;
 }
 
-/** Return recorded signals as CSV, units in the heads, all SI. */
+/** Return recorded signals as CSV in SI, with units in the headings. */
 function csvOf(time, signals, known) {
   const heads = ["time [s]", ...known.map(({ name, unit }) => `${name} [${unit}]`)];
   const columns = [time, ...known.map(({ name }) => signals[name])];

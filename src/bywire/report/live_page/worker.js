@@ -1,6 +1,6 @@
-/* Runs and judges the bench beside the page, which stays alive meanwhile; the scripts that it calls stand above. */
+/* Runs and judges the bench in the background, so the page remains responsive. The scripts that it calls are above. */
 const LOST = "the bench cannot be computed with these values: a state becomes infinite or is not a number";
-/** Return a loop's response and margins, or why there are none. */
+/** Return a loop's response and margins, or the reason for their absence. */
 function loopOf(exported, loop) {
   try {
     return loopAt(exported, loop);

@@ -1,4 +1,4 @@
-"""Figures of single cases: points over drivers, or lines over parallel axes."""
+"""Figures of single cases: points versus drivers, or lines across parallel axes."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from bywire.report.readable_axis import (
 from bywire.report.study.drawn_cases import DrawnCases
 from bywire.report.style import legend_outside
 
-_JITTER = 0.3  # spread of the points of a choice, as a share of the distance of two
+_JITTER = 0.3  # spread of the points of a choice, relative to the distance between choices
 _GOLDEN = 0.5 * (5.0**0.5 - 1.0)  # its multiples are spread evenly, for any number of them
 _LONGEST = 24  # characters of a choice that fit
 
@@ -115,7 +115,7 @@ def choice_axis(name: str, values: Sequence[str], choices: Sequence[str]) -> Cas
     return CaseAxis(name, "", np.array([places[each] for each in values], float), tuple(choices))
 
 
-# --- A key figure over the quantities that drive it
+# --- A key figure versus the quantities that drive it
 
 _EDGE = 1.03  # position of cases without the figure, in heights of a panel
 _MANY_POINTS = 1000  # number of points from which they are small and translucent
@@ -124,17 +124,17 @@ _MANY_POINTS = 1000  # number of points from which they are small and translucen
 def scatter(
     figure_of: CaseAxis, drivers: Sequence[CaseAxis], limit: float, cases: DrawnCases
 ) -> Figure:
-    """Draw a key figure over its drivers.
+    """Draw a key figure versus its drivers.
 
     Parameters
     ----------
     figure_of, drivers
         The key figure, and the quantities on the abscissas.
     limit
-        Limit [the figure's unit]; only written where it is far away.
+        Limit [the figure's unit]; only written if it is far away.
     cases
-        Drawn cases; those that miss the limit are crosses, and those without the figure, which also
-        miss it, triangles at the upper edge.
+        Drawn cases. Cases that miss the limit are crosses. Cases without the figure also miss the
+        limit; they are triangles at the upper edge.
     """
     figure = Figure(figsize=(style.WIDTH, 2.8), layout="constrained", facecolor="white")
     panels = figure.subplots(1, len(drivers), sharey=True, squeeze=False)[0]
@@ -229,7 +229,7 @@ def scatter(
                 marker="v",
                 markersize=3.5,
                 linestyle="none",
-                label="has no figure: misses it",
+                label="no figure, so missed",
             ),
         ),
         (not far, Line2D([], [], color=look.color, linestyle=":", label="limit")),
@@ -238,7 +238,7 @@ def scatter(
     return figure
 
 
-# --- Parallel axes: what varies and what comes of it
+# --- Parallel axes: varied quantities and their effect
 
 _MANY_LINES = 100  # number of lines from which they are translucent
 _NONE = 1.3  # position of cases without a figure, in lengths of an axis
@@ -248,18 +248,18 @@ _BOX = {"facecolor": "white", "edgecolor": "none", "pad": 0.8}
 def parallel_coordinates(
     axes_of: Sequence[CaseAxis], cases: DrawnCases, limits: Mapping[str, float]
 ) -> Figure:
-    """Draw cases as lines over all axes, those that miss a requirement in front.
+    """Draw cases as lines across all axes, with cases that miss a requirement in front.
 
     Parameters
     ----------
     axes_of
-        Varied quantities, then key figures; each axis goes from its least to its largest value,
-        with undefined values above it.
+        Varied quantities, then key figures; each axis goes from its minimum to its maximum, with
+        undefined values above it.
     cases
         Drawn cases, by whether they meet all requirements.
     limits
         Limits of key figures, in their unit: a mark on the axis, or at its end if no case reaches
-        it.
+        the limit.
     """
     axes_of = [each for each in axes_of if np.isfinite(each.values).any()]
     figure, (axes,) = style.new_figure(3.4)
@@ -331,7 +331,7 @@ def parallel_coordinates(
 
 
 def _write_values(axes: Axes, place: int, shown: CaseAxis, ends: tuple[float, float]) -> None:
-    """Write the ends of an axis beyond it, and further choices beside it."""
+    """Write the end values of an axis beyond it, and other choices next to it."""
     low, high = ends
     numbers = {low: f"{low:.3g}", high: f"{high:.3g}"}
     texts = {float(k): name for k, name in enumerate(shown.names)} or numbers

@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 POINTS = 4000
-"""most points of a scatter plot that meet the limit; all that miss it are drawn"""
+"""maximum number of scatter plot points that meet the limit; all points that miss it are drawn"""
 LINES = 300
-"""most lines of parallel coordinates that meet all requirements, and that miss one"""
+"""maximum number of lines that meet all requirements, and of lines that miss one"""
 
 BARS = 8
-"""most quantities in a panel of bars"""
+"""maximum number of quantities in a panel of bars"""
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class DrawnCases:
     all_met, all_missed
         Total number of each.
     lacking
-        Rows of the cases without the figure, which therefore miss it; all are drawn.
+        Rows of the cases without the figure, which therefore miss the limit; all are drawn.
     """
 
     met: NDArray[np.intp]
@@ -47,7 +47,7 @@ class DrawnCases:
         said = " and ".join(
             f"{drawn} of {count} cases that {text}"
             if drawn < count
-            else f"all that {text} ({count})"
+            else f"all {count} cases that {text}"
             for drawn, count, text in kinds
             if count
         )
@@ -60,14 +60,14 @@ def drawn_cases(
     most_missed: int | None = None,
     known: NDArray[np.bool_] | None = None,
 ) -> DrawnCases:
-    """Return the drawn cases, evenly out of all where all would be too many to distinguish.
+    """Return the drawn cases: all, or an even selection if there are too many to distinguish.
 
     Parameters
     ----------
     met
         Whether each case meets the requirements, shape (cases,).
     most_met, most_missed
-        Largest numbers of drawn cases; default: all that miss.
+        Maximum numbers of drawn cases. Default: all that miss.
     known
         Whether each case has the drawn figure, shape (cases,); default: all. Others are drawn at
         an edge.

@@ -1,4 +1,4 @@
-"""Figures of the drivers of key figures: correlations, indices, effect of each quantity alone."""
+"""Figures of key figures' drivers: correlations, indices, effect of each quantity alone."""
 
 from __future__ import annotations
 
@@ -36,10 +36,10 @@ Driving = Influence | ChoiceInfluence
 
 
 def influence_bars(influences: Mapping[str, Sequence[Driving]]) -> Figure:
-    """Draw the rank correlations of every key figure, by name, the strongest on top.
+    """Draw the rank correlations of every key figure, by name, with the strongest on top.
 
-    Insignificant ones are pale. Choices have their correlation ratio in another color, without a
-    sign or an interval.
+    Insignificant correlations are pale. Choices show their correlation ratio in another color,
+    without a sign or an interval.
     """
     shown = {name: list(each)[:BARS] for name, each in influences.items()}
     counts = [max(len(each), 1) for each in shown.values()]
@@ -91,14 +91,14 @@ def _draw_correlations(axes: Axes, each: Sequence[Driving]) -> None:
 Drivers = Sequence[VarianceShares] | Sequence[ElementaryEffects]
 
 _INDEX = 0.34  # height of a quantity [inch]
-_THICK = 0.38  # height of one of its two bars, as a share of the distance of quantities
+_THICK = 0.38  # height of one of its two bars, relative to the distance between quantities
 _LABELS = {VarianceShares: ("total", "first order"), ElementaryEffects: ("mu*", "sigma")}
 
 
 def sensitivity_bars(
     drivers: Mapping[str, Drivers], units: Mapping[str, str], sizes: Mapping[str, float]
 ) -> Figure:
-    """Draw the indices of every key figure, the strongest quantity on top.
+    """Draw the indices of every key figure, with the strongest quantity on top.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def sensitivity_bars(
     units
         SI unit of every key figure, or ``"%"``.
     sizes
-        Largest magnitude of every key figure, in that unit.
+        Maximum magnitude of every key figure, in that unit.
     """
     shown: dict[str, Drivers] = {name: each[:BARS] for name, each in drivers.items()}
     counts = [len(each) for each in shown.values()]
@@ -171,7 +171,7 @@ def _reach(values: Array) -> Array | None:
     return np.array([below, above]) if np.any(above > 0.0) else None
 
 
-# --- Each quantity alone: the farthest-moving on top
+# --- Each quantity alone, with the largest swing on top
 
 _SWING = 0.28  # height of a quantity [inch]
 _PANEL = style.WIDTH - 2.5  # approximate length of an abscissa [inch]
@@ -188,8 +188,8 @@ def tornado(
 ) -> Figure:
     """Draw the swings of every key figure around its value in the bench itself.
 
-    Choices have no direction: their bars are gray, with the names of the farthest ones at the ends.
-    A triangle at the edge marks quantities with a level without the figure.
+    Choices have no direction, so their bars are gray, with the names of the farthest choices at the
+    ends. A triangle at the edge marks quantities for which the figure is undefined at some level.
 
     Parameters
     ----------
@@ -198,7 +198,7 @@ def tornado(
     units
         SI unit of every key figure, or ``"%"``.
     limits
-        Limits of key figures, in their unit; only written where they are far away.
+        Limits of key figures, in their unit; only written if they are far away.
     """
     shown = {name: each[:BARS] for name, each in effects.items()}
     counts = [len(each) for each in shown.values()]
@@ -226,8 +226,8 @@ def tornado(
     handles: list[Artist] = []
     if any(units_shown):
         handles += [
-            Patch(color=style.BLUE, label="quantity below the bench's"),
-            Patch(color=style.ORANGE, label="above"),
+            Patch(color=style.BLUE, label="quantity below the bench value"),
+            Patch(color=style.ORANGE, label="above the bench value"),
         ]
     if not all(units_shown):
         handles.append(Patch(color=style.GRAY, alpha=_PALE, label="choice"))

@@ -30,12 +30,12 @@ from bywire.studies.statistics import Share
 _COLUMNS = 2
 _HEIGHT = 1.5  # height of a panel [inch]
 _ROOM = 2.7  # width of a panel [inch]
-_BINS = 60  # largest number of bins
+_BINS = 60  # maximum number of bins
 
 
 @dataclass(frozen=True)
 class Spread:
-    """A key figure over the cases.
+    """A key figure's values in all cases.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def histograms(spreads: Mapping[str, Spread], has_band: bool = True) -> Figure:
     spreads
         By name.
     has_band
-        Whether a shaded band contains 90 % of the cases, for randomly drawn ones.
+        Whether to shade a band that contains 90 % of the cases, for randomly drawn cases.
     """
     rows = -(-len(spreads) // _COLUMNS)
     figure = Figure(
@@ -131,7 +131,7 @@ def _bins(values: Array) -> int:
     return int(np.clip(edges.size - 1, 1, _BINS))
 
 
-# --- How probable it is that a key figure comes worse than a value, down to rare ones
+# --- Probability that a key figure is worse than a value, down to rare values
 
 
 @dataclass(frozen=True)
@@ -143,11 +143,11 @@ class Curve:
     name, unit
         The figure, in SI or ``"%"``.
     limit, admitted
-        Its limit, and the largest probability of missing it.
+        Limit, and maximum probability of missing it.
     values
         Shape (points,).
     probability, low, high
-        Estimate and interval at each value; NaN where there is none.
+        Estimate and interval at each value; NaN where it is undefined.
     """
 
     name: str
@@ -161,7 +161,7 @@ class Curve:
 
 
 def exceedance(curves: Sequence[Curve]) -> Figure:
-    """Draw every curve over a logarithmic probability, each in a panel with its own abscissa."""
+    """Draw every curve with a logarithmic probability, each in a panel with its own abscissa."""
     figure, panels = style.new_figure(0.5 + 2.0 * len(curves), [1.0] * len(curves), is_shared=False)
     look = style.STROKES[Role.LIMIT]
     for axes, each in zip(panels, curves, strict=True):
@@ -177,7 +177,7 @@ def exceedance(curves: Sequence[Curve]) -> Figure:
             color=look.color,
             linestyle=look.linestyle,
             linewidth=look.linewidth,
-            label="limit, admitted",
+            label="limit, admissible probability",
         )
         axes.axhline(
             each.admitted, color=look.color, linestyle=look.linestyle, linewidth=look.linewidth
@@ -191,27 +191,28 @@ def exceedance(curves: Sequence[Curve]) -> Figure:
     return figure
 
 
-# --- How the estimate of a probability came about, case by case
+# --- Convergence of a probability's estimate, case by case
 
-_MARGIN = 8.0  # largest displayed interval, relative to the admissible probability of failure
-_LONG = 10.0  # ratio of numbers of cases from which their axis is logarithmic
+_MARGIN = 8.0  # maximum displayed interval, relative to the admissible probability of failure
+_LONG = 10.0  # ratio of case numbers above which their axis is logarithmic
 
 
 def convergence(
     shares: Mapping[str, Sequence[Share]], wanted: Mapping[str, float | None], first: int = 1
 ) -> Figure:
-    """Draw the share of the first cases that meet a requirement, over their number.
+    """Draw the fraction of the first cases that meet a requirement, versus their number.
 
     Ordinates reach from slightly below the required probability to 100 %.
 
     Parameters
     ----------
     shares
-        Text of a requirement -> share of the first cases, with its interval, for growing numbers.
+        Text of a requirement -> fraction of the first cases, with its interval, for increasing
+        numbers.
     wanted
         Required probability, drawn as a dotted line; None for none.
     first
-        Number of cases from which it is drawn: the interval of a few cases is too wide.
+        Number of cases at which the curve starts, because the interval of a few cases is too wide.
     """
     figure, panels = style.new_figure(0.5 + 1.4 * len(shares), [1.0] * len(shares))
     look = style.STROKES[Role.LIMIT]
@@ -259,7 +260,7 @@ def convergence(
 
 
 def _lowest(drawn: Sequence[Share], wanted: float | None) -> float:
-    """Return the least displayed probability."""
+    """Return the minimum displayed probability."""
     reached = min(s.low for s in drawn)
     if wanted is not None:
         reached = max(min(reached, wanted), 1.0 - _MARGIN * (1.0 - wanted))

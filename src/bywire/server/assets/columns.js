@@ -1,10 +1,10 @@
-/* Columns of a measurement: a first plot, a unit and a use for each; the form's fields follow. */
+/* Columns of a measurement, each with a first plot, a unit and a use, from which the script fills in the form. */
 "use strict";
 
 const SVG = "http://www.w3.org/2000/svg", WIDE = 400, HIGH = 60;
 const shortly = (value) => String(Number(value.toPrecision(4)));
 
-/** Return the options of a chooser, some of them in groups: [heading, [[value, text], ...]]. */
+/** Return the options of a select element, some in groups: [heading, [[value, text], ...]]. */
 function optionsOf(groups) {
   return groups.flatMap(([heading, options]) => {
     const made = options.map(([value, text]) => element("option", text, { value }));
@@ -15,7 +15,7 @@ function optionsOf(groups) {
   });
 }
 
-/** Draw a column over its instants, or over its rows: the lowest and highest value of each bin. */
+/** Draw a column versus time, or versus its rows, with the minimum and maximum of each bin. */
 function curveOf({ name, low, high }, x) {
   const svg = document.createElementNS(SVG, "svg"), path = document.createElementNS(SVG, "path");
   const set = (node, values) => Object.entries(values).forEach(([key, value]) => node.setAttribute(key, value));
@@ -37,13 +37,13 @@ function curveOf({ name, low, high }, x) {
   return svg;
 }
 
-/** Return the extreme values of a column in words. */
+/** Return the extreme values of a column as text. */
 function rangeOf({ low, high }) {
   const there = [...low, ...high].filter((value) => value !== null);
   return there.length ? `${shortly(Math.min(...there))} to ${shortly(Math.max(...there))}` : "no numbers";
 }
 
-/** Show the columns in a table; `filled(rows)` is called with every choice. */
+/** Show the columns in a table, and call `filled(rows)` after every choice. */
 function showColumns(place, said, filled) {
   const { columns, inputs, outputs, units } = said;
   const signals = new Map([...inputs.map((each) => [`input ${each.name}`, each]),
@@ -79,7 +79,7 @@ function showColumns(place, said, filled) {
       row.range.textContent = `${rangeOf(column)} ${unitOf(row)}`.trim();
       row.curve.replaceChildren(...(column.low.length ? [curveOf(column, x)] : []));
     }
-    const over = clock ? ` over ${clock.column.name}, ${rangeOf(clock.column)} ${unitOf(clock)}`.trimEnd() : " over its rows";
+    const over = clock ? ` versus ${clock.column.name}, ${rangeOf(clock.column)} ${unitOf(clock)}`.trimEnd() : " versus its rows";
     caption.textContent = `${said.file}: each column${over}`;
   }
   function update(changed) {
@@ -110,7 +110,7 @@ function showColumns(place, said, filled) {
   update(null);
 }
 
-/** Write the choices into the fields of the form. */
+/** Write the choices to the fields of the form. */
 function fillIn(form, rows, usual) {
   const column = ({ name, unit }) => (unit ? `${name} [${unit}]` : name);
   const lines = (kind, isPlain) => rows.filter(({ use }) => use.startsWith(`${kind} `)).map((row) => {
@@ -123,14 +123,14 @@ function fillIn(form, rows, usual) {
     const field = form.elements[name];
     if (!field || field.value === text) return;
     field.value = text;
-    field.dispatchEvent(new Event("input", { bubbles: true })); // an error beside it is outdated
+    field.dispatchEvent(new Event("input", { bubbles: true })); // an error next to it is outdated
   };
   write("input", lines("input", false));
   write("output", lines("output", true));
   write("time", clock && !isUsual ? column(clock) : "");
 }
 
-/** Let a form with a measurement show its columns whenever another file, bench or method is chosen. */
+/** Let a form with a measurement show its columns whenever the file, the bench or the method changes. */
 function armColumns(form) {
   const drop = form.querySelector(".drop"), place = form.querySelector(".columns");
   if (!drop || !form.elements.output) return;
@@ -144,7 +144,7 @@ function armColumns(form) {
     const asked = new URLSearchParams({ file, bench: valueOf("bench"), method: valueOf("method") });
     try {
       const said = await ask(`/api/columns?${asked}`);
-      const folded = form.elements.output.closest("details"); // that hides the fields to fill in
+      const folded = form.elements.output.closest("details"); // which hides the fields to fill in
       if (folded) folded.open = true;
       if (number === latest) showColumns(place, said, (rows, usual) => fillIn(form, rows, usual));
     } catch (error) {

@@ -17,7 +17,7 @@ async function ask(address, method = "GET", body = undefined) {
   try {
     answer = await fetch(address, { method, headers, body: body && JSON.stringify(body) });
   } catch {
-    throw new Error("the server does not answer: if it has ended, start bywire serve again");
+    throw new Error("the server does not reply. If it has stopped, start 'bywire serve' again");
   }
   const said = await answer.json().catch(() => ({ error: `status ${answer.status}` }));
   if (!answer.ok) throw Object.assign(new Error(said.error), { field: said.field });
@@ -35,7 +35,7 @@ function valueOf(field) {
   return field.value;
 }
 
-/* Show an error at its field, and focus the field; errors without a visible field are at the top. */
+/* Show an error at its field, and focus the field. Errors without a visible field are at the top. */
 function complainOf(form, { message, field: name }) {
   const field = name && form.querySelector(`:is(input:not([type=hidden]), select, textarea)[name="${CSS.escape(name)}"]`);
   if (!field) return complain(message);
@@ -88,7 +88,7 @@ function sent(file, bar) {
     const request = new XMLHttpRequest();
     request.open("PUT", `/api/measurements/${encodeURIComponent(file.name)}`);
     request.upload.onprogress = ({ loaded, total }) => { bar.value = total ? loaded / total : 0; };
-    request.onerror = () => reject(new Error(`${file.name} could not be sent: has the server ended?`));
+    request.onerror = () => reject(new Error(`${file.name} could not be sent. The server may have stopped`));
     request.onload = () => {
       let said = {};
       try { said = JSON.parse(request.responseText); } catch { /* the status is the error */ }
@@ -102,8 +102,8 @@ function sent(file, bar) {
 async function take(drop, file) {
   const most = Number(document.body.dataset.largest), bar = drop.querySelector(".sent");
   if (file.size > most) {
-    complain(`${file.name} has ${Math.ceil(file.size / 1e6)} MB, but the limit is ${Math.floor(most / 1e6)} MB: copy `
-      + "it into the served folder, or make it smaller with bywire convert");
+    complain(`${file.name} is ${Math.ceil(file.size / 1e6)} MB, but the limit is ${Math.floor(most / 1e6)} MB. Copy `
+      + "it to the served folder, or make it smaller with 'bywire convert'");
     return;
   }
   bar.hidden = false;
@@ -191,7 +191,7 @@ async function cancel(job, button) {
   await refresh();
 }
 
-/* Keep the focus when an item is rebuilt: on the element of the same label, or on the item itself. */
+/* Keep the focus when an item is rebuilt, on the element with the same label or on the item itself. */
 function replace(old, item) {
   const here = old.contains(document.activeElement) && document.activeElement;
   const name = here && here.getAttribute("aria-label");
@@ -221,7 +221,7 @@ function update(job) {
 
 const NS = "http://www.w3.org/2000/svg";
 
-/* Bars of a histogram; their text is next to them. */
+/* Bars of a histogram, with their text next to them. */
 function bars({ counts, ends }) {
   const drawn = document.createElementNS(NS, "svg"), most = Math.max(...counts);
   const set = (node, values) => Object.entries(values).forEach(([name, value]) => node.setAttribute(name, value));
@@ -270,7 +270,7 @@ async function refresh() {
   try {
     jobs = (await ask("/api/jobs")).jobs;
     const items = jobs.map(update), list = place("jobs");
-    // One by one, because a moved item loses the focus. The latest are first, the oldest are removed.
+    // One at a time, because a moved item loses the focus. The latest are first, and the oldest are removed.
     items.forEach((item, k) => { if (list.children[k] !== item) list.insertBefore(item, list.children[k] ?? null); });
     while (list.children.length > items.length) list.lastElementChild.remove();
     place("no-jobs").hidden = jobs.length > 0;

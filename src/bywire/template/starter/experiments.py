@@ -1,4 +1,4 @@
-"""Experiments of the brake starter, for ``bywire run``; generic experiments need no code."""
+"""Experiments of the brake starter, for ``bywire run``. Generic experiments need no code."""
 
 from __future__ import annotations
 
@@ -25,18 +25,18 @@ from bywire.template.starter.parameters import Parameters
 
 
 class Options(ParameterSet):
-    """Options of the braking."""
+    """Options of the brake application."""
 
     F_set: Annotated[float, Unit("N", 1e4), Field(gt=0, allow_inf_nan=False)]
     """demanded clamp force"""
     duration: Duration
-    """length of the demand"""
+    """duration of the demand"""
     release: Duration
-    """time recorded after the release"""
+    """recording time after the release"""
 
 
 def cases(par: Parameters, options: Options, _: Any) -> tuple[Case, ...]:
-    """Return the single run: from the open caliper to the force, and back."""
+    """Return the only run, from the open caliper to the force and back."""
 
     def stimulus(t: np.ndarray) -> dict[str, np.ndarray]:
         return {"F_set": np.where((t >= 0.0) & (t < options.duration), options.F_set, 0.0)}
@@ -63,7 +63,7 @@ def step(options: Options) -> step_response.Setting:
 
 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
-    """Return the key figures of the braking."""
+    """Return the key figures of the brake application."""
     held = recordings["run"].sel(time=slice(None, options.duration - 1e-9))
     return tuple(evaluate("step_response", held, step(options)).values())
 

@@ -19,7 +19,7 @@ def point(par: ParameterSet, value: float) -> Point:
 LOOP = Loop(
     name="starter-force",
     assembly="starter-actuator",
-    summary="clamp-force control around speed control, 1 kHz",
+    summary="clamp force control around speed control, 1 kHz",
     at=Quantity("force", "N", 10e3),
     inputs=("F_set",),
     output="F",

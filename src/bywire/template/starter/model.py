@@ -45,7 +45,7 @@ class StarterActuator(Assembly[Parameters, Memory]):
     F = Wire("N", "clamp force", 1e4)
 
     def wire(self, w: Self) -> None:
-        """Connect the parts, in the order of the physics."""
+        """Connect the parts, in the physical order."""
         nut = spindle.output(w.spindle.x, w.spindle.par)
         w.travel = nut.x
         w.caliper.u = caliper_spring.Input(w.travel, nut.v)
@@ -55,7 +55,7 @@ class StarterActuator(Assembly[Parameters, Memory]):
         w.spindle.u = spindle.Input(torque, w.F)
 
     def friction(self, w: Self) -> tuple[Bounds, ...]:
-        """Return the limits of the dry friction; at rest it has any value between them."""
+        """Return the limits of the dry friction, between which it has any value at rest."""
         T = spindle.dry_friction(w.spindle.u, w.spindle.par)
         return ((-T, T),)
 

@@ -6,14 +6,14 @@ from bywire.authoring import CitedSet, chosen, derived
 from bywire.template.starter.parameters import Parameters
 
 _MOTOR = "a motor of about 200 W at 12 V"
-_TUNED = "tuned by hand: 'bywire margins starter-force' shows the margins"
+_TUNED = "tuned by hand. 'bywire margins starter-force' shows the margins"
 
 ENTRIES = (
     CitedSet(
         name="starter-example",
         assembly="starter-actuator",
-        source="invented, with magnitudes of a car's brake: cite your source here",
-        summary="an example of 20 kN: replace every number with your own",
+        source="invented, with the magnitudes of a car's brake. Cite your source here",
+        summary="an example of 20 kN. Replace every number with your own",
         parameter_class=Parameters,
         values={
             "motor.R_m": chosen(0.1, _MOTOR),

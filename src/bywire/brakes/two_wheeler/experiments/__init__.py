@@ -1,1 +1,1 @@
-"""Experiments; those of one test family share a file."""
+"""Experiments. Those of one test family share a file."""

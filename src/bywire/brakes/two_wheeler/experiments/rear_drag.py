@@ -16,15 +16,15 @@ from bywire.core.typing import Array
 from bywire.plant.road import SurfaceName
 from bywire.vehicle.ideal_stop import RidingSpeed
 
-_LEFT = 0.1  # share of the torque below which the brake counts as released
+_LEFT = 0.1  # fraction of the torque below which the brake counts as released
 _END = 0.1  # s: averaging window at the end
 
 FIGURES = Figures(
-    drag=("N*m", f"Mean torque of the rear brake in the last {_END:g} s."),
-    residual_pressure=("Pa", "Mean pressure at its pads in the same time."),
+    drag=("N*m", f"Mean rear brake torque in the last {_END:g} s."),
+    residual_pressure=("Pa", f"Mean pressure at the rear pads in the last {_END:g} s."),
     release_time=(
         "s",
-        f"Time from the release until the torque stays below {_LEFT:g} of its initial value.",
+        f"Time from the release until the torque stays below {_LEFT:g} times its initial value.",
     ),
 )
 _SIGNALS = ("T_r", "p_r")
@@ -40,13 +40,13 @@ class Options(ParameterSet):
     hold: Duration
     """time of the release"""
     surface: SurfaceName
-    """surface of the road"""
+    """road surface"""
     duration: Duration
     """recording time"""
 
 
 def cases(par: WholeRearParameters, options: Options, _: object = None) -> tuple[Case, ...]:
-    """Return the single run, which begins with the rear brake applied."""
+    """Return the single run, which starts with the rear brake applied."""
 
     def demand(t: Array) -> Array:
         return np.where(t < options.hold, options.p_rear, 0.0)
@@ -95,7 +95,7 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
 EXPERIMENT = Experiment(
     name="rear-drag",
     assembly="two-wheeler-whole-rear",
-    summary="residual drag after the rider releases the whole rear brake at {v_0}",
+    summary="residual drag after the rider releases the whole rear brake, from {v_0}",
     options=Options,
     defaults=Options(v_0=20.0, p_rear=20e5, hold=0.5, surface="dry-asphalt", duration=2.0),
     cases=cases,

@@ -18,9 +18,9 @@ from bywire.vehicle.ideal_stop import RidingSpeed
 FIGURES = Figures(
     undefined="the rear wheel stays on the ground",
     lift_time=("s", "Time until the rear wheel leaves the ground."),
-    lift_deceleration=("m/s**2", "Deceleration at the lift."),
+    lift_deceleration=("m/s**2", "Deceleration when the rear wheel leaves the ground."),
     flat_limit=("m/s**2", "Static lift limit of the level body, g l_f/h."),
-    time_to_5_deg=("s", "Time from lift to 5 degrees of pitch."),
+    time_to_5_deg=("s", "Time from the start of the lift to 5 degrees of pitch."),
     peak_pitch=("rad", "Maximum pitch, nose down."),
     air_time=("s", "Time during which the rear wheel is off the ground."),
 )
@@ -28,16 +28,16 @@ _FIVE = math.radians(5.0)
 
 
 class Options(ParameterSet):
-    """The stop; slip control stays off, lift control is a parameter."""
+    """The stop. Slip control stays off, and lift control is a parameter."""
 
     v_0: RidingSpeed
     """initial speed"""
     p_front: Demand
     """front pressure demand"""
     p_rate: PressureRate
-    """build-up rate of the front pressure; if too fast, the wheel locks before it is loaded"""
+    """front pressure build-up rate; if it is too high, the wheel locks before it is loaded"""
     grip: Factor
-    """factor on the road's adhesion: sport tires have more than the surfaces' car tires"""
+    """factor on the road's adhesion; sport tires have more than the car tires in the data"""
     duration: Duration
     """recording time"""
 
@@ -50,7 +50,7 @@ def cases(par: TwoWheelerParameters, options: Options, _: object = None) -> tupl
 
 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
-    """Return time and size of the rear wheel's lift."""
+    """Return time and size of the rear wheel lift."""
     run = recordings["run"]
     body = vehicle_of(run).body
     flat = body.g * body.l_f / body.h
@@ -80,7 +80,7 @@ def _lift(run: xr.Dataset, off: np.ndarray) -> dict[str, float | tuple[float, st
 EXPERIMENT = Experiment(
     name="rear-lift",
     assembly="two-wheeler-by-wire",
-    summary="only the front brake, {p_front}, from {v_0}; lift control is a parameter",
+    summary="stop from {v_0} with only the front brake, {p_front}; lift control is a parameter",
     options=Options,
     defaults=Options(v_0=30.0, p_front=27e5, p_rate=60e5, grip=1.2, duration=1.5),
     cases=cases,

@@ -1,8 +1,8 @@
 """Repeated stops: brakes that warm up from stop to stop, fade, and heat their fluid once parked.
 
 Each stop starts from the final temperatures of the previous stop. Between the stops, no brake acts
-and only heat flows: three temperatures per wheel, over minutes. These stretches use the equations
-of the same element at the driven speed. A high-order method with error control integrates them
+and only heat flows, with three temperatures per wheel, over minutes. These intervals use the same
+element's equations at the driving speed. A high-order method with error control integrates them
 without substeps of 20 us. The vehicle regains its speed instantly.
 """
 
@@ -38,21 +38,21 @@ from bywire.vehicle.ideal_stop import RidingSpeed
 from bywire.vehicle.two_wheeler import cold_start
 
 Heat = Mapping[str, disc_heat.State]
-"""temperatures of the brakes by their parts"""
+"""brake temperatures by part"""
 WARM = {"front.heat.law": "lumped", "rear.heat.law": "lumped"}
 BRAKES = {"front_heat": ("front", "_f"), "rear_heat": ("rear", "_r")}
-"""name and suffix of each brake, by the part of its heat"""
+"""name and suffix of each brake, by its heat part"""
 TEMPERATURES = tuple(n + end for _, end in BRAKES.values() for n in disc_heat.State._fields)
-_SUBSTEPS = 50  # of a sample time
+_SUBSTEPS = 50  # per sample time
 
 
 def braked(case: Case) -> dict[str, Array]:
-    """Return speed, place and temperatures of a stop, row by row to its standstill.
+    """Return speed, position and temperatures of a stop, row by row until standstill.
 
     Raises
     ------
     ParameterError
-        When the vehicle does not come to a standstill.
+        If the vehicle does not come to a standstill.
     """
     run = as_run(case, case.par.ecu.T_s / _SUBSTEPS)  # type: ignore[attr-defined]
     with interrupts_deferred():
@@ -63,8 +63,8 @@ def braked(case: Case) -> dict[str, Array]:
     end = vehicle_stop.standstill(stop.time, stop["v"])
     if math.isnan(end):
         raise ParameterError(
-            f"{case.label} does not come to a standstill within {case.duration:g} s, since its "
-            "brakes have faded or the road is too slippery. Reduce options.stops or "
+            f"{case.label} does not reach a standstill within {case.duration:g} s, because the "
+            "brakes fade or the road is too slippery. Reduce options.stops or "
             "options.deceleration, or increase options.pause",
             name=case.label,
             valid=f"{case.duration:g} s",
@@ -76,14 +76,14 @@ def braked(case: Case) -> dict[str, Array]:
 
 
 def cooled(heat: Heat, par: TwoWheelerParameters, v: float, t: Array) -> dict[str, Array]:
-    """Return temperatures [K] of open brakes by signal; those at the start are ``heat``.
+    """Return the temperatures [K] of open brakes by signal, which start at ``heat``.
 
     Parameters
     ----------
     par
         Parameters of a vehicle whose brakes warm up.
     v
-        Speed of the vehicle [m/s].
+        Vehicle speed [m/s].
     t
         Times [s], increasing from 0.
     """
@@ -107,12 +107,12 @@ def at_end(rows: Mapping[str, Array]) -> Heat:
 
 
 def heat_of(rows: Any, end: str, k: int) -> disc_heat.State:
-    """Return the temperatures of the brake of a suffix in row ``k`` of rows or a recording."""
+    """Return the temperatures of the brake with a suffix, in row ``k`` of rows or a recording."""
     return disc_heat.State(*(float(rows[n + end][k]) for n in disc_heat.State._fields))
 
 
 def peak_time(t: Array, T: Array) -> float | tuple[float, str]:
-    """Return the time of the highest temperature [s], from a parabola through its highest rows."""
+    """Return the time of the maximum temperature [s], from a parabola through its highest rows."""
     k = int(T.argmax())
     if k + 1 == t.size:
         return math.nan, "the fluid is still warming up at the end. Increase options.parked"
@@ -123,8 +123,8 @@ def peak_time(t: Array, T: Array) -> float | tuple[float, str]:
 
 
 _COURSE = "course-temperatures"
-_ROWS, _PARKED_ROWS = 40, 600  # of a pause, and of the parked time
-_USUAL, _LONGEST, _AFTER = 1.3, 3.0, 1.0  # times the length of a cold stop; s beyond a standstill
+_ROWS, _PARKED_ROWS = 40, 600  # of a pause, and of the time parked
+_USUAL, _LONGEST, _AFTER = 1.3, 3.0, 1.0  # lengths of a cold stop; s after standstill
 _STOP = Signal("1", "number of the stop, 0 between stops")
 
 EACH = Figures(
@@ -138,47 +138,47 @@ ALL = Figures(
     pads_last=("K", "Front pad temperature after the last stop."),
     fluid_last=("K", "Front fluid temperature after the last stop."),
     rear_disc_last=("K", "Rear disc temperature after the last stop."),
-    pressure_cold=("Pa", "Front pressure needed for the deceleration with cold pads."),
-    pressure_hot=("Pa", "Front pressure needed at the pad temperature after the last stop."),
-    fluid_peak=("K", "Highest front fluid temperature, including parked time."),
-    fluid_peak_time=("s", "Time of this peak after the last standstill."),
+    pressure_cold=("Pa", "Front pressure that the deceleration needs with cold brakes."),
+    pressure_hot=("Pa", "Front pressure that the deceleration needs after the last stop."),
+    fluid_peak=("K", "Maximum front fluid temperature, including the time parked."),
+    fluid_peak_time=("s", "Time from the last standstill to this maximum."),
 )
 
 
 class Options(ParameterSet):
-    """The stops, and the drive from one to the next.
+    """The stops, and the drive from one stop to the next.
 
-    ``hold``: the rider applies the same pressure in every stop (``"pressure"``), or raises it in
-    proportion to the fading of the pads at the start of the stop (``"deceleration"``).
+    ``hold``: the rider applies the same pressure in every stop (``"pressure"``), or increases it in
+    proportion to the pad fading at the start of the stop (``"deceleration"``).
     """
 
     v_0: RidingSpeed
     """initial speed of each stop"""
     deceleration: Annotated[float, Unit("m/s**2", 8.0), Field(gt=0, allow_inf_nan=False)]
-    """deceleration due to cold brakes, without drag and rolling resistance"""
+    """deceleration from cold brakes, without drag and rolling resistance"""
     share: Weight
     """fraction of the braking force from the front brake"""
     hold: Literal["pressure", "deceleration"]
-    """quantity that the rider keeps constant from stop to stop"""
+    """quantity that stays constant from stop to stop"""
     stops: Annotated[float, Unit("1", 10.0), Field(ge=1, le=200, multiple_of=1)]
     """number of stops"""
     pause: Duration
-    """driving time from a standstill to the next stop"""
+    """driving time from one standstill to the next stop"""
     v_pause: Annotated[float, Unit("m/s", 28.0), Field(ge=0, allow_inf_nan=False)]
-    """speed during the driving time"""
+    """driving speed between stops"""
     parked: Duration
     """time parked after the last stop"""
 
 
 class _Stop(NamedTuple):
-    """A stop, and its rows to the standstill."""
+    """A stop, and its rows until standstill."""
 
     case: Case
     rows: dict[str, Array]
 
 
 def cases(par: TwoWheelerParameters, options: Options, _: object = None) -> tuple[Case, ...]:
-    """Return the first and the last stop, the last from the heat of all stops before it."""
+    """Return the first and the last stop. The last stop starts with the heat of all others."""
     every = _series(par.replace(WARM), options)
     return tuple(
         replace(stop.case, label=label, duration=round(stop.rows["time"][-1] + _AFTER, 1))
@@ -224,13 +224,13 @@ def _case(par: TwoWheelerParameters, options: Options, start: Heat, label: str) 
 
 
 def _pressure(par: TwoWheelerParameters, options: Options, brake: str) -> float:
-    """Return the pressure [Pa] at which one cold brake alone gives the deceleration."""
+    """Return the pressure [Pa] at which one cold brake alone produces the deceleration."""
     torque = par.vehicle.body.m * options.deceleration * par.value(f"vehicle.{brake}_wheel.r")
     return float(torque / brake_disc.torque_per_pressure(par.value(f"{brake}.disc")))
 
 
 def static(par: TwoWheelerParameters, options: Options) -> dict[str, xr.Dataset]:
-    """Return the temperatures over all stops, the drives between them, and the time parked."""
+    """Return the temperatures during all stops, the drives between them, and the time parked."""
     warm, begin, pieces = par.replace(WARM), 0.0, []
     every = _series(warm, options)
     for k, (_, rows) in enumerate(every):
@@ -241,7 +241,7 @@ def static(par: TwoWheelerParameters, options: Options) -> dict[str, xr.Dataset]
         whole, count = (options.parked, _PARKED_ROWS) if is_last else (options.pause, _ROWS)
         t = np.linspace(0.0, whole, count + 1)
         after = cooled(at_end(rows), warm, v, t)
-        inside = slice(1, None if is_last else -1)  # the next stop contains the last instant
+        inside = slice(1, None if is_last else -1)  # the next stop contains the last row
         rest = {name: y[inside] for name, y in after.items()}
         still = 0.0 * rest["time"]
         pieces.append(rest | {"time": begin + rest["time"], "v": still + v, "stop": still})
@@ -272,7 +272,7 @@ def _dataset(par: TwoWheelerParameters, pieces: list[dict[str, Array]]) -> xr.Da
 
 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
-    """Return temperatures of every stop, and the effects of the heat."""
+    """Return the temperatures of each stop, and the effects of the heat."""
     course, stops = recordings[_COURSE], range(1, round(options.stops) + 1)
     disc, number = course["T_disc_f"].values, course["stop"].values
     each = [disc[number == k] for k in stops]
@@ -329,8 +329,8 @@ _DEFAULTS = Options(
 EXPERIMENT = Experiment(
     name="repeated-stops",
     assembly="two-wheeler-by-wire",
-    summary="{stops} stops from {v_0:km/h} at {deceleration} every {pause} with brakes "
-    "that warm up, then parked",
+    summary="{stops} stops from {v_0:km/h} at {deceleration}, {pause} apart, with brakes that "
+    "warm up, then parked",
     options=Options,
     defaults=_DEFAULTS,
     cases=cases,

@@ -1,4 +1,4 @@
-"""Rider's trace: the rider's demand follows a measured file or any stimulus."""
+"""Rider trace: the rider's demand follows a measured file or any stimulus."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from bywire.plant import brake_disc
 from bywire.plant.road import SurfaceName
 from bywire.vehicle.ideal_stop import RidingSpeed
 
-# Built-in ride, our choice: a light pull, a short hesitation, then the full force of the hand.
+# The built-in ride is our choice: a light pull, a short hesitation, then full hand force.
 _TIMES = (0.0, 0.25, 0.9, 1.1, 1.3, 1.5, 3.0)  # s
 _FRONT = (0.0, 8e5, 10e5, 4e5, 5e5, 38e5, 34e5)  # Pa
 _REAR = (0.0, 3e5, 6e5, 6e5, 8e5, 20e5, 20e5)  # Pa
@@ -30,19 +30,25 @@ _DRIVEN = {"p_f_set": _FRONT, "p_r_set": _REAR}
 
 FIGURES = Figures(
     undefined="the rider's demand is zero",
-    rider_share_front=("%", "Time integral of the front pressure over that of its demand."),
-    rider_share_rear=("%", "Time integral of the rear pressure over that of its demand."),
-    rider_share=("%", "The same ratio for the torques of both brakes, until standstill."),
+    rider_share_front=(
+        "%",
+        "Ratio of the time integrals of front pressure and its demand, until standstill.",
+    ),
+    rider_share_rear=(
+        "%",
+        "Ratio of the time integrals of rear pressure and its demand, until standstill.",
+    ),
+    rider_share=("%", "The same ratio for the total torque of both brakes."),
 )
 
 
 class Options(ParameterSet):
-    """The ride; demands are [stimulus.p_f_set] and [stimulus.p_r_set], or the built-in trace."""
+    """The ride. Demands are [stimulus.p_f_set] and [stimulus.p_r_set], or the built-in trace."""
 
     v_0: RidingSpeed
     """initial speed"""
     surface: SurfaceName
-    """surface of the road"""
+    """road surface"""
     duration: Duration
     """recording time"""
 
@@ -55,7 +61,7 @@ def driven(_: Options) -> Mapping[str, str]:
 def cases(
     par: TwoWheelerParameters, options: Options, stimuli: Mapping[str, Stimulus] | None = None
 ) -> tuple[Case, ...]:
-    """Return the single run; if the user sets one demand, the other is zero."""
+    """Return the single run. If the user sets only one demand, the other is zero."""
     custom: dict[str, float | Course] = {
         name: each.sample for name, each in (stimuli or {}).items()
     }
@@ -77,7 +83,7 @@ def _parameters_of(run: xr.Dataset) -> TwoWheelerParameters:
 
 
 def rider_shares(run: xr.Dataset, _: Options) -> tuple[Kpi, ...]:
-    """Return the shares of the rider's demand that the brakes apply."""
+    """Return the fractions of the rider's demand that the brakes apply."""
     return FIGURES(**_shares(run))
 
 
@@ -102,7 +108,7 @@ def _shares(run: xr.Dataset) -> dict[str, float]:
 EXPERIMENT = Experiment(
     name="rider-trace",
     assembly="two-wheeler-by-wire",
-    summary="stop from {v_0} on {surface} with a rider's trace, built in or from stimuli",
+    summary="stop from {v_0} on {surface} with a rider trace, built-in or from stimuli",
     options=Options,
     defaults=Options(v_0=30.0, surface="wet-asphalt", duration=8.0),
     cases=cases,

@@ -1,4 +1,4 @@
-"""Stops from walking pace: held until the end of the run, or held on a slope and released."""
+"""Stops from walking pace, held until the end of the run, or held on a slope and released."""
 
 from __future__ import annotations
 
@@ -62,13 +62,13 @@ SLOW_FIGURES = Figures(
     ),
     rollback=("m", "Distance from the farthest position to the final position."),
     ringing_time=("s", f"Time from the standstill until the speed stays below {_QUIET:g} m/s."),
-    creep_speed=("m/s", f"Maximum speed later than {_CALM:g} s after the first standstill."),
+    creep_speed=("m/s", f"Maximum speed from {_CALM:g} s after the first standstill on."),
     creep=("m", "Distance in that time."),
 )
 
 
 class SlowStopOptions(WalkingPaceOptions):
-    """The stop, and the slope; slip and lift control are off."""
+    """The stop, and the slope. Slip and lift control are off."""
 
     duration: Duration
     """recording time"""
@@ -117,7 +117,7 @@ def _rest(run: xr.Dataset, end: float) -> dict[str, float | tuple[float, str]]:
 SLOW_STOP = Experiment(
     name="slow-stop",
     assembly="two-wheeler-by-wire",
-    summary="stop from {v_0} without control, then held on level road or slope",
+    summary="stop from {v_0} without control, then held on a level road or a slope",
     options=SlowStopOptions,
     defaults=SlowStopOptions(v_0=3.0, p_front=40e5, p_rear=40e5, gradient=0.0, duration=5.0),
     cases=slow_stop,
@@ -129,7 +129,7 @@ SLOW_STOP = Experiment(
 
 # --- Held on a slope, then released
 
-_OPENED, _ROLLS = 0.5, 1.5  # s from the release to free rolling, and its longest time
+_OPENED, _ROLLS = 0.5, 1.5  # s from the release to free rolling, and its maximum duration
 
 HOLD_FIGURES = Figures(
     undefined="the vehicle does not stop before the release",
@@ -139,17 +139,17 @@ HOLD_FIGURES = Figures(
     held_time=("s", "Length of that time."),
     roll_off=(
         "m/s**2",
-        f"Mean downhill acceleration, later than {_OPENED:g} s after the release.",
+        f"Mean downhill acceleration, from {_OPENED:g} s after the release on.",
     ),
     free_roll_off=(
         "m/s**2",
-        "Closed form of that acceleration: slope minus rolling resistance, with wheel inertia.",
+        "Closed form of roll_off: slope minus rolling resistance, with wheel inertia.",
     ),
 )
 
 
 class SlopeHoldOptions(WalkingPaceOptions):
-    """Stop, slope, and time of the hold; slip and lift control are off."""
+    """Stop, slope and hold time. Slip and lift control are off."""
 
     t_release: Duration
     """time of the release"""
@@ -164,7 +164,7 @@ def slope_hold(
     if not options.t_release < options.duration:
         release, end = f"{options.t_release:g} s", f"< options.duration = {options.duration:g} s"
         raise not_valid(
-            "options.t_release", release, end, "so that the recording contains the release"
+            "options.t_release", release, end, "because the recording must contain the release"
         )
 
     def held(p: float) -> Course:
@@ -176,12 +176,12 @@ def slope_hold(
 
 
 def free_roll_off(par: VehicleParameters) -> float:
-    r"""Return the acceleration of the free vehicle downhill [m/s^2].
+    r"""Return the downhill acceleration of the free vehicle [m/s^2].
 
     .. math:: a = g (|\sin\gamma| - C_{rr} \cos\gamma) \frac{m}{m + \sum J/r^2},
 
-    at least zero: on a slope below the rolling resistance, the vehicle stays at rest. Both wheels
-    support their share of the weight. The formula neglects air drag.
+    but at least zero, because the vehicle stays at rest on a slope below the rolling resistance.
+    Each wheel supports its part of the weight. The formula neglects air drag.
     """
     body, front, rear = par.body, par.front_wheel, par.rear_wheel
     slope = road.slope(0.0, par.road)
@@ -193,7 +193,7 @@ def free_roll_off(par: VehicleParameters) -> float:
 
 
 def judge_slope_hold(recordings: Recordings, options: SlopeHoldOptions) -> tuple[Kpi, ...]:
-    """Return creep and roll-off of the vehicle."""
+    """Return the vehicle's creep and roll-off."""
     run = recordings["run"]
     t, x, v = (run[name].values for name in ("time", "x", "v"))
     end = vehicle_stop.standstill(t, v)
@@ -216,7 +216,7 @@ def judge_slope_hold(recordings: Recordings, options: SlopeHoldOptions) -> tuple
 
 
 def _slope(t: Array, v: Array, gradient: float) -> float:
-    """Return the mean acceleration downhill."""
+    """Return the mean downhill acceleration."""
     return float((v[-1] - v[0]) / (t[-1] - t[0])) * (-1.0 if gradient > 0.0 else 1.0)
 
 

@@ -1,7 +1,7 @@
 """Panic stops: the rider demands more than the road's adhesion, with or without slip control.
 
 The same demand applies on one surface, with a whole brake by wire at the rear wheel, with
-increasingly fast brakes, and across a surface change.
+faster and faster brakes, and across a surface change.
 """
 
 from __future__ import annotations
@@ -46,13 +46,15 @@ def _demands(options: PanicOptions) -> dict[str, float]:
 
 
 def _locked_stop(v_0: float, par: VehicleParameters) -> float:
-    """Return a time [s] in which locked wheels, on most roads even one wheel, stop a vehicle."""
+    """Return a time [s] in which locked wheels (on most roads even one) stop a vehicle."""
     road_ahead, body = par.road, par.body
     slope = road.slope(0.0, road_ahead)
     locked = adhesion.adhesion(1.0, road.surface(0.0, road_ahead), par.front_tyre)
     held = locked * slope.cosine + slope.sine
     if not held > 0.0:
-        advice = "the time to record, since locked wheels do not stop on this slope"
+        advice = (
+            "because locked wheels do not stop the vehicle on this slope. Set the recording time"
+        )
         raise not_valid("options.duration", "0 s", "> 0 s", advice)
     return round(v_0 / (0.7 * held * body.g) + 1.0, 1)
 
@@ -61,12 +63,12 @@ def _locked_stop(v_0: float, par: VehicleParameters) -> float:
 
 
 class StraightStopOptions(PanicOptions):
-    """The stop, and the surface; slope and controllers are parameters."""
+    """The stop, and the surface. Slope and controllers are parameters."""
 
     surface: SurfaceName
-    """surface of the road"""
+    """road surface"""
     duration: TimeConstant
-    """recording time; 0: the stopping time of locked wheels on this surface, with a margin"""
+    """recording time; 0 selects the stopping time of locked wheels on this surface plus a margin"""
 
 
 def straight_stop(
@@ -100,7 +102,7 @@ ACTUATOR_FIGURES = Figures(
     rear_current=("A", "Maximum magnitude of the rear motor current until standstill."),
     rear_pressure_error=(
         "Pa",
-        "Root mean square of the rear demand minus the pressure at the pads.",
+        "Root-mean-square difference between rear demand and pressure at the pads.",
     ),
 )
 _ACTUATOR_SIGNALS = ("v", "E_rear_source", "rear_i", "p_r_ref", "p_r")
@@ -132,7 +134,7 @@ def actuator_effort(run: xr.Dataset, _: StraightStopOptions) -> tuple[Kpi, ...]:
 WHOLE_REAR_STOP = Experiment(
     name="whole-rear-stop",
     assembly="two-wheeler-whole-rear",
-    summary="panic stop with the whole motorcycle brake by wire at the rear wheel, {p_rear}",
+    summary="panic stop with a whole brake by wire at the rear wheel, {p_rear}",
     options=StraightStopOptions,
     defaults=StraightStopOptions(
         v_0=30.0, p_front=40e5, p_rear=40e5, surface="wet-asphalt", duration=0.0
@@ -144,7 +146,7 @@ WHOLE_REAR_STOP = Experiment(
 )
 
 
-# --- Over the bandwidth of the brakes: the benefit of faster actuators
+# --- Brakes of different bandwidth: the benefit of faster actuators
 
 _COMPARED = {
     "stopping_distance": "m",
@@ -159,7 +161,7 @@ class BandwidthsOptions(PanicOptions):
     """The stop, and the natural frequencies of both pressure loops."""
 
     surface: SurfaceName
-    """surface of the road"""
+    """road surface"""
     f_n: Annotated[Nodes, Unit("Hz", 10.0), Field(min_length=1)]
     """natural frequencies of the pressure loops, one run each"""
     duration: Duration
@@ -173,7 +175,7 @@ def _label(f: float) -> str:
 def bandwidths(
     par: TwoWheelerParameters, options: BandwidthsOptions, _: object = None
 ) -> tuple[Case, ...]:
-    """Return a run for each frequency."""
+    """Return one run for each frequency."""
     return tuple(
         rolling_case(
             par,
@@ -192,7 +194,7 @@ def bandwidths(
 
 
 def judge_bandwidths(recordings: Recordings, options: BandwidthsOptions) -> tuple[Kpi, ...]:
-    """Return the figures that differ between the stops; their names end with the frequency."""
+    """Return the key figures that differ between the stops. Their names end in the frequency."""
     return tuple(
         Kpi(f"{kpi.name}_{f:g}Hz", kpi.value, kpi.unit, kpi.definition, kpi.note)
         for f in options.f_n
@@ -235,7 +237,7 @@ BANDWIDTHS = Experiment(
 )
 
 
-# --- Across a change of the surface
+# --- Across a surface change
 
 _CALM = 1.2  # relative to the peak slip
 
@@ -243,7 +245,7 @@ JUMP_FIGURES = Figures(
     recovery_time=(
         "s",
         "Time from the front wheel's entry onto the second surface until its slip stays below "
-        f"{_CALM:g} of that surface's peak slip, above {vehicle_stop.SLOW:g} m/s.",
+        f"{_CALM:g} times that surface's peak slip, at speeds above {vehicle_stop.SLOW:g} m/s.",
     ),
     jump_speed=("m/s", "Speed at the surface change."),
 )

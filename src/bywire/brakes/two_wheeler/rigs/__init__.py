@@ -1,1 +1,1 @@
-"""A wheel on a drum, and the vehicle with a whole brake at its rear wheel."""
+"""A wheel on a drum, and a vehicle with a whole brake at its rear wheel."""

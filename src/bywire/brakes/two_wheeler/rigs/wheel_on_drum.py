@@ -1,4 +1,4 @@
-"""A wheel with its brake on a drum at constant speed, for the design of slip control."""
+"""A braked wheel on a drum at constant speed, for the design of slip control."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ Load = Annotated[float, Unit("N", 2e3), Field(gt=0, allow_inf_nan=False)]
 
 
 class DrumParameters(ParameterSet):
-    """The drum: its surface has a constant speed."""
+    """The drum, whose surface has a constant speed."""
 
     v: DrumSpeed
-    """speed of its surface"""
+    """surface speed"""
     N: Load
-    """force that presses the wheel on the drum"""
+    """force of the wheel on the drum"""
     surface: adhesion.SurfaceParameters
 
 
@@ -47,10 +47,10 @@ Par = WheelOnDrumParameters
 
 
 class Stimulus(NamedTuple):
-    """Slip demand, and the pressure that slip control may lower."""
+    """Slip demand, and the pressure that slip control may reduce."""
 
     slip_set: Annotated[float, Signal("1", "slip demand", 0.1)]
-    p_set: Annotated[float, Signal("Pa", "pressure that may be lowered", 4e6), Ge(0)]
+    p_set: Annotated[float, Signal("Pa", "pressure that slip control may reduce", 4e6), Ge(0)]
 
 
 class Memory(NamedTuple):
@@ -66,9 +66,9 @@ class Memory(NamedTuple):
 
 
 class WheelOnDrum(Assembly[WheelOnDrumParameters, Memory]):
-    """A turning wheel, whose brake and rolling resistance are a torque in linear models.
+    """A turning wheel. In linear models its brake and rolling resistance are a torque.
 
-    The rig is not valid if the wheel locks; bywire then warns.
+    The rig is invalid if the wheel locks. bywire then warns.
     """
 
     name: ClassVar[str] = "wheel-on-drum"
@@ -104,7 +104,7 @@ class WheelOnDrum(Assembly[WheelOnDrumParameters, Memory]):
         w.wheel.u = road_wheel.Input(w.F, -w.T)
 
     def power(self, w: Self) -> dict[str, float]:
-        """Return the powers of drum and brake."""
+        """Return the power of the drum and of the brake."""
         return {"W_drum": w.F * w.par.drum.v, "E_brake": w.T * w.wheel.x.omega}
 
     def record(self, w: Self) -> dict[str, float]:
@@ -112,7 +112,7 @@ class WheelOnDrum(Assembly[WheelOnDrumParameters, Memory]):
         return {"slip": braking_slip(w.wheel.x.omega, w.par)}
 
     def tasks(self, par: Par) -> tuple[Task, ...]:
-        """Return slip control."""
+        """Return the task of slip control."""
         return (Task("slip", par.T_s, tick),)
 
     def watch(self, recording: Any, par: Any) -> list[str]:
@@ -120,7 +120,8 @@ class WheelOnDrum(Assembly[WheelOnDrumParameters, Memory]):
         warnings = super().watch(recording, par)
         if "omega" in recording and bool((recording["omega"] <= 0).any()):
             warnings.append(
-                "the wheel locked, so the rig is invalid: it would let the wheel turn backward"
+                "the wheel locked, so the results are invalid. This rig would let the wheel turn "
+                "backward"
             )
         return warnings
 
@@ -131,7 +132,7 @@ class WheelOnDrum(Assembly[WheelOnDrumParameters, Memory]):
 
 
 def braking_slip(omega: float, par: Par) -> float:
-    """Return the slip against the drum."""
+    """Return the slip relative to the drum."""
     return vehicle_speed.slip(par.drum.v, omega * par.wheel.r, par.slip.v_off)
 
 

@@ -1,8 +1,8 @@
 """The two-wheeler with the whole brake by wire of Dardanelli et al. (2010) at its rear wheel.
 
-The front brake is modeled only by its pressure loop. The rear brake is complete: battery, motor,
-screw, cylinder, line, caliper, and an ECU with dither that follows the rider's demand, which slip
-control lowers.
+The model of the front brake is only its pressure loop. The rear brake is complete: battery, motor,
+screw, cylinder, line, caliper, and an ECU with dither. Its ECU follows the rider's demand after
+slip control.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ Par = WholeRearParameters
 
 
 class TwoWheelerWholeRear(HotBrakes[WholeRearParameters, Any]):
-    """A vehicle whose ECU lowers the demand on the rear brake's ECU.
+    """A vehicle whose ECU reduces the demand on the rear brake's ECU.
 
-    The pads' force is the caliper's, so a sticking caliper drags.
+    The pad force comes from the caliper, so a sticking caliper drags.
     """
 
     name: ClassVar[str] = "two-wheeler-whole-rear"
@@ -50,7 +50,7 @@ class TwoWheelerWholeRear(HotBrakes[WholeRearParameters, Any]):
     records: ClassVar[tuple[str, ...]] = (*TwoWheelerByWire.records, *actuator.records)
 
     def cold_torques(self, w: Self) -> tuple[float, float]:
-        """Return the torques that cold discs hold at the pressures on the pads."""
+        """Return the torques that cold discs can hold at the pad pressures."""
         w.p_r = w.actuator.pads.x.p
         w.front_circuit.u = pressure_loop.Input(w.m.p_f_ref)
         w.front_encoder.u = wheel_encoder.Input(w.front.x.omega)
@@ -63,23 +63,23 @@ class TwoWheelerWholeRear(HotBrakes[WholeRearParameters, Any]):
         )
 
     def tasks(self, par: Par) -> tuple[Task, ...]:
-        """Return the vehicle's task, then the brake's, which follows in the same tick."""
+        """Return the vehicle's task, and then the brake's task, which follows in the same tick."""
         return (Task("ecu", par.ecu.T_s, tick), *super().tasks(par))
 
     def rest(self, par: Par) -> tuple[Any, Any]:
-        """Return the vehicle standing on its wheels, brakes open."""
+        """Return the vehicle at rest on its wheels, with open brakes."""
         return at_speed(0.0, par)
 
 
 def at_speed(
     v: float, par: Par, heat: Mapping[str, Any] | None = None, p_rear: float = 0.0
 ) -> tuple[Any, Any]:
-    """Return the vehicle rolling at a speed [m/s], its front brake open, its ECUs running.
+    """Return the vehicle rolling at a speed [m/s], with an open front brake and running ECUs.
 
     Parameters
     ----------
     heat
-        Temperatures of the brakes by their parts, see `cold_start`, which is the default.
+        Brake temperatures by part. Default: `cold_start`.
     p_rear
         Pressure [Pa] that the vehicle's ECU demands and the rear brake's ECU holds.
     """

@@ -1,4 +1,4 @@
-"""A sport motorcycle with its rider, and the sets that follow from it."""
+"""Parameter sets of a sport motorcycle with its rider, and sets derived from it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _DRY = {
 
 
 def _gain(disc: Any) -> float:
-    """Return torque per pressure of a brake."""
+    """Return a brake's torque per pressure."""
     gain: float = disc.faces * disc.mu_pad * disc.A_cal * disc.r_eff
     return gain
 
@@ -66,8 +66,8 @@ FRONT600 = CitedSet(
             for name, value in SPORT600.values.items()
             if name.startswith(f"{there}.")
         },
-        "drum.v": chosen(20.0, "the middle of a stop"),
-        "drum.N": chosen(2200.0, "the front wheel's load during a full stop on wet asphalt"),
+        "drum.v": chosen(20.0, "middle of a stop"),
+        "drum.N": chosen(2200.0, "front wheel load during a full stop on wet asphalt"),
         **{
             f"drum.surface.{name}": derived(value, "wet asphalt for car tires, as circulated")
             for name, value in SURFACES["wet-asphalt"]._asdict().items()
@@ -85,7 +85,7 @@ WHOLE_REAR = CitedSet(
     name="sport600-whole-rear",
     assembly="two-wheeler-whole-rear",
     source=f"{FILE.citation}; the whole rear brake: {dardanelli2010.FILE.citation}",
-    summary="the sport motorcycle with the rear brake of dardanelli2010-retuned",
+    summary="the sport motorcycle with the rear brake from dardanelli2010-retuned",
     parameter_class=WholeRearParameters,
     values={
         **{

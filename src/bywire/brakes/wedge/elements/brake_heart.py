@@ -17,7 +17,7 @@ Loss = Annotated[
     float,
     Signal(
         "W",
-        "loss in the heart's contacts, minus its energy at start",
+        "loss in the heart's contacts, minus their initial energy",
         role=Role("sink", "brake heart"),
     ),
 ]
@@ -27,7 +27,7 @@ FreePlay = Annotated[float, Unit("m", 2e-5), Field(ge=0, allow_inf_nan=False)]
 class Parameters(ParameterSet):
     """Massless screws of axial stiffness K_S, wedge interfaces K_W, screw tips K_C.
 
-    Screw 2 pushes the wedge toward positive travel, screw 1 toward negative travel; tip to tip,
+    Screw 2 pushes the wedge toward positive travel, and screw 1 toward negative travel. Tip to tip,
     screw 1 pushes screw 2 toward positive travel. Damping is proportional to stiffness.
     """
 
@@ -36,7 +36,7 @@ class Parameters(ParameterSet):
     K_W: Stiffness
     """stiffness of each interface between screw and wedge"""
     K_C: Stiffness
-    """stiffness between the screws' tips"""
+    """stiffness between the screw tips"""
     g_1: FreePlay
     """free play between screw 1 and wedge"""
     g_2: FreePlay
@@ -47,7 +47,7 @@ class Parameters(ParameterSet):
     """ratio of damping to stiffness"""
 
 
-FAULTS = (ParameterFault("worn", "larger free play on both sides", ("g_1", "g_2"), 5.0),)
+FAULTS = (ParameterFault("worn", "increased free play on both sides", ("g_1", "g_2"), 5.0),)
 
 
 class Input(NamedTuple):
@@ -86,7 +86,7 @@ class Forces(NamedTuple):
 
 
 class Output(NamedTuple):
-    """Axial forces on the screws, actuation force on the wedge, force that squeezes it."""
+    """Axial forces on the screws, actuation and squeezing force on the wedge."""
 
     F_1: Annotated[float, Signal("N", "axial force on screw 1", 400.0)]
     F_2: Annotated[float, Signal("N", "axial force on screw 2", 400.0)]
@@ -159,14 +159,15 @@ def solve(d: Overlaps, par: Parameters) -> Forces:
 
     Notes
     -----
-    The two wedge contacts do not share a compliance, so they follow from the tips' force:
+    The two wedge contacts do not share a compliance, so their forces follow from the tip force:
     f_k = max(0, d_k + c_s f_12) / c_w. This leaves one increasing, piecewise linear equation
-    in f_12, solved on the piece that contains its root: no, one or both contacts closed.
+    in f_12. The solution is on the piece that contains its root, with no, one or both contacts
+    closed.
     """
     c = compliances(par)
     w, t, s = c.wedge, c.tips, c.screw
     lower, upper = ops.fmin(d.d_1, d.d_2), ops.fmax(d.d_1, d.d_2)
-    # An opening contact lowers the root, so the largest candidate is the root.
+    # A contact that opens lowers the root, so the largest candidate is the root.
     none = d.d_12 / t
     upper_alone = (d.d_12 + s / w * upper) / (t - s * s / w)
     both = (d.d_12 + s / w * (upper + lower)) / (t - 2.0 * s * s / w)
@@ -189,12 +190,12 @@ def output(f: Forces) -> Output:
 
 
 def input_rate(u: Input) -> InputRate:
-    """Return the rates of the travels, the ports of the heart's stored energy."""
+    """Return the rates of the travels, which are the ports of the heart's stored energy."""
     return InputRate(X_1=u.V_1, X_2=u.V_2, x=u.v)
 
 
 def energy(u: Input, par: Parameters) -> Energy:
-    """Return the elastic energy of the contacts, f C f / 2 = f d / 2 without damping."""
+    """Return the elastic energy of the contacts, f C f / 2 = f d / 2, without damping."""
     d = depths(u, par)
     f = solve(d, par)
     return 0.5 * (f.f_1 * d.d_1 + f.f_2 * d.d_2 + f.f_12 * d.d_12)

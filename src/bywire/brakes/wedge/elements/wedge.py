@@ -1,4 +1,4 @@
-"""Wedge: moved by the screws, pulled in by the pad's friction, pushed out by its slope."""
+"""Wedge, which the screws move, the pad friction pulls in, and the slope pushes out."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SpringRate = Annotated[float, Unit("N/m", 1e4), Field(ge=0, allow_inf_nan=False)
 
 
 class Parameters(ParameterSet):
-    """Symmetric wedge on rollers; positive travel brakes positive rotation of the disc."""
+    """Symmetric wedge on rollers. Positive travel brakes positive disc rotation."""
 
     alpha: WedgeAngle
     """wedge angle"""
@@ -27,9 +27,9 @@ class Parameters(ParameterSet):
     mu_B: Gain
     """coefficient of friction between pads and disc"""
     k_return: SpringRate
-    """stiffness of the return spring toward the middle; 0 for none"""
+    """stiffness of the return spring toward the middle; 0 without a spring"""
     x_stop: Length
-    """travel of the end stops, on either side"""
+    """wedge travel to the end stop on either side"""
 
 
 FAULTS = (
@@ -60,14 +60,14 @@ class Balance(NamedTuple):
 
 
 class Input(NamedTuple):
-    """Forces on the wedge, its side, and the disc's direction."""
+    """Forces on the wedge, the wedge's side, and the disc direction."""
 
     F_M: Annotated[float, Signal("N", "actuation force", 400.0)]
     F_N: Annotated[float, Signal("N", "normal force", 3e3)]
-    F_stop: Annotated[float, Signal("N", "load of the end stops", 100.0)]
+    F_stop: Annotated[float, Signal("N", "force on the end stops", 100.0)]
     friction: Annotated[float, Signal("N", "friction force", 50.0)]
     side: Annotated[float, Signal("1", "side of the wedge, +1 or -1")]
-    turning: Annotated[float, Signal("1", "direction of the disc, 0 when stopped")]
+    turning: Annotated[float, Signal("1", "disc direction, 0 when stopped")]
 
 
 def slope(par: Parameters) -> Annotated[float, Signal("1", "slope of the wedge", 0.4)]:
@@ -94,7 +94,7 @@ def balance(x: State, u: Input, par: Parameters) -> Balance:
 
     References
     ----------
-    Roberts et al. (2003), section "Wedge and calliper"; our extraction prints mu_R for the pad.
+    Roberts et al. (2003), section "Wedge and calliper". Our copy prints mu_R for the pad.
     """
     self_reinforcing = (par.mu_B * u.turning - u.side * slope(par)) * u.F_N
     force = u.F_M + self_reinforcing - par.k_return * x.x - u.F_stop + u.friction
@@ -102,12 +102,12 @@ def balance(x: State, u: Input, par: Parameters) -> Balance:
 
 
 def pad_power(x: State, u: Input, par: Parameters) -> Power:
-    """Return the work of the disc on the wedge: the energy of the self-reinforcement."""
+    """Return the power of the disc on the wedge, which is the self-reinforcement."""
     return par.mu_B * u.turning * u.F_N * x.v
 
 
 def energy(x: State, par: Parameters) -> Energy:
-    """Return the energy of motion and of the return spring."""
+    """Return the kinetic energy and the energy of the return spring."""
     return 0.5 * par.M_W * x.v * x.v + 0.5 * par.k_return * x.x * x.x
 
 

@@ -1,4 +1,4 @@
-"""Floating caliper over the wedge: clearance, runout of the disc, stiffness or force table."""
+"""Floating caliper over the wedge: clearance, disc runout, stiffness or force table."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Work = Annotated[float, Signal("W", "work on the caliper")]
 Loss = Annotated[
     float,
     Signal(
-        "W", "loss in the caliper, minus its energy at start", role=Role("sink", "caliper damping")
+        "W", "loss in the caliper, minus its initial energy", role=Role("sink", "caliper damping")
     ),
 ]
 NormalForce = Annotated[float, Signal("N", "normal force", 3e3)]
@@ -28,22 +28,22 @@ NormalForce = Annotated[float, Signal("N", "normal force", 3e3)]
 class Parameters(ParameterSet):
     """Pads, disc and caliper as one spring that pushes but never pulls.
 
-    ``law``: ``"linear"`` is the stiffness; ``"table"`` interpolates a measured curve of force and
-    travel and continues beyond its end with its last slope.
+    ``law``: ``"linear"`` uses a constant stiffness. ``"table"`` interpolates a measured curve of
+    force versus travel and continues beyond its end with its last slope.
     """
 
     law: Literal["linear", "table"]
-    """relation of travel and force"""
+    """relation between travel and force"""
     K_cal: Stiffness
     """stiffness of caliper and pads (law "linear")"""
     n_table: Annotated[Nodes, Unit("m", 1e-4)]
-    """travels of the pads after contact, increasing from 0 (law "table")"""
+    """pad travels after contact, increasing from 0 (law "table")"""
     F_table: Annotated[Nodes, Unit("N", 3e3)]
     """normal forces of the table, increasing from 0 (law "table")"""
     tau_cal: TimeConstant
     """ratio of damping to stiffness"""
     clearance: Clearance
-    """running clearance, sum of both sides of the disc"""
+    """running clearance, sum over both sides of the disc"""
     r_B: Length
     """effective radius of the pads"""
 
@@ -56,14 +56,14 @@ class Parameters(ParameterSet):
             valid = f"of the same length as F_table, {len(F)} nodes"
             raise RuleError("n_table", f"{len(n)} nodes", valid, "set one force for each travel")
         if self.law == "table" and not n:
-            reason = "law = 'table' interpolates n_table and F_table. Set both, or law = 'linear'"
+            reason = "law = 'table' needs n_table and F_table. Set both, or set law = 'linear'"
             raise RuleError("n_table", "0 nodes", "of 2 nodes or more", reason)
         return self
 
 
 FAULTS = (
     ParameterFault(
-        "gap-grown", "larger clearance: worn pads, failed adjuster", ("clearance",), 2.0
+        "gap-grown", "increased clearance: worn pads, failed adjuster", ("clearance",), 2.0
     ),
     ParameterFault(
         "pad-lost", "a pad is lost (value: clearance)", replaced="clearance", value=10e-3
@@ -81,27 +81,27 @@ def _require_rising(name: str, unit: str, nodes: Nodes) -> None:
         raise RuleError(f"{name}.0", f"{nodes[0]:g} {unit}", f"0 {unit}, the start of the curve")
     for k, (a, b) in enumerate(pairwise(nodes), 1):
         if b <= a:
-            reason = "sort the nodes, and omit those where the curve does not rise"
+            reason = "sort the nodes, and omit nodes where the curve does not rise"
             raise RuleError(
                 f"{name}.{k}", f"{b:g} {unit}", f"> {a:g} {unit}, the previous node", reason
             )
 
 
 class Input(NamedTuple):
-    """Wedge, its slope and side, the disc's runout, and the adjuster's travel."""
+    """Wedge travel, slope and side, disc runout, and adjuster travel."""
 
     x: Annotated[float, Signal("m", "wedge travel", 5e-3)]
     v: Annotated[float, Signal("m/s", "wedge velocity", 0.02)]
     side: Annotated[float, Signal("1", "side of the wedge, +1 or -1")]
     tan_alpha: Annotated[float, Signal("1", "slope of the wedge", 0.4)]
-    runout: Annotated[float, Signal("m", "run-out", 4e-6)]
+    runout: Annotated[float, Signal("m", "runout", 4e-6)]
     runout_rate: Annotated[float, Signal("m/s", "rate of the runout", 2e-4)]
     taken: Annotated[float, Signal("m", "clearance removed by an adjuster", 1e-4)]
     taking: Annotated[float, Signal("m/s", "speed of the adjuster", 2e-4)]
 
 
 class InputRate(NamedTuple):
-    """Derivatives of the arguments of the stored energy; slope and side are constant."""
+    """Derivatives of the arguments of the stored energy. Slope and side are constant."""
 
     x: Annotated[float, Signal("m/s", "wedge velocity", 0.02)]
     side: Annotated[float, Signal("1/s", "rate of the side")]
@@ -117,7 +117,7 @@ class Forces(NamedTuple):
 
 
 def depth(u: Input, par: Parameters) -> Overlap:
-    r"""Return the overlap; negative in the gap.
+    r"""Return the overlap, negative in the gap.
 
     .. math:: n = |x| \tan\alpha - (c - c_{taken}) + \text{runout}
     """
@@ -135,7 +135,7 @@ def overlaps(u: Input, par: Parameters) -> Overlap:
 
 
 def compliance(par: Parameters) -> ContactCompliance:
-    """Return the compliance of caliper and pads, for a table that of its first piece."""
+    """Return the compliance of caliper and pads. For a table, its first piece counts."""
     if par.law == "table":
         return par.n_table[1] / par.F_table[1]
     return 1.0 / par.K_cal
@@ -154,7 +154,7 @@ def normal_force(
     -----
     Contacts have constant compliances, which determine whether they are closed. The table maps
     their forces, with the damped overlap C f. At low rates, the damping is therefore tau times the
-    curve's slope. The contact never pulls and never adds energy, since the curve rises.
+    slope of the curve. The contact never pulls and never adds energy, because the curve rises.
     """
     if par.law == "linear":
         return f
@@ -162,7 +162,7 @@ def normal_force(
 
 
 def bent(f: Forces, par: Parameters) -> Forces:
-    """Return the contact forces for those with constant compliance; see `normal_force`."""
+    """Return the contact forces from those with constant compliance (see `normal_force`)."""
     return Forces(F_N=normal_force(f.F_N, par))
 
 
@@ -189,7 +189,7 @@ def travel(F_N: NormalForce, par: Parameters) -> Overlap:
 def moment(
     F_N: NormalForce,
     mu_B: Annotated[float, Signal("1", "friction of the pads", 0.35)],
-    turning: Annotated[float, Signal("1", "direction of the disc, 0 when stopped")],
+    turning: Annotated[float, Signal("1", "disc direction, 0 when stopped")],
     par: Parameters,
 ) -> Annotated[float, Signal("N*m", "braking moment", 300.0)]:
     r"""Return the braking moment of both pads, :math:`M_B = 2 \mu_B s(\Omega) F_N r_B`."""
@@ -231,7 +231,7 @@ def _elastic_force(n: float, par: Parameters) -> float:
 
 
 def _bent(n: float, par: Parameters) -> float:
-    """Return the force of the table in excess of its first slope [N]."""
+    """Return the table's force minus the force at its first slope [N]."""
     force = 0.0 * n / compliance(par)
     for (n_k, _), before, after in _bends(par):
         force = force + (after - before) * ops.fmax(n - n_k, 0.0)

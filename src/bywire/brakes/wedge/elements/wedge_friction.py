@@ -1,4 +1,4 @@
-"""Dry friction on the wedge: its bearing surfaces, its rollers, and a pad on a stopped disc."""
+"""Dry friction on the wedge: bearing surfaces, rollers, and a pad on a stopped disc."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from bywire.core.signals import Power, Signal
 class Parameters(ParameterSet):
     """Coulomb friction, set-valued at rest.
 
-    ``stopped_disc``: with ``"drop"``, the pad's friction vanishes once the disc is at rest, as in
-    the paper (worst case for the actuator). With ``"stick"``, the resting disc holds the wedge.
+    ``stopped_disc``: with ``"drop"``, the pad friction vanishes once the disc is at rest, as in
+    the paper (worst case for the actuator). With ``"stick"``, the stopped disc holds the wedge.
     """
 
     mu_int: Gain
@@ -23,7 +23,7 @@ class Parameters(ParameterSet):
     mu_R: Gain
     """coefficient of friction of the rollers"""
     stopped_disc: Literal["drop", "stick"]
-    """friction of the pad on the wedge while the disc is at rest"""
+    """pad friction on the wedge while the disc is at rest"""
 
 
 FAULTS = (
@@ -32,13 +32,13 @@ FAULTS = (
 
 
 class Input(NamedTuple):
-    """Pressing forces, the wedge's slope and the pad's friction."""
+    """Pressing forces, wedge slope and pad friction."""
 
     squeeze: Annotated[float, Signal("N", "sum of the screws' forces on the wedge", 800.0)]
     F_N: Annotated[float, Signal("N", "normal force", 3e3)]
     tan_alpha: Annotated[float, Signal("1", "slope of the wedge", 0.4)]
     mu_B: Annotated[float, Signal("1", "friction of the pads", 0.35)]
-    turning: Annotated[float, Signal("1", "direction of the disc, 0 when stopped")]
+    turning: Annotated[float, Signal("1", "disc direction, 0 when stopped")]
 
 
 def friction(u: Input, par: Parameters) -> Annotated[float, Signal("N", "wedge friction", 50.0)]:
@@ -48,8 +48,8 @@ def friction(u: Input, par: Parameters) -> Annotated[float, Signal("N", "wedge f
 
     Notes
     -----
-    The wedge slides across the interfaces by tan(alpha) times its travel, so the factor follows
-    from virtual work.
+    The wedge slides across the interfaces by tan(alpha) times its travel. The factor tan(alpha)
+    then follows from virtual work.
 
     References
     ----------
@@ -66,5 +66,5 @@ def power_loss(
     force: Annotated[float, Signal("N", "friction force on the wedge", 50.0)],
     v: Annotated[float, Signal("m/s", "velocity of the wedge", 0.02)],
 ) -> Power:
-    """Return the heat of the friction, signed like force times velocity."""
+    """Return the friction heat (signed: minus force times velocity)."""
     return -force * v

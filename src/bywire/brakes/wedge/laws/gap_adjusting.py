@@ -1,7 +1,7 @@
-"""Law of the wedge brake's adjuster, which corrects the gap that the moment control estimates.
+"""Law of the wedge brake's adjuster, which corrects the moment control's estimate of the gap.
 
-The moment control estimates the travel from parking to contact. The adjuster subtracts its
-commanded teeth from this travel, so the next application does not creep through a gap that no
+The moment control estimates the travel from the parking position to contact. The adjuster subtracts
+its commanded teeth from this travel, so the next application does not creep through a gap that no
 longer exists.
 """
 
@@ -34,14 +34,14 @@ FAULTS = tuple(
 
 
 class Parameters(wear_adjuster.Parameters):
-    """The adjuster's law, its sample time, and its assumptions."""
+    """Law, sample time and assumptions of the adjuster."""
 
     T_adjust: Duration
     """sample time, long enough to turn all due teeth"""
     gap_slope_hat: Slope
     """assumed clearance per motor angle"""
     T_disc_hat: Temperature
-    """assumed temperature of the disc"""
+    """assumed disc temperature"""
 
 
 class State(NamedTuple):
@@ -49,11 +49,11 @@ class State(NamedTuple):
 
     applied: Annotated[float, Signal("1", "the brake was applied since it was last parked")]
     wide: Annotated[float, Signal("1", "applications in a row with too much gap; < 0: too little")]
-    teeth: Annotated[float, Signal("1", "teeth turned, by the adjuster's count", 3.0)]
+    teeth: Annotated[float, Signal("1", "teeth turned, as counted by the adjuster", 3.0)]
 
 
 class Input(NamedTuple):
-    """Contact and mode of the moment control, and its demand."""
+    """Contact position, mode and demand of the moment control."""
 
     theta_c: Annotated[float, Signal("rad", "contact position, estimated", 1.7)]
     mode: Annotated[float, Signal("1", "mode of the moment control", 3.0)]
@@ -61,7 +61,7 @@ class Input(NamedTuple):
 
 
 class Output(NamedTuple):
-    """Teeth commanded and turned; mode; resulting clearance of the cold brake."""
+    """Commanded and turned teeth, mode, and resulting clearance of the cold brake."""
 
     teeth: wear_adjuster.Teeth
     turned: wear_adjuster.Teeth

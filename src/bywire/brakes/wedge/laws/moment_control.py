@@ -1,7 +1,7 @@
 """Moment control of a wedge brake: parked, gap crossing, moment, retracting.
 
-It uses the angle toward clamping, so both directions of rotation are the same. Its output is the
-speed of the common angle reference, which the faster position task integrates.
+The control uses the angle toward clamping, so both directions of rotation are the same. Its output
+is the speed of the common angle reference, which the faster position task integrates.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ MomentSlope = Annotated[float, Unit("N*m/rad", 300.0), Field(gt=0, allow_inf_nan
 
 
 class Parameters(ParameterSet):
-    """Gap crossing with limited acceleration toward the contact position, integral moment law."""
+    """Gap crossing with limited acceleration toward the contact position, then integral control."""
 
     f_c: Frequency
     """crossover frequency of the moment loop"""
@@ -46,9 +46,9 @@ class Parameters(ParameterSet):
     omega_creep: SpeedLimit
     """speed from the estimated contact position until contact is detected"""
     M_on: SomeMoment
-    """minimum moment demand for which the brake leaves its parking position"""
+    """minimum moment demand at which the brake leaves its parking position"""
     M_contact: SomeMoment
-    """minimum measured moment that counts as contact: threshold of the gap mode"""
+    """minimum measured moment that counts as contact, the threshold of the gap mode"""
     Omega_still: SpeedLimit
     """disc speed below which the control does not use the moment sensor"""
 
@@ -62,7 +62,7 @@ class State(NamedTuple):
 
 
 class Input(NamedTuple):
-    """Demand, measurements, and the reference; positive toward clamping."""
+    """Demand, measurements, and reference, all positive toward clamping."""
 
     M_set: Annotated[float, Signal("N*m", "moment demand", 300.0)]
     M_meas: Annotated[float, Signal("N*m", "measured moment", 300.0)]
@@ -76,8 +76,8 @@ def observed(x: State, u: Input, par: Parameters) -> Moment:
 
     Notes
     -----
-    Standstill logic (our choice): with the disc at rest, the sensor reads zero and an integral law
-    would wind up. The control uses the assumed stiffness instead.
+    The standstill logic is our choice. With the disc at rest, the sensor reads zero and an integral
+    law would wind up. The control uses the assumed stiffness instead.
     """
     still = ops.fabs(u.Omega) < par.Omega_still
     believed = ops.fmax(par.slope_hat * (u.theta - x.theta_c), 0.0)
@@ -101,7 +101,7 @@ def next_mode(mode: Flag, braking: Flag, touching: Flag, home: Flag) -> Flag:
 
 
 def crossing_speed(distance: Angle, rate: Speed, T: SampleTime, par: Parameters) -> Speed:
-    r"""Return the speed toward a position: limited speed and acceleration, creeping at the end.
+    r"""Return the speed toward a position, with limited acceleration, and creeping at the end.
 
     .. math:: \omega = \min(\omega_{gap}, |\omega_{k-1}| + a T, \sqrt{\omega_{creep}^2 + 2 a d})
     """
@@ -111,17 +111,17 @@ def crossing_speed(distance: Angle, rate: Speed, T: SampleTime, par: Parameters)
 
 
 def output(x: State, u: Input, T: SampleTime, par: Parameters) -> State:
-    r"""Advance the controller by one sample; its output is the state's ``rate``.
+    r"""Advance the controller by one sample. Its output is the state's ``rate``.
 
     .. math:: \omega_{ref} = \mathrm{sat}\left(2 \pi f_c (M_{set} - M) / S\right)
 
-    in mode "moment" with the assumed slope S. The contact position is updated from angle and
-    moment whenever the moment mode begins.
+    in mode "moment" with the assumed slope S. Whenever the moment mode begins, the controller
+    updates the contact position from angle and moment.
 
     References
     ----------
-    Roberts et al. (2003), section "Moment tests": gap crossing mode and software rate limit; the
-    law itself is ours.
+    Roberts et al. (2003), section "Moment tests", for the gap crossing mode and the software rate
+    limit. The law itself is ours.
     """
     M = observed(x, u, par)
     braking = ops.where(u.M_set > par.M_on, 1.0, 0.0)

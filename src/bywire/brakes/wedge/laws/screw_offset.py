@@ -1,4 +1,4 @@
-"""Offset between the two screws, which squeeze the wedge without free play or push it jointly."""
+"""Offset between the two screws, which squeeze the wedge without free play or push it together."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ ScrewTravel = Annotated[float, Signal("m", "offset of each screw", 4e-5)]
 
 
 class Parameters(ParameterSet):
-    """Positive offsets preload the wedge; with negative offsets, the screws push on each other.
+    """Positive offsets preload the wedge. With negative offsets, the screws push on each other.
 
-    ``law``: ``"preload"`` always preloads; ``"scheduled"`` preloads near the neutral point, and
-    lets the motors cooperate if the actuation force is large.
+    ``law``: ``"preload"`` always preloads. ``"scheduled"`` preloads near the neutral point, and
+    lets the motors work together if the actuation force is large.
     """
 
     law: Literal["preload", "scheduled"]
     """dependence of the offset on the actuation force"""
     delta_preload: Position
-    """offset of each screw from the middle, preload"""
+    """offset of each screw from the middle, for preload"""
     delta_together: Position
-    """offset of each screw from the middle, cooperation (law "scheduled")"""
+    """offset of each screw from the middle, for motors working together (law "scheduled")"""
     F_low: Force
     """actuation force up to which the screws preload the wedge (law "scheduled")"""
     F_high: Force
-    """actuation force from which the motors work together (law "scheduled")"""
+    """actuation force above which the motors work together (law "scheduled")"""
     T_change: Duration
-    """time constant of the offset's changes, slow compared with the position loop"""
+    """time constant of offset changes, slow compared with the position loop"""
     k_hat: GearRatio
     """travel per shaft angle, assumed by the controller"""
 
@@ -55,7 +55,7 @@ class Output(NamedTuple):
 def offset(
     F_M: Annotated[float, Signal("N", "actuation force, estimated", 1000.0)], par: Parameters
 ) -> ScrewTravel:
-    """Return the offset of each screw; between the two forces it changes linearly."""
+    """Return the offset of each screw, which changes linearly between the two forces."""
     if par.law == "preload":
         return par.delta_preload
     nodes = (par.F_low, par.F_high)
@@ -65,8 +65,8 @@ def offset(
 def advance(delta: ScrewTravel, target: ScrewTravel, T: SampleTime, par: Parameters) -> ScrewTravel:
     """Return the offset one sample later, which follows its target with a first-order lag.
 
-    The offset affects the currents from which the controller estimates the actuation force, so a
-    schedule without this lag chatters.
+    The controller estimates the actuation force from the currents, and the offset affects the
+    currents. Without this lag a schedule would chatter.
     """
     return delta + T / (T + par.T_change) * (target - delta)
 
@@ -76,12 +76,12 @@ def output(
     delta: ScrewTravel,
     par: Parameters,
 ) -> Output:
-    """Return the references of both shafts around a common one.
+    """Return the references of both shafts around a common reference.
 
     References
     ----------
-    Roberts et al. (2003), section "Brake heart": preload near the ideal point, cooperation
-    elsewhere.
+    Roberts et al. (2003), section "Brake heart": preload near the ideal point, motors working
+    together elsewhere.
     """
     apart = delta / par.k_hat
     return Output(theta_1=theta - apart, theta_2=theta + apart)

@@ -1,4 +1,4 @@
-"""Rig of two motors that drive their screws against each other, with a force sensor between.
+"""Rig of two motors that drive their screws against each other, through a force sensor.
 
 Source: R. Roberts, M. Schautt, H. Hartmann, B. Gombert, "Modelling and Validation of the
 Mechatronic Wedge Brake", SAE, 2003, sections "Roller-screw efficiency", "Drive train stiffnesses",
@@ -25,7 +25,7 @@ LOSSES = {"E_copper": "copper_loss", "E_damping": "damping_loss"}
 
 
 class Memory(NamedTuple):
-    """Memory of the controllers between their sampling instants."""
+    """Memory of the controllers between their samples."""
 
     theta_1_ref: Annotated[float, Signal("rad", "angle reference 1", 3.0)]
     last_1: Annotated[float, Signal("rad", "encoder 1 at the last sample", 3.0)]
@@ -38,7 +38,7 @@ class Memory(NamedTuple):
 
 
 class Stimulus(NamedTuple):
-    """Demands of the operator; ``rig.mode_1`` and ``rig.mode_2`` select those that act."""
+    """Demands of the operator. ``rig.mode_1`` and ``rig.mode_2`` select the active demands."""
 
     theta_1_set: Annotated[float, Signal("rad", "demanded angle 1", 3.0)]
     theta_2_set: Annotated[float, Signal("rad", "demanded angle 2", 3.0)]
@@ -49,8 +49,8 @@ class Stimulus(NamedTuple):
 class ScrewRig(Assembly[WedgeParameters, Memory]):
     """Model of the rig.
 
-    Two dry frictions: bearings and screw on each shaft. The sensor is bolted to both screws, so
-    that it also takes tension: no contact opens.
+    It has two dry frictions, bearings and screw on each shaft. The sensor is bolted to both screws
+    and also carries tension, so no contact opens.
     """
 
     name: ClassVar[str] = "screw-rig"
@@ -67,10 +67,10 @@ class ScrewRig(Assembly[WedgeParameters, Memory]):
         "J", "friction of bearings and screws", role=Role("sink", "bearings and screws")
     )
     line = Part(force_sensor, par="rig.sensor", state={"y": "y_F"}, loss="E_line")
-    t_stuck = Integral("s", "time in which both shafts stick", role=Role("standstill"))
+    t_stuck = Integral("s", "time during which both shafts stick", role=Role("standstill"))
     F = Wire("N", "force on the sensor", 1000.0)
-    q_1 = Shown("rad", "angle shown by encoder 1", 3.0)
-    q_2 = Shown("rad", "angle shown by encoder 2", 3.0)
+    q_1 = Shown("rad", "angle from encoder 1", 3.0)
+    q_2 = Shown("rad", "angle from encoder 2", 3.0)
     voltage_1 = Shown("V", "motor voltage 1", 10.0)
     voltage_2 = Shown("V", "motor voltage 2", 10.0)
     T_fr_1 = Shown("N*m", "friction torque 1", 0.1)
@@ -124,14 +124,14 @@ class ScrewRig(Assembly[WedgeParameters, Memory]):
         drive_train.wire(w.drive_2, w.motor_2, w.m.i_2_ref, ON, w.F, w.par)
 
     def friction(self, w: Self) -> tuple[Bounds, ...]:
-        """Return the limits of the frictions on both shafts."""
+        """Return the friction limits on both shafts."""
         return tuple(
             drive_train.bounds(motor.x.omega, drive_train.torque(motor), force, w.par)
             for motor, force in ((w.motor_1, -w.F), (w.motor_2, w.F))
         )
 
     def power(self, w: Self) -> dict[str, float]:
-        """Return the power that goes in, and the power of the frictions."""
+        """Return the input power and the friction power."""
         friction_1, friction_2 = w.reaction
         return {
             "W_electric": drive_train.power(w.motor_1) + drive_train.power(w.motor_2),
@@ -154,7 +154,7 @@ class ScrewRig(Assembly[WedgeParameters, Memory]):
         }
 
     def tasks(self, par: Par) -> tuple[Task, ...]:
-        """Return the one real-time computer, which serves both motors."""
+        """Return the task of the real-time computer, which controls both motors."""
         return (Task("motors", par.control.T_fast, tick),)
 
 
@@ -164,13 +164,13 @@ def screws_compliance(par: Par) -> float:
 
 
 def _stuck(w: ScrewRig) -> float:
-    """Return 1 where both shafts stand still, else 0."""
+    """Return 1 if both shafts are at rest, else 0."""
     moving = ops.fabs(w.motor_1.x.omega) + ops.fabs(w.motor_2.x.omega)
     return ops.where(moving == 0, 1.0, 0.0)
 
 
 def tick(x: Any, m: Memory, u: Stimulus, par: Par) -> Memory:
-    """Run the real-time computer once; it serves both motors."""
+    """Run the real-time computer once, for both motors."""
     first = drive_train.command(
         par.rig.mode_1,
         shaft_encoder.reading(x.theta_1, par.encoder),

@@ -1,4 +1,4 @@
-"""Rig of a single motor: on a dummy shaft or a preloaded screw, its shaft free or clamped.
+"""Rig of a single motor with a dummy shaft or a preloaded screw, its shaft free or clamped.
 
 Source: R. Roberts, M. Schautt, H. Hartmann, B. Gombert, "Modelling and Validation of the
 Mechatronic Wedge Brake", SAE, 2003, sections "Motor & rollerscrew alone", "Motor current loop".
@@ -24,7 +24,7 @@ NUT = 0.0  # net axial force: a preloaded nut is braced against itself
 
 
 class Memory(NamedTuple):
-    """Memory of the controller between its sampling instants."""
+    """Memory of the controller between its samples."""
 
     theta_1_ref: Annotated[float, Signal("rad", "angle reference 1", 3.0)]
     last_1: Annotated[float, Signal("rad", "encoder 1 at the last sample", 3.0)]
@@ -33,7 +33,7 @@ class Memory(NamedTuple):
 
 
 class Stimulus(NamedTuple):
-    """Demands of the operator; ``rig.mode_1`` selects the one that acts."""
+    """Demands of the operator. ``rig.mode_1`` selects the active demand."""
 
     theta_1_set: Annotated[float, Signal("rad", "demanded angle 1", 3.0)]
     i_1_set: Annotated[float, Signal("A", "current demand 1", 5.0)]
@@ -42,7 +42,7 @@ class Stimulus(NamedTuple):
 class ShaftRig(Assembly[WedgeParameters, Memory]):
     """Model of the rig.
 
-    One dry friction: bearings, screw and clamp together.
+    It has one dry friction, of bearings, screw and clamp together.
     """
 
     name: ClassVar[str] = "shaft-rig"
@@ -62,8 +62,8 @@ class ShaftRig(Assembly[WedgeParameters, Memory]):
     E_shaft = Integral(
         "J", "friction of bearings, screw and clamp", role=Role("sink", "bearings and screws")
     )
-    t_stuck = Integral("s", "time in which the shaft sticks", role=Role("standstill"))
-    q_1 = Shown("rad", "angle shown by encoder 1", 3.0)
+    t_stuck = Integral("s", "time during which the shaft sticks", role=Role("standstill"))
+    q_1 = Shown("rad", "angle from encoder 1", 3.0)
     sat_current = Shown("1", "current demand saturated")
     voltage_1 = Shown("V", "motor voltage 1", 10.0)
     T_fr_1 = Shown("N*m", "friction torque 1", 0.1)
@@ -96,21 +96,21 @@ class ShaftRig(Assembly[WedgeParameters, Memory]):
         drive_train.wire(w.drive, w.motor, w.m.i_1_ref, ON, NUT, w.par)
 
     def mass(self, xe: Any, par: Par) -> Any:
-        """Return the inductance and the inertia, that of the dummy shaft included."""
+        """Return the inductance and the inertia, including the dummy shaft."""
         motor = super().mass(xe, par)
         return motor._replace(omega_1=motor.omega_1 + _dummy_inertia(par.rig))
 
     def stored(self, w: Self) -> Any:
-        """Return the energy in the motor and in the dummy shaft [J]."""
+        """Return the energy in motor and dummy shaft [J]."""
         omega = w.motor.x.omega
         return super().stored(w) + 0.5 * _dummy_inertia(w.par.rig) * omega * omega
 
     def friction(self, w: Self) -> tuple[Bounds, ...]:
-        """Return the limits of the friction on the shaft."""
+        """Return the friction limits on the shaft."""
         return (friction(w.motor.x.omega, drive_train.torque(w.motor), w.par),)
 
     def power(self, w: Self) -> dict[str, float]:
-        """Return the power that goes in, and the power of the friction."""
+        """Return the input power and the friction power."""
         omega = w.motor.x.omega
         return {
             "W_electric": drive_train.power(w.motor),
@@ -132,25 +132,25 @@ class ShaftRig(Assembly[WedgeParameters, Memory]):
         }
 
     def tasks(self, par: Par) -> tuple[Task, ...]:
-        """Return the one controller."""
+        """Return the controller's task."""
         return (Task(par.rig.mode_1, par.control.T_fast, tick),)
 
 
 def friction(omega: float, torque: float, par: Par) -> Bounds:
-    """Return the limits of the dry friction [N m] of bearings, screw and clamp.
+    """Return the limits of the dry friction [N m] in bearings, screw and clamp.
 
-    ``omega``, ``torque``: speed of the shaft [rad/s], torque of its motor [N m].
+    ``omega``, ``torque``: shaft speed [rad/s], motor torque [N m].
 
     Notes
     -----
-    A preloaded nut has two halves that push on each other through the screw: in either direction
+    A preloaded nut has two halves that push on each other through the screw. In either direction
     of rotation, one half drives and the other is driven. Both rub, and their net torque is zero.
     """
     T_p = T_n = drive_train.bearing_friction(omega, NUT, par)
     if par.rig.load == "screw":
         F_0 = par.rig.F_0
         halves = [drive_train.screw_friction(torque, force, par) for force in (F_0, -F_0)]
-        # A loss by the motor's torque does not depend on the preload: it must not count twice.
+        # A loss due to motor torque does not depend on the preload and must not count twice.
         once = drive_train.screw_friction(torque, 0.0 * F_0, par)
         T_p = T_p + halves[0].T_p + halves[1].T_p - once.T_p
         T_n = T_n + halves[0].T_n + halves[1].T_n - once.T_n
@@ -160,12 +160,12 @@ def friction(omega: float, torque: float, par: Par) -> Bounds:
 
 
 def _dummy_inertia(par: RigParameters) -> float:
-    """Return the inertia [kg m^2] that the rig adds; the screw's own is in the motor's."""
+    """Return the inertia [kg m^2] of the rig. The motor's inertia includes the screw."""
     return par.J_dummy if par.load == "dummy" else 0.0 * par.J_dummy
 
 
 def _current_limit(par: Par) -> float:
-    """Return the limit [A] of the current demand: the drive's, or a lower one of the control."""
+    """Return the limit [A] of the current demand, from the drive or the position control."""
     if par.rig.mode_1 == "position":
         return ops.fmin(par.control.position.i_max, par.drive.i_max)
     return par.drive.i_max
@@ -181,7 +181,7 @@ def tick(x: Any, m: Memory, u: Stimulus, par: Par) -> Memory:
     )
 
 
-# --- One shaft alone: known current, known axial force
+# --- One shaft alone, with known current and known axial force
 
 
 class Load(NamedTuple):
@@ -192,10 +192,10 @@ class Load(NamedTuple):
 
 
 class DrivenShaft(Assembly[WedgeParameters, Load]):
-    """Model of one shaft, for identification: with measured current and force, no drive is needed.
+    """Model of one shaft for identification. It needs no drive, because the current is measured.
 
-    One dry friction: bearings and screw together. ``rig.load`` determines whether the dummy
-    shaft's inertia counts. There is no cogging where ``motor_1.T_cog`` is zero.
+    It has one dry friction, of bearings and screw together. ``rig.load`` determines whether the
+    inertia of the dummy shaft counts. There is no cogging if ``motor_1.T_cog`` is zero.
     """
 
     name: ClassVar[str] = "driven-shaft"
@@ -215,21 +215,21 @@ class DrivenShaft(Assembly[WedgeParameters, Load]):
         w.rotor.u = driven_rotor.Input(i=w.m.i, load=load, friction=0.0)
 
     def mass(self, xe: Any, par: Par) -> Any:
-        """Return the inertia, that of the dummy shaft included."""
+        """Return the inertia, including the dummy shaft."""
         rotor = super().mass(xe, par)
         return rotor._replace(omega=rotor.omega + _dummy_inertia(par.rig))
 
     def friction(self, w: Self) -> tuple[Bounds, ...]:
-        """Return the limits of the friction on the shaft."""
+        """Return the friction limits on the shaft."""
         torque = servo_motor.torque_constant(w.rotor.par) * w.m.i
         return (drive_train.bounds(w.rotor.x.omega, torque, w.m.F, w.par),)
 
     def power(self, w: Self) -> dict[str, float]:
-        """Return the power of the friction."""
+        """Return the friction power."""
         return {"E_shaft": -w.reaction[0] * w.rotor.x.omega}
 
     def tasks(self, par: Par) -> tuple[Task, ...]:
-        """Return the hold of the measured current and force."""
+        """Return the task that holds the measured current and force."""
         return (Task("hold", par.control.T_fast, hold),)
 
 

@@ -1,7 +1,7 @@
-"""A quarter car with the wedge brake: its disc turns with a wheel on the road.
+"""A quarter car with the wedge brake, whose disc turns with a wheel on the road.
 
-At the end of a stop, the tire rocks back and the wheel tends to turn with it. The pads' friction on
-the wedge then changes its sign, and self-reinforcement becomes release.
+At the end of a stop, the tire rocks back and the wheel tends to turn with it. The pad friction on
+the wedge then changes sign, and self-reinforcement turns into release.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from bywire.vehicle.two_wheeler import BOOK
 
 
 class WedgeCornerParameters(WedgeParameters):
-    """The wedge brake, its flywheel for a wheel, and a quarter of a car."""
+    """The wedge brake, its flywheel as the wheel, and a quarter car."""
 
     corner: HotCornerParameters
     ecu: slip_control.Parameters
@@ -42,10 +42,10 @@ Memory: Any = joined(__name__, "Memory", control.Memory, slip_control.Memory)
 
 
 class WedgeCorner(HotCorner[WedgeCornerParameters, Any], WedgeBrake):
-    """The brake with all its controllers; the flywheel is the wheel, driven by the road.
+    """The brake with all its controllers. The flywheel is the wheel, which the road drives.
 
-    Slip control acts above the moment control and lowers the demanded moment. Fading pads reinforce
-    the wedge less, so the motors have to compensate.
+    Slip control works above the moment control and reduces the demanded moment. Fading pads
+    reinforce the wedge less, so the motors have to compensate.
     """
 
     name: ClassVar[str] = "wedge-corner"
@@ -89,24 +89,24 @@ class WedgeCorner(HotCorner[WedgeCornerParameters, Any], WedgeBrake):
     )
 
     def wheel(self, w: Self) -> WheelSpeed:
-        """Return the speed of the disc, which is that of the wheel."""
+        """Return the disc speed, which is the wheel speed."""
         return WheelSpeed(w.disc.x.Omega, w.disc.xe.Omega)
 
     def disc_torque(self, w: Self) -> float:
-        """Return the torque of the road."""
+        """Return the road torque."""
         return self.tyre_torque(w)
 
     def braked(self, w: Self) -> float:
-        """Return the energy that the pads have taken from the disc."""
+        """Return the energy that the pads took from the disc."""
         taken: float = w.flow.W_brake
         return taken
 
     def brake_torque(self, w: Self) -> float:
-        """Return the largest moment that the pads can hold."""
+        """Return the maximum moment that the pads can hold."""
         return wedge_caliper.moment(w.caliper.f.F_N, w.body.par.mu_B, 1.0, w.caliper.par)
 
     def wire(self, w: Self) -> None:
-        """Connect all parts; the pads' friction follows the temperature of their disc."""
+        """Connect all parts. The pad friction follows the disc temperature."""
         w.body.vary(mu_B=w.body.par.mu_B * self.pads_friction(w))
         super().wire(w)
 
@@ -115,7 +115,7 @@ class WedgeCorner(HotCorner[WedgeCornerParameters, Any], WedgeBrake):
         return {**super().record(w), "E_wheel": flywheel.energy(w.disc.x, w.disc.par)}
 
     def tasks(self, par: Any) -> tuple[Task, ...]:
-        """Return the brake's own controllers, with slip control above them if it can act."""
+        """Return the brake's controllers, with slip control above them if it can act."""
         brake = super().tasks(par)
         if par.ecu.abs == "off" or par.command.mode != "moment":
             return brake
@@ -126,7 +126,7 @@ class WedgeCorner(HotCorner[WedgeCornerParameters, Any], WedgeBrake):
         return super()._moment(x, _contact_tracked(x, m, par), left, par)
 
     def remarks(self, recording: Any, par: Any) -> list[str]:
-        """Return remarks on a slip far below the slip of the largest adhesion."""
+        """Return remarks on a slip far below the slip at maximum adhesion."""
         if par.ecu.abs != "pi":
             return []
         return far_from_peak(
@@ -139,7 +139,7 @@ class WedgeCorner(HotCorner[WedgeCornerParameters, Any], WedgeBrake):
         )
 
     def rest(self, par: Any) -> tuple[Any, Any]:
-        """Return the vehicle standing, the brake parked."""
+        """Return the vehicle at rest with a parked brake."""
         return at_speed(0.0, par)
 
 
@@ -161,11 +161,11 @@ def _slip(x: Any, m: Any, u: control.Stimulus, par: WedgeCornerParameters) -> An
 
 
 def _contact_tracked(x: Any, m: Any, par: WedgeCornerParameters) -> Any:
-    """Return the memory with the angle of contact by the measured moment, while the wheel turns.
+    """Return the memory with the contact angle from the measured moment, while the wheel turns.
 
     Once the wheel is at rest, the control estimates the moment from the angle and keeps the last
-    angle of contact. Otherwise an error of the assumed stiffness would make the motors push against
-    a resting wedge.
+    contact angle. Otherwise an error in the assumed stiffness would make the motors push against
+    a wedge at rest.
     """
     law, seen = par.control.moment, readings(x, par)
     measured = ops.where(seen.Omega < 0, -1.0, 1.0) * seen.M
@@ -176,9 +176,9 @@ def _contact_tracked(x: Any, m: Any, par: WedgeCornerParameters) -> Any:
 
 
 def at_speed(v: float, par: WedgeCornerParameters, T_disc: float | None = None) -> tuple[Any, Any]:
-    """Return the corner rolling at a speed [m/s], its brake parked.
+    """Return the corner rolling at a speed [m/s] with a parked brake.
 
-    ``T_disc``: temperature of the disc [K], that of the air by default.
+    ``T_disc``: disc temperature [K]; default: the air temperature.
     """
     heat = par.corner.heat
     disc = warm_disc(heat.T_a if T_disc is None else T_disc, heat)

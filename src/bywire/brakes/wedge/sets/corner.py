@@ -1,4 +1,4 @@
-"""The wedge brake on the front corner of a mid-size car; its own values are in the TOML file."""
+"""The wedge brake on the front corner of a mid-size car. Its own values are in the TOML file."""
 
 from __future__ import annotations
 

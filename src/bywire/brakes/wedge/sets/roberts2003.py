@@ -1,4 +1,4 @@
-"""Parameter sets of Roberts et al. (2003): values by formula; all others are in the TOML file."""
+"""Parameter sets of Roberts et al. (2003): values from formulas. The TOML file has all others."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _LOOP_RATE = 2.0 * math.pi * 1200.0
 
 
 def _moment_slope(par: Any) -> float:
-    """Return moment per angle in contact, as the moment controller assumes it."""
+    """Return the moment per angle in contact that the moment controller assumes."""
     wedge, caliper = par.wedge, par.caliper
     force = caliper.K_cal * math.tan(wedge.alpha) * _travel(par)
     slope: float = 2.0 * wedge.mu_B * caliper.r_B * force
@@ -22,13 +22,13 @@ def _moment_slope(par: Any) -> float:
 
 
 def _travel(par: Any) -> float:
-    """Return travel per angle of a screw."""
+    """Return a screw's travel per angle."""
     travel: float = par.screw.lead / (2.0 * math.pi)
     return travel
 
 
 def _grease(par: Any) -> float:
-    """Return the viscous friction of a bearing at the reference speed and viscosity."""
+    """Return a bearing's viscous friction at the reference speed and viscosity."""
     bearing = par.bearing
     torque: float = 1.2e-4 * (bearing.omega_ref * (bearing.nu_ref / 1e-6)) ** bearing.k_nu
     return torque

@@ -1,6 +1,6 @@
-"""Drive train of the wedge brake: peak power over wedge slope and screw lead at equal response.
+"""Drive train of the wedge brake: peak power versus wedge slope and screw lead at equal response.
 
-A design consists of a wedge slope and a screw lead. All other parameters follow from these two. The
+A design consists of a wedge slope and a screw lead, which determine all other parameters. The
 reference speeds give every design the same response time.
 """
 
@@ -48,7 +48,7 @@ Count = Annotated[int, Unit("1", 11.0), Field(ge=3, le=101)]
 
 
 _PHASES = tuple(0.5 * math.pi * k for k in range(4))
-"""angles of the disc [rad] at which the runs start"""
+"""disc angles [rad] at which the runs start"""
 
 
 @dataclass(frozen=True)
@@ -60,20 +60,20 @@ class Demand:
     moment
         Step of the demand [N m].
     t_90
-        Time [s] within which the sensor must show 90 % of it, at every friction coefficient.
+        Time [s] within which the sensor must show 90 % of the step, at every friction coefficient.
     t_hold, t_release
         Lengths [s] of the demand and of the release after it.
     mu_B
-        Friction coefficients of the pads.
+        Pad friction coefficients.
     known
-        Whether the moment control knows the coefficient, so that its crossover is unchanged.
+        Whether the moment control uses the true coefficient, which keeps its crossover constant.
     enforced
-        Whether the speed of the reference enforces the time; otherwise the pads close as fast as
-        with the given brake.
+        Whether the speed of the reference enforces the time. Otherwise the pads close as fast as
+        in the given brake.
     whole
-        Whether the power of the release also counts, or only that of build-up and hold.
+        Whether the power of the release also counts, in addition to build-up and hold.
     phases
-        Angles of the disc [rad] at which the runs begin.
+        Disc angles [rad] at which the runs begin.
     """
 
     moment: float
@@ -89,24 +89,24 @@ class Demand:
 
 @dataclass(frozen=True)
 class Answer:
-    """Response of a design, per friction coefficient, shape (cases,); the worst of all phases.
+    """Response of a design at each friction coefficient, shape (cases,), worst of all phases.
 
-    The phase of the disc's runout at the stop is random: the study tries several.
+    The phase of the disc runout at the stop is random, so the study tries several.
 
     Parameters
     ----------
     closing_speed
-        Largest speed at which the reference closes the pads [m/s], the same for all cases.
+        Maximum speed at which the reference closes the pads [m/s], the same for all cases.
     t_90
-        Time to 90 % of the demand [s]; NaN if not reached.
+        Time to 90 % of the demand [s], NaN if not reached.
     filtered, instantaneous
-        Largest counted power at the drives' input [W], with and without the rig's filter.
+        Maximum counted power at the drives' input [W], with and without the rig's filter.
     release
-        Largest power during the release [W], with the rig's filter.
+        Maximum power during the release [W], with the rig's filter.
     current
-        Largest current demand of either motor [A].
+        Maximum current demand of either motor [A].
     speed
-        Largest speed of either motor [rad/s].
+        Maximum speed of either motor [rad/s].
     copper, friction
         Energies lost in copper, bearings and screws [J].
     held
@@ -114,7 +114,7 @@ class Answer:
     left
         Moment at the end of the release [N m].
     stop
-        Largest force on the wedge's end stops [N].
+        Maximum force on the wedge's end stops [N].
     unsettled
         Substeps of all cases that hit the contact iteration's limit.
     """
@@ -152,15 +152,15 @@ _SIGNALS = (
     "E_copper",
     "E_shaft",
 )
-_FASTEST = 8.0  # largest closing speed of the search, relative to the smallest
-_NARROWINGS, _TRIED = 2, 8  # rounds, and speeds tried in each between too slow and fast enough
+_FASTEST = 8.0  # maximum closing speed of the search, relative to the minimum
+_NARROWINGS, _TRIED = 2, 8  # rounds, and speeds per round between too slow and fast enough
 _SETTLE, _RECORD, _STEP = 0.05, 2e-4, 20e-6
-_LAST = 0.8  # share of the demand's length at which its final part begins
+_LAST = 0.8  # fraction of the demand's length at which its final part begins
 _TINY_MOMENT = 1e-9
 
 
 def closing_speed(par: WedgeParameters) -> float:
-    """Return the speed [m/s] at which the pads close at the rate limit of the reference."""
+    """Return the closing speed of the pads [m/s] at the rate limit of the reference."""
     travel = roller_screw.slope(par.screw) * wedge.slope(par.wedge)
     return par.control.moment.rate_max * travel
 
@@ -173,9 +173,9 @@ def redesigned(
 ) -> WedgeParameters:
     """Return the brake with another wedge slope and screw lead [m].
 
-    The motion of the pads over time is unchanged: the speeds of the reference and the travel of the
-    end stops change with the ratio of pad to shaft travel, and the controller knows the design.
-    The screw's efficiency follows the lead, see `efficiencies`, or is ``"as-given"``.
+    The pads move in the same way over time. Therefore the speeds of the reference and the travel of
+    the end stops change with the ratio of pad to shaft travel, and the controller uses the values
+    of the design. The screw efficiency depends on the lead, or is ``"as-given"``.
     """
     travel = roller_screw.slope(par.screw) * wedge.slope(par.wedge)
     k = lead / (2.0 * math.pi)
@@ -195,16 +195,16 @@ def redesigned(
 
 
 def _efficiencies(par: WedgeParameters, lead: float) -> dict[str, float]:
-    r"""Return the efficiencies of a screw of another lead [m] with the same friction angle.
+    r"""Return the efficiencies of a screw with another lead [m] and the same friction angle.
 
     With the lead angle :math:`\lambda` and the friction angle :math:`\rho`, both small, as in a
-    screw that can be driven back:
+    back-drivable screw:
 
     .. math::
         1/\eta_f - 1 = \tan(\lambda + \rho) / \tan\lambda - 1 \approx \rho / \lambda, \quad
         1 - \eta_b = 1 - \tan(\lambda - \rho) / \tan\lambda \approx \rho / \lambda
 
-    so that both losses are proportional to 1/lead: the friction torque from the axial force is
+    Both losses are proportional to 1/lead, because the friction torque from the axial force is
     constant. A self-locking screw, with a small lead, has :math:`\eta_b = 0`.
     """
     ratio = par.screw.lead / lead
@@ -214,20 +214,20 @@ def _efficiencies(par: WedgeParameters, lead: float) -> dict[str, float]:
 
 
 def answer(par: WedgeParameters, demand: Demand) -> Answer:
-    """Return a brake's response at the smallest closing speed that is fast enough.
+    """Return a brake's response at the minimum closing speed that is fast enough.
 
     The speeds of the reference have a common factor. With ``demand.enforced`` it is the smallest
-    factor with which the slowest case meets the demanded time, within 1 %. If none does, it is the
-    closest factor. Without ``demand.enforced`` it is 1.
+    factor at which the slowest case meets the demanded time, to within 1 %. If no factor meets it,
+    the closest factor counts. Without ``demand.enforced`` the factor is 1.
     """
     controlled = par.replace({"command.mode": "moment"})
     if not demand.enforced:
         return _judged(controlled, demand, 1.0)
-    # The pads must at least cover their travel in the demanded time.
+    # The pads must cover at least their travel in the demanded time.
     pads = [controlled.replace({"wedge.mu_B": mu_B}) for mu_B in demand.mu_B]
     F_N = 0.9 * max(force_for(demand.moment, brake) for brake in pads)
     least = travel_for(F_N, controlled) * wedge.slope(controlled.wedge) / demand.t_90
-    # All speeds of a round run in parallel lanes: eight cost little more than one.
+    # All speeds of a round run in parallel lanes, so eight cost little more than one.
     factors = least / closing_speed(controlled) * np.geomspace(1.0, _FASTEST, _TRIED)
     low = high = slow_time = fast_time = math.nan
     for _ in range(_NARROWINGS):
@@ -246,7 +246,7 @@ def answer(par: WedgeParameters, demand: Demand) -> Answer:
 
 
 def _run(par: WedgeParameters, demand: Demand, phase: float, duration: float) -> Run:
-    """Return the stop with the disc at an angle [rad] when the settling begins."""
+    """Return the stop with the disc at the angle ``phase`` [rad] when settling begins."""
     levels = {0.0: demand.moment, demand.t_hold: 0.0}
     case = case_from_parked(
         par, lambda t: {"M_set": steps(t, levels)}, duration, settle=_SETTLE, record=_RECORD
@@ -255,7 +255,7 @@ def _run(par: WedgeParameters, demand: Demand, phase: float, duration: float) ->
 
 
 def _variations(par: WedgeParameters, demand: Demand, factors: Array) -> Mapping[str, Array]:
-    """Return the parameters of all cases: every friction coefficient with every factor."""
+    """Return the parameters of all cases, which combine every coefficient with every factor."""
     mu, factor = (
         grid.ravel() for grid in np.meshgrid(np.asarray(demand.mu_B), factors, indexing="ij")
     )
@@ -268,9 +268,9 @@ def _variations(par: WedgeParameters, demand: Demand, factors: Array) -> Mapping
 
 
 def _slowest(par: WedgeParameters, demand: Demand, factors: Array) -> Array:
-    """Return the time to 90 % of the slowest case [s] for every factor; infinite if not reached.
+    """Return the slowest case's time to 90 % [s] for each factor, infinite if not reached.
 
-    Only the smallest and the largest friction coefficient are simulated.
+    Only the lowest and the highest friction coefficient are simulated.
     """
     demand = replace(demand, mu_B=(min(demand.mu_B), max(demand.mu_B)))
     cases, slowest = _variations(par, demand, factors), np.zeros(factors.size)
@@ -322,7 +322,7 @@ def _judged(par: WedgeParameters, demand: Demand, factor: float) -> Answer:
 
 
 def _times(time: Array, y: Array, level: float) -> Array:
-    """Return when each row first exceeds a level [s after the demand], interpolated, or NaN."""
+    """Return the time [s after the demand] at which each row first exceeds a level, or NaN."""
     times = np.full(y.shape[0], math.nan)
     for n, row in enumerate(y):
         above = np.flatnonzero(row > level)
@@ -336,24 +336,26 @@ def _times(time: Array, y: Array, level: float) -> Array:
 # --- The study
 
 _ASSUMPTIONS = (
-    "The wedge's slope and the screws' lead vary; motors, drives, bearings, stiffnesses, clearance "
-    "and the travel that preloads the screws are constant.",
-    "The screws' friction angle is constant: their efficiency grows with the lead, and a small "
-    "lead is self-locking. With efficiency 'as-given' the efficiency is constant.",
+    "Wedge slope and screw lead vary. Motors, drives, bearings, stiffnesses, clearance and the "
+    "screw travel for the preload are constant.",
+    "The friction angle of the screws is constant. Their efficiency therefore increases with the "
+    "lead, and a screw with a small lead is self-locking. With efficiency 'as-given' the "
+    "efficiency is constant.",
     "The controllers use the design's travel per shaft angle and moment per angle.",
-    "Equal response: all speeds and accelerations of the reference are scaled so that the pads "
-    "close equally fast. With response 'enforced', they have a common factor: the smallest with "
-    "which the measured moment reaches 90 % of the demand in time at every friction coefficient.",
-    "The bandwidths of the position loops on the shaft and the moment loop's crossover are "
+    "Equal response means that all speeds and accelerations of the reference are scaled so that "
+    "the pads close equally fast. With response 'enforced', they have a common factor. It is the "
+    "smallest factor at which the measured moment reaches 90 % of the demand in time at every "
+    "friction coefficient.",
+    "The bandwidths of the position loops on the shaft and the crossover of the moment loop are "
     "constant.",
-    "The end stops of the wedge allow the same travel of the pads as before.",
+    "The end stops of the wedge allow the same pad travel as before.",
     "A design is infeasible if at any coefficient it is more than 2 % late (with an enforced "
     "response), does not hold 95 % of the demand, does not release, or presses on an end stop.",
     "Power is the power at the drives' input, including standby, during build-up and hold, and "
     "optionally during the release.",
-    "Each case runs with the disc at four angles, a quarter turn apart, and the worst counts: "
-    "the phase of the runout at the stop is random, and holding the moment against it takes "
-    "power.",
+    "Each case runs with the disc at four angles, a quarter turn apart, and the worst one counts. "
+    "The phase of the runout at the stop is random, and holding the moment against the runout "
+    "needs power.",
 )
 
 
@@ -361,7 +363,7 @@ class Options(ParameterSet):
     """The stop, the friction coefficients, and the designs to compare."""
 
     moment: SomeMoment
-    """demanded moment, in one step"""
+    """demanded moment, as one step"""
     t_90: Duration
     """time within which the measured moment must reach 90 %"""
     t_hold: Duration
@@ -371,27 +373,27 @@ class Options(ParameterSet):
     counted: Literal["build-up-and-hold", "whole-pulse"]
     """whether the power of the release also counts"""
     omega_gap: SpeedLimit
-    """maximum speed of the given drive train while crossing the gap, scaled with all others"""
+    """maximum speed while crossing the gap with the given drive train, scaled like all speeds"""
     mu_B: Coefficients
-    """friction coefficients of the pads; the worst case counts"""
+    """pad friction coefficients; the worst case counts"""
     believed: Literal["known", "as-given"]
-    """whether the moment controller knows them, or assumes the parameter set's coefficient"""
+    """whether the moment controller uses the true coefficients or the parameter set's"""
     response: Literal["enforced", "as-scaled"]
-    """whether the time is enforced, or the pads close as fast as with the given drive train"""
+    """whether t_90 is enforced, or the pads close as fast as with the given drive train"""
     efficiency: Efficiency
-    """screw property held constant as the lead varies: friction angle, or efficiency"""
+    """screw property that stays constant as the lead varies: friction angle or efficiency"""
     power: Literal["filtered", "instantaneous"]
-    """power to minimize: with the rig's filter, or without"""
+    """power to minimize, with the rig's filter or without it"""
     tan_alpha_min: Slope
-    """minimum slope of the wedge"""
+    """minimum wedge slope"""
     tan_alpha_max: Slope
-    """maximum slope of the wedge"""
+    """maximum wedge slope"""
     slopes: Count
     """number of slopes"""
     lead_min: Length
-    """minimum lead of the screws"""
+    """minimum screw lead"""
     lead_max: Length
-    """maximum lead of the screws"""
+    """maximum screw lead"""
     leads: Count
     """number of leads"""
 
@@ -421,18 +423,18 @@ DEFAULTS = Options(
     lead_max=8e-3,
     leads=15,
 )
-"""the pulse of Fig. 9 in Roberts et al. (2003), around the catalog's design"""
+"""pulse of Fig. 9 in Roberts et al. (2003), designs around the catalog's design"""
 
 _NONE_FEASIBLE = "no design is feasible. Increase t_90 or t_hold, or compare other designs"
 _NEAR = 1.05
-"""designs within this factor of the smallest power count as equally good"""
-_ROUNDS = 2  # of the optimum's refinement; each halves the spacing
-_TINY = 1e-6  # of the spacing
+"""designs within this factor of the minimum power count as equally good"""
+_ROUNDS = 2  # rounds that refine the optimum; each halves the spacing
+_TINY = 1e-6  # fraction of the spacing
 _BORDER = 0.02  # contour between 0, feasible, and 1, close to the last feasible designs
 
 
 class _Best(NamedTuple):
-    """A design, and its largest power [W] at the worst friction coefficient."""
+    """A design, and its maximum power [W] at the worst friction coefficient."""
 
     tan_alpha: float
     lead: float
@@ -441,12 +443,12 @@ class _Best(NamedTuple):
 
 
 def compute(par: WedgeParameters, options: Options, progress: Progress) -> Findings:
-    """Return the map of peak power, its optimum on a finer grid around it, and the given design.
+    """Return the map of peak power, the optimum from a finer grid, and the given design.
 
     Raises
     ------
     InputError
-        When a design is not valid.
+        If a design is not valid.
     """
     demand = Demand(
         options.moment,
@@ -481,7 +483,7 @@ def compute(par: WedgeParameters, options: Options, progress: Progress) -> Findi
             f"worst_{kind}",
             "lead",
             "tan_alpha",
-            f"Largest {kind} power of the stop at the worst friction coefficient.",
+            f"Maximum {kind} power during the stop at the worst friction coefficient.",
             marks if kind == options.power else (here,),
             {"infeasible": ("infeasible", _BORDER)},
         )
@@ -495,7 +497,7 @@ def compute(par: WedgeParameters, options: Options, progress: Progress) -> Findi
 
 
 def _smallest(data: xr.Dataset, power: str) -> _Best:
-    """Return the feasible design of least power; at least one must exist."""
+    """Return the feasible design with the least power. At least one must exist."""
     worst = data[f"worst_{power}"].values
     i, j = np.unravel_index(int(np.nanargmin(worst)), worst.shape)
     at = data.isel(tan_alpha=int(i), lead=int(j))
@@ -521,7 +523,7 @@ def _optimum(best: _Best, grids: Sequence[xr.Dataset], options: Options) -> tupl
         good = np.argwhere(data[f"worst_{options.power}"].values <= _NEAR * best.power)
         slopes += [float(value) for value in data["tan_alpha"].values[good[:, 0]]]
         leads += [float(value) for value in data["lead"].values[good[:, 1]]]
-    share = f"of designs within {100 * (_NEAR - 1):.0f} % of the smallest power"
+    share = f"of designs within {100 * (_NEAR - 1):.0f} % of the minimum power"
     return (
         Kpi("optimum_tan_alpha", best.tan_alpha, "1", "Wedge slope with the lowest power."),
         Kpi("optimum_lead", best.lead, "m", "Screw lead with the lowest power."),
@@ -529,31 +531,31 @@ def _optimum(best: _Best, grids: Sequence[xr.Dataset], options: Options) -> tupl
             "optimum_power",
             best.power,
             "W",
-            f"Largest {options.power} power of the stop, worst friction coefficient.",
+            f"Maximum {options.power} power during the stop at the worst friction coefficient.",
         ),
         Kpi(
             "optimum_mu_B",
             float(best.at[f"mu_B_{options.power}"]),
             "1",
-            "Friction coefficient that needs this power.",
+            "Friction coefficient that needs optimum_power.",
         ),
         Kpi(
             "optimum_release",
             float(best.at["release"].max()),
             "W",
-            "Maximum power during its release, filtered.",
+            "Maximum filtered power during the optimum's release.",
         ),
         Kpi(
             "optimum_t_90",
             float(best.at["t_90"].max()),
             "s",
-            "Time to 90 % of the demand, slowest friction coefficient.",
+            "Time to 90 % of the demand at the slowest friction coefficient.",
         ),
         Kpi(
             "optimum_closing_speed",
             float(best.at["closing_speed"]),
             "m/s",
-            "Maximum speed at which its reference closes the pads.",
+            "Maximum speed at which the optimum's reference closes the pads.",
         ),
         Kpi("optimum_current", float(best.at["current"].max()), "A", "Maximum current demand."),
         Kpi("flat_tan_alpha_min", min(slopes), "1", f"Minimum slope {share}."),
@@ -576,7 +578,7 @@ def _optimum(best: _Best, grids: Sequence[xr.Dataset], options: Options) -> tupl
             "other_power",
             other.power,
             "W",
-            f"Largest {_other(options.power)} power there, worst friction coefficient.",
+            f"Maximum {_other(options.power)} power there at the worst friction coefficient.",
         ),
     )
 
@@ -590,42 +592,45 @@ def _given(given: Answer, options: Options) -> tuple[Kpi, ...]:
             "given_power",
             float(sizes[k]),
             "W",
-            f"Largest {options.power} power of the given drive train, worst coefficient.",
+            f"Maximum {options.power} power of the given drive train at the worst coefficient.",
         ),
         Kpi(
-            "given_mu_B", float(options.mu_B[k]), "1", "Friction coefficient that needs this power."
+            "given_mu_B",
+            float(options.mu_B[k]),
+            "1",
+            "Friction coefficient that needs given_power.",
         ),
         Kpi(
             "given_release",
             float(given.release.max()),
             "W",
-            "Maximum power during its release, filtered.",
+            "Maximum filtered power during the release of the given drive train.",
         ),
         Kpi(
             "given_t_90",
             t_90,
             "s",
-            "Its time to 90 % of the demand, slowest friction coefficient.",
+            "Time to 90 % of the demand with the given drive train, slowest friction coefficient.",
             note,
         ),
         Kpi(
             "given_closing_speed",
             given.closing_speed,
             "m/s",
-            "Maximum speed at which its reference closes the pads.",
+            "Maximum closing speed of the pads with the given drive train.",
         ),
     )
 
 
 def _cuts(data: xr.Dataset, best: _Best) -> tuple[Cut, ...]:
-    """Return the dependence on the lead at the map's slope nearest to the optimum."""
+    """Return the dependence on the lead at the map slope nearest to the optimum."""
     row = data.sel(tan_alpha=best.tan_alpha, method="nearest")
     worst = row[["release", "t_90", "current", "speed", "copper"]].max(dim="mu_B", keep_attrs=True)
     names = ("worst_filtered", "mu_B_filtered", "worst_instantaneous")
     shown = xr.merge([worst, row[list(names)]], compat="override")
     title = (
         f"tan(alpha) = {float(row['tan_alpha']):.3g}, worst friction coefficient; current, speed "
-        "and copper loss of the whole pulse"
+        "and copper loss over the whole pulse"
     )
     return (Cut(title, shown, ("lead", *names, *(str(name) for name in worst))),)
 
@@ -636,7 +641,7 @@ def _warnings(data: xr.Dataset) -> tuple[str, ...]:
 
 
 def _edges(best: _Best, options: Options) -> tuple[str, ...]:
-    """Return a warning if the optimum is at the edge of the range of designs."""
+    """Return a warning if the optimum is at the edge of the design range."""
     slopes = (options.tan_alpha_min, options.tan_alpha_max)
     leads = (options.lead_min, options.lead_max)
     return (
@@ -648,25 +653,25 @@ def _edges(best: _Best, options: Options) -> tuple[str, ...]:
 # --- Many drive trains as a dataset
 
 _LATE = 1.02
-"""fraction of the demanded time up to which a design counts as equally fast"""
+"""ratio to the demanded time up to which a design counts as equally fast"""
 
 
 _HELD = 0.95
-"""fraction of the demand that counts as held"""
+"""fraction of the demand above which the demand counts as held"""
 
 
 _LEFT = 0.05
 """fraction of the demand below which the brake counts as released"""
 
 
-_NEVER = 10.0  # lateness of a moment that is never reached
+_NEVER = 10.0  # lateness if the moment is never reached
 
 
 _PER_CASE = {
     "t_90": ("s", "time to 90 % of the demand"),
     "filtered": ("W", "maximum power, filtered"),
     "instantaneous": ("W", "maximum power"),
-    "release": ("W", "maximum power of the release, filtered"),
+    "release": ("W", "maximum power during the release, filtered"),
     "current": ("A", "maximum current demand"),
     "speed": ("rad/s", "maximum motor speed"),
     "copper": ("J", "copper loss"),
@@ -685,18 +690,19 @@ def _mapped(
     progress: Callable[[float], None],
     efficiency: Efficiency,
 ) -> xr.Dataset:
-    """Return the responses of all designs on a grid, computed on all cores; interruptible.
+    """Return the responses of all designs on a grid, computed on all cores. Can be interrupted.
 
-    ``slopes``, ``leads``: slopes of the wedge, shape (n,), and leads of the screws [m], shape (m,);
-    ``progress``: called with the finished share, 0 to 1; ``efficiency``: see `redesigned`.
+    ``slopes``, ``leads``: wedge slopes, shape (n,), and screw leads [m], shape (m,); ``progress``:
+    called with the finished fraction, 0 to 1; ``efficiency``: see `redesigned`.
 
     Returns
     -------
     xarray.Dataset
-        Dimensions ``tan_alpha``, ``lead`` and ``mu_B``. Per case the fields of `Answer`; per
-        design ``closing_speed``, ``lateness`` (slowest time over the demanded one), ``infeasible``
-        (0 or 1), and ``worst_filtered`` and ``worst_instantaneous``, NaN where infeasible, with
-        ``mu_B_filtered`` and ``mu_B_instantaneous``, the coefficients at which they occur.
+        Dimensions ``tan_alpha``, ``lead`` and ``mu_B``. Each case has the fields of `Answer`. Each
+        design has ``closing_speed``, ``lateness`` (ratio of the slowest time to the demanded one),
+        ``infeasible`` (0 or 1), ``worst_filtered`` and ``worst_instantaneous`` (NaN if
+        infeasible), and ``mu_B_filtered`` and ``mu_B_instantaneous``, the coefficients at which
+        they occur.
     """
     designs = [(float(a), float(b)) for a in slopes for b in leads]
     answers: list[Answer] = []
@@ -709,9 +715,9 @@ def _mapped(
             answers.append(judged)
             progress((k + 1) / len(designs))
     axes = {
-        "tan_alpha": (slopes, "1", "slope of the wedge"),
-        "lead": (leads, "m", "lead of the screws"),
-        "mu_B": (np.asarray(demand.mu_B), "1", "friction coefficient of the pads"),
+        "tan_alpha": (slopes, "1", "wedge slope"),
+        "lead": (leads, "m", "screw lead"),
+        "mu_B": (np.asarray(demand.mu_B), "1", "pad friction coefficient"),
     }
     return _dataset(answers, demand, axes)
 
@@ -723,7 +729,7 @@ def _dataset(answers: Sequence[Answer], demand: Demand, axes: Mapping[str, Label
         for name in _PER_CASE
     }
     data = labeled(axes, {name: (cases[name], *_PER_CASE[name]) for name in _PER_CASE})
-    slowest = cases["t_90"].max(axis=2)  # NaN where one case does not reach it
+    slowest = cases["t_90"].max(axis=2)  # NaN if one case does not reach 90 %
     lateness = np.where(np.isnan(slowest), _NEVER, slowest / demand.t_90)
     in_time = (lateness <= _LATE) if demand.enforced else (lateness < _NEVER)
     holds = cases["held"].min(axis=2) >= _HELD * demand.moment
@@ -731,21 +737,21 @@ def _dataset(answers: Sequence[Answer], demand: Demand, axes: Mapping[str, Label
     feasible = in_time & holds & released & (cases["stop"].max(axis=2) == 0.0)
     speeds = np.array([each.closing_speed for each in answers]).reshape(shape[:2])
     data["closing_speed"] = variable(speeds, plane, "m/s", "closing speed of the pads")
-    data["lateness"] = variable(lateness, plane, "1", "slowest time over the demanded time")
+    data["lateness"] = variable(lateness, plane, "1", "ratio of slowest time to demanded time")
     data["infeasible"] = variable(1.0 - feasible, plane, "1", "late, not held, or at a stop")
     for name in ("filtered", "instantaneous"):
         worst = np.where(feasible, cases[name].max(axis=2), np.nan)
         mu_B = np.asarray(demand.mu_B)[cases[name].argmax(axis=2)]
-        label = f"largest {name} power, worst mu_B"
+        label = f"maximum {name} power, worst mu_B"
         data[f"worst_{name}"] = variable(worst, plane, "W", label)
         data[f"mu_B_{name}"] = variable(mu_B, plane, "1", "worst friction coefficient")
     data.attrs["unsettled_substeps"] = sum(each.unsettled for each in answers)
     return data
 
 
-# --- Limits of a drive train: active constraints, and failures or costs of its neighbors
+# --- Limits of a drive train: active constraints, and failures or power of its neighbors
 
-_AT = 0.99  # share of a limit at which it counts as reached
+_AT = 0.99  # fraction of a limit above which the limit counts as reached
 
 
 def active(at: xr.Dataset, par: WedgeParameters, options: Options) -> list[str]:
@@ -754,7 +760,7 @@ def active(at: xr.Dataset, par: WedgeParameters, options: Options) -> list[str]:
     Parameters
     ----------
     at
-        The design: variables over ``mu_B`` and scalars.
+        The design, with variables over ``mu_B`` and scalars.
     par
         The given brake.
     options
@@ -763,8 +769,8 @@ def active(at: xr.Dataset, par: WedgeParameters, options: Options) -> list[str]:
     texts = []
     if options.response == "enforced" and float(at["lateness"]) >= _AT:
         texts.append(
-            f"time: {float(at['t_90'].max()) * 1e3:.4g} ms of the {options.t_90 * 1e3:.4g} ms "
-            f"demanded, slowest at mu_B = {_where(at['t_90']):g}"
+            f"time: {float(at['t_90'].max()) * 1e3:.4g} ms of the demanded "
+            f"{options.t_90 * 1e3:.4g} ms, slowest at mu_B = {_where(at['t_90']):g}"
         )
     limits = {"control.position.i_max": par.control.position.i_max, "drive.i_max": par.drive.i_max}
     name, i_max = min(limits.items(), key=lambda limit: limit[1])
@@ -774,7 +780,7 @@ def active(at: xr.Dataset, par: WedgeParameters, options: Options) -> list[str]:
     held = at["held"].min() / options.moment
     if float(held) < _HELD / _AT:
         texts.append(
-            f"hold: {100.0 * float(held):.3g} % of the demand is held, least at "
+            f"hold: {100.0 * float(held):.3g} % of the demand is held in the worst case, "
             f"mu_B = {_where(-at['held']):g}"
         )
     if float(at["left"].max()) > _AT * _LEFT * options.moment:
@@ -786,7 +792,7 @@ def active(at: xr.Dataset, par: WedgeParameters, options: Options) -> list[str]:
 
 
 def failures(at: xr.Dataset, options: Options) -> list[str]:
-    """Return the reasons why a design is infeasible; empty if it is feasible."""
+    """Return the reasons why a design is infeasible, empty if it is feasible."""
     reasons = []
     slowest = float(at["t_90"].max(skipna=False))
     if math.isnan(slowest):
@@ -805,7 +811,7 @@ def failures(at: xr.Dataset, options: Options) -> list[str]:
 def around(grids: Sequence[xr.Dataset], best: xr.Dataset, options: Options) -> list[str]:
     """Return the neighbors of the best design, on the finest grid that contains it.
 
-    ``grids``: maps of designs, coarse to fine; ``best``: design of the last grid with it.
+    ``grids``: maps of designs, coarse to fine; ``best``: the best design.
     """
     tan_alpha, lead = float(best["tan_alpha"]), float(best["lead"])
     power, texts = float(best[f"worst_{options.power}"]), []
@@ -855,7 +861,7 @@ STUDY = Study(
     defaults=DEFAULTS,
     compute=compute,
     ruled={
-        "wedge.mu_B": "the study uses several; set its option mu_B, for example mu_B=0.3,0.5",
+        "wedge.mu_B": "set the study's option mu_B, for example mu_B=0.3,0.5",
         "control.moment.omega_gap": "set the study's option omega_gap",
         "command.mode": "the study demands moments",
         "rig": "only the rigs use it",

@@ -1,4 +1,4 @@
-"""Wedge brake stability over friction coefficient and slope, with and without control."""
+"""Wedge brake stability versus friction coefficient and slope, with and without control."""
 
 from __future__ import annotations
 
@@ -35,9 +35,9 @@ from bywire.synthesis.study import (
 
 _POINTS = 200  # frequencies of a disk margin
 _LOWEST = 0.05  # Hz
-_SPAN = 1.5  # factor on both sides of the neutral point for the search for a border
+_SPAN = 1.5  # factor on both sides of the neutral point for the search for a stability limit
 _EXACT = 1e-9
-_FREE = 1e-12  # share of the largest coupling below which a coupling is a rounding error
+_FREE = 1e-12  # fraction of the largest coupling below which a coupling is a rounding error
 
 
 class Motion(NamedTuple):
@@ -46,11 +46,11 @@ class Motion(NamedTuple):
     Parameters
     ----------
     growth, frequency
-        Largest growth rate [1/s] with the motors at constant currents, and its frequency [Hz].
+        Maximum growth rate [1/s] with the motors at constant currents, and its frequency [Hz].
     rigid
-        The same rate by the closed form of a rigid, undamped brake heart [1/s]; 0 below neutral.
+        Growth rate from the closed form of a rigid, undamped brake heart [1/s], 0 below neutral.
     locked
-        Largest growth rate with locked motors [1/s].
+        Maximum growth rate with locked motors [1/s].
     """
 
     growth: float
@@ -65,9 +65,9 @@ class Controlled(NamedTuple):
     Parameters
     ----------
     disk
-        Disk margin; NaN if unstable.
+        Disk margin, NaN if unstable.
     unstable
-        1 if unstable, else 0; NaN without an operating point.
+        1 if unstable, else 0, and NaN without an operating point.
     """
 
     disk: float
@@ -77,10 +77,10 @@ class Controlled(NamedTuple):
 def brake(
     par: WedgeParameters, mu_B: float, tan_alpha: float, known: bool = False
 ) -> WedgeParameters:
-    """Return the brake with another wedge and other pads; its controllers know the wedge.
+    """Return the brake with another wedge and other pads. Its controllers use the new wedge slope.
 
-    ``mu_B``, ``tan_alpha``: friction coefficient of the pads and slope of the wedge; ``known``:
-    whether the moment controller knows the friction coefficient too.
+    ``mu_B``, ``tan_alpha``: pad friction coefficient and wedge slope; ``known``: whether the moment
+    controller also uses the true friction coefficient.
     """
     redesign = redesigned(par, tan_alpha, par.screw.lead)
     slope = redesign.control.moment.slope_hat
@@ -90,20 +90,20 @@ def brake(
 
 
 def motion(par: WedgeParameters, F_N: float) -> Motion:
-    """Return the motion of the wedge without control at a normal force [N], friction removed.
+    """Return the uncontrolled wedge's motion at a normal force [N], without friction.
 
     Raises
     ------
     InputError
-        When there is no operating point.
+        If there is no operating point.
     """
     whole = mechanical(full(par, F_N))
-    # If the force exceeds the preload, one motor is free: no state depends on its angle.
+    # If the force exceeds the preload, one motor is free, and no state depends on its angle.
     acting = np.abs(whole.A).max(axis=0) > _FREE * np.abs(whole.A).max()
     bound = whole.reduced(
         [n for n, acts in zip(whole.states, acting, strict=True) if acts], held=True
     )
-    # The pole that grows fastest; rounded, so that the choice within a pair is unique.
+    # Choose the pole with the highest growth rate. Rounding makes the choice in a pair unique.
     slow = max(bound.poles(), key=lambda s: (round(s.real, 9), s.imag))
     locked = whole.reduced(("x", "v"), held=True).poles()
     return Motion(
@@ -115,14 +115,14 @@ def motion(par: WedgeParameters, F_N: float) -> Motion:
 
 
 def neutral(par: WedgeParameters, F_N: float) -> float:
-    r"""Return the friction coefficient at which the wedge without control turns unstable.
+    r"""Return the friction coefficient at which the uncontrolled wedge becomes unstable.
 
     The closed form of the neutral point is :math:`\mu_B = \tan\alpha`.
 
     Parameters
     ----------
     par
-        Brake; its own friction coefficient does not matter.
+        The brake, whose own friction coefficient does not matter.
     F_N
         Normal force [N].
 
@@ -158,21 +158,21 @@ def controlled(par: WedgeParameters, moment: float) -> Controlled:
 def _moment_borders(
     par: WedgeParameters, moment: float, between: tuple[float, float], count: int
 ) -> tuple[Border, ...]:
-    """Return the friction coefficients at which the closed moment loop changes its stability.
+    """Return the friction coefficients at which the closed moment loop changes stability.
 
     Parameters
     ----------
     par
-        Brake; its controller keeps its assumptions.
+        The brake, whose controller keeps its assumptions.
     moment
         Operating point [N m].
     between, count
-        Range of friction coefficients of the search, and number of values in it.
+        Search range of friction coefficients, and number of values in it.
 
     Raises
     ------
     InputError
-        When an operating point does not exist.
+        If an operating point does not exist.
     """
     values = [float(value) for value in np.geomspace(*between, count)]
     return locus(MOMENT_LOOP, par, moment, "wedge.mu_B", "1", values).borders
@@ -184,48 +184,48 @@ Force = Annotated[float, Unit("N", 1e3), Field(gt=0, allow_inf_nan=False)]
 _ASSUMPTIONS = (
     "The linear models are exact for the brake without dry friction. Friction also holds the "
     "brake, so the real brake is stable in a wider range.",
-    "Without control: both motors at constant currents, or locked; the wedge is preloaded between "
-    "the screws and supports the specified normal force. If the actuation force exceeds the "
-    "preload, one screw loses the wedge, and the other moves or holds it alone.",
-    "With control: sampled moment loop around position and current loops, at the specified moment. "
-    "The controllers use the wedge's slope.",
-    "The end stops of the wedge allow the same travel of the pads as before.",
+    "Without control, both motors have constant currents or are locked. The wedge is preloaded "
+    "between the screws and supports the specified normal force. If the actuation force exceeds "
+    "the preload, one screw loses contact with the wedge, and the other moves or holds it alone.",
+    "With control, a sampled moment loop works around position and current loops, at the specified "
+    "moment. The controllers use the wedge's slope.",
+    "The end stops of the wedge allow the same pad travel as before.",
 )
 _HIGHEST = 5.0
-"""maximum friction coefficient in the search for the moment loop's stability limit"""
+"""maximum friction coefficient in the search for the stability limit of the moment loop"""
 _SEARCHED = 40
 _PLANES = {
     "growth_open": ("1/s", "growth rate, motors at constant currents"),
-    "frequency_open": ("Hz", "frequency of that motion"),
+    "frequency_open": ("Hz", "frequency of this motion, motors at constant currents"),
     "growth_rigid": ("1/s", "growth rate from the closed form of a rigid brake heart"),
     "growth_locked": ("1/s", "growth rate, motors locked"),
     "disk_moment": ("1", "disk margin of the moment loop"),
     "unstable_moment": ("1", "whether the moment loop is unstable"),
 }
-_FAST = 5.0  # smallest growth rate [1/s] for the comparison with the closed form
+_FAST = 5.0  # minimum growth rate [1/s] for the comparison with the closed form
 
 
 class Options(ParameterSet):
     """The designs to compare, and their operating points."""
 
     mu_B_min: Coefficient
-    """minimum friction coefficient of the pads"""
+    """minimum pad friction coefficient"""
     mu_B_max: Coefficient
-    """maximum friction coefficient of the pads"""
+    """maximum pad friction coefficient"""
     coefficients: Count
     """number of friction coefficients"""
     tan_alpha_min: Slope
-    """minimum slope of the wedge"""
+    """minimum wedge slope"""
     tan_alpha_max: Slope
-    """maximum slope of the wedge"""
+    """maximum wedge slope"""
     slopes: Count
     """number of slopes"""
     force: Force
-    """normal force of the wedge without control"""
+    """normal force on the wedge without control"""
     moment: SomeMoment
-    """moment of the moment loop"""
+    """moment in the moment loop"""
     believed: Literal["known", "as-given"]
-    """whether the moment controller knows mu_B, or assumes the parameter set's value"""
+    """whether the moment controller uses the true mu_B or the parameter set's value"""
 
     @model_validator(mode="after")
     def _ordered(self) -> Options:
@@ -249,12 +249,12 @@ DEFAULTS = Options(
 
 
 def compute(par: WedgeParameters, options: Options, progress: Progress) -> Findings:
-    """Return growth rates, borders and disk margins over the map.
+    """Return growth rates, stability limits and disk margins over the map.
 
     Raises
     ------
     InputError
-        When the wedge without control has no operating point.
+        If the wedge without control has no operating point.
     """
     mu = np.linspace(options.mu_B_min, options.mu_B_max, options.coefficients)
     tan = np.linspace(options.tan_alpha_min, options.tan_alpha_max, options.slopes)
@@ -281,8 +281,8 @@ def _dataset(mu: Array, tan: Array, values: Array, borders: Array) -> xr.Dataset
     planes = {**dict(zip(_PLANES, np.moveaxis(values, 2, 0), strict=True)), "beyond_open": beyond}
     border = variable(borders, ("tan_alpha",), "1", "friction coefficient of the neutral point")
     axes = {
-        "tan_alpha": (tan, "1", "slope of the wedge, tan(alpha)"),
-        "mu_B": (mu, "1", "friction coefficient of the pads"),
+        "tan_alpha": (tan, "1", "wedge slope, tan(alpha)"),
+        "mu_B": (mu, "1", "pad friction coefficient"),
     }
     labels = _PLANES | {"beyond_open": ("1", "friction coefficient beyond the neutral point")}
     data = labeled(axes, {name: (plane, *labels[name]) for name, plane in planes.items()})
@@ -298,9 +298,10 @@ def _maps(data: xr.Dataset, given: Mark) -> dict[str, Map]:
             "growth_open",
             "mu_B",
             "tan_alpha",
-            "Maximum growth rate of the wedge without control, motors at constant currents; "
-            "dashed: closed form of the neutral point. The hatched boundary is computed. Colors "
-            "are interpolated between designs, although the rate jumps at the boundary.",
+            "Maximum growth rate of the wedge without control, with the motors at constant "
+            "currents. The dashed line is the closed form of the neutral point, and the hatched "
+            "boundary is computed. Colors are interpolated between designs, although the rate "
+            "jumps at the boundary.",
             (given,),
             {"unstable without control": ("beyond_open", 0.0)},
             closed,
@@ -309,7 +310,7 @@ def _maps(data: xr.Dataset, given: Mark) -> dict[str, Map]:
             "disk_moment",
             "mu_B",
             "tan_alpha",
-            "Disk margin of the closed moment loop; dashed: neutral point of the wedge.",
+            "Disk margin of the closed moment loop. The dashed line is the wedge's neutral point.",
             (given,),
             {"unstable in the moment loop": ("unstable_moment", 0.5)},
             closed,
@@ -385,8 +386,8 @@ def _controlled(par: WedgeParameters, data: xr.Dataset, options: Options) -> tup
             "moment_mu_B",
             border[0] if border else math.nan,
             "1",
-            "Friction coefficient above which the given wedge's moment loop is unstable with its "
-            "given controller.",
+            "Friction coefficient above which the moment loop is unstable with the given wedge and "
+            "controller.",
             note,
         ),
     )

@@ -1,1 +1,1 @@
-"""Physical elements, one file each; ``bywire check`` finds and tests them."""
+"""Physical elements, one file each. ``bywire check`` finds and tests them."""

@@ -11,7 +11,7 @@ from bywire.core import ops
 
 
 class Parameters(ParameterSet):
-    """A curve without hysteresis: losses in pads and housing are neglected."""
+    """Curve without hysteresis, which neglects losses in pads and housing."""
 
     x_gap: Annotated[float, Unit("m", 2e-4), Field(ge=0, allow_inf_nan=False)]
     """travel across the clearance"""

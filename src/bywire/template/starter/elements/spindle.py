@@ -1,4 +1,4 @@
-"""Rotor, planetary gear and ball screw: one inertia, and dry friction that grows with the load."""
+"""Rotor, planetary gear and ball screw: one inertia, and dry friction that rises with the load."""
 
 from __future__ import annotations
 
@@ -26,18 +26,18 @@ Loss = Annotated[float, Signal("W", "viscous loss", role=Role("sink", "viscous f
 
 
 class Parameters(ParameterSet):
-    """Rigid spindle without backlash or windup; friction is the same in both directions."""
+    """Rigid spindle without backlash or windup. Friction is the same in both directions."""
 
     J: Inertia
-    """inertia of all rotating parts, at the rotor"""
+    """inertia of all rotating parts, relative to the rotor"""
     r: GearRatio
-    """travel of the nut per angle of the rotor"""
+    """nut travel per rotor angle"""
     d: RotaryDamping
     """viscous friction"""
     T_0: Torque
     """dry friction without load"""
     c_F: Annotated[float, Unit("m", 1e-6), Field(ge=0, allow_inf_nan=False)]
-    """dry friction per clamp force"""
+    """dry friction per unit clamp force"""
 
 
 class State(NamedTuple):

@@ -1,1 +1,1 @@
-"""Control laws, one file each; ``bywire check`` finds and tests them."""
+"""Control laws, one file each. ``bywire check`` finds and tests them."""

@@ -1,4 +1,4 @@
-"""Clamp-force control: proportional from force to speed, then a PI to the motor voltage."""
+"""Clamp force control: proportional from force to speed, then PI from speed to voltage."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from bywire.core import ops
 
 
 class Parameters(ParameterSet):
-    """Gains and limits; measurements have no delay or noise."""
+    """Gains and limits. Measurements have no delay or noise."""
 
     k_F: Annotated[float, Unit("rad/(s*N)", 0.05), Field(ge=0, allow_inf_nan=False)]
-    """speed per force error"""
+    """speed per unit force error"""
     omega_max: Annotated[float, Unit("rad/s", 200.0), Field(gt=0, allow_inf_nan=False)]
     """maximum speed demand"""
     k_p: Annotated[float, Unit("V*s/rad", 0.05), Field(ge=0, allow_inf_nan=False)]
-    """voltage per speed error"""
+    """voltage per unit speed error"""
     k_i: Annotated[float, Unit("V/rad", 2.0), Field(ge=0, allow_inf_nan=False)]
-    """voltage per integrated speed error"""
+    """voltage per unit integrated speed error"""
     v_max: Voltage
     """maximum magnitude of the voltage"""
 
@@ -49,7 +49,7 @@ SampleTime = Annotated[float, Signal("s", "sample time", 1e-3), Field(gt=0)]
 
 
 def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, Output]:
-    """Advance the controller by one sample; the integral stops while the voltage is limited."""
+    """Advance the controller by one sample. The integral stops while the voltage is limited."""
     omega_ref = ops.clip(par.k_F * (u.F_set - u.F), -par.omega_max, par.omega_max)
     error = omega_ref - u.omega
     v = par.k_p * error + x.v_i

@@ -1,0 +1,84 @@
+"""Orifices and check valves against closed forms."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from bywire.plant import brake_fluid, check_valve, orifice
+
+BAR = 1e5
+LINE = 0.011e-6 / BAR  # linear compliance of a caliper, 0.011 cm^3/bar
+FLUID = brake_fluid.Parameters.create(
+    {
+        "beta": 1e12,
+        "nu": 12e-6,
+        "rho": 1070.0,
+        "air": "none",
+        "V_air": 0.0,
+        "n_air": 1.2,
+        "p_atm": 101_325.0,
+    }
+)
+
+
+def valve(d: float) -> orifice.Parameters:
+    return orifice.Parameters.create({"d": d, "C_d": 0.65, "Re_cr": 100.0})
+
+
+def flow(p_a: float, p_b: float, d: float = 0.5e-3) -> float:
+    return orifice.flow(orifice.Input(p_a, p_b, 1.0), valve(d), FLUID)
+
+
+def time_between(start: float, end: float, p_far: float, d: float) -> float:
+    """Return the time in which a linear caliper goes from one pressure to another."""
+
+    def rate(t, p):
+        return [flow(p_far, p[0], d) / LINE]
+
+    def arrived(t, p):
+        return p[0] - end
+
+    arrived.terminal = True
+    found = solve_ivp(rate, (0.0, 1.0), [start], events=arrived, rtol=1e-10, atol=1e-3)
+    return float(found.t_events[0][0])
+
+
+@pytest.mark.parametrize(("d", "K"), [(0.5e-3, 5.518e-9), (0.6e-3, 7.946e-9)])
+def test_the_coefficient_is_that_of_a_sharp_edge(d, K):
+    assert orifice.coefficient(valve(d), FLUID) == pytest.approx(K, rel=1e-3)
+
+
+GRADIENTS = [(120, 0.5e-3, 1738), (50, 0.5e-3, 1122), (98.5, 0.6e-3, 2267)]
+
+
+@pytest.mark.parametrize(("drop", "d", "gradient"), GRADIENTS)
+def test_pressure_gradients_of_a_linear_caliper(drop, d, gradient):
+    assert flow(drop * BAR, 0.0, d) / LINE / BAR == pytest.approx(gradient, rel=1e-3)
+
+
+def test_a_linear_caliper_builds_and_releases_in_the_time_of_the_closed_form():
+    K = orifice.coefficient(valve(0.6e-3), FLUID)
+    p_a, p_0, p_1 = 1.5 * BAR, 100 * BAR, 20 * BAR
+    closed = 2 * LINE / K * (math.sqrt(p_0 - p_a) - math.sqrt(p_1 - p_a))
+    assert closed == pytest.approx(49.24e-3, rel=1e-3)
+    assert time_between(p_0, p_1, p_a, 0.6e-3) == pytest.approx(closed, rel=5e-3)
+    assert time_between(20 * BAR, 100 * BAR, 120 * BAR, 0.5e-3) == pytest.approx(69.70e-3, rel=5e-3)
+
+
+def test_the_slope_at_zero_is_finite_and_the_flow_is_odd():
+    par = valve(0.5e-3)
+    slope = orifice.coefficient(par, FLUID) / math.sqrt(orifice.critical_pressure(par, FLUID))
+    assert flow(1.0, 0.0) == pytest.approx(slope, rel=1e-6)
+    assert flow(0.0, 7 * BAR) == -flow(7 * BAR, 0.0)
+
+
+def test_a_check_valve_is_tight_below_its_cracking_pressure():
+    par = check_valve.Parameters.create(
+        {"seat.d": 1.2e-3, "seat.C_d": 0.65, "seat.Re_cr": 100.0, "p_crack": 0.2 * BAR}
+    )
+    drops = np.array([-50.0, 0.0, 0.2, 0.3, 10.0]) * BAR
+    flows = [check_valve.flow(check_valve.Input(p, 0.0), par, FLUID) for p in drops]
+    assert flows[:3] == [0.0, 0.0, 0.0]
+    assert flows[3:] == [flow(0.1 * BAR, 0.0, 1.2e-3), flow(9.8 * BAR, 0.0, 1.2e-3)]

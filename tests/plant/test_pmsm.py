@@ -1,0 +1,205 @@
+"""Synchronous motor, inverter and field-oriented control against closed forms.
+
+The runs integrate the elements' equations with an independent fourth-order method.
+"""
+
+import math
+
+import numpy as np
+import pytest
+
+from bywire.control import field_oriented as foc
+from bywire.plant import inverter, pmsm
+
+SERVO = {"p": 4.0, "R": 0.36, "L_d": 0.2e-3, "L_q": 0.2e-3, "psi": 6.395e-3}  # Teknic M-2310P
+TRACTION = {"p": 3.0, "R": 18e-3, "L_d": 0.37e-3, "L_q": 1.2e-3, "psi": 66e-3}
+IRON = {"iron": "off", "c_h": 0.0, "c_e": 0.0}
+T = 1e-4
+SUBSTEPS = 10
+POWER_STAGE = {"law": "ideal", "f_s": 10e3, "t_d": 1e-6, "V_f": 0.0, "i_th": 0.05}
+
+
+def motor(values):
+    return pmsm.Parameters.create(values | IRON)
+
+
+def law(values, **changes):
+    own = {
+        "omega_c": 1 / (3 * T),
+        "p": values["p"],
+        "R_hat": values["R"],
+        "L_d_hat": values["L_d"],
+        "L_q_hat": values["L_q"],
+        "psi_hat": values["psi"],
+        "lead": 1.5,
+        "i_max": 240.0,
+        "k_fw": 0.0,
+        "reserve": 0.95,
+    }
+    return foc.Parameters.create(own | changes)
+
+
+class Run:
+    """Run of motor, inverter and control at constant speed; the voltage acts one tick later."""
+
+    V_dc = 24.0
+
+    def __init__(self, values, i_ref, omega=0.0, stage=None, ticks=60, offset=0.0, **own):
+        self.par, self.law = motor(values), law(values, **own)
+        self.stage = inverter.Parameters.create(POWER_STAGE | (stage or {}))
+        self.omega = omega
+        emf = values["p"] * omega * values["psi"]
+        # It starts without current: the voltage equals the back EMF, in the middle of each sample.
+        held = [self._at_start(emf, k) for k in (-1.5, -0.5)]
+        x, state = pmsm.State(0.0, 0.0), foc.State(0.0, 0.0, 0.0)
+        rows, waiting = [], held[1]
+        self.power_in = self.copper = self.shaft = self.lost = 0.0
+        for k in range(ticks):
+            theta = self._theta(k * T)
+            c, s = math.cos(theta), math.sin(theta)
+            u = foc.Input(
+                i_ref,
+                c * x.i_d - s * x.i_q,
+                s * x.i_d + c * x.i_q,
+                theta + offset,
+                omega,
+                self.V_dc,
+                240.0,
+            )
+            acting = waiting
+            state, out = foc.output(state, u, T, self.law)
+            waiting = (out.v_alpha, out.v_beta)
+            for n in range(SUBSTEPS):
+                t = k * T + n * T / SUBSTEPS
+                rows.append((t, *x))
+                x = self._step(x, t, T / SUBSTEPS, acting)
+        self.t, self.i_d, self.i_q = np.array(rows).T
+        self.end = x
+
+    def _at_start(self, emf, k):
+        middle = self._theta((k + 1.0) * T)
+        return -emf * math.sin(middle), emf * math.cos(middle)
+
+    def _theta(self, t):
+        return self.par.p * self.omega * t
+
+    def _voltages(self, x, t, held):
+        u = inverter.Input(*held, *x, self._theta(t), self.V_dc)
+        return inverter.output(u, self.stage), inverter.power_loss(u, self.stage)
+
+    def _rate(self, y, t, held):
+        x = pmsm.State(*y[:2])
+        out, lost = self._voltages(x, t, held)
+        u = pmsm.Input(out.v_d, out.v_q, self.omega)
+        f, b = pmsm.mass(x, self.par), pmsm.balance(x, u, self.par)
+        energies = (
+            out.i_dc * self.V_dc,
+            pmsm.power_loss(x, self.par),
+            pmsm.airgap_torque(x, self.par) * self.omega,
+            lost,
+        )
+        return np.array([b.i_d / f.i_d, b.i_q / f.i_q, *energies])
+
+    def _step(self, x, t, h, held):
+        y = np.array([*x, self.power_in, self.copper, self.shaft, self.lost])
+        k_1 = self._rate(y, t, held)
+        k_2 = self._rate(y + h / 2 * k_1, t + h / 2, held)
+        k_3 = self._rate(y + h / 2 * k_2, t + h / 2, held)
+        k_4 = self._rate(y + h * k_3, t + h, held)
+        y = y + h / 6 * (k_1 + 2 * k_2 + 2 * k_3 + k_4)
+        self.power_in, self.copper, self.shaft, self.lost = y[2:]
+        return pmsm.State(*y[:2])
+
+    def rise(self, share, final):
+        """Return the time [s] of a fraction of the final current across the magnets."""
+        k = int(np.argmax(self.i_q >= share * final))
+        t, i = self.t[k - 1 : k + 1], self.i_q[k - 1 : k + 1]
+        return float(np.interp(share * final, i, t))
+
+
+def test_a_current_step_at_rest():
+    run = Run(SERVO, 7.0)
+    assert run.rise(0.1, 7.0) == pytest.approx(131e-6, rel=1e-2)
+    assert run.rise(0.9, 7.0) == pytest.approx(449e-6, rel=1e-2)
+    assert 100 * (max(run.i_q) / 7.0 - 1) == pytest.approx(4.55, rel=1e-2)
+    assert max(abs(run.i_d)) < 1e-12
+
+
+def test_a_current_step_at_speed():
+    run = Run(SERVO, 5.0, 200.0)
+    assert run.rise(0.9, 5.0) == pytest.approx(453e-6, rel=2e-2)
+    assert 100 * (max(run.i_q) / 5.0 - 1) == pytest.approx(5.3, rel=2e-2)
+    assert max(abs(run.i_d)) == pytest.approx(0.33, rel=3e-2)
+
+
+@pytest.mark.parametrize(("omega", "overshoot"), [(200.0, 10.8), (350.0, 28.8)])
+def test_without_lead_the_delay_turns_the_voltage(omega, overshoot):
+    run = Run(SERVO, 5.0, omega, lead=0.0)
+    assert 100 * (max(run.i_q) / 5.0 - 1) == pytest.approx(overshoot, rel=3e-2)
+
+
+@pytest.mark.parametrize(("omega", "i"), [(0.0, 38.490), (200.0, 22.907), (350.0, 12.393)])
+def test_the_largest_current_at_a_voltage(omega, i):
+    V, par = inverter.largest_voltage(24.0), motor(SERVO)
+    u = pmsm.Input(-par.p * omega * par.L_q * i, 0.0, omega)
+    v_q = -pmsm.balance(pmsm.State(0.0, i), u, par).i_q
+    assert math.hypot(u.v_d, v_q) == pytest.approx(V, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("degrees", "share", "i_d"), [(4, 0.99756, -0.4883), (15, 0.96593, -1.8117)]
+)
+def test_an_angle_error_turns_the_current(degrees, share, i_d):
+    run = Run(SERVO, 7.0, ticks=200, offset=-math.radians(degrees))
+    torque = pmsm.airgap_torque(run.end, run.par)
+    assert torque / (1.5 * 4 * SERVO["psi"] * 7.0) == pytest.approx(share, rel=1e-4)
+    assert abs(run.end.i_d) == pytest.approx(abs(i_d), rel=1e-4)
+
+
+def test_dead_time_takes_voltage_along_the_current():
+    stage = inverter.Parameters.create(POWER_STAGE | {"law": "dead time", "i_th": 1e-6})
+    angles = np.linspace(0.0, 2 * math.pi, 7201)[:-1]
+    drops = [
+        inverter.output(inverter.Input(0.0, 0.0, 0.0, 5.0, a, 24.0), stage).v_q for a in angles
+    ]
+    assert np.mean(drops) == pytest.approx(-4 / math.pi * 24.0 * 1e-6 * 10e3, rel=1e-3)
+    assert -np.mean(drops) == pytest.approx(0.3056, rel=1e-2)
+
+
+@pytest.mark.parametrize(
+    ("amplitude", "i_d", "i_q", "torque"),
+    [(120.0, -67.27, 99.37, 54.48), (240.0, -150.99, 186.56, 160.61)],
+)
+def test_interior_magnets_use_their_reluctance(amplitude, i_d, i_q, torque):
+    ref = foc.set_points(amplitude, 0.0, 240.0, law(TRACTION))
+    assert ref == pytest.approx((i_d, i_q), rel=1e-3)
+    assert pmsm.airgap_torque(pmsm.State(*ref), motor(TRACTION)) == pytest.approx(torque, rel=1e-3)
+    negative = foc.set_points(-amplitude, 0.0, 240.0, law(TRACTION))
+    assert negative == (ref[0], -ref[1])
+
+
+def test_the_base_speed_of_a_traction_motor():
+    par, omega = motor(TRACTION), 253.33
+    x = pmsm.State(-150.99, 186.56)
+    zero = pmsm.balance(x, pmsm.Input(0.0, 0.0, omega), par)
+    V = math.hypot(zero.i_d, zero.i_q)
+    assert pytest.approx(inverter.largest_voltage(300.0), rel=1e-3) == V
+
+
+def test_field_weakening_reaches_a_speed_beyond_the_back_emf():
+    beyond = {"ticks": 600, "k_fw": 300.0, "i_max": 10.04, "reserve": 0.95}
+    weakened = Run(SERVO, 2.0, 560.0, **beyond)
+    plain = Run(SERVO, 2.0, 560.0, ticks=600, i_max=10.04)
+    assert inverter.largest_voltage(24.0) / (4 * SERVO["psi"]) < 560.0  # 541.7 rad/s
+    assert weakened.end.i_q == pytest.approx(2.0, abs=0.05)
+    assert weakened.end.i_d < -1.0
+    assert plain.end.i_q < 0.5
+
+
+@pytest.mark.parametrize("stage", [{}, {"law": "dead time", "V_f": 0.4}])
+def test_power_is_balanced(stage):
+    run = Run(SERVO, 5.0, 200.0, stage)
+    stored = pmsm.energy(run.end, run.par)
+    out = run.copper + run.shaft + run.lost + stored  # within the error of the method
+    assert run.power_in == pytest.approx(out, rel=1e-6)
+    assert (run.lost > 0.01) == bool(stage)
