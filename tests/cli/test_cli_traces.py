@@ -105,7 +105,7 @@ def test_trace_that_cannot_be_read(bywire, bench, name, text):
     ("column", "value", "texts"),
     [
         ("pedal [mm]", 46, ["pedal", "46 mm", "pedal.x_max = 45 mm"]),
-        ("force [N]", 1e6, ["force", "1e+06 N", "pedal.x_max = 45 mm"]),
+        ("force [N]", 1e6, ["force", "1000 kN", "pedal.x_max = 45 mm"]),
     ],
 )
 def test_ride_beyond_the_stop_of_the_pedal_is_refused(bywire, ride, column, value, texts):

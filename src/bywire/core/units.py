@@ -8,7 +8,7 @@ from typing import Any, Self, TypeVar, cast
 
 from bywire.core.clean_text import clean
 from bywire.core.errors import UnitError, not_valid, quoted
-from bywire.core.quantities import display_unit
+from bywire.core.quantities import display_unit, readable_unit
 from bywire.core.unit_list import (
     BASES,
     Scale,
@@ -223,14 +223,14 @@ def unit_text(symbol: str) -> str:
 
 
 def shown(value: float, symbol: str, unit: str = "") -> str:
-    """Return a value in its display unit, for example ``25 bar``, or in another unit.
+    """Return a value in its most readable unit, for example ``25 bar``, or in another unit.
 
     Examples
     --------
-    >>> shown(25e5, "Pa"), shown(100.0 / 3.6, "m/s", "km/h")
-    ('25 bar', '100 km/h')
+    >>> shown(25e5, "Pa"), shown(0.05, "s"), shown(100.0 / 3.6, "m/s", "km/h")
+    ('25 bar', '50 ms', '100 km/h')
     """
-    unit = unit or display_unit(symbol)
+    unit = unit or readable_unit(value, symbol)
     number = convert(value, symbol, unit)
     return f"{number:.6g}" + ("" if unit == "1" else f" {unit}")
 

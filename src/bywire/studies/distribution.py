@@ -19,7 +19,7 @@ from scipy import special
 from bywire.bench.changes import refuse_share_of_temperature, share_of
 from bywire.core.errors import ParameterError, not_valid, quoted, unknown_name
 from bywire.core.parameters import Leaf
-from bywire.core.quantities import Unit
+from bywire.core.quantities import Unit, display_unit
 from bywire.core.typing import Array
 from bywire.core.units import difference_unit, parse, shown
 from bywire.core.values import written
@@ -698,8 +698,9 @@ class _Entry:
         return width
 
     def amount(self, value: float) -> str:
-        """Return a value with its unit."""
-        return shown(value, self.leaf.unit.symbol)
+        """Return a value in its display unit: the text is part of a study's identity."""
+        symbol = self.leaf.unit.symbol
+        return shown(value, symbol, display_unit(symbol))
 
     def _refuse_share(self, key: str, text: str) -> None:
         refuse_share_of_temperature(f"{self.where}.{key}", text, self.leaf.unit.symbol)
@@ -714,8 +715,9 @@ class _Entry:
         return self.section[key]
 
     def breadth(self, value: float) -> str:
-        """Return a width with its unit."""
-        return shown(value, difference_unit(self.leaf.unit.symbol))
+        """Return a width in its display unit, like `amount`."""
+        symbol = difference_unit(self.leaf.unit.symbol)
+        return shown(value, symbol, display_unit(symbol))
 
     def _number(self, key: str, value: Any, symbol: str = "") -> float:
         unit = self.leaf.unit
