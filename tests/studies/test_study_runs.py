@@ -230,7 +230,7 @@ def test_a_study_is_kept_with_its_changes_and_another_says_how_it_differs(study,
     assert bywire.study_report(out).plan.bench.par == run.plan.bench.par
     with pytest.raises(FileError, match=r"parameters seal\.T_pr: 0\.0022\d*, now 0\.002\)"):
         bywire.run_study(path, out, workers=1)
-    with pytest.raises(ParameterError, match=r"study = .* must be a text or a path"):
+    with pytest.raises(ParameterError, match=r"study = .* must be a string or a path"):
         bywire.run_study({"bench": "hard-braking"})
     study(
         VARY.replace(
