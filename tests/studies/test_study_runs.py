@@ -246,7 +246,7 @@ def test_time_is_a_budget(study, tmp_path):
     path = study(VARY + '[design]\ntime = "1 us"\n')
     first = bywire.run_study(path, tmp_path / "out", cases=128, workers=1)
     assert (len(first.cases), first.status) == (64, "unfinished")
-    assert "the study file limits each call to 1e-06 s" in first.warnings[-1]
+    assert "the study file limits each call to 0.001 ms" in first.warnings[-1]
     assert bywire.resume_study(tmp_path / "out", workers=1).status == "passed"
     with raises(ParameterError, name="[design] time", value="worst-case"):
         read_study(study(VARY + "[design]\nkind = 'worst-case'\ntime = '1 s'\n"))
