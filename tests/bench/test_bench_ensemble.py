@@ -1,4 +1,4 @@
-"""A bench for many values: as if each were run alone, with its start, its figures, its verdict."""
+"""A bench for many values gives the same start, figures and verdict as separate runs."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ def test_what_is_refused(bench):
 
 
 def test_key_figures_and_warnings_without_recordings_are_the_same():
-    """The piston of a release rests on its stop, which the run warns of."""
+    """After a release, the piston is at its stop, and the run warns about it."""
     bench = bywire.Bench("pressure-release", "dardanelli2010")
     benches = [bench.varied({"motor.R_m": value}, {}) for value in (0.3, 0.4)]
     figures = key_figures_of(benches)
@@ -113,8 +113,8 @@ def test_key_figures_and_warnings_without_recordings_are_the_same():
 
 
 def test_recordings_that_were_judged_are_let_go_at_once(bench):
-    """And not when Python looks for garbage: of few large arrays it takes long to."""
-    key_figures_of([bench])  # what is kept of the model
+    """They are not left to the garbage collector, which runs rarely with few large arrays."""
+    key_figures_of([bench])  # fill the caches of the model
     gc.collect()
     gc.disable()
     try:
@@ -130,7 +130,7 @@ def test_recordings_that_were_judged_are_let_go_at_once(bench):
 
 
 def test_warnings_of_cases_need_no_more_than_the_signals_that_are_watched(bench):
-    """The ranges of both sensors and of the pipe's law, which differ from case to case."""
+    """The ranges of both sensors and of the pipe's law differ from case to case."""
     changes = [
         {"current_sensor.i_high": 4.0},
         {"current_sensor.i_high": 4.5, "pipeline.Re_max": 1.0},
@@ -145,7 +145,7 @@ def test_warnings_of_cases_need_no_more_than_the_signals_that_are_watched(bench)
 
 
 def test_elements_that_all_cases_share_may_warn_of_some(bench):
-    """The sensor is of the same range in both, and its end passed in one of them."""
+    """The sensor has the same range in both cases, and only one case exceeds it."""
     same = {"current_sensor.i_high": 4.0}
     benches = [bench.varied(same, options) for options in ({}, {"p_to": 6.5e5})]
     figures = key_figures_of(benches)
@@ -163,14 +163,14 @@ def test_a_varied_bench_is_the_one_that_is_made_anew(bench):
         anew.chosen_options,
         anew.system,
     )
-    assert varied == replace(varied)  # every check again
+    assert varied == replace(varied)  # repeats every check
     assert run(varied).kpis == run(anew).kpis
     with pytest.raises(ParameterError, match=r"motor\.R_m"):
         bench.varied({"motor.R_m": -1.0}, {})
 
 
 def test_what_is_driven_is_checked_anew_whatever_varies(bench, monkeypatch):
-    """A choice or a number may have an experiment drive other signals."""
+    """A choice or a number can make an experiment drive other signals."""
     checked = []
     monkeypatch.setattr("bywire.bench.bench._check_driven", lambda case, _: checked.append(case))
     for changes in (({"motor.R_m": 0.4}, {}), ({"adc.law": "ideal"}, {}), ({}, {"p_to": 30e5})):
@@ -179,7 +179,7 @@ def test_what_is_driven_is_checked_anew_whatever_varies(bench, monkeypatch):
 
 
 def test_key_figures_of_faulty_cases_are_those_of_each():
-    """What fails changes parameters during a run: energies are then recorded in all rows."""
+    """Faults change parameters during a run: energies are then recorded in all rows."""
     fault = {"set": {"motor.K_e": "-30%"}, "onset": "30 ms"}
     options = {"duration": "60 ms", "settle": "10 ms"}
     bench = bywire.Bench("hard-braking", "dardanelli2010", options=options, faults=(fault,))

@@ -1,4 +1,4 @@
-"""Every experiment runs from two lines, and gives what it declares."""
+"""Every experiment runs from a bench file of two lines and gives its declared results."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ PAIRS = [
     for found in PARAMETER_SETS.all().values()
     if found.assembly == experiment.assembly
 ]
-FIRST = dict(reversed(PAIRS))  # of every experiment, the first parameter set that fits it
+FIRST = dict(reversed(PAIRS))  # the first parameter set that fits each experiment
 LINES = 'experiment = "{}"\nparameters = "{}"\n'
-FEWER = {  # of experiments of many runs, which tests of their brakes run as they are
+FEWER = {  # experiments with many runs, which are run unchanged in the tests of their brakes
     "static-force": 'mu_B = "0.2, 0.6"',
     "friction-sweep": 'mu_B = "0.2, 0.6"',
     "position-step": 'amplitudes = "0.5 rad"',
@@ -59,7 +59,7 @@ LARGE = (
 """kernels in lanes that no other test needs, and long runs; other experiments of the same models
 have their figures computed in the same way, and all that are computed by families are left"""
 WARNED = {name: ["retracted stop"] for name in ("pressure-release", "rear-drag")}
-"""their port is no model's"""
+"""their port belongs to no model"""
 STEP = '[stimulus]\nkind = "step"\nstart = "0 {0}"\nend = "1 {0}"\nt_step = "0.1 s"\n'
 
 
@@ -144,7 +144,7 @@ def test_all_experiments_judged_by_families_are_put_to_the_test():
     "name", [pytest.param(n, marks=pytest.mark.trust) if n in LARGE else n for n in NAMES]
 )
 def test_figures_of_many_cases_are_those_of_their_recordings(results, name):
-    """By families of all at once, of no more signals than they need; and in lanes as alone."""
+    """Families evaluate all cases from the required signals only; lanes equal single runs."""
     bench = results[name].bench
     (other,) = random_cases(bench, 1)
     figures = key_figures_of([bench, other])
@@ -164,7 +164,7 @@ def test_figures_of_many_cases_are_those_of_their_recordings(results, name):
 @pytest.mark.trust
 @pytest.mark.parametrize("name", NAMES)
 def test_random_cases_in_lanes_are_those_alone(results, name):
-    """To the last digit, of which 1e-9 was wanted: both kernels do the same in the same order."""
+    """Exactly, although 1e-9 would suffice: both kernels have the same order of operations."""
     cases = random_cases(results[name].bench, 1000)
     for begin in range(0, len(cases), 50):
         each = cases[begin : begin + 50]
@@ -174,13 +174,13 @@ def test_random_cases_in_lanes_are_those_alone(results, name):
 
 
 def random_cases(bench, count):
-    """Return benches with ten parameters up to 5 % off and noise of their own, alike in plan."""
+    """Return benches with the same plan, ten parameters up to 5 % off, and different noise."""
     rng = np.random.default_rng([count, *bench.experiment.encode()])
     leaves, found = bench.par.leaves(), []
     while len(found) < count:
         names = rng.choice(list(leaves), 10, replace=False)
         values = {n: leaves[n] * rng.uniform(0.95, 1.05) for n in names}
-        with suppress(InputError):  # sample times that do not divide, ranges that cross
+        with suppress(InputError):  # incompatible sample times, crossed ranges
             case = bench.varied(values, {}, int(rng.integers(1000)))
             pairs = zip(bench.cases(), case.cases(), strict=True)
             runs = [[run_of(b, c, 0) for b, c in zip((bench, case), p, strict=True)] for p in pairs]
@@ -193,7 +193,7 @@ def random_cases(bench, count):
 def test_every_parameter_set_of_the_assembly_fits(name, parameters):
     definition = EXPERIMENTS.all()[name]
     stimulus = {"kind": "step", "start": 0, "end": 1, "t_step": 0} if definition.driven_unit else {}
-    options = {"stops": 1} if name == "repeated-stops" else {}  # each of which its cases run
+    options = {"stops": 1} if name == "repeated-stops" else {}  # every case runs each of them
     bench = bywire.Bench(name, parameters, options=options, stimulus=stimulus)
     for case in bench.cases():
         assert type(case.par) is type(bench.par)

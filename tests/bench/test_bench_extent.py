@@ -1,4 +1,4 @@
-"""Durations, steps and rows: what divides, what a machine can hold."""
+"""Durations, steps and rows: divisibility and limits of memory."""
 
 from __future__ import annotations
 

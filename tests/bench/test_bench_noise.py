@@ -1,4 +1,4 @@
-"""Noise of stimuli: the samples of NumPy's own seed sequences."""
+"""Noise of stimuli: the samples of NumPy's seed sequences."""
 
 import numpy as np
 import pytest
@@ -15,6 +15,6 @@ def test_noise_is_that_of_a_child_of_the_seed(seed: tuple[int, ...], child: int)
     expected = np.random.default_rng(sequence).standard_normal(50)
     row, rows = np.empty(50), np.zeros((50, 3))
     put_noise(row, seed, child)
-    put_noise(rows[:, 1], seed, child)  # not in one piece
+    put_noise(rows[:, 1], seed, child)  # in two parts
     assert np.array_equal(row, expected)
     assert np.array_equal(rows, np.column_stack((0 * expected, expected, 0 * expected)))

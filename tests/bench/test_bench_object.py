@@ -1,4 +1,4 @@
-"""The bench as a Python object: frozen, complete, and the same thing as a bench file."""
+"""The bench as a Python object: immutable, complete, and equivalent to a bench file."""
 
 from __future__ import annotations
 

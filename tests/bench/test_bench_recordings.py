@@ -1,4 +1,4 @@
-"""Recordings: what they say of themselves, their files, and what the seed decides."""
+"""Recordings: their attributes, their files, and the effect of the seed."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def recorded(**changes) -> xr.Dataset:
 
 @pytest.fixture(scope="module")
 def recording() -> xr.Dataset:
-    """Return one recording for all tests that only look at it."""
+    """Return one recording for all tests that only read it."""
     return recorded(seed=5)
 
 
@@ -92,7 +92,7 @@ def test_netcdf_gives_the_same_recording_back(recording, tmp_path):
         ([], []),
         (["stuck; hot"], ["stuck; hot"]),
         (["stuck; hot", "at 20 °C"], ["stuck; hot", "at 20 °C"]),
-        ("", []),  # as earlier versions wrote none, and several
+        ("", []),  # earlier versions wrote none or several
         ("stuck; hot", ["stuck; hot"]),
     ],
 )
@@ -149,7 +149,7 @@ def test_other_seed_other_noise():
     one, two = recorded(seed=1, **noisy), recorded(seed=2, **noisy)
     difference = one["p_meas"] - two["p_meas"]
     assert float(abs(difference).max()) > 0.0
-    assert float(abs(difference).max()) < 1e5  # codes of a 12-bit converter, not another brake
+    assert float(abs(difference).max()) < 1e5  # within codes of a 12-bit converter
 
 
 def test_without_noise_the_seed_does_nothing():
@@ -189,7 +189,7 @@ def test_engines_agree_on_every_signal():
     ("k_lf", "is_open"), [("32", False), ("3.2e-12", False), ("3.2e-15", True), ("3.2e-19", True)]
 )
 def test_a_run_whose_energy_balance_is_open_says_so(k_lf, is_open):
-    """A pipeline nearly without friction lets fluid of a few grams whirl at absurd speed."""
+    """A nearly frictionless pipe lets a few grams of fluid reach absurd speeds."""
     result = run_once("hard-braking", {"pipeline.k_lf": k_lf})
     said = [text for text in result.warnings if "the energy balance is off by" in text]
     assert bool(said) == is_open

@@ -1,4 +1,4 @@
-"""Requirements: read before anything runs, judged on the signed number."""
+"""Requirements: read before the run, evaluated with the sign."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How cases become runs: zero on a tick and on a row, noise, and what a recording tells of them."""
+"""How cases become runs: zero at a tick and a row, noise, and attributes of the recording."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def test_step_falls_on_a_tick_and_on_a_row(settle):
     plain, odd = braking(math.ceil(settle * 1e3 - 1e-9) * 1e-3), braking(settle)
     assert 0.0 in odd.recording["time"].values
     for name in ("dead_time", "rise_time", "overshoot"):
-        # Times count from another start, whose last digit is another one.
+        # Times count from a different start, so their last digits differ.
         assert odd.kpi(name).value == pytest.approx(plain.kpi(name).value, rel=1e-13)
 
 
@@ -126,12 +126,12 @@ HALF = "bywire abandoned the error estimate from half the step, which needed mor
 
 
 def estimated(bench: bywire.Bench) -> list[Result]:
-    """Return the bench run with errors, alone and beside another one."""
+    """Return the bench run with errors, alone and together with another."""
     return [run(bench, estimate_error=True), *run_benches([bench] * 2, estimate_error=True)]
 
 
 def test_an_estimate_that_takes_too_much_work_is_abandoned_with_a_note(monkeypatch):
-    """Half the step is twice the work; without it, the scatter of the others tells the error."""
+    """Half the step doubles the work; without it, the scatter of the others gives the error."""
     bench = bywire.Bench("hard-braking", SET, options={"duration": 0.1, "settle": 0.1})
     usual = estimated(bench)
     others = [factor for factor in step_error.steps_of(bench.runs().values()) if factor != 0.5]

@@ -1,4 +1,4 @@
-"""Whatever stands in a bench file: it is a bench, or one error meant for the user."""
+"""Any content of a bench file gives a bench or one error for the user."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ CONTENT = st.fixed_dictionaries(
 
 
 def outcome(make: Callable[[], Any]) -> Any:
-    """Return what is made, or the message for the user; any other exception is a defect."""
+    """Return the result or the message for the user; any other exception is a defect."""
     try:
         return make()
     except InputError as error:

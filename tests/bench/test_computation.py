@@ -1,4 +1,4 @@
-"""What tells studies apart is what they compute: no comment, name of a file or place of a line."""
+"""Studies are distinguished by their computation, not by comments, file names or line numbers."""
 
 from __future__ import annotations
 

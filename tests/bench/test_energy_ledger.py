@@ -1,4 +1,4 @@
-"""The books of a run: they close, parts stand for wholes, and nothing is counted twice."""
+"""The energy balance of a run: it closes, and nothing is counted twice."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ T = np.linspace(0.0, 1.0, 5)
 
 
 def recording(**energies: float) -> xr.Dataset:
-    """Return a recording in which every energy grows evenly from zero."""
+    """Return a recording in which every energy increases linearly from zero."""
     rows = {name: ("time", value * T, {"units": "J"}) for name, value in energies.items()}
     return xr.Dataset(rows, coords={"time": T})
 
@@ -140,7 +140,7 @@ _RECORDED = """
 
 @pytest.fixture
 def axis(tmp_path: Path) -> Iterator[Callable[[str], Bench]]:
-    """Return a step of a user's axis whose books close, damped or driven by its damping."""
+    """Return a step of a user's axis with a closed balance, damped or driven by its damping."""
     with ExitStack() as stack:
 
         def made(sign: str) -> Bench:

@@ -1,4 +1,4 @@
-"""What is said of an experiment has the options of the bench at hand, and never their defaults."""
+"""Summaries of an experiment show the options of the bench, never their defaults."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def test_reports_of_runs_and_studies_say_it_below_their_titles(tmp_path):
 
 @pytest.mark.parametrize("name", sorted(EXPERIMENTS.all()))
 def test_no_summary_has_the_default_of_an_option_written_out(name):
-    """Such a number would contradict a bench with another one."""
+    """Such a number would contradict a bench with a different value."""
     experiment = EXPERIMENTS.find(name)
     said = re.sub(r"\{.*?\}|\(.*?\)", "", experiment.summary.template)
     leaves = leaf_fields(experiment.options)

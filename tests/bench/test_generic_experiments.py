@@ -1,4 +1,4 @@
-"""Experiments that any brake gets, on a user's brake of one file, against closed forms."""
+"""Generic experiments on a user's brake of one file, compared with closed forms."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ STEP = {"kind": "step", "start": 0, "end": "100 N", "t_step": 0}
 
 @pytest.fixture(autouse=True, scope="module")
 def axis() -> Iterator[None]:
-    """Have the brake known."""
+    """Register the brake."""
     with loaded(SPRING_AXIS):
         yield
 
@@ -71,7 +71,7 @@ def test_every_one_runs_with_its_defaults_and_gives_what_it_declares(name: str) 
 
 @pytest.mark.parametrize("name", sorted(GENERIC_EXPERIMENTS.all()))
 def test_cases_side_by_side_have_the_figures_of_single_runs(name: str) -> None:
-    """To the last digit: sums go in the order of time, however rows lie in memory."""
+    """Exactly: sums are in the order of time, regardless of the memory layout of the rows."""
     driven = name in ("open-loop", "tracking")
     options = {"output": "x", "share": 0.5} if name == "duty" else {}
     made = bench(name, options, stimulus=STEP if driven else {})
@@ -111,7 +111,7 @@ def test_a_step_has_the_overshoot_of_a_second_order_lag() -> None:
     assert result.kpi("overshoot").value == pytest.approx(expected, rel=5e-3)
     assert result.kpi("steady_state_error").note == "the experiment has no set point"
     assert result.recording["x"].values[-1] == pytest.approx(200.0 / K, rel=1e-3)
-    assert result.recording["F_set"].values[-1] == 200.0  # what drove it is recorded
+    assert result.recording["F_set"].values[-1] == 200.0  # its drive is recorded
 
 
 def test_a_step_of_a_set_point_has_an_error() -> None:
@@ -170,7 +170,7 @@ def test_a_stribeck_curve_is_the_friction_of_the_model() -> None:
 def test_a_release_tells_when_it_is_empty_and_what_is_left() -> None:
     options = {"output": "x", "start": "100 N", "empty": "1 mm"}
     result = run_once(bench("release", options, overrides={"k_c": 1e-9}))
-    # Without current it sticks where the spring is as strong as the friction, or nearer to zero.
+    # Without current, it sticks where the spring force is at most the friction.
     assert abs(result.kpi("residual_level").value) <= F_C / K + 1e-6
     assert 0.0 < result.kpi("time_to_empty").value < 0.2
 
@@ -238,7 +238,7 @@ def test_stimuli_are_checked_too() -> None:
     with raises(UnknownNameError, value="lod", valid="load"):
         bench("step", stimulus={"lod": STEP})
     with raises(UnknownNameError, value="F_set"):
-        bench("step", stimulus={"F_set": STEP})  # the step drives it itself
+        bench("step", stimulus={"F_set": STEP})  # already driven by the step
     with pytest.raises(ParameterError, match="has its own stimulus"):
         bench("step", stimulus=STEP)
     with pytest.raises(ParameterError, match=r"\[stimulus.load\] needs a kind"):

@@ -1,4 +1,4 @@
-"""Plain rows answer what a recording answers."""
+"""Plain rows have the same content as a recording."""
 
 from __future__ import annotations
 

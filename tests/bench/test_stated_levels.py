@@ -1,4 +1,4 @@
-"""What sources state: of known experiments and signals, while options are as stated."""
+"""Values stated by sources: for known experiments and signals, with the stated options."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def test_every_figure_is_one_of_its_experiment() -> None:
 
 
 def test_a_level_holds_only_where_the_options_are_those_it_is_stated_for() -> None:
-    """The values are the paper's: 200 N m held, pulses to 80 % of it."""
+    """The values are from the paper: 200 N m held, pulses to 80 % of it."""
     usual = Bench("moment-pulses", "roberts2003")
     assert [each.levels[0] for each in stated_for(usual)] == pytest.approx([200.0, 160.0])
     assert set(stated_figures(usual)) == {"hold_moment"}

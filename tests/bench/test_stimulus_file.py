@@ -1,4 +1,4 @@
-"""A table stimulus out of a file, relative to the bench file."""
+"""A table stimulus from a file, relative to the bench file."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Parameters that a choice switches off are refused, and no others."""
+"""Only parameters that a choice switches off are rejected."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ NAMES = sorted(PARAMETER_SETS.all())
 
 @pytest.mark.parametrize("name", NAMES)
 def test_all_that_a_kernel_reads_counts_as_read(name: str) -> None:
-    """Traced equations may read more, where a product with zero drops out of the graph."""
+    """Traced equations may read more, because a product with zero is removed from the graph."""
     found = PARAMETER_SETS.find(name)
     par, model = found.parameters(), ASSEMBLIES.find(found.assembly)()
     stages = build_stages(prepare(model, par).program)
@@ -93,5 +93,5 @@ def test_a_pattern_passes_over_what_is_switched_off() -> None:
     bench = Bench("hard-braking", "dardanelli2010")
     changed = bench.with_overrides({"caliper.*": "+5%"})
     assert changed.par.caliper.K_pd == pytest.approx(1.05 * bench.par.caliper.K_pd)
-    assert changed.par.caliper.V_hot == bench.par.caliper.V_hot  # of fluid that stays cold
+    assert changed.par.caliper.V_hot == bench.par.caliper.V_hot  # of fluid at constant temperature
     Bench("hard-braking", "dardanelli2010", overrides={"caliper.*": "+5%"})

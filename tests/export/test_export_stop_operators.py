@@ -1,4 +1,4 @@
-"""Exports of a brake with stop operators: digit by digit the bench's own run, or what another solver finds."""
+"""Exports of a brake with stop operators: the digits of the bench, or what a solver finds."""
 
 from __future__ import annotations
 

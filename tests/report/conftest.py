@@ -1,4 +1,4 @@
-"""A recording such as a hard braking gives, made without the simulation."""
+"""A recording like that of a hard braking, generated without a simulation."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a user changed, as terminal, JSON object and page list it."""
+"""Changes by the user, as listed in the terminal, the JSON object and the page."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def test_signals_that_options_name_are_changes_where_they_are_no_default():
         "options.output": ("p_mc", "i"),
         "options.drive": ("i", "i_set"),
     }
-    # Without being set, the output is the first one of the input's unit, the drive the input.
+    # By default, the output is the first one with the input's unit, and the drive is the input.
     assert changed(
         "ramp", "dardanelli2010", options={"input": "i_set", "output": "i", "drive": "i_set"}
     ) == {"options.input": ("i_set", "not set")}
@@ -64,7 +64,7 @@ def few_pixels():
 
 
 def answers(tmp_path):
-    """Yield an answer of every quick use case that takes changes, each with one of them."""
+    """Yield an answer of every quick use case that accepts changes, with one change each."""
     resistance = {"motor.R_m": "0.41 ohm"}
     yield bywire.run("hard-braking", {**QUICK, **resistance}, estimate_error=False)
     over = "motor.L_m=0.1 mH, 0.2 mH"

@@ -1,4 +1,4 @@
-"""Differences of recordings over time: at the first one's times, without rounding and modes."""
+"""Differences of recordings over time: at the times of the first, without rounding and modes."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from bywire.report.time_traces import difference_figure, differences_from_first
 
 
 def ramp(slope: float, step: float, end: float) -> xr.Dataset:
-    """Return a pressure that rises, a temperature that rests and a mode."""
+    """Return a rising pressure, a constant temperature and a mode."""
     time = np.arange(0.0, end, step)
     signals = {
         "p": ("time", slope * time, {"units": "Pa", "long_name": "pressure"}),

@@ -1,4 +1,4 @@
-"""Curves of an identification: points that stand alone, families, records one after the other."""
+"""Curves of an identification: separate points, families, consecutive records."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def test_each_curve_is_shown_where_it_was_read() -> None:
     upper, _ = method_curve(Curve("a", "b", data, "F")).axes
     np.testing.assert_array_equal(line(upper, "up measured").get_xdata()[:2], [1.0, 3.0])
     np.testing.assert_array_equal(line(upper, "down modeled").get_ydata(), [2.0, 4.0, 5.0])
-    assert "line measured" not in {one.get_label() for one in upper.lines}  # nothing was
+    assert "line measured" not in {one.get_label() for one in upper.lines}  # there is none
 
 
 def test_records_in_a_row_are_named_and_told_apart() -> None:

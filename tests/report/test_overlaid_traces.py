@@ -1,4 +1,4 @@
-"""Overlaid traces: one line per recording, told apart, and nothing that never moves."""
+"""Overlaid traces: one distinct line per recording, and no signal that is constant."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Panels of recordings whose model declares none: signals by unit, set points beside them."""
+"""Panels of recordings whose model declares none: signals by unit, with their set points."""
 
 from __future__ import annotations
 

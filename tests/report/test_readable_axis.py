@@ -1,4 +1,4 @@
-"""Axes are readable: units in which values have few digits."""
+"""Readable axes: units in which values have few digits."""
 
 from __future__ import annotations
 

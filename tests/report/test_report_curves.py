@@ -1,4 +1,4 @@
-"""Loops, friction curves, energy bars and frequency responses draw what they were given."""
+"""Loops, friction curves, energy bars and frequency responses show their data."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Thinned lines keep what the eye would have seen."""
+"""Thinned lines look like the original."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def test_phases_too_short_to_see_become_columns_of_the_right_share() -> None:
 
 
 def test_phases_that_follow_closely_are_one_with_its_share() -> None:
-    """As under dither: 60 short ones a second, then one that lasts."""
+    """As under dither: 60 short phases per second, then a long one."""
     time = np.linspace(0.0, 10.0, 100_001)
     dithered = (time < 4.0) & (np.mod(60.0 * time, 1.0) < 0.25)
     again, lasting = lasting_phases(time, dithered | (time >= 6.0) & (time < 8.0))

@@ -1,4 +1,4 @@
-"""Every figure says what it shows, in which unit, and draws what it was given."""
+"""Every figure has labels with units and shows its data."""
 
 from __future__ import annotations
 
@@ -176,7 +176,7 @@ def test_a_step_of_no_height_is_refused() -> None:
 
 def test_stuck_phases_and_saturation_are_named(recording: xr.Dataset) -> None:
     drawn = time_traces(recording)
-    # under dither, which shakes it loose
+    # under dither, which breaks it loose
     again = "shaft stuck repeatedly, 11 % of the shaded time"
     assert again in legend_of(drawn.axes[0])
     assert "saturated" in legend_of(drawn.axes[1])

@@ -1,4 +1,4 @@
-"""Files are whole or absent, and the same input gives the same bytes."""
+"""Files are complete or absent, and the same input gives the same bytes."""
 
 from __future__ import annotations
 

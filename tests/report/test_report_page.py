@@ -1,4 +1,4 @@
-"""The report is one valid file that loads nothing, runs nothing and believes nobody."""
+"""The report is one valid file that loads nothing, runs only its zoom and escapes all text."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ VOID = {"meta", "img", "br", "link", "input", "hr"}
 
 
 class Checker(HTMLParser):
-    """Collects tags, attributes and text; notes tags that do not match."""
+    """Collects tags, attributes and text, and reports tags that do not match."""
 
     def __init__(self) -> None:
         super().__init__(convert_charrefs=True)
@@ -50,13 +50,13 @@ class Checker(HTMLParser):
         self.text = ""
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        """Note a tag that opens."""
+        """Record an opening tag."""
         self.tags.append((tag, dict(attrs)))
         if tag not in VOID:
             self.open.append(tag)
 
     def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        """Note a tag that closes itself."""
+        """Record a self-closing tag."""
         self.tags.append((tag, dict(attrs)))
 
     def handle_endtag(self, tag: str) -> None:
@@ -199,7 +199,7 @@ def test_a_minute_of_recording_makes_a_small_report(
 
 
 def test_figures_beyond_the_budget_become_pixels_largest_first(recording: xr.Dataset) -> None:
-    """The large one is a cloud of points, many times smaller as pixels whatever draws it."""
+    """The large one is a cloud of points, which is always many times smaller as pixels."""
     cloud = Figure(figsize=(2.0, 1.0))
     x, y = np.random.default_rng(1).random((2, 5000))
     cloud.subplots().plot(x, y, ".")

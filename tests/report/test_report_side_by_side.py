@@ -1,4 +1,4 @@
-"""Figures drawn in copies of a process: the same files, wherever each was drawn."""
+"""Figures drawn in forked processes: the files are the same in any process."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from bywire.report.drawing import FEW, drawn_side_by_side, figure_bytes, inline_
 pytestmark = [
     pytest.mark.skipif(sys.platform != "linux", reason="copies are of Linux alone"),
     pytest.mark.filterwarnings("ignore:This process .* is multi-threaded:DeprecationWarning"),
-]  # a process of tests has threads; commands that are copied have none
+]  # the test process has threads; commands that fork have none
 
 
 def line(k: int) -> Figure:

@@ -1,4 +1,4 @@
-"""Tables say the same as text and as HTML, in units that people use."""
+"""Tables have the same content as text and as HTML, in practical units."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Wire(ParameterSet):
     fill: Fraction
     """fraction of copper"""
     law: str
-    """which law holds"""
+    """selected law"""
 
 
 def texts(table: Table) -> list[list[str]]:
@@ -102,7 +102,7 @@ def test_parameters_are_shown_in_display_units_with_range_and_origin() -> None:
         ["R", "0.4 Ω", "> 0 Ω", "override", "cited: 0.35 in SI (chosen, a guess)"],
         ["L", "9 mm", "> 0 mm", "paper", "Table 1"],
         ["fill", "0.9", "> 0 and <= 1", "", ""],
-        ["law", "paper", "which law holds", "", ""],
+        ["law", "paper", "selected law", "", ""],
     ]
 
 

@@ -1,4 +1,4 @@
-"""Figures of the wedge brake and its rigs: panels, limits, modes, and where energy came from."""
+"""Figures of the wedge brake and its rigs: panels, limits, modes, and sources of energy."""
 
 from __future__ import annotations
 
@@ -150,7 +150,7 @@ def test_energy_of_the_wedge_brake_comes_from_motors_disc_and_run_out() -> None:
     )
     names = {label.split(":")[0]: label for label in legend(figure.axes[0])}
     assert {"electrical", "disc on wedge", "run-out (takes)", "bearings and screws"} <= set(names)
-    assert names["rest"].startswith("rest: 0.001 J")  # two losses too small to be seen
+    assert names["rest"].startswith("rest: 0.001 J")  # two losses too small to draw
     assert not any(name.startswith("not accounted") for name in names)
     assert "source" not in names
 

@@ -1,4 +1,4 @@
-"""Units and amounts as people write them."""
+"""Units and amounts as written in print."""
 
 from __future__ import annotations
 

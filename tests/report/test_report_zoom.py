@@ -1,4 +1,4 @@
-"""Zoom of a report's figures in a real browser: time alone across panels over time, else all."""
+"""Zoom of figures in a real browser: only time in panels over time, both axes elsewhere."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from bywire.report.response_figures import Response, bode
 from bywire.report.tables import Cell, Column, Table
 from bywire.report.time_traces import time_traces
 
-JUMP = 0.5  # s, where the signals jump: its place on the screen says where that time is
-FRAME = 18  # px that border and padding of a figure take
+JUMP = 0.5  # s, time of the jump, whose position on the screen locates this time
+FRAME = 18  # px, border and padding of a figure
 SEEN = """() => [...document.querySelectorAll(".zoom svg")].map((svg) => {
   const { a, d, e, f } = svg.getScreenCTM();
   const viewBox = svg.getAttribute("viewBox").split(" ").map(Number), [, , w, h] = viewBox;
@@ -76,7 +76,7 @@ def page(chromium: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[An
 
 @pytest.fixture
 def seen(page: Any) -> Iterator[Any]:
-    """Return what figures look like; at the end all is whole again."""
+    """Return the state of all figures; reset the zoom at the end."""
     yield lambda: page.evaluate(SEEN)
     for k in range(4):
         page.locator(".zoom").nth(k).focus()
@@ -84,7 +84,7 @@ def seen(page: Any) -> Iterator[Any]:
 
 
 def drag(page: Any, box: dict[str, float], *ends: tuple[float, float]) -> None:
-    """Drag from one place to another, in shares of a panel."""
+    """Drag between two positions, as fractions of a panel."""
     width, height = box["right"] - box["left"], box["bottom"] - box["top"]
     for k, (x, y) in enumerate(ends):
         page.mouse.move(box["left"] + x * width, box["top"] + y * height, steps=3)
@@ -92,7 +92,7 @@ def drag(page: Any, box: dict[str, float], *ends: tuple[float, float]) -> None:
 
 
 def times(figure: dict[str, Any]) -> tuple[float, float]:
-    """Return the times at the ends of a figure's panels, by its ticks."""
+    """Return the times at the ends of a figure's panels from its ticks."""
     values, places = zip(*figure["ticks"], strict=True)
     slope, offset = np.polyfit(places, values, 1)
     box = figure["boxes"][0]
@@ -112,8 +112,8 @@ def test_a_drag_across_a_panel_zooms_time_alone_in_all_panels_over_time(page, se
             place = box["left"] + (JUMP - 0.4) / 0.25 * (box["right"] - box["left"])
             assert new["x"] == pytest.approx(place, abs=5.0)  # a pixel of the drag is four here
             assert new["height"] == pytest.approx(old["height"], abs=2.0)
-    assert after[2:] == before[2:]  # ends before that time; and what is no time
-    drag(page, after[0]["boxes"][0], (0.9, 0.5), (0.5, 0.5))  # once more, to the left
+    assert after[2:] == before[2:]  # one ends before that time, the others have no time axis
+    drag(page, after[0]["boxes"][0], (0.9, 0.5), (0.5, 0.5))  # again, to the left
     assert times(seen()[1]) == pytest.approx((0.525, 0.625), abs=3e-3)
 
 
@@ -151,7 +151,7 @@ def test_other_drags_show_a_part_of_the_figure_in_its_proportions(page, seen):
             (end[1] - 0.1) * (box["bottom"] - box["top"]) / (whole["height"] - FRAME),
         )
         assert share == pytest.approx([wanted, wanted], rel=0.05)
-        assert now[0] == before[0]  # time is as it was
+        assert now[0] == before[0]  # time is unchanged
     page.locator(".zoom").nth(1).focus()
     page.keyboard.press("0")
     assert seen()[1] == before[1]
@@ -161,7 +161,7 @@ def test_wheel_and_buttons_zoom_a_figure(page, seen):
     before, place = seen()[0], page.locator(".zoom").first
     place.hover()
     page.mouse.wheel(0, -300)
-    assert seen()[0] == before  # the page scrolls until the figure has the focus
+    assert seen()[0] == before  # without focus on the figure, the page scrolls
     place.focus()
     place.hover()
     page.mouse.wheel(0, -300)

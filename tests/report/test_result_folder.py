@@ -1,4 +1,4 @@
-"""A folder holds one result, the old or the new, or says that it is unfinished."""
+"""A folder contains one result, the old or the new, or is marked as unfinished."""
 
 from __future__ import annotations
 
@@ -49,11 +49,11 @@ def test_the_new_result_leaves_nothing_of_the_old(tmp_path: Path) -> None:
 
 
 class Killed(BaseException):
-    """Stands for the end of the process."""
+    """Represents the end of the process."""
 
 
 def killed_at(step: int) -> Iterator[None]:
-    """Count moves, and end at one of them."""
+    """Count moves, and end the process at one of them."""
     for _ in range(step):
         yield
     raise Killed
@@ -63,7 +63,7 @@ def killed_at(step: int) -> Iterator[None]:
 def test_killed_while_files_are_moved_it_says_so(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: int
 ) -> None:
-    """Never is the recording of one beside the report of the other without a word."""
+    """The recording of one is never next to the report of the other without a marker."""
     write_document(document("old", ("a.nc",)), tmp_path)
     moves, replace = killed_at(step), os.replace
 

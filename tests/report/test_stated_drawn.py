@@ -1,4 +1,4 @@
-"""What a source states, in figures and tables: levels as lines, ranges as bands, key figures."""
+"""Values stated by a source, in figures and tables: levels are lines, ranges are bands."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def test_a_range_is_a_band_between_its_ends():
     assert bands == [pytest.approx((25.0, 29.0))]
     assert lines == pytest.approx([25.0, 29.0])
     assert legend.count("stated: axis") == 1
-    assert low <= 25.0 < 29.0 <= high  # in sight, though the curve is not there
+    assert low <= 25.0 < 29.0 <= high  # visible, although the curve is elsewhere
 
 
 def test_a_level_has_a_band_only_by_its_tolerance():

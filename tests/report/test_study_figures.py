@@ -1,4 +1,4 @@
-"""Figures of studies can be read: labels apart, limits named, entries for all that is drawn."""
+"""Figures of studies are readable: separate labels, named limits, complete legends."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def labels(axes: Axes) -> list[Text]:
 
 
 def assert_readable(figure: Figure) -> None:
-    """Labels of all abscissas never touch, and nothing stands beside an axis."""
+    """Labels of horizontal axes never touch, and nothing is drawn outside the axes."""
     shown = [label for axes in figure.axes if axes.get_visible() for label in labels(axes)]
     for one, other in combinations(shown, 2):
         assert not one.get_window_extent().overlaps(other.get_window_extent()), (one, other)
@@ -360,8 +360,8 @@ def test_a_narrow_axis_has_two_labels_at_least(ends: tuple[float, float]) -> Non
 
 
 def test_a_limit_far_off_crosses_no_line_of_a_histogram() -> None:
-    own = float(np.max(ERROR.values))  # the bench itself lies at that end
+    own = float(np.max(ERROR.values))  # the value of the bench is at that end
     axes = drawn(histograms({"far": Spread(ERROR.values, "Pa", own, 1e4)})).axes[0]
-    title = axes._right_title  # matplotlib hands out its text alone
+    title = axes._right_title  # matplotlib returns only its text
     assert title.get_text() == "limit 0.1 bar →"
     assert not title.get_window_extent().overlaps(axes.get_window_extent())

@@ -1,4 +1,4 @@
-"""Faults of a bench: what may fail is known of every brake, and what does not fit is refused."""
+"""Faults of a bench: the possible faults of every brake are known, and others are rejected."""
 
 from __future__ import annotations
 
@@ -178,7 +178,7 @@ def test_text_and_files_want_units(tmp_path):
         name = "" if "fault" in line else 'fault = "pressure.stuck"\n'
         text = FILE.partition("[[")[0] + f"[[faults]]\n{name}{line}\n"
         (tmp_path / "bad.toml").write_text(text)
-        with pytest.raises(InputError, match="for example, write"):
+        with pytest.raises(InputError, match="or example, write"):
             load(tmp_path / "bad.toml")
     for text in ("@1 s", "motor.hot@", "motor.hot=@1 s"):
         with raises(InputError, name="fault", value=text, valid="NAME=VALUE@ONSET"):
@@ -210,7 +210,7 @@ def test_noise_and_dropouts_are_drawn_anew_by_their_seed_alone():
 
 
 def test_every_assembly_with_numbers_has_modes_with_values_that_they_take():
-    """Each mode's own value is admissible: its parameters can be made."""
+    """The value of each mode is admissible: its parameters can be constructed."""
     known = {cited.assembly: cited.name for cited in PARAMETER_SETS.all().values()}
     assert {name for places in faults().values() for name, _ in places} >= set(known)
     for assembly, cited in known.items():

@@ -1,4 +1,4 @@
-"""Families judge many cases at once as each for itself: value, reason, to the last digit."""
+"""Families evaluate many cases at once exactly like single cases: values and reasons."""
 
 from __future__ import annotations
 
@@ -59,12 +59,12 @@ REASONS = {
     "release": 2,
     "static_gain": 2,
 }
-"""least number of different reasons, where a family has others than samples that are no numbers"""
+"""least number of different reasons, if a family has any besides samples that are not numbers"""
 
 
 @pytest.fixture(scope="module")
 def rows() -> Rows:
-    """Return responses that swing, creep, never settle, never begin, or begin at their end."""
+    """Return responses that oscillate, creep, never settle, never start, or start at their end."""
     random = np.random.default_rng(1)
     t = np.linspace(-0.2, 1.0, 241)
     rate, swing, gain = (random.uniform(*ends, (CASES, 1)) for ends in ((1, 40), (0, 60), (0, 1.2)))
@@ -129,7 +129,7 @@ def test_c_gives_the_bits_and_texts_of_python_on_any_samples(family):
 
 
 def test_a_step_is_judged_as_numpy_does():
-    """A reference of its own, by arrays: crossings, the last entry, extremes."""
+    """An independent reference with arrays: crossings, the last entry, extremes."""
     random, defined = np.random.default_rng(9), 0
     for place in range(300):
         few, setting = _drawn(random, "step_response")
@@ -193,7 +193,7 @@ def test_without_a_compiler_each_case_is_judged_by_python(rows, monkeypatch):
 
 
 def _drawn(random: np.random.Generator, family: str) -> tuple[Rows, object]:
-    """Return few rows, so coarse that they meet levels and each other, and how they are seen."""
+    """Return a few coarse rows, equal to levels and to each other in places, with their views."""
     n = int(random.integers(2, 40))
     t = np.cumsum(random.choice([0.01, 0.02, 0.05], n)) - 0.1
     y = np.round(random.choice([0.0, 1.0, 3.0]) * random.standard_normal((5, n)), 1)
@@ -221,7 +221,7 @@ def _drawn(random: np.random.Generator, family: str) -> tuple[Rows, object]:
 
 
 def _drawn_stop(random: np.random.Generator, t: np.ndarray, y: np.ndarray) -> tuple[Rows, object]:
-    """Return speeds that fall to zero, jump below it or never come there, wheels that lock, heat.
+    """Return speeds that fall to zero, jump below it or never reach it, locked wheels, and heat.
 
     ``y``: the speeds, or damaged samples.
     """
@@ -269,7 +269,7 @@ def test_what_differs_otherwise_or_is_broken_is_judged_one_by_one(rows):
         for k, setting in enumerate(settings):
             alone = evaluate("step_response", few.case(k), setting)
             assert {n: figure.case(k) for n, figure in together.items()} == alone
-    loops = [hysteresis.Setting("y", "y")] * 3  # a family that takes no cases together
+    loops = [hysteresis.Setting("y", "y")] * 3  # a family that evaluates cases one by one
     loop = evaluate_cases("hysteresis", few, loops)["loop_area"]
     assert loop.case(2) == evaluate("hysteresis", few.case(2), loops[2])["loop_area"]
     assert "not a number" in together["rise_time"].case(1).note

@@ -1,4 +1,4 @@
-"""Hysteresis, effort and occupation against closed forms; the listing of all key figures."""
+"""Hysteresis, effort and occupation compared with closed forms; the list of all key figures."""
 
 import math
 
@@ -32,7 +32,7 @@ def test_ellipse(start):
 
 
 def play(friction):
-    """Ramp (17) on a brake with play: a parallelogram of known widths and area."""
+    """Ramp (17) on a brake with backlash: a parallelogram of known widths and area."""
     t = np.linspace(0.0, 50.0, 50_001)
     i = np.where(t <= 25, 0.2 * t, 10 - 0.2 * t)
     p = np.where(t <= 25, np.maximum(i - friction, 0), np.minimum(5 - friction, i + friction))
@@ -81,7 +81,7 @@ def test_effort_of_a_sine():
         "energy": 2,
     }
     assert {k: v.value for k, v in found.items()} == pytest.approx(expected, rel=1e-6)
-    recording["E_source"] = ("time", 5 + 7 * t)  # integrated within the samples: it counts
+    recording["E_source"] = ("time", 5 + 7 * t)  # integrated between the samples, therefore used
     found = families.evaluate("effort", recording, effort.Setting())
     assert found["energy"].value == pytest.approx(7)
     empty = families.evaluate(
@@ -91,7 +91,7 @@ def test_effort_of_a_sine():
 
 
 def test_occupation_of_modes():
-    t = np.array([0.0, 1.0, 2.0, 4.0])  # uneven: time counts, not samples
+    t = np.array([0.0, 1.0, 2.0, 4.0])  # unequal: weighted by time, not by samples
     recording = xr.Dataset(
         {"stuck": ("time", [1.0, 1.0, 0.0, 0.0]), "sat_duty": ("time", [0.0, 0.5, 0.0, 0.0])},
         {"time": ("time", t)},
@@ -158,7 +158,7 @@ def test_of_several_windings_the_hottest_counts():
 
 
 def narrowing(width: float, closed_from: float) -> hysteresis.Loop:
-    """Return a loop that narrows linearly to nothing at a level."""
+    """Return a loop whose width decreases linearly to zero at a level."""
     up = np.linspace(0.0, 10.0, 101)
     half = 0.5 * width * np.clip(1.0 - up / closed_from, 0.0, None)
     y = np.concatenate((up, up[::-1][1:]))

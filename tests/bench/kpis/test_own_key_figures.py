@@ -1,4 +1,4 @@
-"""Key figures of a brake of one's own, as docs/modeling.md shows them, in Python and in C."""
+"""Key figures of a user's brake, as shown in docs/modeling.md, in Python and in C."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ BRAKE = Brake("swung", "a brake", __name__)
 
 
 def written(folder: Path, family: str, name: str = "swung") -> Path:
-    """Return the folder of a brake with a family of key figures; what is loaded is kept by name."""
+    """Return the folder of a brake with key figures; loaded brakes are cached by name."""
     package = folder / name
     (package / "kpis").mkdir(parents=True)
     (package / "__init__.py").write_text(BRAKE)
@@ -33,7 +33,7 @@ def written(folder: Path, family: str, name: str = "swung") -> Path:
 
 
 def example() -> str:
-    """Return the file that the page shows."""
+    """Return the file shown on the page."""
     blocks = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
     (text,) = (block for block in blocks if "swing_period" in block)
     return str(text)
@@ -62,7 +62,7 @@ def test_what_cannot_be_translated_is_refused_when_the_brake_is_loaded(tmp_path)
     with loaded(written(tmp_path, wrong, "swung_wrongly")):
         with pytest.raises(ModelError, match=sentence):
             FAMILIES.find("swinging")
-        with pytest.raises(ModelError, match=sentence):  # no experiment needs to ask for it
+        with pytest.raises(ModelError, match=sentence):  # even if no experiment requests it
             bywire.check("swung")
 
 

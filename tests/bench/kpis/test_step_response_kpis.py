@@ -1,4 +1,4 @@
-"""Key figures of step responses against the closed forms of lags of first and second order."""
+"""Key figures of step responses compared with closed forms of first and second order."""
 
 import math
 

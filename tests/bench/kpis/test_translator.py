@@ -1,4 +1,4 @@
-"""Loops in Python and in C: the same bits of any construct; others are refused with their line."""
+"""Loops in Python and in C give the same bits; unsupported constructs are rejected by line."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ WORDS = "its words"
 
 @dataclass(frozen=True)
 class Setting:
-    """What is looked at."""
+    """The signal."""
 
     y: str = "y"
     other: str = "other"
@@ -67,7 +67,7 @@ Write = Callable[..., LoopFamily]
 
 @pytest.fixture
 def written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Write:
-    """Return a function that makes a family of texts of functions."""
+    """Return a function that creates a family from the source of functions."""
 
     def write(*functions: str) -> LoopFamily:
         file = tmp_path / "written.py"
@@ -185,7 +185,7 @@ def test_c_computes_what_python_does(written, body, setting):
 
 
 def assert_alike(family, random, setting):
-    """Run a family in both languages, on samples that are coarse."""
+    """Run a family in both languages on coarse samples."""
     assert family.is_compiled
     n = 23
     t = np.cumsum(random.choice([0.01, 0.05], n)) - 0.1

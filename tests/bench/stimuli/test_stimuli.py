@@ -1,4 +1,4 @@
-"""Stimuli against closed forms, and the errors of building them."""
+"""Stimuli compared with closed forms, and errors of their construction."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Design of the dither: what reaches the shaft, what it overcomes, what it costs, what binds."""
+"""Design of the dither: torque at the shaft, friction, cost and active limits."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ LIMITS = {
 
 
 def figures(stuck, ripple, copper):
-    """Return made-up figures over gains and frequencies."""
+    """Return artificial figures over gains and frequencies."""
     shape = np.shape(stuck)
     zero = np.zeros(shape)
     return {
@@ -70,7 +70,7 @@ def test_the_least_gain_is_enough_from_there_on_upward() -> None:
 
 
 def test_the_cheapest_frequency_within_all_limits_is_chosen() -> None:
-    """Of four: cheap but shaking too much, dear, cheap, never enough."""
+    """Four candidates: cheap with too much vibration, expensive, cheap, and insufficient."""
     gains = np.array([1.0, 2.0])
     stuck = [[0.5, 0.5, 0.5, 1.0], [0.0, 0.0, 0.0, 1.0]]
     ripple = [[3.0, 0.1, 0.1, 0.0], [3.0, 0.2, 0.2, 0.0]]
@@ -107,7 +107,7 @@ def test_what_reaches_the_shaft(place) -> None:
 
 
 def test_the_law_is_that_of_the_paper_but_for_efficiency_and_attenuation() -> None:
-    """Equal friction both ways: (18) and (19) over efficiency and reach."""
+    """Equal friction in both directions: (18) and (19) divided by efficiency and transmission."""
     even = {"seal.f_cfr_n": PAR.seal.f_cfr_p, "seal.k_brk_n": PAR.seal.k_brk_p}
     own = PAR.replace(even)
     assert breakaway_torques(own, 20e5)[0] == pytest.approx(2.6 * (2e-3 + 1.6e-8 * 20e5))
@@ -127,13 +127,13 @@ def test_friction_gives_way_where_linear_models_say(f) -> None:
     amplitude = 0.6 * needed * breakaway_current(20e5, PAR.ecu.est_par) * reach(PAR, f, 20e5)
     copper = 0.5 * PAR.motor.R_m * amplitude**2
     assert found["copper"][0, 0] == pytest.approx(copper, rel=0.06)
-    # The fluid's inertia is none: what shakes the sensor nearly all shakes the caliper.
+    # Without inertia of the fluid, nearly all vibration at the sensor reaches the caliper.
     assert found["ripple_caliper"][1, 0] == pytest.approx(found["ripple_sensor"][1, 0], rel=0.15)
 
 
 def test_dither_shrinks_the_loop_of_the_ramp() -> None:
     paper, weak = area_ratios(PAR, [(1.0, 50.0), (0.3, 50.0)])
-    assert paper == pytest.approx(0.143, abs=0.01)  # as the reproduction of Fig. 5 has it
+    assert paper == pytest.approx(0.143, abs=0.01)  # as in the reproduction of Fig. 5
     assert weak > 0.9
 
 

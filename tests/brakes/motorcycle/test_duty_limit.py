@@ -1,4 +1,4 @@
-"""Whoever limits the duty cycle, ECU or bridge, the current PI knows of it."""
+"""The current PI detects a limit of the duty cycle, both in the ECU and in the bridge."""
 
 from __future__ import annotations
 

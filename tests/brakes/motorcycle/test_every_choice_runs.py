@@ -1,4 +1,4 @@
-"""Every structural choice of the motorcycle brake runs, matters, closes its energy balance."""
+"""Every structural choice of the motorcycle brake runs, has an effect and conserves energy."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ CASES = [("", "")] + [(name, value) for name, values in CHOICES.items() for valu
 
 
 def stimulus(t: np.ndarray) -> Signals:
-    """Return a brake application and its release, whatever the mode reads."""
+    """Return a brake application and its release for any mode."""
     on = np.where((t >= 0.05) & (t < 0.25), 1.0, 0.0)
     return {"p_set": 20e5 * on, "pedal_force": 150.0 * on, "i_set": 4.0 * on, "v_set": 2.5 * on}
 
@@ -108,7 +108,7 @@ def test_engines_agree(name: str, value: str) -> None:
     known = signals_of(MotorcycleBrake.Output)
     for signal in map(str, compiled.data_vars):
         size = float(abs(compiled[signal]).max())
-        # A stop's force is its stiffness times an overlap that is known to 1e-18 m: 2e-11 N.
+        # The force of a stop is its stiffness times an overlap with an error of 1e-18 m: 2e-11 N.
         rounding = 1e-12 * max(known[signal].nominal, 1.0)
         difference = float(abs(slow[signal] - compiled[signal]).max())
         assert difference <= 1e-9 * size + rounding, signal

@@ -1,4 +1,4 @@
-"""The gain schedule of the pressure PID: continuous, without bumps, and frozen at rest."""
+"""The gain schedule of the pressure PID: continuous, bumpless, and constant at rest."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def test_new_gains_at_a_constant_input_leave_the_demand_as_it_was() -> None:
     old = parameters("dardanelli2010-retuned").ecu.pressure  # type: ignore[attr-defined]
     new = old.replace({"k_p": 0.3 * old.k_p, "k_i": 0.2 * old.k_i, "k_d": 4.0 * old.k_d})
     state, u = pressure_pid.State(2.0, 0.3, 1e5), pressure_pid.Input(p_ref=25e5, p_meas=22e5)
-    state, _ = pressure_pid.output(state, u, 1e-3, old)  # the input rests from here on
+    state, _ = pressure_pid.output(state, u, 1e-3, old)  # the input is constant from here on
     _, before = pressure_pid.output(state, u, 1e-3, old)
     taken = pressure_pid.transferred(state, u, old.k_p, new)
     _, after = pressure_pid.output(taken, u, 1e-3, new)
@@ -82,7 +82,7 @@ def test_new_gains_at_a_constant_input_leave_the_demand_as_it_was() -> None:
 
 
 def one_tick(par: MotorcycleParameters, p_before: float) -> float:
-    """Return the demand of a tick that finds 10 bar after another pressure at the last one."""
+    """Return the demand of a tick at 10 bar after a different pressure at the last tick."""
     point = LOOPS.find("pressure").point(par, 10e5)
     memory: Any = point.memory
     share = (10e5 + par.ecu.p_atm) / (par.pressure_sensor.p_high - par.pressure_sensor.p_low)
@@ -99,7 +99,7 @@ def one_tick(par: MotorcycleParameters, p_before: float) -> float:
 
 
 def test_the_ecu_hands_over_from_the_gains_of_its_last_pressure() -> None:
-    """Of two ticks that differ in the pressure before, one has to make up for the other gain."""
+    """Of two ticks with different previous pressures, one must compensate the change of gain."""
     par = of()
     k = [par.ecu.pressure_at(p).k_p for p in (9.5e5, 10e5)]
     difference = one_tick(par, 9.5e5) - one_tick(par, 10e5)
@@ -110,12 +110,12 @@ def test_the_ecu_hands_over_from_the_gains_of_its_last_pressure() -> None:
 
 @pytest.mark.parametrize("p", PRESSURES)
 def test_small_motion_knows_the_frozen_gains_only(p: float) -> None:
-    """Exactly: with b = 1 matrix by matrix, else in every response."""
+    """Exactly: with b = 1 in every matrix, otherwise in every response."""
     loop = LOOPS.find("pressure")
     par = of(b=1.0)
     for make in (loop.gain, loop.closed):
         ours, theirs = make(par, p), make(frozen(par, p), p)
-        # The pressure that the sensor gives back differs from the set point by rounding: 1e-18.
+        # The pressure from the sensor differs from the set point by a rounding error: 1e-18.
         np.testing.assert_allclose(ours.A, theirs.A, rtol=1e-12, atol=1e-18)
         np.testing.assert_allclose(ours.B, theirs.B, rtol=1e-12, atol=1e-18)
     par = of(b=0.4)
@@ -126,14 +126,14 @@ def test_small_motion_knows_the_frozen_gains_only(p: float) -> None:
 
 
 def test_without_the_transfer_small_motion_would_know_the_slope(monkeypatch: Any) -> None:
-    """A gate that can fail: the naive schedule has a loop of its own within a blend."""
+    """A test that can fail: the naive schedule has an additional loop within a transition."""
     monkeypatch.setattr(pressure_pid, "transferred", lambda x, u, k_p, par: x)
     par = of(b=0.4)
     loop = LOOPS.find("pressure")
     p, f = 10e5, np.array([1.0, 5.0])
 
     class Naive(MotorcycleBrake):
-        """Another model: functions are kept by model and structure."""
+        """Another model: functions are cached by model and structure."""
 
         name = "naive"
 
@@ -163,7 +163,7 @@ def test_laws_of_the_identified_loop_are_those_of_the_region() -> None:
 
 
 def test_a_schedule_of_equal_gains_is_none() -> None:
-    """The whole nonlinear braking from 6 to 37 bar, dither and converter on."""
+    """The complete nonlinear braking from 6 to 37 bar, with dither and converter."""
     bench = Bench("hard-braking", "dardanelli2010-retuned")
     off = run(bench).recordings["run"]
     on = run(bench.with_overrides({"ecu.schedule.law": "regions"})).recordings["run"]

@@ -1,4 +1,4 @@
-"""Dry losses of gear and seals are told apart, also where there is nothing to share."""
+"""Dry losses of gear and seals are separated, also if both are zero."""
 
 from __future__ import annotations
 

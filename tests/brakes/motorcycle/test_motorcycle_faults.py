@@ -44,7 +44,7 @@ def bar(recording):
 
 
 def time_of(recording, condition):
-    """Return how long after the onset a condition first holds [s]."""
+    """Return the time from the onset until a condition is first true [s]."""
     time = recording["time"].values
     return float(time[np.argmax(condition & (time >= ONSET))]) - ONSET
 
@@ -88,13 +88,13 @@ def test_pressure_is_lost_or_runs_away(name, value, level, below, after, left):
 )
 def test_pressure_is_held_elsewhere(name, value, mean, peak):
     p = bar(failed(name, value))
-    # A dithered current sensor without reading leaves 0.9 bar more, within 10 %.
+    # A current sensor without a reading leaves 0.9 bar more under dither, within 10 %.
     assert p[-100:].mean() == pytest.approx(mean, rel=0.1, abs=0.2)
     assert peak is None or p.max() == pytest.approx(peak, rel=0.1, abs=0.2)
 
 
 def test_weak_magnets_take_the_inverse_of_their_weakness_where_the_controller_knows_them():
-    """Unknown to it they weaken the dither, too: the piston sticks, and the current is higher."""
+    """Unknown to it, they also weaken the dither: the piston sticks, and the current is higher."""
     both = {"set": {"motor.K_e": "-30%", "ecu.est_par.K_e": "-30%"}, "onset": ONSET}
     healthy, known, unknown = held(), held(both), failed("motor.demagnetized", 0.7)
     current, *weak = (float(each["i"][-1000:].mean()) for each in (healthy, known, unknown))
@@ -116,7 +116,7 @@ def test_what_stays_without_power_lies_between_the_two_closed_forms():
 
 @pytest.mark.parametrize(("factor", "holds"), [(1.95, False), (2.0, True)])
 def test_swollen_seals_hold_the_brake_without_power_beyond_a_cliff(factor, holds):
-    """The piston starts to go back if its pressure's torque exceeds the breakaway: up to 1.98."""
+    """The piston retracts if the torque of its pressure exceeds the breakaway: up to 1.98."""
     p = bar(
         held(
             {"fault": "seal.swollen", "value": factor, "onset": -9.0},
@@ -140,7 +140,7 @@ def test_a_leak_is_hidden_by_the_loop_and_seen_in_the_stroke():
     recording = failed("caliper.leaking", "1e-14 m**3/(s*Pa)")
     x = recording["x_mc"].values
     assert bar(recording)[-100:].mean() == pytest.approx(37.09, abs=0.2)
-    # 1 kHz: what it moves on in a second, over whole periods of the dither.
+    # 1 kHz: its motion in one second, over whole periods of the dither.
     assert 1e3 * (x[-1] - x[-1001]) == pytest.approx(0.41, rel=0.1)
 
 
@@ -191,7 +191,7 @@ def test_fluid_at_a_temperature_beyond_its_law_is_refused(T):
 
 def test_pads_that_were_knocked_back_take_the_volume_of_their_gap():
     par = Bench("hard-braking", "dardanelli2010").par
-    low = {"p_from": "1e-5 bar", "p_to": "37 bar"}  # any more begins to fill the gap
+    low = {"p_from": "1e-5 bar", "p_to": "37 bar"}  # more would start to fill the gap
     near, far = (
         recording["x_mc"].values[-1000:].mean()
         for recording in (held(**low), failed("caliper.knocked-back", "0.3 mm", -9.0, **low))
@@ -203,7 +203,7 @@ def test_pads_that_were_knocked_back_take_the_volume_of_their_gap():
 
 @pytest.mark.parametrize("rollback", [0.0, 0.6])
 def test_a_stuck_piston_keeps_its_friction_over_its_area_on_the_pads(rollback):
-    """The line is empty but for what the seals hold, 1.37 bar; a rolled-back seal leaves less."""
+    """The line is empty except for the 1.37 bar of the seals; a rolled-back seal leaves less."""
     seized = {"set": {"piston.rollback": f"{rollback}"}, "onset": -9.0}
     recording = held(
         seized,
@@ -213,14 +213,14 @@ def test_a_stuck_piston_keeps_its_friction_over_its_area_on_the_pads(rollback):
     p, p_mc, q = (recording[name].values for name in ("p_pd", "p_mc", "q"))
     assert p_mc[-1] == pytest.approx(1.37e5, abs=0.01e5)
     assert p[-1] - p_mc[-1] == pytest.approx((1.0 - rollback) * 2e5, abs=100.0)
-    assert not np.ptp(p[-500:])  # it stands exactly, not nearly
-    # Fluid flows only where the friction is overcome, line and all.
+    assert not np.ptp(p[-500:])  # exactly at rest
+    # Fluid flows only if friction is overcome, also that of the line.
     beyond = np.where(q > 0, p_mc - p - 2e5, np.where(q < 0, p - p_mc - (1.0 - rollback) * 2e5, 0))
     assert (beyond >= -1e-9 * 37e5).all()
 
 
 def test_the_friction_of_a_stuck_piston_takes_its_force_times_its_way():
-    """The way is what the pads' pressure says of their spring."""
+    """The travel corresponds to the pressure and the spring of the pads."""
     recording = held(
         {"set": {"ecu.dither.waveform": "off"}, "onset": -9.0},
         {"fault": "piston.stuck", "onset": -9.0},
@@ -269,7 +269,7 @@ def test_a_controller_that_restarts_begins_with_empty_memory():
     np.testing.assert_array_equal(p[:again], dead[:again])
     assert p[again] < 17.0
     assert p[-100:].mean() == pytest.approx(37.0, abs=0.3)
-    # its integral starts at nothing: the pressure is built up as from a standing start
+    # its integral starts at zero: the pressure is built up as from rest
     assert p[again:].max() < 45.0
 
 
@@ -295,7 +295,7 @@ def test_fluid_that_warms_behind_a_blocked_port_presses_the_pads_on():
     blocked = {"port.law": "dead-stroke", "port.G_port": 0.0}
     (recording, par), (opened, _) = warmed(**blocked), warmed(**{"port.law": "dead-stroke"})
     p = recording["p_pd"].values[-1]
-    # 30 K of 5 ml go into the pads' spring, the chamber's fluid, and the stop the piston leans on.
+    # The expansion of 5 ml by 30 K compresses the pads, the fluid, and the stop of the piston.
     grown = par.caliper.alpha_V * par.caliper.V_hot * 30.0
     assert grown == pytest.approx(1.05e-7)
     pads = par.caliper.A_pd**2 / par.caliper.K_pd
@@ -304,7 +304,7 @@ def test_fluid_that_warms_behind_a_blocked_port_presses_the_pads_on():
     chamber = cylinder.A_mc * (cylinder.s_mc - cylinder.x_rest) / par.fluid.beta
     leans = -cylinder.A_mc * recording["F_stop"].values[-1] / par.stop.k_stop
     assert p * (pads + chamber) + leans == pytest.approx(grown, rel=1e-3)
-    # an open port lets it out: flow over conductance
+    # through an open port: flow divided by conductance
     flow = par.caliper.alpha_V * par.caliper.V_hot * 5.0
     assert opened["p_mc"].values[-1] == pytest.approx(flow / 1e-11, rel=1e-3)
 

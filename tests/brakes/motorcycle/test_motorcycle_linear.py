@@ -1,4 +1,4 @@
-"""Linear models: eqs. (14) and (15) against each other and Table 2, rationals against control."""
+"""Linear models: eqs. (14) and (15), Table 2, and rational functions from python-control."""
 
 import math
 
@@ -71,7 +71,7 @@ def test_air_slows_the_slow_pole_and_leaves_the_gain() -> None:
     assert soft.poles_hz[0] < 0.9 * clear.poles_hz[0]
 
 
-# --- Rational transfer functions against python-control
+# --- Rational transfer functions compared with python-control
 
 
 @pytest.fixture

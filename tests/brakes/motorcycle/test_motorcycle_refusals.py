@@ -1,4 +1,4 @@
-"""Parameters of the motorcycle brake that contradict each other are refused, with the way out."""
+"""Contradictory parameters of the motorcycle brake are rejected with a remedy."""
 
 from __future__ import annotations
 

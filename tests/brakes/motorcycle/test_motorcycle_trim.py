@@ -46,7 +46,7 @@ def brake(changes: dict[str, Any], name: str = "dardanelli2010") -> MotorcyclePa
 
 
 def fine_travel(p: float, par: MotorcycleParameters, x: float) -> float:
-    """Return the travel by the midpoint rule; the nodes of the table are ends of its steps."""
+    """Return the travel by the midpoint rule, with nodes of the table at the ends of steps."""
     cylinder, h = par.master_cylinder, p / STEPS
 
     def slope(x: float, p: float) -> float:

@@ -1,4 +1,4 @@
-"""The same brake twice in one vehicle: each is the one that stands alone, number by number."""
+"""The same brake twice in one vehicle: each gives exactly the numbers of a single brake."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class BothParameters(ParameterSet):
 
 
 class Both(Assembly[BothParameters, Any]):
-    """Front and rear of a kind, nothing between them."""
+    """Front and rear of the same type, without a connection."""
 
     name = "both"
     front = Sub(MotorcycleBrake, prefix="front_")

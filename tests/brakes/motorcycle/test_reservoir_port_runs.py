@@ -1,4 +1,4 @@
-"""The reservoir port in runs: with a dead stroke, a released brake vents."""
+"""The reservoir port in runs: with a dead stroke, a released brake is vented."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A recording warns when a sensor is asked to show more than its range."""
+"""A recording warns if a signal exceeds the range of its sensor."""
 
 from __future__ import annotations
 

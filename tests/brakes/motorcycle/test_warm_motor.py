@@ -1,4 +1,4 @@
-"""A motor that warms up, in the whole brake: closed forms, books, and what derating leaves."""
+"""A warming motor in the whole brake: closed forms, energy balance, and derating."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ KNOWN = {"ecu.derating.law": "current", "ecu.derating.C_w_hat": 2.0, "ecu.derati
 
 
 def held(i: float, duration: float, **changes: Any) -> xr.Dataset:
-    """Return a run in which an ideal source drives a current [A] from the start on."""
+    """Return a run in which an ideal source drives a current [A] from the start."""
     case = case_from_rest(
         "run",
         BRAKE,
@@ -49,7 +49,7 @@ def duty(options: dict[str, Any], **changes: Any) -> bywire.Result:
 
 @pytest.mark.parametrize("a_R", [0.0, 3.93e-3])
 def test_a_constant_current_warms_the_winding_exponentially(a_R: float) -> None:
-    # With a housing that stays cold: C T' = R(T) i^2 - G (T - T_a), linear in T.
+    # With a housing at constant temperature: C T' = R(T) i^2 - G (T - T_a), linear in T.
     i, T_ref = 12.0, 300.0
     changes = {"motor_heat.C_h": 1e15, "motor_heat.a_R": a_R, "motor_heat.T_ref": T_ref}
     run = held(i, 6.0, **changes)
@@ -64,7 +64,7 @@ def test_a_constant_current_warms_the_winding_exponentially(a_R: float) -> None:
 
 
 def test_a_steady_winding_solves_a_linear_equation() -> None:
-    # Resistance grows with temperature, heat with resistance: T_w - T_a = R(T_w) i^2 / G.
+    # Resistance increases with temperature, and heat with resistance: T_w - T_a = R(T_w) i^2 / G.
     i = 6.0
     G = 1.0 / (1.0 / HEAT.G_wh + 1.0 / HEAT.G_ha)
     P_ref = BRAKE.motor.R_m * i * i
@@ -156,7 +156,7 @@ def test_derating_keeps_a_motor_below_its_limit_that_would_pass_it() -> None:
     law = BRAKE.ecu.derating
     assert law.T_derate < derated.kpi("peak_winding").value < law.T_limit
     assert free.kpi("peak_winding").value > HEAT.T_most
-    # what it costs: the pressure follows less far
+    # the cost: the pressure follows less
     assert derated.kpi("final_output").value < 0.97 * free.kpi("final_output").value
 
 
@@ -181,7 +181,7 @@ def test_the_limit_falls_between_two_temperatures(T: float, left: float) -> None
     assert out.i_max == pytest.approx(left, abs=1e-9)
     assert out.derated == (1.0 if left < 20.0 else 0.0)
     assert math.isclose(out.T, T + 273.15)
-    # a limit below what is always left stays what it is
+    # a limit below the minimum is unchanged
     _, small = derating.output(x, derating.Input(0.0, 1.0), 1e-12, par.derating)
     assert small.i_max == 1.0
 

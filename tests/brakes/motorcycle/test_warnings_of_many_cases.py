@@ -1,4 +1,4 @@
-"""Warnings of many cases at once are those of each for itself, whatever varies."""
+"""Warnings of many cases are the same as those of single cases for any varied parameter."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def test_elements_that_look_at_what_varies_are_silent_together(monkeypatch):
 
 
 def test_books_are_those_of_single_runs_though_rows_tell_their_ends_alone():
-    """A pipeline nearly without friction opens them; see the test of a single run."""
+    """A nearly frictionless pipe opens them; see the test of a single run."""
     bench = bywire.Bench("hard-braking", SET)
     benches = [changed(bench, {"pipeline.k_lf": k}) for k in (32.0, 3.2e-19, 3.2e-15)]
     said = key_figures_of(benches).warnings
@@ -49,7 +49,7 @@ def test_books_are_those_of_single_runs_though_rows_tell_their_ends_alone():
 
 
 def test_stops_warn_in_the_cases_that_are_looked_at_and_in_no_other():
-    """Free, on the far stop for a while, pulled against the near one, and off it at the end."""
+    """Free, temporarily at the far stop, pulled against the near stop, and released at the end."""
     force = np.zeros((4, 9))
     force[1, 3:5], force[2, -1], force[3, 2:5] = 40.0, -60.0, -60.0
     signals = {"F_stop": force, "at_stop": np.sign(force), "i": np.full(force.shape, -1.0)}

@@ -1,4 +1,4 @@
-"""The page that plays a scene: whole in itself, with as many numbers as frames."""
+"""The page that plays a scene: self-contained, with one number per frame."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Benches whose pages are tried, in Node and in a browser."""
+"""Benches whose pages are tested in Node and in a browser."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ VARIED = {
 
 
 def tried(page: bywire.BenchPage, folder: Path, *tasks: dict[str, Any]) -> list[dict[str, Any]]:
-    """Return what the page's scripts answer."""
+    """Return the output of the page's scripts."""
     task = folder / "task.json"
     task.write_text(json.dumps(tasks))
     call = [str(NODE), str(DRIVER), str(page.file), str(SCRIPTS), str(task)]

@@ -1,4 +1,4 @@
-"""A bench's page: what it computes is what the bench computes, and nothing else gets in."""
+"""The page of a bench: it computes what the bench computes, and rejects all other input."""
 
 from __future__ import annotations
 
@@ -327,7 +327,7 @@ def test_what_a_brake_declares_stands_first_where_nobody_chose(pages):
     shown = block(pages["wedge"], "bench")["chosen"]
     assert shown[0] == "wedge.mu_B"
     assert shown == list(SLIDERS.find("wedge").parameters)
-    assert block(pages["motorcycle"], "bench")["chosen"] == ["adc.noise"]  # what its bench changes
+    assert block(pages["motorcycle"], "bench")["chosen"] == ["adc.noise"]  # changed by its bench
 
 
 def test_every_declared_slider_is_a_parameter_of_its_assembly():

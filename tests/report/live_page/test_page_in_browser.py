@@ -1,4 +1,4 @@
-"""Pages in a real browser: what moving a slider gives, what links do, and nothing else."""
+"""Pages in a real browser: sliders, links, and no other requests."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ SAID = '() => place("message").hidden ? "" : place("message").textContent'
 
 
 class Tab:
-    """A page in the browser, with all that it said and asked for."""
+    """A page in the browser, with its messages and requests."""
 
     def __init__(self, opened: Any, file: Path) -> None:
         self.file, self.noise = file, list[str]()
@@ -49,13 +49,13 @@ class Tab:
             self.noise.append(f"request: {request.url}")
 
     def open(self, link: str = "") -> None:
-        """Open the page anew and wait for its first run."""
+        """Reload the page and wait for its first run."""
         self.page.goto("about:blank")
         self.page.goto(self.file.as_uri() + link)
         self.page.wait_for_function(READY)
 
     def moved(self, shares: dict[str, int]) -> dict[str, Any]:
-        """Return the run after sliders were moved, to shares of their way in thousandths."""
+        """Return the run after sliders were moved, to thousandths of their travel."""
         self.page.evaluate(MOVE, shares)
         self.page.wait_for_function(READY)
         given: dict[str, Any] = self.page.evaluate(GIVEN)
@@ -119,7 +119,7 @@ def test_panels_out_of_sight_follow_when_sliders_rest(tab):
 
 def test_a_link_restores_what_was_moved(tab):
     given = tab.moved({name: 417 for name in VARIED[tab.file.stem]})
-    count = len(VARIED[tab.file.stem])  # the address follows when sliders rest
+    count = len(VARIED[tab.file.stem])  # the address changes once sliders are at rest
     tab.page.wait_for_function(f"() => location.hash.split('&').length > {count}")
     tab.open(tab.page.evaluate("() => location.hash"))
     again = tab.page.evaluate(GIVEN)
@@ -171,13 +171,13 @@ STATE = """() => ({
 
 
 def typed(tab: Tab, name: str, text: str) -> dict[str, Any]:
-    """Type a value into a field, and return what the page shows when all is computed."""
+    """Type a value into a field, and return the content of the page after the computation."""
     field = tab.page.locator(f"[id='p-{name}']")
     field.evaluate("(each) => each.closest('details')?.setAttribute('open', '')")
     field.fill(text)
     field.press("Enter")
     tab.page.wait_for_function("() => !busy")
-    tab.page.wait_for_timeout(400)  # loops follow when fields rest
+    tab.page.wait_for_timeout(400)  # loops are computed once fields are at rest
     state: dict[str, Any] = tab.page.evaluate(STATE)
     return state
 
@@ -195,7 +195,7 @@ def test_values_with_units_are_taken_and_an_invalid_field_marks_the_results(tab)
     assert refused["isOld"]
     assert refused["hasNote"]
     assert tab.page.evaluate("() => values['motor.R_m']") == 0.43
-    still = typed(tab, "motor.K_e", "0.03")  # another field is right: this one stays wrong
+    still = typed(tab, "motor.K_e", "0.03")  # another field is valid; this one stays invalid
     assert (still["said"], still["isOld"]) == (refused["said"], True)
     mended = typed(tab, "motor.R_m", "0.4")
     assert (mended["said"], mended["isOld"], mended["hasNote"]) == ("", False, False)
@@ -294,7 +294,7 @@ def test_the_ordinate_fits_a_part_of_the_time_and_new_values_keep_it(tab):
     ranges = tab.page.evaluate("() => ranges")
     close = 0.1 * (whole[1] - whole[0])
     assert any(each == pytest.approx(shown, abs=close) for each in ranges)
-    if tab.file.stem == "motorcycle":  # pulses of the other bench look alike everywhere
+    if tab.file.stem == "motorcycle":  # all pulses of the other bench look alike
         assert shown[1] - shown[0] < 0.8 * (whole[1] - whole[0])
     tab.page.evaluate("() => { ranges.length = 0; }")
     tab.moved({VARIED[tab.file.stem][0]: 480})

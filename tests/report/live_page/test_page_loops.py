@@ -14,7 +14,7 @@ from bywire.analysis.margins import figures_at, margins_of
 from bywire.export.loop_source import loop_source
 
 SAME = 1e-9
-CANCELED = 1e-12  # of a loop gain, beside the 1 that matters
+CANCELED = 1e-12  # of a loop gain, compared with 1
 NAMES = {
     "gain",
     "lower_gain",
@@ -37,7 +37,7 @@ BENCH_OF = {
 
 
 def case_of(name):
-    """Return the run that has the bench's own values, where there are several."""
+    """Return the run with the values of the bench if there are several."""
     return "parallel_usual" if name == "drive-current" else ""
 
 
@@ -56,7 +56,7 @@ def test_loops_follow_the_parameters(name, tmp_path):
         wanted, given = margins_of(figures), made["margins"]
         np.testing.assert_allclose(made["frequency"], figures.frequencies, rtol=1e-12)
         L = 10 ** (np.array(made["decibel"]) / 20) * np.exp(1j * np.radians(made["phase"]))
-        # Far above the crossover terms of 1 cancel to nothing, in both to their last bits.
+        # Far above the crossover, terms near 1 cancel in both, except for their last bits.
         assert (np.abs(L - figures.L) <= SAME * np.abs(figures.L) + CANCELED).all()
         assert given["isStable"] == wanted.stable
         for margin in NAMES:

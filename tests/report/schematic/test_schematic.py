@@ -1,4 +1,4 @@
-"""The schematic of a model: its parts and wires, connected as its equations say, none overlaps."""
+"""The schematic of a model: parts and wires are connected as in the equations, without overlap."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ MODELS = {
 
 @pytest.fixture(scope="module", params=MODELS)
 def known(request: pytest.FixtureRequest) -> tuple[type, Network, Schematic]:
-    """Return an assembly, what connects its parts, and where these are drawn."""
+    """Return an assembly, its connections, and the positions of its parts."""
     place = MODELS[request.param]
     with nullcontext() if place is None else loaded(place):
         model = ASSEMBLIES.find(request.param)
@@ -75,7 +75,7 @@ def test_no_box_lies_on_another_and_no_connection_crosses_one(
 
 
 def test_connections_are_those_of_the_equations() -> None:
-    """Read off ``MotorcycleBrake.wire`` by hand, loops through the ECU included."""
+    """Read from ``MotorcycleBrake.wire`` by hand, including loops through the ECU."""
     found = network(ASSEMBLIES.find("motorcycle-brake")(), bywire.parameters("dardanelli2010"))
 
     def sources(kind: str, name: str, port: str = "") -> set[str]:
@@ -84,7 +84,7 @@ def test_connections_are_those_of_the_equations() -> None:
     assert sources("part", "motor", "v") == {"voltage"}
     assert sources("part", "motor", "omega") == {"gear"}
     assert sources("wire", "load") == {"chamber", "stop"}
-    assert sources("part", "chamber", "q") == {"line", "port"}  # not through them to the caliper
+    assert sources("part", "chamber", "q") == {"line", "port"}  # not beyond them to the caliper
     assert sources("part", "gear", "friction") == {"seal"}
     assert sources("task", "ecu", "y_p") == {"filter_p"}
     assert found.sources(Node("task", "ecu"), "p_set") == [STIMULUS]

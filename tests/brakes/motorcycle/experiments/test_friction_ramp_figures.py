@@ -1,4 +1,4 @@
-"""Friction ramp: figures of a ramp that shows no loop."""
+"""Friction ramp: figures of a ramp without a loop."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from bywire.brakes.motorcycle.experiments import friction_ramp
 
 
 def test_a_loop_without_area_has_no_ratio(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where the current is not seen, the area is zero to the last digit, or a rounding of it."""
+    """If the current is not recorded, the area is exactly zero or a rounding error."""
 
     def flat(family: str, *given: object) -> dict[str, Kpi]:
         kpis = evaluate(family, *given)

@@ -1,4 +1,4 @@
-"""The open loop's sources: what they hold, what they drive, what their recordings leave out."""
+"""Sources of the open loop: the held quantity, the driven one, and omitted signals."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ ECU_ONLY = {"p_ref", "duty", "i_star", "i_dit", "sat_current", "sat_duty"}
 
 
 def held(source: str, **changes) -> bywire.Bench:
-    """Return a bench that holds 20 bar without a stimulus of its own."""
+    """Return a bench that holds 20 bar with the default stimulus."""
     options = {"source": source, "add_holding": True, "p_start": "20 bar", "duration": "0.2 s"}
     stimulus = {"kind": "step", "start": 0, "end": f"0 {UNITS[source]}", "t_step": 0}
     return bywire.Bench("motor-open-loop", SET, options=options, stimulus=stimulus, **changes)

@@ -1,4 +1,4 @@
-"""Pedal tracking: the lag that fits best, and where none can be told."""
+"""Pedal tracking: the lag with the best fit, and cases without one."""
 
 from __future__ import annotations
 

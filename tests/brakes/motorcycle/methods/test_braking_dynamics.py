@@ -1,4 +1,4 @@
-"""Transfer function (22) from steps and sines: what is put in comes back, what lacks is said."""
+"""Transfer function (22) from steps and sines: known parameters are found, gaps are reported."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def data() -> dict[int, xr.Dataset]:
 
 @pytest.fixture(scope="module")
 def every(data: dict[int, xr.Dataset]) -> dict[int, Identified]:
-    """What each record tells."""
+    """The result of each record."""
     return {seed: identified(record) for seed, record in data.items()}
 
 
@@ -77,7 +77,7 @@ def test_response_equals_python_control_and_its_derivatives_differences() -> Non
 
 
 def slope(function: Callable[[Any], Any], k: int) -> Any:
-    """Return a derivative by differences of fourth order, whose step is far above rounding."""
+    """Return a derivative by differences of fourth order, with a step far above rounding errors."""
     by = np.zeros(5)
     by[k] = 1e-3 * VALUES[k]
     near, far = (function(VALUES + n * by) - function(VALUES - n * by) for n in (1, 2))
@@ -101,7 +101,7 @@ def test_lines_beside_a_dither_30_times_their_size() -> None:
 def test_steps_are_told_from_sines() -> None:
     t = np.linspace(0.0, 1.0, 200)
     assert step_at(np.where(t < 0.3, 1.0, 2.0)) == 60
-    # Half a period is the sine that two levels explain best.
+    # The sine that two levels explain best is half a period long.
     assert step_at(np.cos(math.pi * t)) is None
     assert step_at(np.ones(50)) is None
     assert block_of(1e-3, 50.0) == 20
@@ -112,7 +112,7 @@ def test_steps_are_told_from_sines() -> None:
 
 
 def deviations(estimates: Iterable[Iterable[Estimate]]) -> Array:
-    """Return errors over told standard deviations, shape (seeds, 15)."""
+    """Return errors divided by estimated standard deviations, shape (seeds, 15)."""
     wanted, rows = truth(PAR, EQ22), []
     for regions in estimates:
         found: dict[str, float] = {}
@@ -141,7 +141,7 @@ def require_honest(z: Array) -> None:
 
 
 def test_intervals_that_forget_the_current_s_noise_would_lie(data: dict[int, xr.Dataset]) -> None:
-    """The gate above can fail: residuals over seconds go together and count as independent."""
+    """The test above can fail: residuals correlated over seconds are treated as independent."""
 
     def forgetful(record: xr.Dataset) -> list[Estimate]:
         found = []
@@ -167,7 +167,7 @@ def test_two_steps_in_turn_agree_with_all_at_once(
 
 
 def test_a_slow_pair_of_either_order() -> None:
-    """A response that creeps on: the zero above the pole, as air that fills slowly has it."""
+    """A creeping response: the zero is above the pole, as for air that fills slowly."""
     options = EQ22.replace({"f_zero": 0.13, "f_pole": 0.1})
     found = METHOD.identify(METHOD.synthetic(PAR, options, 3), PAR, options, Effort())
     for region in REGIONS:
@@ -232,7 +232,7 @@ def test_what_lacks_is_named(data: dict[int, xr.Dataset], every: dict[int, Ident
 
 
 def test_the_whole_brake_s_gain_is_that_of_its_dithered_motion() -> None:
-    """Measured through converters and filters, against the linear model of the periodic motion."""
+    """With converters and filters, compared with the linear model of the periodic motion."""
     options = METHOD.defaults.replace({"model": "eq-21"})
     found = METHOD.identify(METHOD.synthetic(PAR, options, 1), PAR, options, Effort())
     gain = found.figures["medium.K"][0]

@@ -1,4 +1,4 @@
-"""Friction from the slow ramp: slips found, parameters recovered, what cannot be told is said."""
+"""Friction from the slow ramp: slips are found, parameters recovered, gaps reported."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from raising import raises
 PAR = parameters("dardanelli2010")
 OPTIONS = METHOD.defaults
 COARSE = OPTIONS.replace({"step": 1e-4, "longest": 2.0})
-"""for what shows far beyond its limit"""
+"""for effects far beyond their limit"""
 OFF = {"T_pr": 1.3, "f_cfr_p": 0.75, "f_cfr_n": 1.2, "k_brk_p": 0.9, "k_brk_n": 1.1, "c": 1.3}
 
 
@@ -33,13 +33,13 @@ def data() -> xr.Dataset:
 
 @pytest.fixture(scope="module")
 def rising(data: xr.Dataset) -> xr.Dataset:
-    """Two of its slips up."""
+    """Two upward slips of the ramp."""
     return data.isel(time=slice(5000, 12000))
 
 
 @pytest.fixture(scope="module")
 def alone(rising: xr.Dataset) -> Identified:
-    """What they tell from starts that are off."""
+    """The estimates from wrong start values."""
     return METHOD.identify(rising, off(), COARSE, Effort(starts=2, spread=0.3))
 
 
@@ -58,7 +58,7 @@ def test_slips_are_found_where_they_are(data: xr.Dataset) -> None:
 
 
 def test_the_rest_s_own_noise_is_no_slip() -> None:
-    """Noise through a low-pass looks smooth from sample to sample."""
+    """Noise after a low-pass filter is smooth from sample to sample."""
     noise = np.random.default_rng(0).normal(0.0, 1e5, 5020)
     slow = np.convolve(noise, np.ones(20) / 20.0, mode="valid")
     assert find_slips(slow, 1e-3, 0.2e5) == []
@@ -77,7 +77,7 @@ def test_slips_that_follow_at_once_are_left_out(data: xr.Dataset) -> None:
 
 
 def test_a_wrong_unit_is_refused_in_a_sentence(data: xr.Dataset) -> None:
-    """Of bar titled MPa."""
+    """Pressures in bar with the heading MPa."""
     with raises(ParameterError, name="p_mc", value="bar", valid="<= "):
         METHOD.identify(data.assign(p_mc=10.0 * data["p_mc"]), PAR, OPTIONS, Effort(starts=1))
 
@@ -102,7 +102,7 @@ def test_a_pressure_whose_zero_is_off_is_found_out(data: xr.Dataset) -> None:
 
 
 def test_derivatives_of_a_slip(data: xr.Dataset) -> None:
-    """Residuals with their best shift, and breakaway, against central differences.
+    """Residuals with their best shift, and breakaway, compared with central differences.
 
     Driven by its ramp alone, and by the measured current: that its dip is met earlier or later is
     not differentiated, small beside what the ramp alone would do.
@@ -139,7 +139,7 @@ def test_two_slips_up_tell_the_way_up(alone: Identified) -> None:
 
 @pytest.mark.trust
 def test_from_starts_30_per_cent_off(data: xr.Dataset) -> None:
-    """At least four of five starts reach the minimum, and it is the truth within 2 per cent."""
+    """At least four of five starts reach the minimum, within 2 % of the true values."""
     options = OPTIONS.replace({"step": 5e-5})
     found = METHOD.identify(data, off(), options, Effort(starts=5, spread=0.3))
     share = next(c.value for c in found.checks if c.name == "starts_at_minimum")
@@ -158,7 +158,7 @@ def test_from_starts_30_per_cent_off(data: xr.Dataset) -> None:
 
 @pytest.mark.trust
 def test_what_is_put_in_comes_back() -> None:
-    """Through the ECU's converter, each experiment from one start off the truth."""
+    """Through the converter of the ECU, each experiment from one start with wrong values."""
     study = trust(METHOD, PAR, OPTIONS, range(1, 11), Effort(starts=1, spread=0.3))
     assert not study.failed
     assert {r.label for r in study.recovered} == set(METHOD.unknowns) - {"seal.mu_T"}

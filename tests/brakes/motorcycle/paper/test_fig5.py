@@ -1,4 +1,4 @@
-"""Jumps of the staircase of pressure in Fig. 5."""
+"""Jumps of the pressure staircase in Fig. 5."""
 
 import numpy as np
 import xarray as xr

@@ -1,4 +1,4 @@
-"""The set estimated from what the paper measured: its residuals, its minimum, its honesty."""
+"""The set estimated from the paper's measurements: residuals, minimum, uncertainties."""
 
 from __future__ import annotations
 
@@ -39,8 +39,8 @@ from bywire.identification.least_squares import rho
 from bywire.reproduction.reproduction import Reproduction
 from raising import raises
 
-# At the lowest minimum two overshoots are met, and what they cost is not: T1 above 10 bar, k_brk_p
-# of Table 3 and Fig. 7's peak.
+# At the lowest minimum, two overshoots fit, at the cost of T1 above 10 bar, k_brk_p of Table 3 and
+# the peak of Fig. 7.
 UNEXPLAINED = {
     *(f"table4.{region}.T2" for region in ("low", "medium", "high")),
     "table4.low.overshoot",
@@ -53,7 +53,7 @@ UNEXPLAINED = {
     "fig7.peak",
 }
 FIRM = ("seal.f_cfr_n", "seal.k_brk_p", "ecu.filter.zeta")
-"""parameters that the statements hold firmly"""
+"""parameters that the statements determine well"""
 
 
 @pytest.fixture(scope="module")
@@ -67,7 +67,7 @@ def best(page) -> Appraisal:
 
 
 def test_the_stored_set_explains_what_it_did_and_lies_lower_than_beside():
-    """One vector of brakes: the whole page, with every parameter to both sides, takes six."""
+    """One vector of brakes: the whole page, with every parameter on both sides, takes six."""
     own = {u.name: parameters(NAME).leaves()[u.name] for u in unknowns()}
     beside = [{**own, name: share * own[name]} for name in FIRM for share in (0.99, 1.01)]
     rows = residuals([brake(values) for values in (own, *beside)])
@@ -97,7 +97,7 @@ def test_the_stored_set_is_a_minimum(best):
     firm = np.abs(best.jacobian).max(axis=0) > 10.0  # a tolerance for 10 % of the parameter
     assert firm.sum() > 5
     worse = 0.5 * rho(best.beside[:, firm] ** 2, LOSS)[0].sum(axis=2) - best.misfit
-    # A side that lacks a figure (A_mc 1 % smaller: the loop without dither) leaves it to the other.
+    # If a side lacks a figure (A_mc 1 % smaller: the loop without dither), the other side is used.
     assert (np.nanmax(worse, axis=0) > 1e-4 * best.misfit).all()
 
 
@@ -187,7 +187,7 @@ def test_a_trial_step_to_no_brake_is_one_that_cannot_be_computed():
 
 
 def test_a_side_that_lacks_a_figure_leaves_its_slope_to_the_other():
-    """Of 3 x + y a side is missing, then both."""
+    """For 3 x + y, one side is missing, then both."""
     x, ends = np.array([1.0, 2.0]), (np.array([0.9, 1.8]), np.array([1.1, 2.2]))
 
     def residual(values):
@@ -204,7 +204,7 @@ def test_a_side_that_lacks_a_figure_leaves_its_slope_to_the_other():
 
 @pytest.mark.trust
 def test_overshoot_is_no_slow_pair(page):
-    """A slow pair's would be seven times as high with Fig. 6's step as with one of 0.05 A."""
+    """That of a slow pair would be seven times as high with the step of Fig. 6 as with 0.05 A."""
     found = {item.id: item.computed for item in page.items if item.kind == "ours"}
     assert 1.0 < found["step.overshoot"] / found["step.small.overshoot"] < 2.0
     assert found["step.overshoot_by_table3"] < 0.1 * found["step.overshoot"]

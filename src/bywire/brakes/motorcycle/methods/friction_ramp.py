@@ -290,8 +290,8 @@ def identify(
     Parameters
     ----------
     data
-        ``i``: measured motor current [A]; ``p_mc``: pressure [Pa]. The current demand is no
-        substitute for the current: the current lags it while the shaft turns fast, which biases
+        ``i``: measured motor current [A]; ``p_mc``: pressure [Pa]. Do not use the
+        current demand instead: the current lags it while the shaft turns fast, which biases
         the estimates.
     par
         Known parameters. The motor and the current controller matter: they make the current dip
