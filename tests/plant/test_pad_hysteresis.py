@@ -8,6 +8,7 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 import numpy as np
 import pytest
 
+import bywire
 from bywire.authoring import (
     Assembly,
     Duration,
@@ -23,6 +24,7 @@ from bywire.authoring import (
 from bywire.core.errors import ModelError
 from bywire.plant import pad_hysteresis, shaft
 from bywire.simulation.run import Run, Trajectory, simulate
+from systems import pad_press
 from systems.pad_press import PADS, PAR, PadPress, Stimulus, TwoParameters, TwoPresses
 
 AMPLITUDE = 1e-4
@@ -201,6 +203,32 @@ def test_mistakes_are_named() -> None:
         Without().output(
             zeros(PadPress.State), PadPress.Memory(0.0), PAR, (), (0.0,) * 5, zeros(PadPress.Flow)
         )
+
+
+@pytest.fixture(scope="module")
+def press() -> None:
+    bywire.load_system(str(pad_press.__file__))
+
+
+def test_all_contracts_hold(press: None) -> None:
+    findings = bywire.check("pad-press").findings
+    assert [str(f) for f in findings if f.outcome == "broken"] == []
+    held = {(f.contract, f.subject) for f in findings if f.outcome == "holds"}
+    of_model = {name for name, subject in held if subject == "pad-press (press-one)"}
+    assert of_model >= {"units", "order of the step", "exact rest", "energy of a run", "engines"}
+    assert of_model >= {"lanes", "linear model", "derivatives of a run"}
+    assert ("energy of a run", "pad-press (press-by-load)") in held
+
+
+@pytest.mark.parametrize("parameters", ["press-one", "press-by-load"])
+def test_a_bench_estimates_its_error(parameters: str, press: None) -> None:
+    """The estimate from one more step is that of the difference from a much finer step."""
+    bench = bywire.Bench("press-and-release", parameters)
+    largest = bywire.run(bench).kpi("output_max")
+    fine = bywire.run(replace(bench, step=1e-6)).kpi("output_max")
+    assert largest.error is not None
+    assert abs(largest.value - fine.value) < 2.0 * largest.error + 1e-9 * fine.value
+    assert largest.error < 1e-6 * fine.value
 
 
 def test_start_at_a_preload_keeps_its_books() -> None:
