@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
+from bywire.core.ops import fabs
 from bywire.simulation.run import simulate
 from convergence.observed_order import assert_order
 from reference.maxwell_slip import maxwell_slip
-from systems.maxwell_slip import driven
+from systems.maxwell_slip import MaxwellSlip, driven
 
 STEPS = (5e-5, 4e-5, 2.5e-5, 2e-5, 1.25e-5, 1e-5, 5e-6)
 STATES = ("x", "v", "z_1", "z_2", "z_3", "z_4")
@@ -44,6 +46,33 @@ def test_slip_forces_that_follow_the_load(rubs: bool) -> None:
     errors = []
     for step in STEPS:
         result = simulate(replace(run, step=step))
+        errors.append([np.abs(result[n] - exact[n]).mean() for n in (*STATES, "E_slip")])
+    for name, column in zip((*STATES, "E_slip"), np.transpose(errors), strict=True):
+        assert_order(STEPS, column, 2.0, f"mean error of {name}")
+
+
+class _Nonlinear(MaxwellSlip):
+    """Springs that grow stiffer, and friction that follows a spring's force."""
+
+    def springs(self, x: Any, par: Any) -> Any:
+        """Return the force of all springs."""
+        return super().springs(x, par) + par.k_4 * x.z_4 * (x.z_4 / 2e-4) ** 2 + 0.2 * par.k * x.z_3
+
+    def bounds(self, x: Any, xe: Any, m: Any, par: Any, contact: Any) -> Any:
+        """Return bounds that depend on a spring."""
+        force = par.F_c + 0.3 * par.k_2 * fabs(xe.z_2)
+        return ((-force, force),) if self.rubs else ()
+
+
+@pytest.mark.parametrize("rubs", [False, True])
+def test_nonlinear_equations_of_springs(rubs: bool) -> None:
+    run = replace(driven(), model=_Nonlinear(rubs=rubs))
+    exact = simulate(replace(run, step=5e-7))
+    assert np.abs(exact["z_4"]).max() > 1e-4
+    errors = []
+    for step in STEPS:
+        result = simulate(replace(run, step=step))
+        assert result.status == "done"
         errors.append([np.abs(result[n] - exact[n]).mean() for n in (*STATES, "E_slip")])
     for name, column in zip((*STATES, "E_slip"), np.transpose(errors), strict=True):
         assert_order(STEPS, column, 2.0, f"mean error of {name}")

@@ -22,10 +22,13 @@ from bywire.authoring import (
     zeros,
 )
 from bywire.core.errors import ModelError
-from bywire.plant import pad_hysteresis, shaft
+from bywire.core.quantities import Length
+from bywire.plant import end_stop, pad_hysteresis, shaft
+from bywire.simulation.ensemble import simulate_ensemble
 from bywire.simulation.run import Run, Trajectory, simulate
 from systems import pad_press
 from systems.pad_press import PADS, PAR, PadPress, Stimulus, TwoParameters, TwoPresses
+from systems.pad_press import Parameters as PressParameters
 
 AMPLITUDE = 1e-4
 QUARTER = 20
@@ -142,14 +145,14 @@ def test_faults_scale_all_slip_forces() -> None:
 # --- In a brake
 
 
-def pressed(model: Any, par: Any, count: int) -> Trajectory:
+def pressed(model: Any, par: Any, count: int, step: float = 2e-5) -> Trajectory:
     """Return a run that presses and releases."""
     state, memory = zeros(model.State), zeros(model.Memory)
 
     def stimulus(t: Any) -> Any:
         return np.repeat((4.0 * np.sin(20.0 * t) ** 2)[:, None], count, axis=1)
 
-    return simulate(Run(model, par, state, memory, stimulus, 0.2))
+    return simulate(Run(model, par, state, memory, stimulus, 0.2, step))
 
 
 def test_two_in_one_run_as_one_alone() -> None:
@@ -173,6 +176,58 @@ def test_two_in_one_run_as_one_alone() -> None:
             parts = [result[f"E_{side}_{n}"] for n in ("pads", "damping", "friction", "stored")]
             residual = result[f"E_{side}_source"] - sum(parts)
             assert np.abs(residual).max() < 1e-11 * result[f"E_{side}_source"][-1]
+
+
+class ContactParameters(PressParameters):
+    """A press whose pads are reached after a gap."""
+
+    stop: end_stop.Parameters
+    gap: Length
+
+
+class Clearance(PadPress):
+    """The slip forces follow the contact force of the pads."""
+
+    name: ClassVar[str] = "press-with-clearance"
+    stop = Part(end_stop, work="W_stop", loss="E_stop", output={"far": "F_stop"})
+
+    def wire(self, w: Any) -> None:
+        """Connect the parts."""
+        lead, gap = w.par.lead, w.par.gap
+        w.travel, v = lead * w.shaft.x.theta, lead * w.shaft.x.omega
+        w.stop.u = end_stop.Input(w.travel, v, -1.0 * gap, gap)
+        w.pads.u = pad_hysteresis.Input(v, w.stop.f.far)
+        hysteresis = pad_hysteresis.output(w.pads.x, w.pads.par).F_hysteresis
+        w.F = end_stop.load(w.stop.f) + hysteresis
+        w.shaft.u = shaft.Input(w.m.T - lead * w.F, 0.0)
+
+    def record(self, w: Any) -> dict[str, float]:
+        """Return no energy of a caliper."""
+        return {}
+
+
+def test_slip_forces_follow_a_contact() -> None:
+    par = ContactParameters(
+        **dict(PAR.replace({"pads.law": "load"})),
+        stop=end_stop.Parameters(k_stop=1e7, tau_stop=1e-5),
+        gap=1e-4,
+    )
+    residuals = []
+    for step in (2e-5, 1e-5):
+        result = pressed(Clearance(), par, 1, step)
+        assert result.status == "done"
+        names = ("pads", "damping", "friction", "stop", "stored")
+        residual = result["E_source"] - sum(result[f"E_{name}"] for name in names)
+        residuals.append(np.abs(residual).max() / np.ptp(result["E_source"]))
+    assert residuals[0] < 1e-5
+    assert residuals[1] < residuals[0] / 3.0
+    is_open = result["F_stop"] == 0.0
+    assert 0.1 < np.mean(is_open) < 0.9
+    assert np.abs(result["F_hysteresis"][is_open]).max() < 1e-9
+    assert result["F_hysteresis"].max() > 100.0
+    run = result.run
+    lanes = simulate_ensemble(run, {"k_p": np.array([0.4, 0.4])}, result.names)
+    np.testing.assert_array_equal(lanes.values[1], simulate(run).values)
 
 
 def test_stops_follow_from_the_parts() -> None:
