@@ -57,21 +57,27 @@ def test_a_spring_without_slip_force_has_no_corner() -> None:
     assert model.corners == ()
 
 
-def test_a_width_that_follows_the_load_has_no_slipping_model() -> None:
+def test_a_slipping_spring_follows_its_width() -> None:
+    """Its width is in proportion to the load, which is in proportion to the angle."""
     par = PAR.replace({"pads.law": "load"})
-    width = 50.0 * (PAR.k_c * PAR.lead * 2.0 / PADS.F_ref) / PADS.k_1
-    state = at(width, 0.0, 0.0, 0.0)
-    with pytest.raises(CornerError, match="z_1 slips, and its width changes with the state"):
-        linear(state, par, "above")
-    assert linear(state, par, "below").corners == ("z_1 follows at its width",)
+    by_angle = 50.0 / PADS.F_ref * PAR.k_c * PAR.lead / PADS.k_1
+    for sign in (1.0, -1.0):
+        state = at(sign * 2.0 * by_angle, 0.0, 0.0, 0.0)
+        model = linear(state, par, "above")
+        assert model.corners == ("z_1 slips at its width",)
+        assert model.A[2, 1] == pytest.approx(sign * by_angle, rel=1e-9)
+        assert linear(state, par, "below").A[2, 1] == pytest.approx(PAR.lead)
 
 
+@pytest.mark.parametrize("law", ["constant", "load"])
 @pytest.mark.parametrize(("side", "sign"), [("above", 1.0), ("below", -1.0)])
-def test_small_motions_are_those_of_the_stated_side(side: str, sign: float) -> None:
+def test_small_motions_are_those_of_the_stated_side(side: str, sign: float, law: str) -> None:
     """The first spring at its width: a small torque outward, and inward, from rest."""
-    par = PAR.replace({"T_fr": 0.0, "shaft.d": 0.05})
-    start = at(WIDTHS[0], 1e-6, 0.0, 0.0)
-    force = PAR.k_c * PAR.lead * 2.0 + 50.0 + PADS.k_2 * 1e-6
+    par = PAR.replace({"T_fr": 0.0, "shaft.d": 0.05, "pads.law": law, "pads.F_ref": 1e4})
+    load = PAR.k_c * PAR.lead * 2.0
+    W = 50.0 * (load / 1e4 if law == "load" else 1.0)
+    start = at(W / PADS.k_1, 1e-6, 0.0, 0.0)
+    force = load + W + PADS.k_2 * 1e-6
     rest = PAR.lead * force
     step = sign * 1e-4
 

@@ -320,35 +320,24 @@ def on_stops(point: SmoothPoint, free: NDArray[np.bool_]) -> tuple[SmoothPoint, 
     Raises
     ------
     CornerError
-        When no side is stated, or the width of a slipping stop operator changes with the state.
+        When no side is stated.
     """
     side = _STATED.get().usual
     reached = _widths_reached(point, free) if point.model.stops else {}
     if not reached:
         return point, ()
     beside = point.moved(beside_point(point, free)).widths()
-    fixed = {each for each, width in reached.items() if beside[each] == width}
-    without = {each for each in fixed if reached[each] == 0.0}  # it has no effect
-    slipping = set(without)
-    kinks = [each for each in reached if each not in without]
-    name, names = point.model.name, ", ".join(kinks)
+    kinks = [each for each, width in reached.items() if width or beside[each]]
     if kinks and not side:
+        names = ", ".join(kinks)
         raise CornerError(
-            f"{name}: at the operating point, {names} is at its width: it slips outward, and "
-            "follows its motion inward. Choose another operating point, or one side: "
+            f"{point.model.name}: at the operating point, {names} is at its width: it slips "
+            "outward, and follows its motion inward. Choose another operating point, or one side: "
             f"{option('side', 'above')}, it slips, or {option('side', 'below')}, it follows",
             name=names,
         )
-    if side == ABOVE:
-        changing = ", ".join(each for each in kinks if each not in fixed)
-        if changing:
-            raise CornerError(
-                f"{name}: at the operating point, {changing} slips, and its width changes with the "
-                "state, for which there is no linear model here. Choose another operating point, "
-                f"or the side where it follows its motion: {option('side', 'below')}",
-                name=changing,
-            )
-        slipping |= set(kinks)
+    # Without a width, it has no effect.
+    slipping = reached if side == ABOVE else reached.keys() - {*kinks}
     first, moving = len(point.model.frictions), list(point.moving)
     for each in slipping:
         moving[first + point.model.stops.index(each)] = 0.0

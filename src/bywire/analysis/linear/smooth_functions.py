@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from threading import Lock
@@ -133,12 +133,30 @@ def _plant(
     s = ca.SX.sym("s", len(model.frictions))
     g = ca.SX.sym("g", len(model.frictions) + len(model.stops))
     contact = tuple(_split(K @ gap))
-    rates, outputs = equations(model, par, (x, held), contact, _split(s), _split(g))
+    growth = _growth(model, par, (x, held), contact, symbols[0])
+    rates, outputs = equations(model, par, (x, held), contact, _split(s), _split(g), growth=growth)
     rate, y = _column(rates), _column(outputs)
     parts = [ca.jacobian(a, b) for a in (rate, y) for b in symbols[:2]]
     results = [ca.densify(each) for each in (*parts, rate, y)]
     function = ca.Function("plant", [*symbols, K, s, g], results)
     return function, (_pattern(parts[0]), _pattern(parts[1]))
+
+
+def _growth(
+    model: Model, par: ParameterSet, at: tuple[Any, Any], contact: tuple[Any, ...], symbols: Any
+) -> Callable[[list[Any]], list[Any]]:
+    """Return the function from the states' rates to the rates of slipping stop operators."""
+    import casadi as ca
+
+    x, held = at
+    widths = _column(list(model.widths(x, x, held, par, contact)))
+    signs = [ca.sign(getattr(x, name)) for name in model.stops]
+
+    def growth(rates: list[Any]) -> list[Any]:
+        grown = _split(ca.jtimes(widths, symbols, _column(rates))) if model.stops else []
+        return [sign * each for sign, each in zip(signs, grown, strict=True)]
+
+    return growth
 
 
 def _pattern(matrix: Any) -> NDArray[np.bool_]:
@@ -157,6 +175,7 @@ def equations(
     moving: Sequence[Any],
     *,
     outputs: bool = True,
+    growth: Callable[[list[Any]], list[Any]] | None = None,
 ) -> tuple[list[Any], list[Any]]:
     """Return rates and outputs of a model's smooth part, on numbers of any kind.
 
@@ -173,6 +192,8 @@ def equations(
         0 for each stop operator that slips.
     outputs
         Whether to compute outputs.
+    growth
+        ``growth(rates)``: rates of slipping stop operators, from the states' rates. Default: zero.
     """
     x, held = at
     force = dict(zip(x._fields, model.balance(x, x, held, par, contact), strict=True))
@@ -182,11 +203,14 @@ def equations(
         s = directions[k]
         reaction[k] = where(s > 0, low, where(s < 0, high, 0.0))
         force[name] = moving[k] * (force[name] + reaction[k])
-    for k, name in enumerate(model.stops, len(model.frictions)):
-        reaction[k + len(model.limits)] = (moving[k] - 1.0) * force[name]
-        force[name] = moving[k] * force[name]
     mass = model.mass(x, par)
     rates = [force[name] / getattr(mass, name) for name in x._fields]
+    slipping = [0.0 for _ in model.stops] if growth is None else growth(rates)
+    for k, (name, rate) in enumerate(zip(model.stops, slipping, strict=True), len(model.frictions)):
+        place = x._fields.index(name)
+        lost = (1.0 - moving[k]) * (rates[place] - rate)
+        reaction[k + len(model.limits)] = -lost
+        rates[place] = rates[place] - lost
     if not outputs:
         return rates, []
     flow = zeros(cast(Any, model.Flow))
