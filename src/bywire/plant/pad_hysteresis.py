@@ -15,10 +15,8 @@ stiffness of a spring that is not at its slip force. At the slip force, it requi
 
 References
 ----------
-F. Al-Bender, V. Lampaert, J. Swevers, "Modeling of dry sliding friction dynamics: From
-heuristic models to physically motivated models and back", Chaos 14(2), 446-460, 2004,
-doi:10.1063/1.1741752: a generalization, in which the slip force of each element depends on its
-sliding speed.
+F. Al-Bender, V. Lampaert, J. Swevers, Chaos 14(2), 2004, doi:10.1063/1.1741752 (abstract): the
+generalized Maxwell-slip model, which also describes how friction depends on the sliding speed.
 """
 
 from __future__ import annotations
@@ -33,8 +31,6 @@ from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Force, Stiffness, Unit
 from bywire.core.signals import Energy, Role, Signal
 
-Deflection = Annotated[float, Signal("m", "deflection of a spring that slips", 1e-4)]
-Speed = Annotated[float, Signal("m/s", "speed", 0.01)]
 Load = Annotated[float, Unit("N", 1e4), Field(gt=0, allow_inf_nan=False)]
 Work = Annotated[float, Signal("W", "work on the springs that slip")]
 Loss = Annotated[
@@ -87,10 +83,10 @@ FAULTS = (
 class State(NamedTuple):
     """Deflections, positive for a spring that pushes back."""
 
-    z_1: Deflection
-    z_2: Deflection
-    z_3: Deflection
-    z_4: Deflection
+    z_1: Annotated[float, Signal("m", "deflection of the first spring", 1e-4)]
+    z_2: Annotated[float, Signal("m", "deflection of the second spring", 1e-4)]
+    z_3: Annotated[float, Signal("m", "deflection of the third spring", 1e-4)]
+    z_4: Annotated[float, Signal("m", "deflection of the fourth spring", 1e-4)]
 
 
 class Input(NamedTuple):
@@ -103,10 +99,10 @@ class Input(NamedTuple):
 class Speeds(NamedTuple):
     """Speeds of the springs' ends, or slip speeds."""
 
-    z_1: Speed
-    z_2: Speed
-    z_3: Speed
-    z_4: Speed
+    z_1: Annotated[float, Signal("m/s", "speed of the first spring", 0.01)]
+    z_2: Annotated[float, Signal("m/s", "speed of the second spring", 0.01)]
+    z_3: Annotated[float, Signal("m/s", "speed of the third spring", 0.01)]
+    z_4: Annotated[float, Signal("m/s", "speed of the fourth spring", 0.01)]
 
 
 class Output(NamedTuple):
