@@ -1,4 +1,4 @@
-"""The wedge brake on a quarter car warms up and fades: books, closed forms, what fading costs."""
+"""Heat and fade of the wedge brake on a quarter car: energy, closed forms, longer stops."""
 
 from __future__ import annotations
 

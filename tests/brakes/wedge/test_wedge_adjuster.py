@@ -1,4 +1,4 @@
-"""The wedge brake's adjuster: thousands of stops of constant wear, and what its faults do."""
+"""The wedge brake's adjuster over thousands of stops with constant wear, and its faults."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The wedge brake on a quarter car: it stops, and holds what rocks back."""
+"""The wedge brake on a quarter car stops it and holds it afterwards."""
 
 import math
 
@@ -97,7 +97,7 @@ def test_without_it_the_wheel_locks_and_slides_as_far_as_the_trial_says():
 
 
 def stops_by_rules(surface, duration):
-    """Return stops from speeds next to each other: by rules a single one tells little."""
+    """Return stops from neighboring speeds, since a single stop by rules depends on chance."""
     bench = read(
         "corner-panic",
         {"ecu.abs": "rules", "options.surface": surface, "options.duration": duration},

@@ -1,4 +1,4 @@
-"""Open-loop poles of the wedge brake: linear model, rigid closed form, and what a run does."""
+"""Open-loop poles of the wedge brake: linear model, rigid closed form and runs."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def rigid_pole(par):
 
 @pytest.mark.parametrize("mu_B", [0.2, 0.5])
 def test_poles_approach_the_rigid_ones_as_the_heart_stiffens(mu_B):
-    """2 % off at the stiffnesses of the set; the error falls with the heart's compliance."""
+    """The error is 2 % at the set's stiffnesses and falls with the compliance."""
     errors = []
     for factor in (1.0, 10.0, 100.0):
         par = brake(UNDAMPED, mu_B)

@@ -30,7 +30,7 @@ def sound():
 
 @pytest.fixture(scope="module")
 def dragging():
-    """Teeth of twice what the ECU knows: three of them press the pads on the disc."""
+    """With teeth twice as long as the ECU assumes, three of them press the pads on the disc."""
     with pytest.warns(AnswerWarning, match="current limit"):
         return ran(changes={"adjuster.tooth": 0.16e-3})
 

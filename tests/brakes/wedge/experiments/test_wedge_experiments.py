@@ -1,4 +1,4 @@
-"""The wedge brake's maneuvers: released, positioned within the clearance, stopped."""
+"""The wedge brake's maneuvers: release, positioning within the clearance, stop."""
 
 from __future__ import annotations
 
@@ -123,7 +123,7 @@ def test_friction_that_a_step_leaves_behind(results):
 
 
 def test_step_without_friction_is_the_loop_of_second_order():
-    """Rise time and overshoot of natural frequency and damping ratio; no load, no friction."""
+    """Rise time and overshoot follow from natural frequency and damping ratio without load."""
     zeta = 0.5
     free = FRICTIONLESS | {
         "control.position.zeta": zeta,
@@ -189,7 +189,7 @@ class SensorTrusted(WedgeBrake):
 
 
 def test_control_without_standstill_logic_winds_up():
-    """What the figure of the wind-up is for: a sensor on a standing disc reads zero."""
+    """The windup figure shows that a sensor on a disc at rest reads zero."""
     bench = bywire.Bench("disc-stop", "roberts2003")
     case = next(one for one in bench.cases() if one.label == "drop")
     made = as_run(replace(case, model=SensorTrusted()), bench.step)
