@@ -82,7 +82,7 @@ def test_step_is_of_second_order_across_nodes_and_energy_closes():
     """Nodes are passed within substeps. The error of each falls like the other errors."""
     par = tabled(PROGRESSIVE)
     runs = [drive(par, 0.3, step, M_set=on_and_off) for step in (40e-6, 20e-6, 10e-6)]
-    # No node asks for another pass: only where the motion turns, as often in any step.
+    # No node needs another pass. Only reversals of the motion do, equally often in any step.
     assert len({run.repeated for run in runs}) == 1
     left = [float(np.abs(residual(run)).max()) for run in runs]
     assert left[1] < 1e-6 * runs[1]["E_source"].max()

@@ -78,7 +78,7 @@ def test_ramp_downward_is_refused():
 
 
 def test_pulse_moment_does_not_depend_on_where_the_runout_stands():
-    """Over less than a revolution, it depends on settling by a third of the runout's ripple."""
+    """Over less than a revolution, it does, by a third of the runout's ripple."""
     for settle in (0.05, 0.08, 0.1):
         found = values(run("moment-pulses", options={"settle": settle}))
         assert found["pulse_moment"] == pytest.approx(160.0, abs=1.0)

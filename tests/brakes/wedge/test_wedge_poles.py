@@ -67,7 +67,7 @@ def test_open_loop_rates(mu_B, published):
     squeezed = brake_heart.Input(-42e-6, 42e-6, 0.0, 0.0, 0.0, 0.0)
     preload = brake_heart.forces(squeezed, par.heart).f_1
     push = (TAN_ALPHA - mu_B) * par.caliper.K_cal * TAN_ALPHA * depth
-    # The balanced screws stand ahead of the wedge by what the push compresses.
+    # The balanced screws are ahead of the wedge by the compression of the pushed side.
     ahead = 0.5 * push * (1.0 / par.heart.K_S + 1.0 / par.heart.K_W)
     i_1, i_2 = (k * (0.5 * push + sign * preload) / par.motor_1.K_ref for sign in (-1.0, 1.0))
     duty = par.motor_1.R_ref / par.drive.V_dc
