@@ -56,7 +56,7 @@ def test_efficiency(results):
         assert found[f"{name}_reverse"] == pytest.approx(put_in, rel=0.006)
     assert found["bearing_growth"] == pytest.approx(par.bearing.C_2, rel=0.01)
     assert found["eta_f_raw"] == pytest.approx(0.60, abs=0.015)
-    # Only the torque without load is known, so friction that grows with force counts as the screw's.
+    # Only the torque without load is known, so losses that grow with force count as the screw's.
     unseen = par.bearing.C_2 * found["force"] / (1e-3 / math.pi)
     eta_f = 1.0 / (1.0 / par.screw.eta_f + unseen)
     assert found["eta_f_no_load"] == pytest.approx(eta_f, rel=0.001)
