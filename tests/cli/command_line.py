@@ -51,6 +51,11 @@ def refused(outcome: Outcome, *texts: str, status: int = 2) -> None:
         assert text in outcome.err, outcome.err
 
 
+def page_text(path: Path) -> str:
+    """Return a report's HTML without the places at which long names may break."""
+    return path.read_text(encoding="utf-8").replace("<wbr>", "")
+
+
 def no_half_files(folder: Path) -> None:
     """Check that a folder contains no incomplete file."""
     assert not [path.name for path in folder.rglob("*") if path.name.startswith(".")]

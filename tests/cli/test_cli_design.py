@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import pytest
-from command_line import refused
+from command_line import page_text, refused
 
 from few_starts import few_starts
 
@@ -68,7 +68,7 @@ def test_requirements_from_a_file_and_a_bench_file_that_runs(bywire, tmp_path):
     assert outcome.status in (0, 1)
     assert "nonlinear bench" in outcome.out
     assert "bandwidth, sine of 1 A" in outcome.out
-    page = (tmp_path / "out" / "report.html").read_text()
+    page = page_text(tmp_path / "out" / "report.html")
     assert "ecu.current.k_p" in page
     assert "disk_margin &gt;= 0.5" in page
     names = {path.name for path in (tmp_path / "out").glob("*.png")}

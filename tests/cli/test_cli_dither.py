@@ -49,7 +49,7 @@ def test_the_dithered_loop_stands_beside_the_one_without_friction(bywire, tmp_pa
     [
         (("linearize", "moment", "--dither"), ("moment", "has no dither", "pressure")),
         (("study", "dither", "--set", "approach=9 bar"), ("approach = 9 bar", "lowest")),
-        (("study", "dither", "--set", "pressures=20"), ("pressures", "for example, write")),
+        (("study", "dither", "--set", "pressures=20"), ("pressures", "For example, write")),
         (
             ("study", "dither", "--set", "pressures=20 bar, 5 bar"),
             ("pressures = 20 bar, 5 bar", "increasing"),

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from command_line import Outcome, no_half_files, refused
+from command_line import Outcome, no_half_files, page_text, refused
 
 from bywire.api.identification import parameter_file
 from bywire.bench.bench_file import load
@@ -42,7 +42,7 @@ def test_a_simulated_measurement_can_be_fed_back(bywire: Bywire, tmp_path: Path)
     for name in ("estimates", "figures", "checks"):
         assert again.object[name] == first.object[name]
     assert json.loads((out / "estimate.json").read_text())["estimates"] == again.object["estimates"]
-    page = (out / "report.html").read_text()
+    page = page_text(out / "report.html")
     for text in ("All checks passed.", "loop_half_width_at_0", "Residuals", "simulated experiment"):
         assert text in page
 
@@ -137,7 +137,7 @@ def test_a_study_keeps_out_of_other_folders(bywire: Bywire, tmp_path: Path) -> N
         bywire("identify", "seal-friction", "--study", "2", "--out", tmp_path),
         "contains a result of friction-model",
     )
-    page = (tmp_path / "report.html").read_text()
+    page = page_text(tmp_path / "report.html")
     assert "put in" in page
     assert ">start<" not in page
 

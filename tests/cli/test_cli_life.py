@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from command_line import no_half_files, refused
+from command_line import no_half_files, page_text, refused
 
 LIFE = """
 life = "two-wheeler-pads"
@@ -33,7 +33,7 @@ def test_a_life_is_written_and_told(bywire, tmp_path):
         "life.json",
         "report.html",
     }
-    page = (out / "report.html").read_text(encoding="utf-8")
+    page = page_text(out / "report.html")
     assert all(text in page for text in ("fluid in the reservoir", "remaining lining", "kappa_0"))
     no_half_files(out)
 

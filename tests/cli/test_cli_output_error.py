@@ -193,7 +193,7 @@ def test_refusals(bywire: Bywire, bench: Path, tmp_path: Path) -> None:
     refused(bywire(*current, "--input", "v_set=i_bat"), "'i_bat'")
     refused(bywire(*current, "--input", "v_set=pressure"), "pressure is in Pa, but must be in V")
     refused(bywire(*current, "--loss", "hubert"), "'huber'")
-    refused(bywire(*current, "--unknown", "motor.K_e"), "motor.K_e is given twice")
+    refused(bywire(*current, "--unknown", "motor.K_e"), "motor.K_e appears twice")
     refused(bywire(*current, "--set", "motor.Rm=1 ohm"), "motor.R_m")
     refused(
         bywire(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from command_line import no_half_files, refused
+from command_line import no_half_files, page_text, refused
 
 SMALL = ("--set", "slopes=3", "--set", "leads=3", "--set", "mu_B=0.25, 0.45")
 
@@ -31,7 +31,7 @@ def test_the_actuator_is_sized_with_figures_and_numbers(bywire, tmp_path):
     assert [len(power["values"]), len(power["values"][0])] == [5, 4]
     assert found["assumptions"]
     assert {path.suffix for path in out.iterdir()} == {".nc", ".png", ".html"}
-    page = (out / "report.html").read_text(encoding="utf-8")
+    page = page_text(out / "report.html")
     assert all(text in page for text in ("optimum_k_g", "neglects dither"))
     no_half_files(out)
 
@@ -59,7 +59,7 @@ def test_a_response_that_is_too_fast_is_said(bywire):
         (("drive-train", "--parameters", "dardanelli2010"), ("wedge-brake", "motorcycle-brake")),
         (("drive-train", "--set", "lead=3mm"), ("lead_min",)),
         (("drive-train", "--set", "lead_min=9mm"), ("lead_min", "lead_max", "below")),
-        (("drive-train", "--set", "t_90=0.1"), ("t_90", "for example, write")),
+        (("drive-train", "--set", "t_90=0.1"), ("t_90", "For example, write")),
         (("drive-train", "--set", "slopes=2"), ("slopes", ">= 3")),
         (("drive-train", "--set", "power=peak"), ("'filtered' or 'instantaneous'",)),
         (("drive-train", "--set", "wedge.mu_b=0.4"), ("wedge.mu_B",)),

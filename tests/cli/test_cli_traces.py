@@ -63,7 +63,7 @@ def test_absolute_path_is_taken_as_it_is(bywire, bench, ride, tmp_path):
         ("time [s],lever [mm]\n0,9\n0.01,9\n", ["none of its columns 'lever'", "pedal [mm]"]),
         ("clock [s],pedal [mm]\n0,9\n0.01,9\n", ["has no time column", "'time [s]'"]),
         ("0,9\n0.01,9\n", ["the columns '1, 2' have no names", "Add a first row"]),
-        (b"time [s],pedal [m\x81]\n0,1\n", ["line 1", "not UTF-8"]),
+        (b"time [s],pedal [m\x81]\n0,1\n", ["line 1", "neither UTF-8 nor cp1252"]),
         (bytes(200), ["contains something else"]),
         (HEADER + '0,"9\n0.01,9\n', ["quotation marks"]),
         ("time [s],pedal [mm]," + "x" * 200_000, ["line 1", "field limit"]),
@@ -105,7 +105,7 @@ def test_trace_that_cannot_be_read(bywire, bench, name, text):
     ("column", "value", "texts"),
     [
         ("pedal [mm]", 46, ["pedal", "46 mm", "pedal.x_max = 45 mm"]),
-        ("force [N]", 1e6, ["force", "1e+06 N", "pedal.x_max = 45 mm"]),
+        ("force [N]", 1e6, ["force", "1000 kN", "pedal.x_max = 45 mm"]),
     ],
 )
 def test_ride_beyond_the_stop_of_the_pedal_is_refused(bywire, ride, column, value, texts):

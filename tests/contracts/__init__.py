@@ -1,1 +1,1 @@
-"""What every element, parameter set and model must keep: users of ``bywire.contracts``."""
+"""Tests of ``bywire.contracts``, the contracts of all elements, parameter sets and models."""

@@ -1,4 +1,4 @@
-"""Every element and control law keeps every contract, and none is overlooked."""
+"""All elements and control laws meet all contracts, and none is overlooked."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What experiments name is looked at before they are run, in our brakes and in anybody's."""
+"""Checks of the names in experiments before a run, in our brakes and in users' brakes."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ PUSH = Experiment("push", "spring-axis", "a push", Options, Options(), cases, ju
 
 @pytest.fixture(autouse=True)
 def _forgotten() -> Iterator[None]:
-    """Forget what a test loads."""
+    """Remove the modules that a test loads."""
     with forgotten():
         yield
 

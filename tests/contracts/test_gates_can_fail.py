@@ -1,4 +1,4 @@
-"""Every contract of this folder refuses an element with a seeded mistake."""
+"""Every contract of an element rejects a seeded mistake."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ ranges = parameters(element_contracts.keeps_its_ranges)
 
 
 class Mistake(NamedTuple):
-    """What is changed in an element, and the gate that must notice."""
+    """A change of an element, and the gate that must detect it."""
 
     element: str
     right: str
@@ -169,7 +169,7 @@ def test_gate_refuses(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 
 
 def _loaded(name: str, source: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> ModuleType:
-    """Return a module made of the source of an element."""
+    """Return a module from an element's source code."""
     path = folder / f"{name}.py"
     path.write_text(source, encoding="utf-8")
     spec = importlib.util.spec_from_file_location(f"element_{name}", path)

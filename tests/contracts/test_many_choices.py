@@ -1,4 +1,4 @@
-"""Of many choices, not every combination is put to the test, but each of them."""
+"""With many choices, the contracts test each choice but not every combination."""
 
 from typing import Literal
 

@@ -1,4 +1,4 @@
-"""Every contract of a model refuses the template's brake with a seeded mistake."""
+"""Every contract of a model rejects the template's brake with a seeded mistake."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ STAIRS = (
 
 
 class Mistake(NamedTuple):
-    """What is changed in a file of the template, and the contract that must notice."""
+    """A change in a file of the template, and the contract that must detect it."""
 
     contract: str
     file: str
@@ -101,7 +101,7 @@ CHANNELS = Channels({model}.name, (Channel("angle", "angle sensor", "rad", "{sig
 
 @contextmanager
 def seeded(folder: Path, name: str, mistake: Mistake | None = None) -> Iterator[Any]:
-    """Yield the trial of a template's brake with a mistake; nobody knows it afterwards."""
+    """Yield the trial of a template's brake with a mistake, and unload it at the end."""
     package = write_package(name, folder) / "src" / name.replace("-", "_")
     if mistake is not None:
         source = package / f"{mistake.file}.py"
@@ -126,7 +126,7 @@ def test_gate_refuses(mistake: str, tmp_path: Path) -> None:
 def test_a_linear_model_that_is_the_mean_of_two_sides_is_found(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """What differentiation makes of a magnitude at 0, without a word."""
+    """Differentiation of a magnitude at 0 silently gives the mean."""
     monkeypatch.setattr(linearize, "linear_models", lambda of: of.models(of.point))
     with seeded(tmp_path, "seeded-mean", MISTAKES["kink where it rests"]) as subject:
         found = examine(OF_A_MODEL["linear model on kinks"], subject, subject.place())

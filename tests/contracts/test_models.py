@@ -1,4 +1,4 @@
-"""Our models keep every contract that users' models have to keep."""
+"""Our models meet all contracts that users' models must meet."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a check says: values that broke a contract, one error per cause, faults of what is there."""
+"""Findings of a check: values that broke a contract, one error per cause, valid faults."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def seeded(folder: Path, name: str, file: str, right: str, wrong: str) -> Path:
 
 
 def test_a_cause_is_one_error(tmp_path: Path) -> None:
-    """A parameter that was renamed keeps every contract of the model from being tried."""
+    """A renamed parameter prevents the check of all contracts of the model."""
     package = seeded(tmp_path, "renamed", "point.py", "par.", "par.renamed.")
     with loading.loaded(package):
         found = list(one_by_cause(demand.settle() for demand in demands_on("renamed-actuator", ())))

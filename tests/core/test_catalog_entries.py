@@ -1,4 +1,4 @@
-"""The catalog: every value has its provenance, and every parameter its value."""
+"""The catalog: each value has a provenance, and each parameter has a value."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ NAMES = sorted(PARAMETER_SETS.all())
 
 
 def check_provenance(found: CitedSet) -> None:
-    """Refuse an entry with a value that does not say where it comes from."""
+    """Reject an entry with a value without a source."""
     for name, cited in found.values.items():
         assert isinstance(cited, Cited), name
         assert cited.kind in get_args(Origin), name
@@ -42,7 +42,7 @@ def check_provenance(found: CitedSet) -> None:
 
 
 def check_coverage(found: CitedSet) -> None:
-    """Refuse an entry that leaves a parameter out, or has one too many."""
+    """Reject an entry that omits a parameter or has an unknown one."""
     fields = {*leaf_fields(found.parameter_class), *choice_fields(found.parameter_class)}
     assert found.values.keys() == fields
 
@@ -113,7 +113,7 @@ def test_kinds_of_provenance():
 
 
 class Lever(ParameterSet):
-    """A force, an arm, and what a controller knows of both."""
+    """A force, an arm, and the controller's estimates of both."""
 
     F: Force
     arm: Length

@@ -1,4 +1,4 @@
-"""No process of bywire takes code from the working folder, nor from one that is served."""
+"""No process of bywire loads code from the working folder or from a served folder."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ def planted(tmp_path: Path, names: set[str], monkeypatch: pytest.MonkeyPatch) ->
 
 
 def marks(folder: Path) -> str:
-    """Return what was run of a folder."""
+    """Return the files of a folder that were executed."""
     mark = folder.parent / "mark"
     return mark.read_text() if mark.exists() else ""
 

@@ -1,4 +1,4 @@
-"""Arguments of public functions: another kind than the signature says is one clear error."""
+"""Arguments of public functions: a type that the signature does not allow is one clear error."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from bywire.core.errors import ParameterError
         (lambda: bywire.run_study("a.toml", cases=True), "cases = True must be a whole number"),
         (lambda: bywire.resume_study("a", workers=1.5), r"workers = 1\.5 must be a whole number"),
         (lambda: bywire.run_study("a.toml", None, ["x"]), r"overrides = \['x'\] must be a mapping"),
-        (lambda: bywire.run_study("a.toml", cluster=None), "cluster = None must be a text"),
-        (lambda: bywire.study_report(None), "folder = None must be a text or a path"),
-        (lambda: bywire.run_study("a.toml", 5), "out = 5 must be a text or a path"),
+        (lambda: bywire.run_study("a.toml", cluster=None), "cluster = None must be a string"),
+        (lambda: bywire.study_report(None), "folder = None must be a string or a path"),
+        (lambda: bywire.run_study("a.toml", 5), "out = 5 must be a string or a path"),
         (lambda: bywire.design("pressure", seed=-1), "seed = -1 must be a whole number from 0"),
         (lambda: bywire.run_study("a.toml", progress=True), "progress = True must be a function"),
         (lambda: bywire.design("pressure", require="gain"), "require = .gain. must be a list"),

@@ -1,4 +1,4 @@
-"""Assemblies: what follows from parts, and mistakes of wiring said with place and next step."""
+"""Assemblies: derived equations, and errors of wiring with place and next step."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Held(NamedTuple):
 
 
 class Screw(Assembly[Parameters, Held]):
-    """What the other ones here do wrong, done right."""
+    """The correct version of the faulty assemblies in this file."""
 
     name = "screw"
     Memory = Stimulus = Held
@@ -226,15 +226,15 @@ class NoParameters(Screw):
 MISTAKES: list[tuple[type[Screw], str, dict[str, str]]] = [
     (Forgotten, "Forgotten", {"name": "gear", "valid": "ball_screw_gear.Input(torque"}),
     (Unset, "Unset", {"name": "more", "valid": "A"}),
-    (Twice, "sets it a second time", {"name": "Screw.torque"}),
-    (InputTwice, "assigns its input a second time", {"name": "Screw.motor"}),
+    (Twice, "a second time", {"name": "Screw.torque"}),
+    (InputTwice, "a second time", {"name": "Screw.motor"}),
     (Early, "read before it is set", {"name": "Screw.torque", "valid": "w.torque = ..."}),
     (WrongUnit, "WrongUnit.wire", {"name": "torque", "value": "A", "valid": "N*m"}),
     (WrongInput, "WrongInput.wire", {"name": "gear.u.torque", "value": "V", "valid": "N*m"}),
     (UnlikeSum, "cannot be added", {"name": "UnlikeSum.wire", "value": "A", "valid": "V"}),
     (
         OtherElement,
-        "as its input",
+        "assigns a",
         {
             "name": "Screw.motor",
             "value": "bywire.plant.ball_screw_gear.Input",
@@ -244,7 +244,7 @@ MISTAKES: list[tuple[type[Screw], str, dict[str, str]]] = [
     (UnknownPart, "UnknownPart", {"name": "part or wire", "value": "moter", "valid": "motor"}),
     (UnknownWire, "UnknownWire", {"name": "part or wire", "value": "torqe", "valid": "torque"}),
     (OnItself, "has no value here", {"name": "Screw.motor", "valid": "model.at("}),
-    (Unitless, "it has no unit", {"name": "more"}),
+    (Unitless, "Unitless", {"name": "more"}),
     (OddUnit, "is not known", {"name": "more", "value": "flurb"}),
     (NoPower, "does not return", {"name": "NoPower.power", "value": "W_in"}),
     (OddPower, "OddPower.power", {"name": "signal", "value": "W_out"}),

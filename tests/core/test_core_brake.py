@@ -1,4 +1,4 @@
-"""Brakes of users: loaded from files and packages, found by entry points; what is wrong is said."""
+"""Users' brakes from files, packages and entry points, and their errors."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ Write = Callable[[str, str], Path]
 
 @pytest.fixture(autouse=True)
 def _forgotten() -> Iterator[None]:
-    """Forget what a test loads."""
+    """Remove the modules that a test loads."""
     with forgotten():
         yield
 
@@ -81,7 +81,7 @@ def test_a_package_keeps_each_kind_in_its_own_module(write: Write) -> None:
             "raises.py",
             f"{HEAD}x = 3\ny = x / 0\n",
             ModelError,
-            ["raises.py, line 3: ZeroDivisionError: division by zero", "fix it and load it again"],
+            ["raises.py, line 3: ZeroDivisionError: division by zero"],
         ),
         (
             "deep.py",
@@ -117,7 +117,7 @@ def test_a_package_keeps_each_kind_in_its_own_module(write: Write) -> None:
             "taken.py",
             declared("motorcycle"),
             ModelError,
-            ["taken.py declares a brake 'motorcycle', and so does", "rename one of them"],
+            ["taken.py", "a brake 'motorcycle'", "Rename one of them"],
         ),
         (
             "json.py",
@@ -272,7 +272,7 @@ def test_what_a_brake_does_not_declare_is_said_with_how_it_is_declared() -> None
 def installed(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> Iterator[Callable[[str, str], None]]:
-    """Return a function that installs a brake of one file beside ours."""
+    """Return a function that installs a single-file brake next to ours."""
     real = brakes_module.entry_points(group=brakes_module.GROUP)
     added: list[EntryPoint] = []
     monkeypatch.syspath_prepend(tmp_path)
@@ -292,7 +292,7 @@ def installed(
     [
         ("broken_at_import", "x = 1\nx.no\n", r"broken_at_import.py, line 2: AttributeError"),
         ("without_declaration", "x = 1\n", "declares no BRAKE"),
-        ("with_our_name", declared("wedge"), "declares a brake 'wedge', and so does"),
+        ("with_our_name", declared("wedge"), "declare a brake 'wedge'"),
     ],
 )
 def test_a_broken_entry_point_is_reported_once_and_left_out(
@@ -316,7 +316,7 @@ def test_what_an_installed_brake_breaks_is_left_out_and_the_others_stay(
         "from bywire.core.parameters import ParameterSet\n"
         'SETS = (CitedSet("roberts2003", "a", "", "", ParameterSet, {}),)\n',
     )
-    with pytest.warns(BrakeWarning, match=r"'clashing' is skipped: .*'roberts2003'"):
+    with pytest.warns(BrakeWarning, match="'clashing': .*'roberts2003'"):
         known = PARAMETER_SETS.all()
     assert known["roberts2003"].assembly == "wedge-brake"
     assert set(brakes()) == OURS | {"clashing"}

@@ -1,4 +1,4 @@
-"""Messages name flags to whoever typed a command, and arguments to whoever called a function."""
+"""Messages contain flags for commands, and arguments for function calls."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def test_an_argument_has_one_flag() -> None:
 
 
 def test_messages_name_arguments_that_there_are() -> None:
-    """Every ``option("NAME")`` of the package is an argument of a use case."""
+    """Each ``option("NAME")`` in the package is an argument of a use case."""
     known = {name for case in use_cases().values() for name in case.takes}
     known |= {n for c in use_cases().values() for n in inspect.signature(c.public).parameters}
     named = {}

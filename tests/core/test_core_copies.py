@@ -1,4 +1,4 @@
-"""Copies of a process: only of one with a single thread, and deaf to Ctrl-C."""
+"""Copies of a process, which must have a single thread; the copies ignore Ctrl-C."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="of Linux alone"
 
 
 def test_a_command_may_be_copied_while_it_has_one_thread_and_a_program_never():
-    """The system counts threads: those of libraries are unknown to Python."""
+    """The system counts the threads, because Python does not know those of libraries."""
     lines = """
 import _thread, threading, time
 from bywire.core.callers import command_line
@@ -103,7 +103,7 @@ def test_a_command_is_copied_with_a_single_thread(tmp_path):
 # A process of tests has threads; commands that are copied have none.
 @pytest.mark.filterwarnings("ignore:This process .* is multi-threaded:DeprecationWarning")
 def test_copies_do_not_hear_an_interrupt_that_their_maker_hears():
-    """They know what it knows, and end with the block, whatever they are at."""
+    """They have the same data as the process, and end with the block even if they are busy."""
     heard: list[int] = []
     before = signal.signal(signal.SIGINT, lambda number, _: heard.append(number))
     _told.append("by their maker")

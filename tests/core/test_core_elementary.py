@@ -1,4 +1,4 @@
-"""Exponential, logarithm, power, sine and cosine of floats: those of kernels, in every bit."""
+"""Exponential, logarithm, power, sine and cosine of floats: bit-identical to kernels."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Ctrl-C is kept back for the length of a block, and never lost."""
+"""Ctrl-C is deferred until the end of a block, and never lost."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from bywire.core.interrupts import interrupt_handled, interrupts_deferred, inter
 
 @pytest.fixture(autouse=True)
 def handler():
-    """Leave the process' handler as it was."""
+    """Restore the handler of the process."""
     before = signal.getsignal(signal.SIGINT)
     signal.signal(signal.SIGINT, signal.default_int_handler)
     yield

@@ -1,4 +1,4 @@
-"""Elementary functions give the same number on every kind of argument."""
+"""Elementary functions give the same number for all kinds of arguments."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ CALLS = {
 
 
 def close(found, expected):
-    """Check numbers against the exact ones."""
+    """Compare numbers with the exact values."""
     np.testing.assert_allclose(np.asarray(found, dtype=float), expected, rtol=1e-12, atol=1e-300)
 
 
@@ -97,7 +97,7 @@ def test_a_symbol_may_stand_anywhere(name):
 
 
 class Traced:
-    """A number that brings its own operations, as unit-carrying numbers do."""
+    """A number with its own operations, like numbers with units."""
 
     def __init__(self, value: float) -> None:
         self.value = value

@@ -1,4 +1,4 @@
-"""Parameter sets: built, changed, walked, and refused with a message that helps."""
+"""Parameter sets: creation, changes, traversal, and helpful errors."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ def test_replaced_values_are_checked_again():
 
 
 def test_groups_that_hold_no_changed_value_are_kept():
-    """A search makes thousands of sets a second."""
+    """A search creates thousands of sets per second."""
     before = made()
     assert before.replace({"share": 0.5}).inner is before.inner
     assert before.replace({"inner.R": 0.4}).inner is not before.inner
@@ -124,7 +124,7 @@ class Pair(ParameterSet):
 
 
 class Doubled(Pair):
-    """Two parts, of which one is not taken as it is given."""
+    """Two parts, one of which is converted."""
 
     @field_validator("right")
     @classmethod
@@ -209,7 +209,7 @@ def test_nothing_can_be_assigned_or_added():
         ({"inner.law": 3}, "inner.law must be 'paper' or 'directional', got 3"),
         ({"on": "maybe"}, "on: it must be true or false, got 'maybe'"),
         ({"on": [1]}, "on: it must be true or false, got [1]"),
-        ({"note": 3}, "note: it must be a text, got 3"),
+        ({"note": 3}, "note: it must be a string, got 3"),
         ({"short": 2.0}, "Outer: short must be shorter than long"),
     ],
 )

@@ -1,4 +1,4 @@
-"""The registry finds a thing by the files that are called so or quote it, and loads no others."""
+"""The registry loads only files that are named after a thing or quote it."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""Files whole or not at all, and nothing left of processes that were killed."""
+"""Complete files or none, and no leftovers of killed processes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Signals, quantities and errors: declared once, read everywhere."""
+"""Signals, quantities and errors: declared once and read everywhere."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Pair(NamedTuple):
 
 
 class Half(NamedTuple):
-    """A signal and something that is none."""
+    """A signal and a field that is not a signal."""
 
     p: signals.Pressure
     q: float

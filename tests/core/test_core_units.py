@@ -1,4 +1,4 @@
-"""Texts with units: what is read, what is refused, and how quickly."""
+"""Strings with units: valid and invalid strings, and the time to read them."""
 
 from __future__ import annotations
 
@@ -167,13 +167,13 @@ def test_wrong_unit(text, symbol, message):
 
 @pytest.mark.parametrize("text", UNKNOWN)
 def test_unknown_unit(text):
-    with pytest.raises(UnitError, match=r"is not known.*; for example, write"):
+    with pytest.raises(UnitError, match=r"is not known.*For example, write"):
         units.parse(text, "m", "x")
 
 
 @pytest.mark.parametrize("text", NO_QUANTITY)
 def test_no_quantity(text):
-    with pytest.raises(UnitError, match=r"is not a quantity: for example, write '1\.5 mm'"):
+    with pytest.raises(UnitError, match=r"is not a quantity\. For example, write '1\.5 mm'"):
         units.parse(text, "m", "x")
 
 

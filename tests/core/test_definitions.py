@@ -1,4 +1,4 @@
-"""Digests of definitions reach as far as the definitions do, however long the way."""
+"""Digests cover everything that definitions reach, over any number of steps."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Commands tell warnings that a user can act on, and none for developers of libraries."""
+"""Commands show warnings that a user can act on, but none for developers of libraries."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Linear algebra has one thread unless a user chose another number; a recording needs no dask."""
+"""Linear algebra uses one thread unless the user sets a number; a recording needs no dask."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ main.process()
 
 
 def said_by(lines: str, **chosen: str) -> str:
-    """Return what a program prints whose user has chosen so much and no more."""
+    """Return a program's output for a number of threads that the user sets."""
     kept = {name: value for name, value in os.environ.items() if name not in VARIABLES}
     done = subprocess.run(
         [sys.executable, "-c", THREADS + lines],

@@ -1,4 +1,4 @@
-"""Every public function and declaration refuses arguments of another kind, in one sentence."""
+"""Every public function and declaration rejects arguments of the wrong type in one sentence."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def test_runs_and_benches_are_not_taken_for_each_other() -> None:
     with raises(ParameterError, name="run", value="Bench", valid="a Run"):
         bywire.simulate(bench)
     (run,) = bench.runs().values()
-    with raises(ParameterError, name="bench", value="Run", valid="a Bench or a text or a path"):
+    with raises(ParameterError, name="bench", value="Run", valid="a Bench or a string or a path"):
         bywire.run(run)
 
 

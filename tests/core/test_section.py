@@ -1,4 +1,4 @@
-"""Sections of files: what they read, and one sentence for each thing that does not fit."""
+"""Sections of files: their values, and one sentence for each invalid value."""
 
 from __future__ import annotations
 
@@ -61,8 +61,8 @@ def test_a_file_is_read_into_si() -> None:
     ("content", "kind", "message"),
     [
         ({"cuont": 1}, UnknownNameError, "unknown key of a file 'cuont': did you mean 'count'? Va"),
-        ({"name": "  "}, ParameterError, "name = '  ' must be a text"),
-        ({"name": 3}, ParameterError, "name = 3 must be a text"),
+        ({"name": "  "}, ParameterError, "name = '  ' must be a string"),
+        ({"name": 3}, ParameterError, "name = 3 must be a string"),
         ({"kind": "grdi"}, UnknownNameError, "unknown kind 'grdi': did you mean 'grid'?"),
         ({"kind": 3}, UnknownNameError, "unknown kind '3'"),
         ({"count": 10}, ParameterError, "count = 10 must be a whole number from 1 to 9"),
@@ -85,11 +85,11 @@ def test_a_file_is_read_into_si() -> None:
             "[inner] share = '90 %' must be >= 0.1 % and < 50 %",
         ),
         ({"inner": {"share": 0.9}}, ParameterError, "share = 0.9 must be >= 0.001 and < 0.5"),
-        ({"each": {"delay": 0}}, ParameterError, "write [[each]] with double brackets"),
+        ({"each": {"delay": 0}}, ParameterError, "[[each]] must be a list"),
         ({"each": [{"delay": -1}]}, UnitError, "[[each]] delay = -1 has the wrong unit"),
         ({"by_name": {"x": 1}}, ParameterError, "[by_name.x] must be a section"),
         ({"by_name": {"x": {"delay": "-1 s"}}}, ParameterError, "[by_name.x] delay = '-1 s' must"),
-        ({"texts": {"x": 1}}, ParameterError, "[texts] x = 1 must be a text"),
+        ({"texts": {"x": 1}}, ParameterError, "[texts] x = 1 must be a string"),
         ({"vary": 1}, ParameterError, "[vary] must be a section"),
     ],
 )

@@ -1,4 +1,4 @@
-"""Assemblies in assemblies: every mistake has one error, with its place."""
+"""Subassemblies: each mistake gives one error with its place."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ def declare(**body: Any) -> type[Any]:
     [
         (
             lambda: {"a": Sub(Ram, prefix="2_")},
-            {"name": "prefix", "value": "2_", "valid": "like 'rear_'"},
+            {"name": "prefix", "value": "2_", "valid": "such as 'rear_'"},
         ),
         (
             lambda: {"a": Sub(Ram, prefix="a_"), "b": Sub(Ram, prefix="a_")},

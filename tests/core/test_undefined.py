@@ -1,4 +1,4 @@
-"""Results are equal where the same numbers are not defined, in every version of Python."""
+"""Results with the same undefined numbers are equal in every version of Python."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What tests of the simulation share."""
+"""Fixtures for tests of the simulation."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import pytest
 
 @pytest.fixture
 def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Return the folder of a kernel cache of this test's own."""
+    """Return the folder of a kernel cache for one test."""
     folder = tmp_path / "kernels"
     monkeypatch.setenv("BYWIRE_CACHE", str(folder))
     return folder

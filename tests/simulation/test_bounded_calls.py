@@ -1,4 +1,4 @@
-"""Every call of a kernel ends, whatever friction does, and lets Ctrl-C through within a moment."""
+"""Every kernel call ends quickly despite any friction, so that Ctrl-C takes effect."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Place(NamedTuple):
 
 
 class RoughParameters(ParameterSet):
-    """A body that a force pulls back, on a belt that is rough from a place on."""
+    """A body that a force pulls back, on a belt with a smooth part and a rough part."""
 
     m: Mass
     F: Force
@@ -40,7 +40,7 @@ class RoughParameters(ParameterSet):
 
 
 class RoughBelt(System):
-    """Friction that is there in the middle of a substep, and not at the instant of the turn."""
+    """Friction that acts in the middle of a substep but not at the time of reversal."""
 
     name = "rough belt"
     State = Place
@@ -83,7 +83,7 @@ END = -(PAR.F - PAR.F_c) * 0.9 * H  # it turns a tenth into the second substep, 
 
 
 def ended(function: Callable[[], float]) -> float:
-    """Return what a function returns within a minute; a kernel that hangs cannot be stopped."""
+    """Return a function's result within a minute, because a kernel that hangs cannot be stopped."""
     values: list[float] = []
     thread = threading.Thread(target=lambda: values.append(function()), daemon=True)
     thread.start()

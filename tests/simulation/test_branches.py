@@ -1,4 +1,4 @@
-"""What an arm of a selection alone needs stands in its branch, and nothing else does."""
+"""The branch of a selection's arm contains exactly the nodes that only this arm needs."""
 
 from __future__ import annotations
 

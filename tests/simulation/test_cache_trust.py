@@ -1,4 +1,4 @@
-"""Kernels are code that is run: none from where somebody else may have put it."""
+"""bywire does not run kernels that another user may have written."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ PLANTED = "double twice(double x) { return 666.0; }\n"
 
 
 def planted(library: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Put foreign code in a library's place, with a digest that is right."""
+    """Replace a library with foreign code that has a correct digest."""
     with monkeypatch.context() as patch:
         patch.setenv("BYWIRE_CACHE", str(tmp_path / "elsewhere"))
         foreign = compile_library(PLANTED, PLAIN, system_compiler())
@@ -40,7 +40,7 @@ def planted(library: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
 
 
 def test_a_planted_library_does_not_run(cache, tmp_path, monkeypatch):
-    """Its digest is right, and the folder is private again; but others could write to the file."""
+    """The digest is correct and the folder is private again, but others could write to the file."""
     compiler = system_compiler()
     library = compile_library(SOURCE, PLAIN, compiler)
     planted(library, tmp_path, monkeypatch)
@@ -100,7 +100,7 @@ def test_the_usual_folder_is_left_alone_with_a_word(tmp_path, monkeypatch):
 
 
 def test_a_private_group_may_write(tmp_path, monkeypatch):
-    """Many systems give each user a group, and files that it may write to."""
+    """Many systems create a group for each user, which may write to the user's files."""
     folder = tmp_path / "group"
     folder.mkdir()
     folder.chmod(0o770)

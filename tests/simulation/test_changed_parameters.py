@@ -1,4 +1,4 @@
-"""Parameters that change during a run: as two runs in a row, in lanes too, and in the books."""
+"""Parameters that change during a run: the same as two consecutive runs, with energy balance."""
 
 from __future__ import annotations
 

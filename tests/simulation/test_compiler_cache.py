@@ -1,4 +1,4 @@
-"""The C compiler and its cache: damage, races, failures, and doing without."""
+"""The C compiler and its cache: damage, races, failures, and runs without a compiler."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ from systems.two_mass import rig
 
 
 class Counting:
-    """Stands in for the compiler's start and counts it."""
+    """Replacement for the start of the compiler, which counts the starts."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.starts, run = 0, subprocess.run
@@ -94,7 +94,7 @@ print(repr(float(simulate(rig(0.01), engine="compiled")["x_1"][-1])))
 
 
 def test_two_processes_at_once(cache: Path) -> None:
-    """Both compile into a fresh cache; both get the kernel, and so does a third one."""
+    """Two processes compile into an empty cache, and both and a third one get the kernel."""
     tests = str(Path(__file__).parents[1])
     environment = os.environ | {"PYTHONPATH": os.pathsep.join([tests, *sys.path])}
     command = [sys.executable, "-W", "error", "-c", RACE]
@@ -141,7 +141,7 @@ def test_no_compiler_falls_back_with_one_warning(monkeypatch: pytest.MonkeyPatch
 def test_native_code_is_kept_apart_per_processor(
     cache: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A cache folder shared between machines must not hand out instructions that one lacks."""
+    """A cache folder for several machines must not return instructions that one lacks."""
     compiler, native = system_compiler(), (*PLAIN, "-march=native")
     plain, here = (compile_library(SOURCE, flags, compiler) for flags in (PLAIN, native))
     monkeypatch.setattr(compiler_module, "processor", lambda: "flags: another one")
@@ -156,7 +156,7 @@ def script(path: Path, text: str) -> Path:
 
 
 def test_a_compiler_that_fails(cache: Path, tmp_path: Path) -> None:
-    """Its own words are passed on; nothing is left in the cache."""
+    """The error quotes the compiler's message, and the cache stays empty."""
     broken = script(tmp_path / "brokencc", "echo 'fatal: no space left' >&2; exit 1")
     with pytest.raises(CompilerError, match=r"(?s)rejected a generated kernel.*no space left"):
         compile_library(SOURCE, PLAIN, Compiler((str(broken),), "broken 1.0"))
@@ -222,7 +222,7 @@ def test_choosing_a_compiler(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) ->
 
 
 def test_a_cache_that_cannot_be_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A private folder among the temporary files serves instead."""
+    """Kernels then go to a private temporary folder."""
     blocked = tmp_path / "file"
     blocked.write_text("not a folder")
     monkeypatch.setenv("BYWIRE_CACHE", str(blocked / "kernels"))
@@ -236,7 +236,7 @@ def test_a_cache_that_cannot_be_written(tmp_path: Path, monkeypatch: pytest.Monk
 
 @pytest.mark.parametrize("content", [b"garbage", b"\x7fELF", "halved", "without the function"])
 def test_a_library_that_is_none_is_rebuilt_and_not_loaded(cache, monkeypatch, content):
-    """Though its digest fits: the system would crash on half a library."""
+    """The digest matches, but the system would crash when it loads half a library."""
     compiler = system_compiler()
     library = compile_library(SOURCE, PLAIN, compiler, "twice")
     whole = library.read_bytes()
@@ -263,7 +263,7 @@ def test_a_full_disk_is_said_with_a_way_out(cache, monkeypatch):
 
 @pytest.mark.parametrize("is_before", [True, False])
 def test_a_cache_deleted_while_it_is_used_costs_nothing(cache, monkeypatch, is_before):
-    """Kernels are then compiled where the process keeps its temporary files."""
+    """Kernels are then compiled in the process's temporary folder."""
     compile_it, usable = compiler_module._compile, compiler_module.usable_folder
 
     def in_a_deleted_one(*args: object) -> None:

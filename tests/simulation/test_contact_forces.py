@@ -1,4 +1,4 @@
-"""Contact forces against brute-force solutions of the complementarity problem, ties included."""
+"""Contact forces versus brute-force solutions of the complementarity problem, including ties."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def test_heart_of_the_wedge_brake() -> None:
 
 
 def test_exact_ties() -> None:
-    """Where a contact just touches, several subsets are right; none of them may lose the force."""
+    """If a contact just touches, several subsets are correct, and none may lose the force."""
     C, _ = random_groups(3, 5)
     rng = np.random.default_rng(6)
     forces = np.where(rng.random((COUNT, 3)) < 0.5, rng.uniform(0.0, 2.0, (COUNT, 3)), 0.0)
@@ -94,7 +94,7 @@ def test_exact_ties() -> None:
 
 
 def test_brute_force_can_tell() -> None:
-    """Forces of contacts taken one by one, without their coupling, are not the solution."""
+    """Contact forces that are computed one by one, without coupling, are not the solution."""
     C, d = random_groups(3, 7)
     alone = np.maximum(d / np.einsum("nii->ni", C), 0.0)
     assert np.abs(alone - brute_forces(C, d)).max() > 0.1
@@ -102,7 +102,7 @@ def test_brute_force_can_tell() -> None:
 
 @pytest.mark.parametrize("system", ["two-mass", "three-contacts"])
 def test_conditions_hold_at_every_instant(system: str) -> None:
-    """In every row: forces >= 0, no overlap left; friction in its bounds, at them in motion."""
+    """Each row has forces >= 0 and no remaining overlap; friction is in its bounds."""
     run = rig(0.1, record=20e-6) if system == "two-mass" else heart(0.1, record=20e-6)
     result, model, par = simulate(run), run.model, run.par
     assert result.status == "done"

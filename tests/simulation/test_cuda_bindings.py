@@ -1,4 +1,4 @@
-"""NVIDIA's bindings are called as they want it: over a driver's library that is emulated."""
+"""Valid calls of NVIDIA's bindings, with an emulated driver library."""
 
 from __future__ import annotations
 

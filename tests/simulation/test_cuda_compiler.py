@@ -1,4 +1,4 @@
-"""NVIDIA's compiler takes the kernels that are emitted; it needs no graphics processor."""
+"""NVIDIA's compiler accepts the generated kernels; it needs no graphics processor."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A graphics processor is found and chosen, or it is said what is missing."""
+"""Selection of a graphics processor, and errors if one is missing."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Many cases on an emulated graphics processor: the digits of the processor's own kernels."""
+"""Many cases on an emulated graphics processor, bit-identical to kernels on the processor."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A substep that is cut where a velocity passes zero takes the time that it has, no more."""
+"""A substep that is cut at a zero of a velocity has the same total length."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ H = 1e-3
 
 
 def settled(x: Array, d: Array, m: Array, p: Array, h: float) -> tuple[list[Array], bool]:
-    """Return a body that friction slows down, moved by a drag too, beside a clock."""
+    """Return a body that friction and drag slow down, next to a clock."""
     v, _ = x
     force = 0.0 if v == 0.0 else -2.0 * np.sign(v) - 40.0 * (v + d[0]) ** 2
     end = np.array([v + h * force, x[1] + h])

@@ -1,4 +1,4 @@
-"""The inline functions of lane kernels against libm, for every width of vectors."""
+"""Inline functions of lane kernels versus libm, for all vector widths."""
 
 from __future__ import annotations
 
@@ -128,7 +128,7 @@ def test_arithmetic(library: ctypes.CDLL) -> None:
 
 @pytest.mark.parametrize("width", WIDTHS)
 def test_kernels_of_every_width(width: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The heart of a wedge brake in lanes: the same run, whatever the processor offers."""
+    """The contacts of a wedge brake in lanes give the same run on any processor."""
     monkeypatch.setattr(case_kernels, "VECTOR", (*VECTOR, *WIDTHS[width]))
     monkeypatch.setattr(
         case_kernels,

@@ -1,4 +1,4 @@
-"""Mistakes in a user's model are said in the model's own terms."""
+"""Errors for mistakes in a user's model use the model's own names."""
 
 from __future__ import annotations
 

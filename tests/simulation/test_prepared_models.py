@@ -1,4 +1,4 @@
-"""What is built once per structure serves many threads, and tells models apart."""
+"""Many threads share the objects that are built once per structure, which distinguish models."""
 
 from __future__ import annotations
 

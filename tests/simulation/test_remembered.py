@@ -1,4 +1,4 @@
-"""What follows from ramps alone is kept while these stand still, and nothing else is."""
+"""Values that depend only on ramps are stored while the ramps are constant; others are not."""
 
 from __future__ import annotations
 

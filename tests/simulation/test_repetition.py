@@ -1,4 +1,4 @@
-"""Windows run in parts: bit for bit as in one, and ended by Ctrl-C within a moment."""
+"""Windows that run in parts: bit-identical to a single part, and quickly ended by Ctrl-C."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ def test_interrupt_ends_a_long_sweep_within_a_moment():
 
 
 def test_a_case_ends_by_itself_and_gives_its_lane_to_the_next():
-    """More cases than lanes, ended after other numbers of windows: bit for bit as each alone."""
+    """More cases than lanes with different numbers of windows: bit-identical to single cases."""
     run, sweep = position(50.0)
     sweep = replace(sweep, amplitudes=[0.02 * 1.4**k for k in range(19)], tolerance=3e-3)
     together = frequency_response(run, sweep)

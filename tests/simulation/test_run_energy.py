@@ -1,4 +1,4 @@
-"""The energy balance of whole runs closes, second order in the step, and sees a wrong sign."""
+"""The energy balance of whole runs closes with second order, and reveals a wrong sign."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def test_losses_never_return(experiment: tuple[str, dict[str, float]]) -> None:
 
 
 def test_the_paper_s_gear_gives_energy() -> None:
-    """Its constant efficiency is what the check above would refuse."""
+    """The check above would reject its constant efficiency."""
     recording = recorded(RELEASE, 20e-6, law="paper")
     assert np.diff(recording["E_gear"].values).min() < -1e-5
     assert worst(recording) < 2e-11

@@ -1,4 +1,4 @@
-"""Runs side by side: each with its own parameters, start and stimulus, as if it ran alone."""
+"""Runs side by side, each with its own parameters, start and stimulus, as in a single run."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How a run ends: whole, in chunks, interrupted, out of the numbers."""
+"""Outcomes of a run: complete, in chunks, interrupted, diverged."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def braking(duration: float) -> Run:
 @ENGINES
 @pytest.mark.parametrize("system", ["rig", "heart", "braking"])
 def test_chunks_do_not_show(system: str, engine: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """One chunk, many, and chunks of one row: bit by bit the same values and the same end."""
+    """One chunk, many chunks and chunks of one row: bit-identical values and the same end."""
     run = {"rig": rig(0.05), "heart": heart(0.05), "braking": braking(0.05)}[system]
     reached: list[list[float]] = []
     results = []
@@ -85,13 +85,13 @@ def test_interrupt_between_chunks(engine: str) -> None:
 
 
 def overwhelmed(run: Run) -> Run:
-    """Return the run with a force that is finite but leads out of the numbers."""
+    """Return the run with a force that is finite but makes the run diverge."""
     return replace(run, stimulus=lambda t: np.where(t > 0.01, 1e308, 1.0)[:, None])
 
 
 @ENGINES
 def test_leaving_the_numbers_is_an_error(engine: str) -> None:
-    """With the time by which it happened; never a recording with holes."""
+    """The error contains the time; there is never a recording with gaps."""
     with pytest.raises(SolverError, match=r"diverged before t = 0\.\d+ s"):
         simulate(overwhelmed(rig(0.05)), engine=engine)
 
@@ -106,7 +106,7 @@ def test_leaving_the_numbers_in_lanes_and_tangents() -> None:
 
 @ENGINES
 def test_a_controller_that_computes_no_number(engine: str) -> None:
-    """A force that is no number must not pass for one that friction holds."""
+    """A NaN force must not count as a force that friction holds."""
     tick = TwoMass.tasks
 
     class Undefined(TwoMass):

@@ -1,4 +1,4 @@
-"""Steps, sample times and recording intervals: how they divide each other, and who refuses."""
+"""Steps, sample times and recording intervals: how they divide each other, and errors."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def test_plan_of_two_tasks() -> None:
 def test_a_step_that_does_not_divide(
     step: float, record: float, period: float, name: str, interval: str
 ) -> None:
-    """The message has both numbers, whose interval it is, and a step that would do."""
+    """The message contains both numbers, the owner of the interval, and a valid step."""
     with pytest.raises(StepError) as caught:
         plan(0.1, step, {"drive": period}, record)
     text = str(caught.value)
@@ -88,7 +88,7 @@ def test_a_run_refuses_before_it_starts() -> None:
 @pytest.mark.parametrize("duration", [1e-3, 3e-3, 0.1, 0.3, 1.1])
 @pytest.mark.parametrize("step", [20e-6, 1e-6 / 3.0 * 3.0, 1e-3 / 7.0])
 def test_time_axis_is_whole(duration: float, step: float) -> None:
-    """As many rows as asked for, whatever floating point makes of the quotients."""
+    """The number of rows is correct despite rounding of the quotients."""
     schedule = plan(duration, step, {"drive": 1e-3}, 1e-3)
     assert schedule.rows == round(duration / 1e-3) + 1
     assert schedule.frames * schedule.substeps * step == pytest.approx(duration, rel=1e-9)

@@ -1,4 +1,4 @@
-"""Whether a step resolves the contacts: asked of many runs at once as of each alone."""
+"""Check whether a step resolves the contacts: many runs at once give the same result as each."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One substep against closed forms: linear, nonlinear, held by friction, at a limit."""
+"""One substep versus closed forms: linear, nonlinear, held by friction, at a limit."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class State(NamedTuple):
 
 
 class Reactions(NamedTuple):
-    """What friction and limit add."""
+    """Contributions of friction and limit."""
 
     friction: Annotated[float, Signal("N", "friction")]
     makeup: Annotated[float, Signal("m3/s", "inflow that keeps the level at zero")]
@@ -99,7 +99,7 @@ class Result(NamedTuple):
 def substep(
     program: Program, par: ParameterSet, x: object, d: object, m: object, exact: bool = False
 ) -> Result:
-    """Return what a pass gives for a state, a predicted half increment and a memory."""
+    """Return a pass's results for a state, a predicted half increment and a memory."""
     leaves = [par.leaves()[name] for name in program.parameter_names]
     values = (program.exact if exact else program.fast)(x, d, m, leaves, H)
     *vectors, flag, doubt = (np.array(value).ravel() for value in values)
@@ -165,7 +165,7 @@ TURNS = [(0.01, 0.0), (0.01, -4.0), (-0.01, 3.0), (0.01, -9.0), (-0.02, 12.0)]
 def test_friction_holds_exactly_or_opposes_the_motion_at_its_bound(
     body: Program, v: float, F: float, exact: bool
 ) -> None:
-    """What moves keeps the friction that it begins with, and says where its motion turns."""
+    """A moving body keeps its initial friction, and the pass reports where the motion reverses."""
     m, (low, high) = PARAMETERS.m, (PARAMETERS.low, PARAMETERS.high)
     pushed = min(F + high, 0.0) + max(F + low, 0.0)  # at rest
     friction = low if v > 0.0 else high if v < 0.0 else pushed - F

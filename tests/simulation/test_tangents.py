@@ -1,4 +1,4 @@
-"""Exact sensitivities against central differences: smooth runs, contacts, stick and slip."""
+"""Exact sensitivities versus central differences: smooth runs, contacts, stick and slip."""
 
 from __future__ import annotations
 
@@ -217,7 +217,7 @@ def test_breakaway_of_coupled_bodies_is_of_first_order_in_derivatives() -> None:
 
 
 def test_initial_state_that_depends_on_a_parameter() -> None:
-    """Derivatives of the initial state join those along the run."""
+    """Derivatives of the initial state add to those of the run."""
     options = {"source": "voltage", "p_start": 10e5, "add_holding": True, "duration": 0.02}
     run = open_loop({"drive.T_source": 1e-3}, options, 1.0, 20.0)
     run = replace(run, state=run.state._replace(omega=20.0))

@@ -1,4 +1,4 @@
-"""Signals behind taps: as they are without a fault, falsified as said, tasks that miss ticks."""
+"""Signals after taps: unchanged without a fault, falsified as specified; missed ticks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Contacts far stiffer than the step resolves: right, or reported as unsettled, never silent."""
+"""Contacts that are too stiff for the step: correct or reported as unsettled, never silent."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def test_stiff_wall(stiffer: float, tau_wall: float) -> None:
 
 
 def test_a_single_pass_would_be_silently_wrong(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The check behind all this: without it the stiff heart ends far off, and nothing tells."""
+    """Without the check, the stiff contacts end far off without any report."""
     run = heart(0.08, record=1e-3, stiffer=300.0, tau=0.0)
     checked = simulate(run, engine="virtual-machine")
     assert checked.repeated > 20

@@ -109,7 +109,7 @@ def test_a_normal_tolerance_ends_where_it_says():
             {"kind": "discrete", "values": ["0.3 ohm", "1 ohm"], "weights": [1, "3"]},
             ["weights = [1, '3']", "2 numbers > 0"],
         ),
-        ({"kind": "normal", "sd": "1 %", "low": "1.5 ohm"}, ["too little to draw from"]),
+        ({"kind": "normal", "sd": "1 %", "low": "1.5 ohm"}, ["too little for sampling"]),
         ({"kind": "discrete", "values": []}, ["values = [...]"]),
         ({"kind": "tolerance", "tolerance": "5 %", "shape": "cauchy"}, ["'cauchy'", "normal"]),
         ("5 %", ["Write a tolerance"]),

@@ -85,7 +85,7 @@ def test_some_of_them_and_cut_off(study, written):
     ("content", "text"),
     [
         ("{", "contains no estimates"),
-        ({"estimates": {}}, "nothing is estimated"),
+        ({"estimates": {}}, "contains no estimates"),
         (estimate(value="0.3"), "not a number"),
         (estimate(standard_deviation=0.0), "not above zero"),
         ({"estimates": [1, 2]}, "contains no estimates"),

@@ -136,7 +136,7 @@ def test_an_experiment_needs_no_bench_file(tmp_path):
         (
             '[vary]\n"motor.R_m" = "+-5 %"\n[design]\nkind = "corners"\n[requirements]\n'
             'overshoot = "<= 15 % with 90 %"',
-            ["draws nothing", "'monte-carlo'"],
+            ["does not draw random cases", "'monte-carlo'"],
         ),
         (
             '[vary]\n"motor.R_m" = "+-5 %"\n[requirements]\novershoot = "<= 10 % with 0.9"',

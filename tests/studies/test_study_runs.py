@@ -230,7 +230,7 @@ def test_a_study_is_kept_with_its_changes_and_another_says_how_it_differs(study,
     assert bywire.study_report(out).plan.bench.par == run.plan.bench.par
     with pytest.raises(FileError, match=r"parameters seal\.T_pr: 0\.0022\d*, now 0\.002\)"):
         bywire.run_study(path, out, workers=1)
-    with pytest.raises(ParameterError, match=r"study = .* must be a text or a path"):
+    with pytest.raises(ParameterError, match=r"study = .* must be a string or a path"):
         bywire.run_study({"bench": "hard-braking"})
     study(
         VARY.replace(
@@ -246,7 +246,7 @@ def test_time_is_a_budget(study, tmp_path):
     path = study(VARY + '[design]\ntime = "1 us"\n')
     first = bywire.run_study(path, tmp_path / "out", cases=128, workers=1)
     assert (len(first.cases), first.status) == (64, "unfinished")
-    assert "the study file limits each call to 1e-06 s" in first.warnings[-1]
+    assert "the study file limits each call to 0.001 ms" in first.warnings[-1]
     assert bywire.resume_study(tmp_path / "out", workers=1).status == "passed"
     with raises(ParameterError, name="[design] time", value="worst-case"):
         read_study(study(VARY + "[design]\nkind = 'worst-case'\ntime = '1 s'\n"))

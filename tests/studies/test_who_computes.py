@@ -122,7 +122,7 @@ def test_a_cluster_computes_the_same_until_its_workers_are_gone(study):
 def test_a_cluster_that_is_not_there_is_named(study, monkeypatch):
     pytest.importorskip("distributed")
     monkeypatch.setattr("bywire.studies.executor._SECONDS", 0.5)
-    with pytest.raises(RunError, match=r"no cluster answers at 'tcp://192\.0\.2\.1:9'"):
+    with pytest.raises(RunError, match=r"no cluster responds at 'tcp://192\.0\.2\.1:9'"):
         next(chunks_of(Cluster("tcp://192.0.2.1:9"), read_study(study()), [0]))
 
 

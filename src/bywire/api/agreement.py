@@ -221,13 +221,13 @@ def verdict(compared: Agreement) -> str:
     gain = max(map(abs, compared.gain[NOTHING].tolist()))
     phase = max(map(abs, compared.phase[NOTHING].tolist()))
     return (
-        f"with all causes off, both responses {state}: largest differences {gain:.2g} dB and "
+        f"with all causes off, both responses {state}: maximum differences {gain:.2g} dB and "
         f"{phase:.2g}° (limits {GAIN:g} dB and {PHASE:g}°)"
     )
 
 
 def agreement_table(compared: Agreement) -> Table:
-    """Return a table of differences by active cause, and the largest cause at each frequency."""
+    """Return a table of differences by active cause, with the largest cause at each frequency."""
     heading = ["left on", *(amount(float(f), "Hz", 3) for f in compared.frequencies)]
     rows = [
         [LABELS.get(cause, cause), *map(_cell, compared.gain[cause], compared.phase[cause])]

@@ -81,7 +81,7 @@ class Check(Answer):
             banner=Banner(summary, "good" if self.holds else "bad"),
             record="check.json",
             remarks=[
-                f"broken contract: {f.subject}: {f.contract}: {f.text}; see {f.place}"
+                f"broken contract: {f.subject}: {f.contract}: {f.text}. See {f.place}"
                 for f in self.broken
             ],
         )

@@ -173,11 +173,11 @@ class Replay(Answer):
         return Banner(self._verdict(), ("good" if self.holds else "bad") if is_judged else "none")
 
     def _verdict(self) -> str:
-        """Return the verdict as text, with the largest difference and its time."""
+        """Return the verdict as text, with the maximum difference and its time."""
         outcomes = [v.outcome for fit in self.fits for v in fit.verdicts]
         if not outcomes:
             worst = self._worst(self.fits)
-            return f"No tolerance is set{worst and f'. The largest difference: {worst}'}"
+            return f"No tolerance is set{worst and f'. Maximum difference: {worst}'}"
         if self.holds:
             return (
                 "The model reproduces the record within the tolerance"
@@ -185,17 +185,19 @@ class Replay(Answer):
                 else f"The model reproduces the record within all {len(outcomes)} tolerances"
             )
         counted = ((outcomes.count(word), word) for word in ("missed", "undecided"))
-        open_ = " and ".join(f"{count} {word}" for count, word in counted if count)
+        open_ = " and ".join(
+            f"{count} {'is' if count == 1 else 'are'} {word}" for count, word in counted if count
+        )
         failing = [fit for fit in self.fits if any(v.outcome != "met" for v in fit.verdicts)]
         worst = self._worst(failing)
         reproduces = "does not reproduce" if "missed" in outcomes else "may not reproduce"
         return (
-            f"The model {reproduces} the record: {open_} of {len(outcomes)} tolerances"
-            f"{worst and f'; worst: {worst}'}"
+            f"The model {reproduces} the record: of {len(outcomes)} tolerances, {open_}"
+            f"{worst and f'. Worst: {worst}'}"
         )
 
     def _worst(self, fits: Iterable[SegmentFit]) -> str:
-        """Return the largest difference relative to its signal's range, as text with its time."""
+        """Return the maximum difference relative to its signal's range, as text with its time."""
         places = []
         for fit in fits:
             pair = self.replayed.outputs[fit.signal]

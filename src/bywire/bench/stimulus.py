@@ -281,7 +281,7 @@ def _require_values(title: str, kind: str, values: Mapping[str, Any], level: str
     cls = STIMULI.find(kind).parameter_class
     fields = cls.model_fields
     lacking = [name for name in fields if fields[name].is_required() and name not in values]
-    if lacking:
+    if lacking and values.keys() <= fields.keys():  # otherwise, a name may be misspelled
         leaves = leaf_fields(cls)
         typed = {}
         for name in lacking:

@@ -36,7 +36,7 @@ _INTERVAL = 0.1  # s between two updates of the bar
 
 @contextmanager
 def progress_bar() -> Iterator[Progress]:
-    """Yield a function that shows a label and the finished share of the work."""
+    """Yield a function that shows a label and the completed fraction of the work."""
     if not sys.stderr.isatty():
         yield lambda label, share: None
         return

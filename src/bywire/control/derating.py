@@ -66,7 +66,7 @@ class Parameters(ParameterSet):
                 "T_derate",
                 shown(self.T_derate, "K"),
                 f"< T_limit = {shown(self.T_limit, 'K')}",
-                "because the current limit decreases between these temperatures",
+                "the current limit decreases between these temperatures",
             )
         return self
 

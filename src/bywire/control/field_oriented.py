@@ -1,4 +1,4 @@
-"""Field-oriented current control of a synchronous motor, sampled."""
+"""Sampled field-oriented current control of a synchronous motor."""
 
 from __future__ import annotations
 
@@ -43,21 +43,21 @@ class Parameters(ParameterSet):
     psi_hat: FluxLinkage
     """flux linkage of the magnets"""
     lead: LeadTicks
-    """angle by which the voltage is ahead, in sample times of rotation; 1.5 for a delay of one"""
+    """lead angle of the voltage, in sample times of rotation; 1.5 for a delay of one sample time"""
     i_max: Current
-    """largest amplitude of the current"""
+    """maximum current amplitude"""
     k_fw: WeakeningGain
-    """gain of the field weakening; 0 without it"""
+    """field-weakening gain; 0 disables field weakening"""
     reserve: Fraction
-    """fraction of the largest voltage from which the field is weakened"""
+    """fraction of the maximum voltage above which field weakening starts"""
 
 
 class State(NamedTuple):
-    """Integral parts, and the current that weakens the field."""
+    """Integral parts, and the field-weakening current."""
 
     z_d: Annotated[float, Signal("V", "integral part, along the magnets", 1.0)]
     z_q: Annotated[float, Signal("V", "integral part, across the magnets", 1.0)]
-    i_fw: Annotated[float, Signal("A", "current that weakens the field", 1.0)]
+    i_fw: Annotated[float, Signal("A", "field-weakening current", 1.0)]
 
 
 class Input(NamedTuple):
@@ -73,7 +73,7 @@ class Input(NamedTuple):
 
 
 class Output(NamedTuple):
-    """Voltages in stator coordinates, set points in rotor coordinates."""
+    """Voltages in stator coordinates, and set points in rotor coordinates."""
 
     v_alpha: Volts
     v_beta: Volts
@@ -83,7 +83,7 @@ class Output(NamedTuple):
 
 
 def least_current(amplitude: Amperes, par: Parameters) -> Amperes:
-    r"""Return the current along the magnets with the most torque per current.
+    r"""Return the current along the magnets that gives the maximum torque per ampere.
 
     .. math:: i_d = \frac{-\psi + \sqrt{\psi^2 + 8 (L_d - L_q)^2 I^2}}{4 (L_d - L_q)}
         = \frac{2 (L_d - L_q) I^2}{\psi + \sqrt{\psi^2 + 8 (L_d - L_q)^2 I^2}}
@@ -98,16 +98,16 @@ def least_current(amplitude: Amperes, par: Parameters) -> Amperes:
 def set_points(
     i_ref: Amperes, i_fw: Amperes, i_lim: Amperes, par: Parameters
 ) -> tuple[Amperes, Amperes]:
-    r"""Return the set points in rotor coordinates within the largest amplitude.
+    r"""Return the set points in rotor coordinates, limited to the maximum amplitude.
 
-    The field-weakening current never exceeds the magnets' flux, :math:`i_d \ge -\psi/L_d`.
+    The field-weakening current never cancels more than the magnet flux, :math:`i_d \ge -\psi/L_d`.
     """
     top = ops.fmin(par.i_max, i_lim)
     amplitude = ops.clip(i_ref, -top, top)
     least = ops.fmax(-top, -par.psi_hat / par.L_d_hat)
     i_d = ops.clip(least_current(amplitude, par) + i_fw, least, 0.0)
     room = _root(top * top - i_d * i_d, par)
-    # Without weakening, the amplitude is that of the demand.
+    # Without field weakening, the amplitude equals the demanded amplitude.
     across = _root(amplitude * amplitude - i_d * i_d, par)
     weakened = ops.fmin(ops.fabs(amplitude), room)
     i_q = ops.where(i_fw < 0.0, weakened, across)
@@ -115,7 +115,7 @@ def set_points(
 
 
 def _root(square: float, par: Parameters) -> float:
-    """Return the root, and 0 below a millionth of the largest current: its slope is infinite."""
+    """Return the square root, or 0 below a millionth of the maximum current (infinite slope)."""
     least = 1e-12 * par.i_max * par.i_max
     return ops.where(square > least, ops.sqrt(ops.fmax(square, least)), 0.0 * par.i_max)
 
@@ -127,9 +127,9 @@ def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, O
         v_d = k_p e_d + z_d - \omega_e L_q i_q, \quad
         v_q = k_p e_q + z_q + \omega_e (L_d i_d + \psi)
 
-    A voltage above :math:`V_{dc}/\sqrt 3` keeps its direction. The integral parts follow the
-    limited voltage. The voltage is then ahead by the angle through which the rotor turns until the
-    middle of the sample in which the inverter applies it.
+    A voltage above :math:`V_{dc}/\sqrt 3` is limited in magnitude and keeps its direction. The
+    integral parts follow the limited voltage. The voltage then gets a lead angle: the rotation of
+    the rotor until the middle of the sample in which the inverter applies the voltage.
     """
     omega_e = par.p * u.omega
     c, s = ops.cos(u.theta_e), ops.sin(u.theta_e)

@@ -1,1 +1,1 @@
-"""Foundations that know no brake: quantities, operations, parameters, signals, model protocol."""
+"""Brake-independent foundations: quantities, operations, parameters, signals, model protocol."""

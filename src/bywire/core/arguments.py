@@ -1,4 +1,4 @@
-"""Argument checks of public functions against their annotations, with one clear error."""
+"""Checks of a public function's arguments against its annotations, with one clear error."""
 
 from __future__ import annotations
 
@@ -58,14 +58,14 @@ def require_kinds(
     Parameters
     ----------
     function
-        Function whose annotations are texts (``from __future__ import annotations``).
+        Function whose annotations are strings (``from __future__ import annotations``).
     args, kwargs
-        Arguments of the call. Python itself rejects missing and unknown ones.
+        Arguments of the call. Python itself rejects missing and unknown arguments.
 
     Raises
     ------
     ParameterError
-        With the argument's name and value, and the valid types.
+        When an argument has the wrong type, with its name, its value, and the valid types.
 
     Examples
     --------
@@ -81,7 +81,7 @@ def require_kinds(
         kinds = expected.get(name)
         if kinds and not any(fits(value) for _, fits in kinds):
             valid = " or ".join(dict.fromkeys(text for text, _ in kinds if text))
-            shown = _LINES.repr(value)  # in Python's notation, not in TOML's
+            shown = _LINES.repr(value)  # in Python notation instead of TOML notation
             text = f"{name} = {shown} must be {valid}"
             raise ParameterError(text, name=name, value=shown, valid=valid)
 
@@ -94,7 +94,7 @@ def whole_number(name: str, value: object, least: int, most: int) -> int:
     name
         Name of the number in errors.
     value
-        Value to check; a truth value is not valid.
+        Value to check. A truth value is not valid.
     least, most
         Bounds of the range, both valid.
 
@@ -118,7 +118,7 @@ _Kind = tuple[str, Callable[[Any], bool]]
 
 @cache
 def _signature(function: Callable[..., Any]) -> tuple[list[str], dict[str, list[_Kind]]]:
-    """Return the names of positional arguments, and each argument's checkable kinds."""
+    """Return the names of positional arguments, and the kinds of each argument to check."""
     parameters = inspect.signature(function).parameters
     positional = [
         p.name
@@ -139,7 +139,7 @@ def _signature(function: Callable[..., Any]) -> tuple[list[str], dict[str, list[
 
 
 def _parts(annotation: str) -> list[str]:
-    """Split an annotation at the bars outside brackets.
+    """Split an annotation at vertical bars outside brackets.
 
     Examples
     --------
@@ -162,7 +162,7 @@ def _kind(part: str, known: Mapping[str, Any]) -> _Kind | None:
     Parameters
     ----------
     part
-        Name of a type, perhaps with the types of its items in brackets.
+        Name of a type, possibly with the types of its items in brackets.
     known
         Names in the function's module.
     """
@@ -170,7 +170,7 @@ def _kind(part: str, known: Mapping[str, Any]) -> _Kind | None:
     if name in _KINDS:
         return _KINDS[name]
     meant = known.get(name)
-    if meant is None:  # the module imports that library only when the function is called
+    if meant is None:  # the module imports the library only when the function is called
         meant = getattr(sys.modules.get("bywire"), name, None)
     if meant is None and name.startswith("xr."):
         meant = getattr(import_module("xarray"), name[3:], None)
@@ -211,14 +211,14 @@ _KINDS: dict[str, tuple[str, Callable[[Any], bool]]] = {
     "int": ("a whole number", _is_whole),
     "float": ("a number", lambda v: isinstance(v, Real) and not isinstance(v, bool)),
     "bool": ("True or False", _is_truth_value),
-    "str": ("a text", lambda v: isinstance(v, str)),
+    "str": ("a string", lambda v: isinstance(v, str)),
     "Path": ("a path", lambda v: isinstance(v, os.PathLike)),
     "Mapping": ("a mapping of names to values", lambda v: isinstance(v, Mapping)),
     "Sequence": (
         "a list",
         lambda v: isinstance(v, Iterable) and not isinstance(v, _ONE),
     ),
-    "Progress": ("a function of a label and the finished share", callable),
+    "Progress": ("a function of a label and the finished fraction", callable),
     "Callable": ("a function", callable),
     "tuple": ("a tuple", lambda v: isinstance(v, Iterable) and not isinstance(v, _ONE)),
     "type": ("a class", lambda v: isinstance(v, type)),

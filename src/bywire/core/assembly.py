@@ -1,10 +1,10 @@
 """Models made of parts and wires, whose equations follow from their elements.
 
 An assembly declares its elements and assigns each input once, in the order of the physics. States,
-masses, balances, contacts, stored energies, plain losses and recorded signals follow from the
-elements. Connections are causal on purpose: acausal connections need index reduction, which does
-not fit the diagonal mass form of ``core.model``. Models in that form can also be written without
-assemblies.
+masses, balances, contacts, stored energies, simple losses and recorded signals follow from the
+elements. Connections are deliberately causal, because acausal connections need index reduction,
+which does not fit the diagonal mass form of ``core.model``. You can also write models in this form
+without assemblies.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from bywire.core.wires import Instant, Integral, Port, Shown, Wire, Wired, insta
 AnyPart = Part[Any, Any, Any, Any]
 
 _STORED = Signal("J", "stored energy", role=Role("sink", "stored", returns="any"))
-"""signal that every assembly can record as ``E_stored``"""
+"""signal that each assembly can record as ``E_stored``"""
 ParT = TypeVar("ParT")
 MemoryT = TypeVar("MemoryT")
 
@@ -36,7 +36,7 @@ _NAN = float("nan")
 
 
 class Evaluated(Generic[ParT, MemoryT]):
-    """An assembly evaluated at an instant, on its own or within another assembly."""
+    """Assembly that is evaluated at an instant, on its own or within another assembly."""
 
     shared: ClassVar[tuple[str, ...]]
     subs: ClassVar[dict[str, Sub[Any]]]
@@ -91,7 +91,7 @@ class Evaluated(Generic[ParT, MemoryT]):
         contact: tuple[float, ...] | None = None,
         **more: Any,
     ) -> Self:
-        """Return the wired assembly at an instant, where its parts have values.
+        """Return the wired assembly at an instant, with values in all its parts.
 
         Parameters
         ----------
@@ -112,8 +112,8 @@ class Evaluated(Generic[ParT, MemoryT]):
         """Return the wired assembly at its holder's instant."""
         if state is not here.x:
             raise ModelError(
-                f"{type(self).__name__} is evaluated at a state other than its holder's: within an "
-                "assembly its equations are valid only at that instant",
+                f"{type(self).__name__} is evaluated at a state that is not its holder's state. "
+                "Within an assembly, its equations are valid only at the holder's instant",
                 name=type(self).__name__,
             )
         here.settle()
@@ -153,7 +153,7 @@ class Evaluated(Generic[ParT, MemoryT]):
 
 @cache
 def _at_an_instant(cls: type[Any]) -> type[Any]:
-    """Return the class of an assembly at an instant, which allows setting only wires."""
+    """Return the class of an assembly at an instant, whose only settable attributes are wires."""
     kinds = (Part, Wire, Integral, Shown, Sub)
     every = {k: v for base in cls.__mro__ for k, v in vars(base).items()}
     known = frozenset(name for name, value in every.items() if isinstance(value, kinds))
@@ -212,7 +212,7 @@ class Assembly(Evaluated[ParT, MemoryT], Watching, Generic[ParT, MemoryT]):
     ports: ClassVar[tuple[Port, ...]]
     """wires that this assembly's holder sets"""
     reaction_places: ClassVar[dict[str, tuple[int, ...]]]
-    """places of each subassembly's reactions; the assembly's own places have an empty name"""
+    """places of each subassembly's reactions; an empty name means the assembly's own places"""
 
     def __init_subclass__(cls, *, at_an_instant: bool = False, **options: Any) -> None:
         """Derive signals and equations from the parts."""
@@ -234,7 +234,7 @@ class Assembly(Evaluated[ParT, MemoryT], Watching, Generic[ParT, MemoryT]):
         return {}
 
     def record(self, w: Self) -> Mapping[str, float]:
-        """Return recorded signals that no part defines, or that replace a part's signals."""
+        """Return recorded signals that no part defines, and those that replace a part's signals."""
         return {}
 
     # Derived from the parts.
@@ -375,7 +375,7 @@ class Assembly(Evaluated[ParT, MemoryT], Watching, Generic[ParT, MemoryT]):
         return _filled(self, "record", self.Output, values)
 
     def stored(self, w: Self) -> Any:
-        """Return the parts' stored energy at an instant [J], without contacts."""
+        """Return the energy stored in the parts at an instant [J], without contacts."""
         sums: list[Any] = []
         for wanted in (False, True):
             values = [
@@ -388,11 +388,11 @@ class Assembly(Evaluated[ParT, MemoryT], Watching, Generic[ParT, MemoryT]):
         return sum(sums[1:], sums[0]) if sums else 0.0
 
     def tasks(self, par: ParT) -> tuple[Task, ...]:
-        """Return the tasks of the subassemblies; a subclass adds its own."""
+        """Return the tasks of the subassemblies; a subclass adds its own tasks."""
         return tuple(task for sub in self.subs.values() for task in sub.tasks(par))
 
     def rest(self, par: ParT) -> tuple[Any, Any]:
-        """Return a zero state, with the subassemblies at rest."""
+        """Return a zero state in which the subassemblies are at rest."""
         inner = {name: sub.assembly.rest(sub.parameters(par)) for name, sub in self.subs.items()}
         return (
             self.state(**{name: state for name, (state, _) in inner.items()}),
@@ -408,7 +408,7 @@ class Assembly(Evaluated[ParT, MemoryT], Watching, Generic[ParT, MemoryT]):
         Raises
         ------
         ModelError
-            When there is no such part, or the state belongs to another element.
+            When the part does not exist, or the state belongs to another element.
         """
         given = (0.0, *chain.from_iterable(parts.values()))
         kinds = tuple((name, type(each)) for name, each in parts.items())
@@ -423,7 +423,7 @@ class Assembly(Evaluated[ParT, MemoryT], Watching, Generic[ParT, MemoryT]):
         Raises
         ------
         ModelError
-            When there is no such subassembly.
+            When the subassembly does not exist.
         """
         values = {} if own is None else own._asdict()
         for name, given in subs.items():
@@ -435,7 +435,7 @@ class Assembly(Evaluated[ParT, MemoryT], Watching, Generic[ParT, MemoryT]):
     @classmethod
     @cache  # studies start thousands of runs per second
     def _sources(cls, kinds: tuple[tuple[str, type], ...]) -> tuple[int, ...]:
-        """Return each State entry's index in the sequence of zero and the parts' states."""
+        """Return the index of each State entry in the sequence of a zero and the parts' states."""
         sources, place = [0] * len(cls.State._fields), 0
         for name, kind in kinds:
             for there in cls._places(name, kind):
@@ -529,8 +529,8 @@ def _filled(model: Any, method: str, kind: Any, values: Mapping[str, Any]) -> An
     for name in kind._fields:
         if name not in values:
             raise ModelError(
-                f"{type(model).__name__}.{method} does not return {name!r}, and no part has it: "
-                f"add it to the return value of {method}",
+                f"{type(model).__name__}.{method} does not return {name!r}, and no part has it. "
+                f"Add it to the return value of {method}",
                 name=f"{type(model).__name__}.{method}",
                 value=name,
             )
@@ -557,15 +557,15 @@ def _gather(cls: type[Any]) -> None:
             )
         if not (part.has("balance") or part.has("rate")):
             raise ModelError(
-                f"{part.where}: {part.kind} has states, but no balance and no rate",
+                f"{part.where}: {part.kind} has states, but defines no balance and no rate",
                 name=part.where,
                 valid="balance",
             )
         for name, signal in part.states().items():
             if name in states:
                 raise ModelError(
-                    f"{part.where}: another part has a state {name!r} too. Add a suffix or another "
-                    "name, Part(..., suffix='_2') or Part(..., state={...})",
+                    f"{part.where}: another part also has a state {name!r}. Add a suffix or "
+                    "another name, Part(..., suffix='_2') or Part(..., state={...})",
                     name=part.where,
                     value=name,
                     valid="Part(..., suffix='_2') or Part(..., state={...})",
@@ -589,7 +589,7 @@ def _gather(cls: type[Any]) -> None:
         if name in states or name in flows or name in shown:
             raise ModelError(
                 f"{cls.__name__}.Memory has a field {name!r}, but a part or a wire already records "
-                "a signal of that name. Rename the field",
+                "a signal with this name. Rename the field",
                 name=f"{cls.__name__}.Memory",
                 value=name,
             )
@@ -622,7 +622,7 @@ def _take_over(
             for name in new:
                 if name in taken:
                     raise ModelError(
-                        f"{sub.where}: there is already a signal {name!r}. Use another prefix",
+                        f"{sub.where}: the signal {name!r} already exists. Use another prefix",
                         name=sub.where,
                         value=name,
                     )
@@ -675,12 +675,12 @@ def _names(cls: type[Any], kind: str) -> tuple[str, ...]:
 
 
 def _derives(kind: Any) -> bool:
-    """Return whether a signal tuple follows from the parts, since the class does not declare it."""
+    """Return whether a signal tuple follows from the parts because no class declares it."""
     return not isinstance(kind, type) or hasattr(kind, "derived")
 
 
 def _named_tuple(owner: type, kind: str, signals: Mapping[str, Signal]) -> Any:
-    """Return a signal tuple that can be pickled as an attribute of its assembly."""
+    """Return a signal tuple that pickle can find as an attribute of its assembly."""
     make: Callable[..., Any] = NamedTuple
     gathered = make(kind, [(name, Annotated[float, signal]) for name, signal in signals.items()])
     gathered.__module__, gathered.__qualname__ = owner.__module__, f"{owner.__qualname__}.{kind}"

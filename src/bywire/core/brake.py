@@ -5,7 +5,7 @@ A brake is a package or a single file with one declaration::
     BRAKE = Brake("servo-axis", "a motor that turns a lever against a spring", __name__)
 
 bywire finds installed brakes, including its own, by entry points of the group ``bywire.brakes``.
-`load_system` loads others from a path. Bench files never load a brake, since they are untrusted.
+`load_system` loads other brakes from a path. Bench files are untrusted, so they never load a brake.
 """
 
 from __future__ import annotations
@@ -49,8 +49,8 @@ class Brake:
     summary
         One line for listings.
     module
-        Its ``__name__``, where bywire finds its models, parameter sets, experiments and loops. In a
-        package, each kind has its own module or folder; see ``bywire.core.registry``.
+        ``__name__`` of the module where bywire finds the models, parameter sets, experiments and
+        loops. In a package, each kind has its own module or folder; see ``bywire.core.registry``.
     """
 
     name: str
@@ -77,7 +77,7 @@ _loaded: dict[str, Brake] = {}
 
 
 def brakes() -> Mapping[str, Brake]:
-    """Return every brake by name: the installed ones, then those loaded from files."""
+    """Return all brakes by name: installed brakes, then brakes that were loaded from files."""
     return {**_installed(), **_loaded}
 
 
@@ -86,7 +86,7 @@ def _installed() -> Mapping[str, Brake]:
     brakes: dict[str, Brake] = {}
 
     def order(point: EntryPoint) -> tuple[bool, str]:
-        """Sort bywire's brakes first, so another brake with one of their names is skipped."""
+        """Sort bywire's brakes first, so that another brake with the same name is skipped."""
         return not point.module.startswith("bywire."), point.name
 
     for point in sorted(entry_points(group=GROUP), key=order):
@@ -98,7 +98,7 @@ def _installed() -> Mapping[str, Brake]:
         except Exception as error:
             place = _place_of(point.module)
             reason = str(error) if isinstance(error, ModelError) else error_with_line(error, place)
-            text = f"the installed brake {point.name!r} ({point.value}) is skipped: {reason}"
+            text = f"bywire skips the installed brake {point.name!r} ({point.value}): {reason}"
             warn_at_line(text, BrakeWarning, error, place)
         else:
             brakes[brake.name] = brake
@@ -106,7 +106,7 @@ def _installed() -> Mapping[str, Brake]:
 
 
 def _place_of(module: str) -> str:
-    """Return the folder of a module's package, or its file; its name where neither exists."""
+    """Return the folder of a module's package, or its file, or its name if neither exists."""
     root = module.partition(".")[0]
     try:
         spec = importlib.util.find_spec(root)
@@ -124,7 +124,7 @@ def is_foreign(brake: Brake) -> bool:
 def foreign_line(error: BaseException) -> str:
     """Return an error with file and line if another package's brake raised it, otherwise "".
 
-    The line is the innermost one in that brake's files.
+    The line is the innermost line in the files of that brake.
     """
     folders = [
         str(Path(brake.file).parent if _is_package(brake) else brake.file)
@@ -157,13 +157,13 @@ def load_brakes(files: Iterable[str]) -> None:
 def load_system(path: str | Path) -> Brake:
     """Load a brake from a file or a package, so that its names work with every function.
 
-    This executes its code: load only files that you trust.
+    Loading executes the brake's code. Load only files that you trust.
 
     Parameters
     ----------
     path
-        Python file, or folder with an ``__init__.py``, that declares a ``BRAKE``; or that
-        ``__init__.py``; or a project's folder with a single such package in its ``src``.
+        Python file, or folder with an ``__init__.py`` (or this ``__init__.py``), that declares a
+        ``BRAKE``. Or a project folder with a single package of this kind in its ``src``.
 
     Returns
     -------
@@ -173,9 +173,9 @@ def load_system(path: str | Path) -> Brake:
     Raises
     ------
     FileError
-        When there is no such file or folder.
+        When the file or folder does not exist.
     ModelError
-        When its import fails, or it does not declare a brake with an unused name.
+        When the import fails, or the module does not declare a brake with an unused name.
     """
     place = Path(path).expanduser().resolve()
     place = place.parent if place.name == "__init__.py" else _package_of(place)
@@ -205,9 +205,9 @@ def _package_of(place: Path) -> Path:
 def _imported(place: Path, source: Path) -> ModuleType:
     name = place.name if place.is_dir() else place.stem
     if not name.isidentifier():
-        valid = "a name that Python can import, like servo_axis"
+        valid = "a name that Python can import, such as servo_axis"
         raise ModelError(
-            f"{place}: its name must be {valid}", name=str(place), value=name, valid=valid
+            f"the name of {place} must be {valid}", name=str(place), value=name, valid=valid
         )
     there = sys.modules.get(name)
     elsewhere = importlib.util.find_spec(name) if there is None else None
@@ -216,7 +216,7 @@ def _imported(place: Path, source: Path) -> ModuleType:
     )  # None: a folder that is not a package
     if (
         origin is not None and Path(origin).resolve() != source
-    ):  # equal if the folder is the working folder
+    ):  # they are equal if the folder is the working folder
         there = ModuleType(name)
         there.__file__ = origin
     if there is not None and Path(getattr(there, "__file__", None) or "").resolve() != source:
@@ -241,7 +241,7 @@ def _imported(place: Path, source: Path) -> ModuleType:
         if not isinstance(error, (Exception, SystemExit)):
             raise
         message = error_with_line(error, str(source.parent) if place.is_dir() else str(source))
-        text = f"{message}; fix it and load it again"
+        text = f"{message}. Correct this, and load the brake again"
         raise ModelError(text, name=str(place)) from error
     return module
 
@@ -271,8 +271,8 @@ def _declared(module: ModuleType, where: str) -> Brake:
 def _require_new(brake: Brake, known: Mapping[str, Brake]) -> None:
     if brake.name in known:
         raise ModelError(
-            f"{brake.file} declares a brake {brake.name!r}, and so does {known[brake.name].file}: "
-            "rename one of them",
+            f"both {brake.file} and {known[brake.name].file} declare a brake {brake.name!r}. "
+            "Rename one of them",
             name="BRAKE",
             value=brake.name,
         )
@@ -283,12 +283,12 @@ def _origin(module: ModuleType) -> str:
 
 
 def modules_of(brake: Brake, names: tuple[str, ...]) -> Iterator[ModuleType]:
-    """Yield a brake's modules that may declare a kind of thing: the main one, and some others.
+    """Yield a brake's modules that may declare a kind of thing: the main module and some others.
 
     Parameters
     ----------
     names
-        Modules or folders of its package, for example ``("loops",)``.
+        Modules or folders of the brake's package, for example ``("loops",)``.
 
     Raises
     ------
@@ -337,7 +337,7 @@ def _attempted(name: str) -> ModuleType:
 
 
 def error_with_line(error: BaseException, *inside: str) -> str:
-    """Return an error's text with file and line: the innermost line within these folders."""
+    """Return an error's text with file and line, which is the innermost line in these folders."""
     text = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
     text = str(error) if isinstance(error, BywireError) else text
     if isinstance(error, SyntaxError) and error.filename:
@@ -348,7 +348,10 @@ def error_with_line(error: BaseException, *inside: str) -> str:
     if type(error).__name__ == "ValidationError":
         text = _of_pydantic(error)
     if "truth value of a CasADi" in text:
-        text = "an if, and, or, min or max on a number of the model: use bywire.core.ops.where"
+        text = (
+            "if, and, or, min and max do not work with a number of the model. Use "
+            "bywire.core.ops.where"
+        )
     line = _innermost(error, *inside)
     return f"{line[0]}, line {line[1]}: {text}" if line else text
 
@@ -368,17 +371,17 @@ def _of_pydantic(error: Any) -> str:
 
 
 def warn_at_line(text: str, kind: type[Warning], error: BaseException, *inside: str) -> None:
-    """Warn at the author's line that raised an error, not at a line of bywire.
+    """Warn with the author's line that raised an error, instead of a line of bywire.
 
     Parameters
     ----------
     text, kind
         The warning's message and category.
     error
-        The error; if it has a cause, the line is the cause's.
+        The error. If it has a cause, the line is that of the cause.
     inside
         The author's folders or files. If the error comes from elsewhere, the warning points to
-        line 1 of the last one.
+        line 1 of the last file.
     """
     line = _innermost(error.__cause__ or error, *inside)
     warnings.warn_explicit(text, kind, *(line or (inside[-1], 1)))

@@ -1,4 +1,4 @@
-"""Wording of messages for their reader: a command's flags, or a Python function's arguments.
+"""Wording of messages for their reader, with a command's flags or a Python function's arguments.
 
 A message refers to an argument with `option`. The use case declares the corresponding flag; see
 `bywire.usecases`.
@@ -20,7 +20,7 @@ _flags: dict[str, str] = {}
 
 @contextmanager
 def command_line() -> Iterator[None]:
-    """Use flags in messages until the block ends, since a person typed a command."""
+    """Use flags in messages until the block ends, because a person typed a command."""
     _commands.append(None)
     try:
         yield
@@ -29,7 +29,7 @@ def command_line() -> Iterator[None]:
 
 
 def is_command_line() -> bool:
-    """Return whether a person typed a command, rather than a program calling a function."""
+    """Return whether a person typed a command, or a program called a function."""
     return bool(_commands)
 
 
@@ -60,7 +60,7 @@ def name_flag(argument: str, flag: str) -> None:
 
 
 def option(argument: str, value: str | bool | dict[str, str] | None = None) -> str:
-    """Return an argument as the message's reader writes it, with its value if there is one.
+    """Return an argument in the notation of the message's reader, with its value if it has one.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ _FOR_DEVELOPERS = (
 
 @contextmanager
 def collected_warnings() -> Iterator[list[warnings.WarningMessage]]:
-    """Yield a list that collects every warning until the block ends, including repeated ones.
+    """Yield a list that collects all warnings until the block ends, including repeated warnings.
 
     It excludes warnings for developers, unless Python was started with options for warnings.
     """

@@ -1,4 +1,4 @@
-"""Named parameter sets with a source for every value."""
+"""Named parameter sets with a source for each value."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from bywire.core.registry import Kind, instances
 
 Origin = Literal["paper", "derived", "chosen", "calibrated"]
 Formula = Callable[[Any], Any]
-"""``formula(par)``: a value of a set from others, such as ``par.body.h``"""
+"""``formula(par)``: a value computed from other values of a set, such as ``par.body.h``"""
 
 
 @dataclass(frozen=True)
@@ -28,15 +28,15 @@ class Cited:
     value
         Number, table or choice, in SI.
     kind
-        ``paper``: printed in the source. ``derived``: follows from printed values.
+        ``paper``: printed in the source. ``derived``: computed from printed values.
         ``chosen``: our choice, without a source. ``calibrated``: tuned to match a statement in the
-        source, which then no longer counts as evidence.
+        source. The statement then no longer counts as evidence.
     where
         Place in the source, or the reason.
     formula
-        Formula of a derived value; None if it does not follow from the set's parameters.
+        Formula of a derived value; None if it is not computed from the set's parameters.
     moved
-        New places of the formula's groups, by their original places.
+        New places of the groups in the formula, by their original places.
     """
 
     value: Any
@@ -59,7 +59,7 @@ class Cited:
         read: set[str] = set()
         try:
             value = self.formula(_Values(values, self.moved, read))
-        except (ArithmeticError, ValueError):  # overflow, division by zero, root of a negative
+        except (ArithmeticError, ValueError):  # overflow, division by zero, root below zero
             value = math.nan
         return value, frozenset(read)
 
@@ -72,7 +72,7 @@ class Cited:
 
 
 class _Values:
-    """Values by attribute, as in a parameter set, with a record of the names that are read."""
+    """Values by attribute, as in a parameter set, which records the names that a formula reads."""
 
     def __init__(
         self, values: Mapping[str, Any], moved: Mapping[str, str], read: set[str], place: str = ""
@@ -107,13 +107,13 @@ def _moved(place: str, moved: Mapping[str, str]) -> str:
 
 @checked
 def paper(value: Any, where: str) -> Cited:
-    """Mark a value printed in the source."""
+    """Mark a value that is printed in the source."""
     return Cited(value, "paper", where)
 
 
 @checked
 def derived(value: Any, where: str) -> Cited:
-    """Mark a value that follows from others.
+    """Mark a value that is computed from other values.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ def derived(value: Any, where: str) -> Cited:
         ``derived(lambda par: 0.95 * par.body.g, "0.95 g")``. bywire warns if a bench changes the
         formula's parameters but not the value.
     where
-        Its origin, for readers.
+        Origin of the value, for readers.
     """
     if callable(value):
         return Cited(None, "derived", where, value)
@@ -137,13 +137,13 @@ def chosen(value: Any, where: str) -> Cited:
 
 @checked
 def calibrated(value: Any, where: str) -> Cited:
-    """Mark a value tuned to a statement of the source, with that statement."""
+    """Mark a value that was tuned to match a statement of the source, with this statement."""
     return Cited(value, "calibrated", where)
 
 
 # --- Parameter sets
 
-_SAME = 1e-9  # relative tolerance of a derived value, for its formula's rounding
+_SAME = 1e-9  # relative tolerance of a derived value for rounding in its formula
 
 
 @checked
@@ -156,15 +156,15 @@ class CitedSet:
     name
         Name in bench files and on the command line.
     assembly
-        Name of its assembly.
+        Name of the assembly.
     source
-        Full citation; empty if the values have none.
+        Full citation; empty if the values have no source.
     summary
         One line for listings.
     parameter_class
         Class that validates the values.
     values
-        Every value by dotted name, with its provenance; a plain value counts as chosen.
+        All values by dotted name, with their provenance. A plain value counts as chosen.
     """
 
     name: str
@@ -204,7 +204,7 @@ def _computed_values(values: Mapping[str, Cited]) -> dict[str, Cited]:
         for name, each in waiting.items():
             try:
                 ready[name] = each.computed(_Known(known, waiting))[0]
-            except KeyError:  # it reads a value that is not computed yet
+            except KeyError:  # the formula reads a value that is not computed yet
                 continue
         if not ready:
             names = ", ".join(sorted(waiting))
@@ -215,7 +215,7 @@ def _computed_values(values: Mapping[str, Cited]) -> dict[str, Cited]:
 
 
 class _Known(dict[str, Any]):
-    """Values by name; a value that is not computed yet exists, but cannot be read."""
+    """Values by name; a value that is not computed yet exists but cannot be read."""
 
     def __init__(self, known: Mapping[str, Any], waiting: Mapping[str, Any]) -> None:
         super().__init__({**dict.fromkeys(waiting), **known})
@@ -234,9 +234,9 @@ class Outdated:
     Parameters
     ----------
     name, where
-        Its name and origin.
+        Name and origin of the value.
     now, formula
-        Its value, and the result of its formula [SI].
+        Current value, and result of the formula [SI].
     changed
         Names of the changed parameters that the formula reads.
     """
@@ -260,7 +260,7 @@ def outdated_values(
     par
         All parameters, including the changed ones.
     changed
-        Names of changed parameters; a derived value among them was changed on purpose.
+        Names of changed parameters. A derived value among them was changed on purpose.
     """
     found: list[Outdated] = []
     values: dict[str, Any] = {}
@@ -296,12 +296,12 @@ def main_set(assembly: str, beside: type | None = None) -> str:
     """
     first = () if beside is None else (PARAMETER_SETS.beside(beside),)
     rest = (PARAMETER_SETS.of(brake.module) for brake in brakes().values())
-    for sets in chain(first, rest):  # lazily, since each set loads its models
+    for sets in chain(first, rest):  # lazily, because each set loads its models
         for name, cited in sets.items():
             if cited.assembly == assembly:
                 return name
     raise ModelError(
-        f"there is no parameter set for a {assembly}. Declare a bywire.CitedSet for that assembly",
+        f"there is no parameter set for a {assembly}. Declare a bywire.CitedSet for this assembly",
         name=assembly,
         valid="a bywire.CitedSet",
     )
@@ -310,7 +310,7 @@ def main_set(assembly: str, beside: type | None = None) -> str:
 def sets_of_loaded() -> tuple[str, ...]:
     """Return the names of the parameter sets of all brakes loaded by path.
 
-    A user who loads a brake intends to use it, so its set is the default if it has only one.
+    A user who loads a brake intends to use it, so its set is the default if it has only one set.
     """
     files = loaded_files()
     loaded = [brake.module for brake in brakes().values() if brake.file in files]

@@ -1,4 +1,4 @@
-"""Child processes, none of which executes code from the working folder.
+"""Child processes that never execute code from the working folder.
 
 A user may run bywire within a downloaded folder. A file ``ziglang.py``, an executable ``cc`` or a
 library ``libm.so`` in that folder must never run. An interpreter searches its working folder for
@@ -6,9 +6,9 @@ modules (``python -m``, ``python -c``). So does a search path with an empty or r
 as ``PATH=:/usr/bin``. Child processes therefore start elsewhere, and their search paths contain
 only absolute folders. This module starts all processes except copies of this one.
 
-There are two limits. Python loads modules before it executes bywire's first line:
-``python -m bywire`` searches the working folder, but the command ``bywire`` and
-``python -P -m bywire`` do not. And workers share the search path of a caller's script or notebook.
+There are two exceptions. First, Python loads modules before it executes bywire's first line. For
+``python -m bywire``, it searches the working folder, but not for the command ``bywire`` and for
+``python -P -m bywire``. Second, workers use the search path of a caller's script or notebook.
 """
 
 from __future__ import annotations
@@ -39,11 +39,11 @@ _LISTS = (
 )
 """environment variables that list folders with programs, libraries, headers and modules"""
 SAFE_PATH = "PYTHONSAFEPATH"
-"""environment variable that keeps interpreters from searching the working folder for modules"""
+"""environment variable that prevents interpreters from searching the working folder for modules"""
 _WARNINGS, _SILENT_TRACKER = "PYTHONWARNINGS", "ignore:resource_tracker:UserWarning"
 _ROOT = str(Path(__file__).resolve().parents[2])
 _ELSEWHERE = sys.prefix
-"""working folder of child processes: this interpreter's own folder, which is trusted anyway"""
+"""working folder of child processes: this interpreter's folder, which must be trusted anyway"""
 
 
 def _trusted_folders(
@@ -56,9 +56,9 @@ def _trusted_folders(
     entries
         Folders, as listed in ``sys.path`` and ``PATH``.
     untrusted
-        Other folders to leave out, such as the folder that is served.
+        Other folders to leave out, such as the folder that a server publishes.
     keep
-        A folder to keep, even if it would be left out.
+        A folder to keep in any case.
     """
     left_out = {os.path.realpath(each) for each in (os.curdir, *untrusted)} - {keep}
     return [
@@ -69,20 +69,20 @@ def _trusted_folders(
 def import_path(untrusted: Sequence[str | Path] = ()) -> list[str]:
     """Return the folders from which this process and its children may import.
 
-    They include the folder that bywire was imported from. See `_trusted_folders`.
+    They include the folder from which bywire was imported. See `_trusted_folders`.
     """
     return _trusted_folders(sys.path, untrusted, keep=_ROOT)
 
 
 def leave_out_working_folder() -> None:
-    """Keep this process and its Python children from importing from the working folder."""
+    """Prevent this process and its Python children from importing from the working folder."""
     sys.path[:] = import_path()
     os.environ[SAFE_PATH] = "1"
 
 
 @contextmanager
 def safe_start() -> Iterator[None]:
-    """Keep interpreters that start within the block from searching the working folder.
+    """Prevent interpreters that start within the block from searching the working folder.
 
     `multiprocessing` starts workers, a fork server and a resource tracker with ``python -c``. The
     workers then use this process's search path.
@@ -90,7 +90,7 @@ def safe_start() -> Iterator[None]:
     changes = {
         SAFE_PATH: "1",
         "PYTHONPATH": os.pathsep.join(import_path()),
-        # The tracker would print what a killed command could not clean up.
+        # The tracker would print the resources that a killed command could not release.
         _WARNINGS: ",".join(filter(None, (os.environ.get(_WARNINGS), _SILENT_TRACKER))),
     }
     before = {name: os.environ.get(name) for name in changes}
@@ -106,9 +106,9 @@ def safe_start() -> Iterator[None]:
 
 
 def find_program(name: str) -> str | None:
-    """Return a program's path, searched for only in the absolute folders of ``PATH``.
+    """Return the path of a program, found in one of the absolute folders of ``PATH``.
 
-    A path such as ``./my-cc`` is used as it is, since its author chose that file.
+    The function returns a path such as ``./my-cc`` unchanged, because the user chose this file.
     """
     if os.path.dirname(name):
         program = shutil.which(name)
@@ -123,13 +123,13 @@ def environment(untrusted: Sequence[str | Path] = ()) -> dict[str, str]:
     for name in _LISTS:
         if name in variables:
             trusted = _trusted_folders(variables.pop(name).split(os.pathsep), untrusted)
-            if trusted:  # an empty list would mean the working folder
+            if trusted:  # an empty list would stand for the working folder
                 variables[name] = os.pathsep.join(trusted)
     return {**variables, SAFE_PATH: "1"}
 
 
 def python_command(*arguments: str) -> list[str]:
-    """Return the command line of a Python process, to be started with `environment`.
+    """Return the command line of a Python process, which the caller starts with `environment`.
 
     Parameters
     ----------
@@ -162,12 +162,13 @@ def start_python(
 ) -> subprocess.Popen[bytes]:
     """Start one of bywire's modules, which communicates through standard input and output.
 
-    Ctrl-C does not reach the process: its parent must end it. It starts outside the working folder.
+    Ctrl-C does not reach the process, so its parent must end it. It starts outside the working
+    folder.
 
     Parameters
     ----------
     module, arguments
-        The module's name, and its command-line arguments.
+        Name of the module, and its command-line arguments.
     further
         Additional environment variables.
     untrusted
@@ -191,7 +192,8 @@ def start_python(
 def _tool_folders() -> dict[str, str]:
     """Return environment variables that give the extra's compiler a writable cache folder.
 
-    By default it caches in the user's cache folder, and fails if that is missing or read-only.
+    By default, the compiler uses the user's cache folder, and fails if this folder is missing or
+    read-only.
     """
     home = os.environ.get("HOME", "")
     above = os.environ.get("XDG_CACHE_HOME") or (os.path.join(home, ".cache") if home else "")
@@ -202,7 +204,7 @@ def _tool_folders() -> dict[str, str]:
 
 
 def _is_writable(folder: str) -> bool:
-    """Return whether a folder is writable, or can be made in a writable folder."""
+    """Return whether a folder is writable, or can be created in a writable folder."""
     if not os.path.isabs(folder):
         return False
     there = next(each for each in Path(folder, "zig", "x").parents if each.exists())
@@ -210,14 +212,14 @@ def _is_writable(folder: str) -> bool:
 
 
 def run_program(command: Sequence[str], seconds: float) -> subprocess.CompletedProcess[str]:
-    """Run a program to its end, outside the working folder; its paths must be absolute.
+    """Run a program to its end outside the working folder; paths must be absolute.
 
     Raises
     ------
     OSError
         When the program does not start.
     TimeoutExpired
-        When it takes longer than ``seconds``.
+        When the program takes longer than ``seconds``.
     """
     return subprocess.run(
         command,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import unicodedata
 
-_WORD, _PATH, _MESSAGE = 120, 600, 3000  # longest shown texts, in characters
+_WORD, _PATH, _MESSAGE = 120, 600, 3000  # maximum lengths of displayed texts, in characters
 
 
 def clean(text: object) -> str:
@@ -30,7 +30,7 @@ def _clean_character(character: str) -> str:
 
 
 def shortened(text: str) -> str:
-    """Shorten a message to a readable length; keep its beginning and its end.
+    """Shorten a message to a readable length, but keep its beginning and its end.
 
     Examples
     --------

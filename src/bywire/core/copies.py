@@ -1,4 +1,4 @@
-"""Worker processes: copies of this process where that is safe; they always end with it."""
+"""Worker processes, which are copies of this process if that is safe, and always end with it."""
 
 from __future__ import annotations
 
@@ -25,16 +25,16 @@ from bywire.core.child_process import safe_start
 from bywire.core.errors import RunError
 from bywire.core.libraries import keep_one_thread
 
-_ENDING = 0.05  # s for which the system may still list a joined thread
+_ENDING = 0.05  # time [s] for which the system may still list a joined thread
 
 
 def may_copy() -> bool:
-    """Return whether this process may fork: only a command's process with a single thread.
+    """Return whether this process may fork, which requires a command's process with one thread.
 
-    A copy has one thread. A lock that another thread held stays locked in it forever. Libraries'
-    threads count too, so the operating system counts them; with `keep_one_thread`, the libraries
-    that commands load start none. Other people's programs are never copied, since their locks are
-    unknown.
+    A copy has one thread. In the copy, a lock that another thread held stays locked forever.
+    Threads of libraries also count, so the function asks the operating system. With
+    `keep_one_thread`, the libraries that commands load start no threads. Other people's programs
+    are never copied, because their locks are unknown.
     """
     if sys.platform != "linux" or not is_command_line() or threading.active_count() > 1:
         return False
@@ -50,14 +50,14 @@ def _thread_count() -> int:
 
 
 class _WithoutMain(SpawnProcess):
-    """A process that loads the functions it computes, but not the calling program.
+    """A process that loads the functions that it needs, but not the calling program.
 
-    Python would execute that program's file again in each process. Without a guard
-    ``if __name__ == "__main__":``, that would repeat the call itself, which must not happen.
+    Python would execute the program's file again in each process. Without a guard
+    ``if __name__ == "__main__":``, this would repeat the call itself.
     """
 
     def start(self) -> None:
-        """Start the process; its arguments come from modules that it can import."""
+        """Start the process; its arguments must be defined in modules that it can import."""
         main = sys.modules["__main__"]
         nameless = ModuleType("__main__")
         vars(nameless).update(vars(main), __spec__=None, __file__=None)
@@ -79,7 +79,7 @@ class _Anew(SpawnContext):
 def processes(
     count: int, prepare: Callable[..., object], *arguments: Any, is_copied: bool
 ) -> Iterator[ProcessPoolExecutor]:
-    """Yield a pool of processes that end with the block, even if busy, and with this process.
+    """Yield a pool of processes that end with the block, even if busy, or with this process.
 
     Ctrl-C reaches only this process.
 
@@ -90,8 +90,8 @@ def processes(
     prepare, arguments
         Function that each process calls first, and its arguments.
     is_copied
-        Whether they are copies of this process, which start with everything that it has loaded and
-        computed. Other processes load what they need.
+        Whether the processes are copies of this process, which already contain everything that it
+        has loaded and computed. Other processes load the data that they need.
     """
     with nullcontext() if is_copied else safe_start():
         pool = ProcessPoolExecutor(
@@ -112,12 +112,12 @@ def processes(
         workers += pool._processes.values()
         watch.start()
         yield pool
-    finally:  # immediately, even after Ctrl-C: nobody needs the unfinished results
+    finally:  # immediately, even after Ctrl-C, because nobody needs the unfinished results
         with ending:
             is_over.set()
             _end(pool)
-        # End the pool's threads too: later copies need a single thread, and Python's shutdown would
-        # race with them. End the watch first, since it may be using the pool's queue.
+        # Also end the pool's threads, because later copies require a single thread, and Python's
+        # shutdown would race with the threads. End the watch first, which may use the pool's queue.
         if watch.ident is not None:
             watch.join()
         pool.shutdown(wait=True, cancel_futures=True)
@@ -127,7 +127,7 @@ def processes(
 def processes_with_brakes(
     count: int, advice: str, prepare: Callable[..., object] | None = None, *arguments: Any
 ) -> Iterator[ProcessPoolExecutor]:
-    """Yield `processes` with this one's brakes: copies of this process where that is safe.
+    """Yield `processes` with the brakes of this process, which are its copies if that is safe.
 
     Parameters
     ----------
@@ -142,9 +142,9 @@ def processes_with_brakes(
         When a process is killed.
     """
     is_copied = may_copy()
-    files = () if is_copied else loaded_files()  # a copy has them
+    files = () if is_copied else loaded_files()  # a copy already has these files
     try:
-        words = None if is_copied else flags()  # likewise
+        words = None if is_copied else flags()  # a copy already has the flags
         with processes(
             count, _know, files, words, prepare, *arguments, is_copied=is_copied
         ) as pool:
@@ -176,8 +176,8 @@ def _break_off(
     """Break a pool when one of its processes is killed, at any point of its work.
 
     All processes send their results through one pipe. If a process is killed while it sends a
-    result longer than the pipe's buffer, the pool waits for the rest of that result and does not
-    notice. The other processes wait for their turn.
+    result that is longer than the pipe's buffer, the pool waits for the rest of the result forever.
+    The other processes wait for the pipe.
     """
     wait([process.sentinel for process in workers])
     with ending:
@@ -194,13 +194,13 @@ def _end(pool: ProcessPoolExecutor) -> None:
     while left:
         left = [each for each in left if each not in wait(left)]
     last_end: Connection = vars(pool._result_queue)["_writer"]
-    if not last_end.closed:  # otherwise its number may belong to another file by now
+    if not last_end.closed:  # otherwise, its number may already belong to another file
         last_end.close()
 
 
 @contextmanager
 def _interrupts_blocked() -> Iterator[None]:
-    """Block Ctrl-C until the block ends; copies that are made within it never receive it."""
+    """Block Ctrl-C until the block ends; copies that start within the block never receive it."""
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
@@ -221,13 +221,13 @@ def _begin(prepare: Callable[..., object], *arguments: Any) -> None:
 
 
 def _prepare(prepared: bytes) -> None:
-    """Prepare a process without copied state, once it is sure to end with its parent."""
+    """Prepare a process without copied state after ensuring that it ends with its parent."""
     prepare, arguments = ForkingPickler.loads(prepared)
     prepare(*arguments)
 
 
 def _end_with_parent() -> None:
-    """End this process when its parent is killed; otherwise it would wait for jobs forever."""
+    """End this process when its parent is killed, because it would wait for jobs forever."""
     parent = parent_process()
     if parent is not None:
         parent.join()

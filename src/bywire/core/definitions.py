@@ -1,9 +1,9 @@
-"""Digest of functions' source code that does not depend on its layout, for identities.
+"""Layout-independent digest of the source code of functions.
 
-The digest covers functions and everything that they reach by name: other functions, classes and
+The digest covers functions and everything that they refer to by name: other functions, classes and
 constants. It ignores comments, docstrings, annotations, imports, the order of definitions and the
-files that contain them. It is the same in every version of Python. Only definitions in certain
-packages ("rooms") count by their source code; all others count by their name.
+names of their files. It is the same in every version of Python. Only definitions in certain
+packages ("rooms") count by their source code. All other definitions count by their name.
 """
 
 from __future__ import annotations
@@ -36,20 +36,20 @@ def definitions_digest(
     named: Callable[[str], Iterable[Any]] = lambda _: (),
     with_equations: bool = False,
 ) -> str:
-    """Return a digest of all definitions that some objects compute with.
+    """Return a digest of all definitions that some objects use.
 
     Parameters
     ----------
     roots
-        Functions, classes, and objects or collections that contain some.
+        Functions, classes, and objects or collections that contain functions or classes.
     rooms
         Packages and modules whose definitions count by their source code.
     named
-        ``named(text)``: the objects that a text in these definitions refers to, such as a
-        registry's entry; none for most texts.
+        ``named(text)``: the objects that a string in these definitions refers to, such as a
+        registry's entry. Most strings refer to no object.
     with_equations
-        Whether models and their elements also count by their source code. Otherwise only a model's
-        ``rest`` counts, since the kernel already identifies the equations.
+        Whether models and their elements also count by their source code. Otherwise, only a model's
+        ``rest`` counts, because the kernel already identifies the equations.
     """
     reached = _Reached(tuple(rooms), named, with_equations)
     for root in roots:
@@ -62,7 +62,7 @@ _Steps = Iterator["_Steps"]
 
 
 def _run(steps: _Steps) -> None:
-    """Run visits and their nested visits without recursion, which could exceed Python's stack."""
+    """Run visits and nested visits without recursion, which could exceed Python's stack."""
     stack = [steps]
     while stack:
         nested = next(stack[-1], None)
@@ -80,7 +80,7 @@ class _Reached:
     ) -> None:
         self.pieces: set[str] = set()
         self._rooms, self._named, self._with_equations = rooms, named, with_equations
-        self._seen: dict[int, Any] = {}  # kept alive, so that each address stays unique
+        self._seen: dict[int, Any] = {}  # keeps the objects alive, so that addresses stay unique
         self._seen_collections: set[tuple[str, str]] = set()
         self._sources: dict[str, _Source] = {}
 
@@ -133,7 +133,7 @@ class _Reached:
             return
         code = function.__code__
         nodes = self._source(code.co_filename, function.__globals__).nodes_of(code)
-        if not nodes:  # made by a library, or from source code that is gone
+        if not nodes:  # a library made the function, or its source code no longer exists
             if not code.co_filename.startswith("<"):
                 self.pieces.add(f"{code.co_code.hex()} {code.co_names}")
             return
@@ -196,7 +196,7 @@ class _Reached:
             yield self.visit(functions)
 
     def _visit_assigned(self, name: str, names: Mapping[str, Any]) -> _Steps:
-        """Add a collection's source code, since runs may have changed its content."""
+        """Add the source code of a collection, because runs may have changed its content."""
         file = names.get("__file__") or ""
         if (file, name) in self._seen_collections:  # its source code may refer to itself
             return

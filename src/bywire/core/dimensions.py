@@ -1,4 +1,4 @@
-"""Dimensions in place of numbers: equations evaluated on them reject sums of unlike quantities.
+"""Dimensions that replace numbers in equations, and reject sums of different quantities.
 
 Dimensions have no value, so no operating point can hide a mistake. They need no unit library.
 """
@@ -32,7 +32,7 @@ _NAMED = (
     "Wb",
     "N*m/A",
 )
-"""units whose name stands for their dimension"""
+"""units whose names represent their dimensions"""
 _PURE = frozenset({"exp", "log", "sin", "cos", "arctan", "floor"})
 
 
@@ -43,7 +43,7 @@ class DimensionError(UnitError):
 class Dimension:
     """A quantity with a dimension and no value.
 
-    Plain zero fits every dimension, also as a factor; a plain NaN has an unknown dimension.
+    A plain zero has any dimension, even as a factor. A plain NaN has an unknown dimension.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ class Dimension:
     """
 
     __slots__ = ("powers",)
-    __array_ufunc__ = None  # NumPy's scalars leave operations to this class
+    __array_ufunc__ = None  # NumPy scalars delegate operations to this class
 
     def __init__(self, powers: tuple[float, ...]) -> None:
         self.powers = powers
@@ -127,7 +127,7 @@ class Dimension:
             for value in args:
                 if not _unknown(value) and any(_dimension(value).powers):
                     raise DimensionError(
-                        f"ops.{name} needs a pure number, not a quantity in {value}",
+                        f"ops.{name} needs a pure number, but got a quantity in {value}",
                         name=f"ops.{name}",
                         value=str(value),
                         valid="a pure number",
@@ -149,7 +149,9 @@ class Condition:
         _alike("compared", left, right)
 
     def __bool__(self) -> bool:
-        raise DimensionError("an if on a value: use core.ops.where", valid="core.ops.where")
+        raise DimensionError(
+            "if does not work with a value. Use core.ops.where", valid="core.ops.where"
+        )
 
     def _bywire_op(self, name: str, *args: Any) -> Any:
         _, then, otherwise = args  # from ops.where, the only function of a condition
@@ -162,7 +164,7 @@ class Condition:
 
 
 def fits(value: Any, unit: str) -> bool:
-    """Return whether a result has the dimension of a unit; a plain zero fits any."""
+    """Return whether a result has the dimension of a unit; a plain zero has any dimension."""
     if isinstance(value, Dimension):
         return value.fits(unit)
     return bool(value == 0) or _unknown(value) or Dimension.of("1").fits(unit)
@@ -173,7 +175,7 @@ def _dimension(value: Any) -> Dimension:
 
 
 def _alike(verb: str, left: Any, right: Any) -> Any:
-    """Return the common dimension of two quantities; zero and unknown ones have the other's."""
+    """Return the common dimension of two quantities; zero and NaN adopt the other's dimension."""
     for zero, other in ((left, right), (right, left)):
         if not isinstance(zero, Dimension) and (zero == 0 or _unknown(zero)):
             return other
@@ -206,6 +208,6 @@ def _parsed(unit: str) -> Dimension:
 
 @cache
 def _names() -> dict[tuple[float, ...], str]:
-    """Return the usual name of every named dimension; for energy and torque, N*m."""
+    """Return the usual name of each named dimension; N*m for energy and torque."""
     names = sorted((*_NAMED, *BASE), key=lambda name: (name == "J", name == "rad", name))
     return {_parsed(name).powers: name for name in reversed(names)}

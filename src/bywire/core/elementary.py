@@ -1,13 +1,13 @@
 """Exponential, logarithm, power, sine and cosine, identical on all machines.
 
-The last digit of these functions depends on a system's C library. Here they are sums and products
-in a fixed order, the same as in the kernels (``simulation/c_runtime.py``) and in exported ECU code.
-Python, kernel and target therefore agree bit for bit.
+The last digit of these functions depends on the system's C library. Here, they are sums and
+products in a fixed order, the same as in the kernels (``simulation/c_runtime.py``) and in exported
+ECU code. So the results of Python, kernel and target are bit-identical.
 
 References
 ----------
-W. J. Cody and W. Waite, Software Manual for the Elementary Functions, 1980: reduction of
-arguments in parts. The series are Taylor series, except Remez's polynomial for the exponential.
+W. J. Cody and W. Waite, Software Manual for the Elementary Functions, 1980, for the reduction of
+arguments in parts. The series are Taylor series, except the Remez polynomial for the exponential.
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ QUARTER = (
 SMALL = 0.78
 """maximum angle [rad] without a quarter turn to subtract"""
 FAR = 1e5
-"""beyond this angle [rad], full turns are subtracted first"""
+"""angle [rad] above which full turns are subtracted first"""
 FAR_PARTS = (102943.70806884766, 3.982688587811367e-06, 1.3253124088109142e-16)
 """2^14 turns in three parts"""
 FAR_PERIOD = 1.0 / (2.0 * math.pi * 2.0**14)
 LONGEST = 1e11
-"""beyond this angle [rad], the last digit is too coarse to resolve a turn"""
+"""angle [rad] above which the last digit is too coarse to resolve a turn"""
 LEAST = 1e-300
-"""below this number, logarithms come from the C library"""
+"""number below which logarithms come from the C library"""
 
 
 def _factorials(first: int, last: int, step: int, alternates: bool) -> tuple[float, ...]:
@@ -56,8 +56,8 @@ EXPONENTIAL = (
     2.7625176287774916e-07,
     2.497840191042191e-08,
 )
-"""coefficients of r^3 to r^11 after 1 + r + r^2/2, by Remez's exchange in 50 digits: relative error
-at most 5.9e-18 up to ln(2)/2; the Taylor series up to r^13 has 5.7e-18"""
+"""coefficients of r^3 to r^11 after 1 + r + r^2/2, from the Remez algorithm with 50 digits; their
+relative error is at most 5.9e-18 up to ln(2)/2 (Taylor series up to r^13: 5.7e-18)"""
 SINE = _factorials(3, 15, 2, alternates=True)
 COSINE = _factorials(2, 16, 2, alternates=True)
 LOGARITHM = tuple(2.0 / n for n in range(3, 22, 2))
@@ -90,12 +90,12 @@ def exp(x: float) -> float:
 
 
 def sin(x: float) -> float:
-    """Return the sine of x [rad]; beyond 1e11 the angle counts as 0."""
+    """Return the sine of x [rad]; an angle beyond 1e11 counts as 0."""
     return _turned(float(x), 0)
 
 
 def cos(x: float) -> float:
-    """Return the cosine of x [rad]; beyond 1e11 the angle counts as 0."""
+    """Return the cosine of x [rad]; an angle beyond 1e11 counts as 0."""
     return _turned(float(x), 1)
 
 
@@ -128,7 +128,7 @@ def _near(x: float) -> float:
 
 
 def _log_parts(a: float) -> tuple[float, float]:
-    """Return log a, a > 0, as a sum of two parts: a = m 2^k, m from sqrt(1/2) to sqrt(2)."""
+    """Return log a, a > 0, as a sum of two parts; a = m 2^k, m from sqrt(1/2) to sqrt(2)."""
     m, e = math.frexp(a)
     if m < _HALF_ROOT:
         m, e = 2.0 * m, e - 1
@@ -164,7 +164,7 @@ def log(a: float) -> float:
 
 
 def power(a: float, b: float) -> float:
-    """Return a to the power of b, computing the product b log a with twice the digits."""
+    """Return a to the power of b; the product b log a has twice the precision."""
     a, b = float(a), float(b)
     if not a >= LEAST or math.isinf(a) or math.isinf(b):
         return math.pow(a, b)
@@ -180,7 +180,7 @@ def power(a: float, b: float) -> float:
 
 
 def _upper(a: float) -> float:
-    """Return the upper half of a's digits."""
+    """Return the upper half of the significand's bits."""
     (bits,) = struct.unpack("<Q", struct.pack("<d", a))
     (upper,) = struct.unpack("<d", struct.pack("<Q", bits & _UPPER))
     return float(upper)

@@ -1,6 +1,6 @@
-"""Sine, cosine and exponential in single precision, as exported ECU code computes them.
+"""Single-precision sine, cosine and exponential, the same as in exported ECU code.
 
-Reductions and series are the same as in `bywire.core.elementary`, with the terms that 24 bits need.
+Reductions and series are the same as in `bywire.core.elementary`, with enough terms for 24 bits.
 """
 
 from __future__ import annotations
@@ -46,12 +46,12 @@ def exp(x: np.float32) -> np.float32:
 
 
 def sin(x: np.float32) -> np.float32:
-    """Return the sine of x [rad]; beyond 4e7 the angle counts as 0."""
+    """Return the sine of x [rad]; an angle beyond 4e7 counts as 0."""
     return _turned(x, 0)
 
 
 def cos(x: np.float32) -> np.float32:
-    """Return the cosine of x [rad]; beyond 4e7 the angle counts as 0."""
+    """Return the cosine of x [rad]; an angle beyond 4e7 counts as 0."""
     return _turned(x, 1)
 
 

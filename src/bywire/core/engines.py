@@ -1,7 +1,7 @@
-"""Engines from rooms above the simulation, declared where the package is assembled.
+"""Engines from packages above the simulation, which register here.
 
-A bench selects its engine by name, and the simulation builds it. The simulation must not import an
-upper room, so the upper room registers its engine here.
+A bench selects its engine by name, and the simulation builds it. The simulation must not import a
+package above it, so such a package registers its engine here.
 """
 
 from __future__ import annotations
@@ -14,13 +14,13 @@ if TYPE_CHECKING:
     from bywire.core.parameters import ParameterSet
 
 Make = Callable[["Model", "ParameterSet", Any], Any]
-"""``make(model, par, kernel)``: the engine, which steps the plant by the compiled kernel"""
+"""``make(model, par, kernel)``: the engine, which steps the plant with the compiled kernel"""
 
 _DECLARED: dict[str, Make] = {}
 
 
 def declare_engine(name: str, make: Make) -> None:
-    """Register the engine of an upper room under a name; a later engine replaces an earlier one."""
+    """Register an engine under a name; a later engine replaces an earlier engine."""
     _DECLARED[name] = make
 
 

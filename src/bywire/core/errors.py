@@ -1,4 +1,4 @@
-"""Every error that bywire raises on purpose.
+"""All errors that bywire raises on purpose.
 
 ::
 
@@ -32,7 +32,7 @@ E = TypeVar("E", bound="BywireError")
 
 _SHOWN = 60  # characters of a value in a message
 _MOST = 12  # names in a list
-_NEAR = 0.7  # lowest similarity of a suggestion in an error that lists all names
+_NEAR = 0.7  # minimum similarity of a suggestion in an error that lists all names
 _BARE_KEY = re.compile(r"[\w-]+", re.ASCII)
 
 
@@ -46,7 +46,7 @@ class BywireError(Exception):
     name
         Name as the user writes it: a parameter, an option, a key, a column, a path.
     value
-        Its value, as the text shows it.
+        Value of the name, as it appears in the text.
     valid
         Valid values: a range with its unit, or the nearest names.
     """
@@ -61,7 +61,7 @@ class BywireError(Exception):
         return shortened(super().__str__())
 
     def at(self, place: str, kind: type[E]) -> E:
-        """Return an error of another kind with this one's fields and a place in front of its text.
+        """Return an error of another kind with the same fields, and a place in front of the text.
 
         Examples
         --------
@@ -72,7 +72,7 @@ class BywireError(Exception):
         return kind(f"{place}: {self}", name=self.name, value=self.value, valid=self.valid)
 
     def reworded(self, text: str) -> Self:
-        """Return the same error with another text, such as one that starts with the file's name.
+        """Return the same error with another text, for example with the file's name in front.
 
         Examples
         --------
@@ -139,7 +139,7 @@ class DeviceError(RunError):
 
 
 def place_of(thing: Any) -> str:
-    """Return file and line of a class or a function, or its name if they are unknown."""
+    """Return file and line of a class or function, or its name if they are unknown."""
     from inspect import getsourcefile, getsourcelines
 
     try:
@@ -166,7 +166,7 @@ def not_valid(
     valid
         Valid values, to end the sentence "it must be ...".
     advice
-        Next step, where it is not obvious.
+        Next step, if it is not obvious.
     kind
         Class of the error.
 
@@ -184,7 +184,7 @@ def not_valid(
 def unknown_name(
     kind: str, name: str, known: Iterable[str], first: Iterable[str] = (), listed: str = ""
 ) -> UnknownNameError:
-    """Build the error for an unknown name, with the nearest known ones.
+    """Build the error for an unknown name, with the nearest known names.
 
     Parameters
     ----------
@@ -193,11 +193,11 @@ def unknown_name(
     name
         Name that the user wrote.
     known
-        Every valid name.
+        All valid names.
     first
         Names that come first in the list.
     listed
-        Command that lists all of them, for a list that is too long for the error.
+        Command that lists all names, if there are too many for the error.
     """
     every, leading = {*known}, sorted(first)
     others = sorted(every.difference(leading))
@@ -211,9 +211,10 @@ def unknown_name(
 
 
 def unknown_of_few(kind: str, name: str, known: Iterable[str]) -> UnknownNameError:
-    """Build the error for an unknown name where only a few are valid: the nearest, then all.
+    """Build the error for an unknown name, with the nearest and all valid names.
 
-    The valid names keep their order. For the parameters, see `unknown_name`.
+    It is for names of which only a few are valid. They keep their order. For the parameters, see
+    `unknown_name`.
 
     Examples
     --------
@@ -232,9 +233,9 @@ def unknown_of_few(kind: str, name: str, known: Iterable[str]) -> UnknownNameErr
 def nearest_first(
     names: Iterable[str], requested: Iterable[str], units: Mapping[str, str] | None = None
 ) -> str:
-    """Return a short list of names for an error, those most similar to the requested ones first.
+    """Return a short list of names for an error, starting with those most like the requested names.
 
-    ``units``: unit of each name, to write it beside the name.
+    ``units``: unit of each name, which the list shows next to the name.
 
     Examples
     --------
@@ -264,18 +265,18 @@ def quoted(value: object) -> str:
     ("'9 mm'", '[1, true]')
     """
     if isinstance(value, int) and value.bit_length() > 1000:
-        return "a number of 300 digits or more"  # Python refuses to write the longest ones
+        return "a number of 300 digits or more"  # Python cannot convert the longest numbers to text
     if isinstance(value, str):
         return repr(value if len(value) <= _SHOWN else f"{value[:_SHOWN]}...")
     try:
         text = _as_toml(value)
-    except (ValueError, RecursionError):  # such a number in a list, or lists nested a thousand deep
+    except (ValueError, RecursionError):  # such a number in a list, or a thousand nested lists
         return f"a {type(value).__name__}"
     return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}..."
 
 
 def _as_toml(value: object) -> str:
-    """Return a value in TOML notation, or in Python's where TOML has no notation for it."""
+    """Return a value in TOML notation, or in Python notation if TOML has none."""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, (date, time)):

@@ -1,8 +1,8 @@
 """Fault modes that elements and brakes declare.
 
-The equations support three mechanisms: parameters that change at an instant, falsified signals
+The equations support three mechanisms: parameters that change at a certain time, falsified signals
 between plant and controllers, and controllers that miss their ticks. An element lists the
-parameters that its failure changes. A brake declares the signals, and the failures with several
+parameters that its failure changes. A brake declares the signals, and failures with several
 changes, in a module ``faults`` of its package.
 """
 
@@ -19,7 +19,7 @@ Side = Literal["reading", "demand", "drive"]
 
 @dataclass(frozen=True)
 class ParameterFault:
-    """A failure that changes parameters of an element; declared in ``FAULTS`` of its module.
+    """Failure that changes parameters of an element, declared in ``FAULTS`` of its module.
 
     Parameters
     ----------
@@ -30,13 +30,13 @@ class ParameterFault:
     scaled
         Parameters that the fault multiplies by its value.
     value
-        Default value of that factor.
+        Default value of the factor.
     replaced
-        Parameter that the fault sets to its value, instead of ``scaled``.
+        Parameter that the fault sets to its value, as an alternative to ``scaled``.
     with_it
         Choices and other parameters that also change.
     needs
-        The assembly's choices that this failure requires, by dotted name.
+        Choices of the assembly that this failure requires, by dotted name.
     """
 
     name: str
@@ -50,12 +50,12 @@ class ParameterFault:
 
 @dataclass(frozen=True)
 class Channel:
-    """A signal between plant and controllers that faults can falsify.
+    """Signal between plant and controllers that faults can falsify.
 
     Parameters
     ----------
     name
-        Prefix of its faults' names: ``"pressure"`` has ``pressure.stuck``.
+        Prefix of the names of its faults. For example, ``"pressure"`` has ``pressure.stuck``.
     summary
         Description of the signal.
     unit
@@ -63,16 +63,17 @@ class Channel:
     signal
         State that controllers read, memory field that acts on the plant, or stimulus.
     side
-        ``"reading"`` of a sensor, ``"drive"`` from controller to actuator, or ``"demand"``: a field
-        of the stimulus. Undeclared demands are channels under their own names.
+        ``"reading"`` of a sensor, ``"drive"`` from controller to actuator, or ``"demand"``, which
+        is a field of the stimulus. Undeclared demands are channels under their own names.
     seen
-        ``seen(value, par)``: the signal at a value, affine in the value. Default: the value.
+        ``seen(value, par)``: the signal for a value, affine in the value. Default: the value.
     stuck
         Default value of ``stuck``, in ``unit``.
     offset
-        Default value of ``offset``, ``drift`` per second, and the standard deviation of ``noise``.
+        Default value of ``offset``, of ``drift`` per second, and of the standard deviation of
+        ``noise``.
     task
-        For a drive: the task that updates it, if that task may be late.
+        For a drive, the task that updates it, if the task may be late.
     """
 
     name: str
@@ -88,7 +89,7 @@ class Channel:
 
 @dataclass(frozen=True)
 class Fault:
-    """A brake's failure that changes several parameters together.
+    """Failure of a brake that changes several parameters together.
 
     Parameters
     ----------
@@ -99,9 +100,9 @@ class Fault:
     changes
         ``changes(par, value)``: parameters and choices that change, by dotted name.
     assembly
-        Name of its assembly, or names of several.
+        Name of the assembly, or names of several assemblies.
     unit
-        SI unit of its value; empty if the fault has no value.
+        SI unit of the fault's value; empty if the fault has no value.
     value
         Default value.
     """
@@ -114,7 +115,7 @@ class Fault:
     value: float = 0.0
 
     def is_of(self, assembly: str) -> bool:
-        """Return whether the assembly with a name has this failure."""
+        """Return whether the assembly with this name has the failure."""
         return assembly in ((self.assembly,) if isinstance(self.assembly, str) else self.assembly)
 
 
@@ -127,7 +128,7 @@ class Channels:
     name
         Name of the assembly.
     channels
-        Signals that faults can falsify, in addition to its demands.
+        Signals that faults can falsify, in addition to the assembly's demands.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""Ctrl-C at the wrong moment: deferred where it would be lost, raised again where it was lost."""
+"""Ctrl-C at the wrong time: deferred if it would be lost, and raised again if it was lost."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from types import FrameType
 
 from bywire.core.machine import worker_count
 
-_PAUSE = 0.2  # seconds until an interrupt that may have been swallowed is raised again
+_PAUSE = 0.2  # seconds before an interrupt that may have been swallowed is raised again
 
 
 class _Interrupts:
-    """Handler of Ctrl-C in a command, which raises again what a library has swallowed."""
+    """Handler of Ctrl-C in a command, which raises an interrupt again if a library swallowed it."""
 
     def __init__(self) -> None:
         self.arrived = False
@@ -29,7 +29,7 @@ class _Interrupts:
         """Handle the signal."""
         timer, self._again = self._again, None
         if timer is not None and not timer.is_alive() and not self._is_pending:
-            return  # sent by our timer, after the interrupt had been handled
+            return  # our timer sent the signal after the interrupt had been handled
         self.arrived = True
         self._is_pending = _in_library(frame)
         if self._is_pending:
@@ -69,7 +69,7 @@ _current: list[_Interrupts] = []
 
 
 def interrupt_handled() -> None:
-    """Declare an interrupt handled, where a caller caught KeyboardInterrupt and continues."""
+    """Declare an interrupt handled, for a caller that caught KeyboardInterrupt and continues."""
     for each in _current:
         each.handled()
 
@@ -78,13 +78,13 @@ def interrupt_handled() -> None:
 def interrupts_noted() -> Iterator[Callable[[], bool]]:
     """Yield a function that returns whether Ctrl-C was pressed since the block began.
 
-    Ctrl-C raises KeyboardInterrupt as usual. Where CasADi calls Python, however, CasADi may replace
-    that exception with an error of its own, or drop it. Python itself drops exceptions that are
-    raised during cleanup. In these cases the interrupt is raised again until it is handled.
+    Ctrl-C raises KeyboardInterrupt as usual. However, if CasADi calls Python, it may replace this
+    exception with an error of its own, or drop it. Python itself drops exceptions that are raised
+    during cleanup. In these cases, the interrupt is raised again until it is handled.
     """
     previous = signal.getsignal(signal.SIGINT)
     if threading.current_thread() is not threading.main_thread() or not callable(previous):
-        yield lambda: False  # no interrupt arrives here
+        yield lambda: False  # interrupts never reach this thread
         return
     interrupts = _Interrupts()
     _current.append(interrupts)
@@ -101,14 +101,14 @@ def interrupts_noted() -> Iterator[Callable[[], bool]]:
 
 @contextmanager
 def interrupts_deferred() -> Iterator[None]:
-    """Defer Ctrl-C until the block ends; then raise KeyboardInterrupt.
+    """Defer Ctrl-C until the block ends, and then raise KeyboardInterrupt.
 
     Use it while building symbolic graphs. CasADi swallows exceptions that are raised while it
     inspects its arguments, including KeyboardInterrupt, so the user's Ctrl-C would have no effect.
     """
     previous = signal.getsignal(signal.SIGINT)
     if threading.current_thread() is not threading.main_thread() or not callable(previous):
-        yield  # no interrupt arrives here
+        yield  # interrupts never reach this thread
         return
     arrived: list[int] = []
     signal.signal(signal.SIGINT, lambda number, _: arrived.append(number))
@@ -117,12 +117,12 @@ def interrupts_deferred() -> Iterator[None]:
     finally:
         signal.signal(signal.SIGINT, previous)
         if arrived:
-            previous(signal.SIGINT, None)  # an enclosing `interrupts_noted` notes it
+            previous(signal.SIGINT, None)  # an enclosing `interrupts_noted` records it
             raise KeyboardInterrupt
 
 
 class _Stops(threading.local):
-    """Events that stop a thread's work; the main thread has none, since Ctrl-C reaches it."""
+    """Events that stop a thread's work; the main thread has none, because Ctrl-C reaches it."""
 
     events: tuple[threading.Event, ...] = ()
 
@@ -147,7 +147,8 @@ def raise_if_stopped() -> None:
 def thread_pool(threads: int | None = None) -> Iterator[ThreadPoolExecutor]:
     """Yield a pool of threads that end promptly when an exception leaves the block.
 
-    Ctrl-C reaches only the main thread. Threads that a pool's thread starts also end with it.
+    Ctrl-C reaches only the main thread. Threads that are started by a pool's thread also end with
+    it.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Names that a package loads on first use; only the stub next to the package declares them."""
+"""Names that a package loads on first use, declared only in the stub next to the package."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ class LazyNames:
     Parameters
     ----------
     file
-        ``__init__.py`` of the package. The stub next to it, which type checkers also read, has
-        lines ``from HOME import NAME as NAME``. An object with another name in its home module is
-        imported ``as _NAME``, with a line ``NAME = _NAME`` for type checkers.
+        ``__init__.py`` of the package. The stub next to it, which type checkers also read, contains
+        lines ``from HOME import NAME as NAME``. If an object has another name in its home module,
+        the line imports it ``as _NAME``, and a line ``NAME = _NAME`` follows for type checkers.
     """
 
     def __init__(self, file: str) -> None:
@@ -24,7 +24,7 @@ class LazyNames:
 
     @cached_property
     def homes(self) -> dict[str, tuple[str, str]]:
-        """Name -> module, and the object's name in that module."""
+        """Module of each name, and the object's name in this module."""
         lines = self._stub.read_text(encoding="utf-8").splitlines()
         words = [line.split() for line in lines if line.startswith("from ")]
         return {name.removeprefix("_"): (home, there) for _, home, _, there, _, name in words}
@@ -34,7 +34,7 @@ class LazyNames:
         return sorted(name for name in self.homes if not name.startswith("_"))
 
     def load(self, name: str) -> Any:
-        """Return the object with a name, or the list of all names for ``__all__``.
+        """Return the object with a name, or a list of all names for ``__all__``.
 
         Raises
         ------

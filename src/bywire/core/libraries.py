@@ -1,11 +1,12 @@
-"""Libraries: their threads, their unwanted imports, and how to install optional ones.
+"""Libraries: their threads, their unwanted imports, and the installation of optional libraries.
 
-Linear algebra runs on one thread. The systems here are small: tens of unknowns, Jacobians with a
-few columns. BLAS threads would wait for each other longer than they compute. They spin while they
-wait, which takes the cores from simulations: on one thread, reproducing Dardanelli et al. (2010)
-takes two thirds of the time. Sums are also independent of the number of cores.
+Linear algebra runs on one thread. The systems here are small, with tens of unknowns and a few
+columns in a Jacobian. BLAS threads would spend more time waiting for each other than computing.
+They spin while they wait and thus take the cores from simulations. On one thread, reproducing
+Dardanelli et al. (2010) takes two thirds of the time. Sums are also independent of the number of
+cores.
 
-A number of threads that the environment sets is never changed here.
+This module never changes a number of threads that the environment sets.
 """
 
 from __future__ import annotations
@@ -22,23 +23,23 @@ if TYPE_CHECKING:
     from threadpoolctl import threadpool_limits
 
 _DEFAULTS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-# Libraries that start threads on import, which bywire never uses: numexpr, which pandas loads, and
-# pyarrow's allocator. A process with threads cannot be copied safely.
+# Libraries that start threads on import, which bywire never uses: numexpr, which pandas imports,
+# and the allocator of pyarrow. A process with threads cannot be copied safely.
 _IDLE_THREADS = {
     "NUMEXPR_NUM_THREADS": "1",
     "JE_ARROW_MALLOC_CONF": "background_thread:false",
 }
 VARIABLES = (*_DEFAULTS, "OMP_NUM_THREADS", "BLIS_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
-"""environment variables with which a user sets the number of threads"""
+"""environment variables that set the number of threads"""
 
 
 def one_thread_variables() -> dict[str, str]:
-    """Return environment variables for a child process whose libraries start no threads."""
+    """Return the environment variables for a child process whose libraries start no threads."""
     return {**dict.fromkeys(_DEFAULTS, "1"), "OMP_NUM_THREADS": "1", **_IDLE_THREADS}
 
 
 def keep_one_thread() -> None:
-    """Limit this process to one thread, even if its libraries are loaded already."""
+    """Limit this process to one thread, even if its libraries are already loaded."""
     os.environ.update({k: v for k, v in _IDLE_THREADS.items() if k not in os.environ})
     if _is_chosen():
         return
@@ -82,7 +83,7 @@ class _Limited:
         """Set the limit unless it is set already."""
         with self._lock:
             if self._limits is None:
-                import scipy.linalg  # noqa: F401  its own BLAS must be loaded to be limited
+                import scipy.linalg  # noqa: F401  a limit affects only a BLAS that is loaded
                 from threadpoolctl import threadpool_limits
 
                 self._limits = threadpool_limits(1, "blas")
@@ -108,7 +109,7 @@ _modules: dict[str, Any] = sys.modules
 def leave_out_dask() -> None:
     """Keep xarray from importing dask in this process.
 
-    To recognize dask arrays, xarray imports ``dask.array`` if it is installed. That takes half as
+    To recognize dask arrays, xarray imports ``dask.array`` if it is installed. This takes half as
     long as a short run.
     """
     _modules.setdefault("dask", None)
@@ -121,7 +122,7 @@ def allow_dask() -> None:
 
 
 def silence_matplotlib() -> None:
-    """Silence matplotlib's note that its fonts are elsewhere because home is read-only."""
+    """Silence matplotlib's note on the location of its fonts if the home folder is read-only."""
     logging.getLogger("matplotlib").setLevel(logging.ERROR)
 
 
@@ -129,7 +130,7 @@ def silence_matplotlib() -> None:
 
 
 def how_to_install(extra: str) -> str:
-    """Return the command that installs an extra from a clone; no package index has bywire.
+    """Return the command that installs an extra from a clone, because no package index has bywire.
 
     Examples
     --------

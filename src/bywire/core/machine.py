@@ -18,7 +18,7 @@ def machine_memory() -> float:
 
 
 def address_space() -> int:
-    """Return this process's limit of address space in bytes; 0 if there is no limit."""
+    """Return the limit of this process's address space in bytes; 0 if there is no limit."""
     if os.name != "posix":
         return 0
     import resource
@@ -28,14 +28,14 @@ def address_space() -> int:
 
 
 def worker_count(workers: int | None = None, most: int | None = None) -> int:
-    """Return the number of threads or processes of a piece of work, for all of bywire.
+    """Return the number of threads or processes for a piece of work.
 
     Parameters
     ----------
     workers
         Number that the caller requests, >= 1. Default: one per core.
     most
-        Largest useful number, such as one per case.
+        Maximum useful number, such as one per case.
     """
     count = workers or os.cpu_count() or 1
     return count if most is None else max(1, min(count, most))

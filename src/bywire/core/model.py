@@ -1,18 +1,18 @@
 """The model protocol: everything the engine needs from a brake, a rig or another system.
 
-A model is written as pure functions of named tuples. The engine evaluates them once on symbols
+A model consists of pure functions of named tuples. The engine evaluates them once on symbols
 and needs no other code of the model. A model has:
 
 * smooth dynamics in mass form, ``mass_k(xe) dx_k/dt = balance_k(x, xe, ...)``;
-* dry *frictions*: a velocity state whose equation carries a set-valued force between two bounds
-  while it is exactly zero;
-* one-sided *limits*: a state that cannot fall below zero (a check valve, a stop);
-* *contact groups*: unilateral contacts whose compliances couple them;
+* dry *frictions*: velocity states whose equations contain a set-valued force between two bounds
+  while the velocity is exactly zero;
+* one-sided *limits*: states that cannot fall below zero (a check valve, a stop);
+* *contact groups*: unilateral contacts that are coupled by their compliances;
 * *tasks*: the sampled controllers, each with its own period, which share one memory;
-* *powers*, integrated along with the states, for the energy balance.
+* *powers*, which are integrated along with the states for the energy balance.
 
-``x`` enters the implicit solve. ``xe`` is the same state as a value only: the Newton matrix omits
-its derivatives. Use it for slowly varying geometry and periodic terms.
+``x`` enters the implicit solve. ``xe`` is the same state, but only its value counts: the Newton
+matrix omits its derivatives. Use it for slowly varying geometry and periodic terms.
 """
 
 from __future__ import annotations
@@ -32,17 +32,17 @@ Matrix = tuple[tuple[float, ...], ...]
 
 @dataclass(frozen=True)
 class Task:
-    """One sampled controller.
+    """Sampled controller.
 
     Parameters
     ----------
     name
         Name in recordings and messages.
     period
-        Sample time [s]; a whole number of substeps.
+        Sample time [s], a whole number of substeps.
     tick
-        ``tick(x, memory, stimulus, par) -> memory``: reads the plant at the sampling instant and
-        returns the memory with this task's fields updated.
+        ``tick(x, memory, stimulus, par) -> memory``: reads the plant at the sampling instant, and
+        returns the memory with the task's fields updated.
     """
 
     name: str
@@ -51,14 +51,14 @@ class Task:
 
 
 class Model(Protocol):
-    """A system that the engine integrates. All methods are pure and accept symbols.
+    """System that the engine integrates. All methods are pure and accept symbols.
 
-    A model may inherit from this class; frictions, limits and contacts then default to none.
+    A model may inherit from this class. By default, it then has no frictions, limits and contacts.
     """
 
     @property
     def name(self) -> str:
-        """Identify the model in messages and recordings."""
+        """Name of the model in messages and recordings."""
         ...
 
     @property
@@ -93,19 +93,20 @@ class Model(Protocol):
 
     @property
     def limits(self) -> tuple[str, ...]:
-        """States that cannot fall below zero; rarely at zero for long (see ``scheme``)."""
+        """States that cannot fall below zero and are rarely at zero for long (see ``scheme``)."""
         return ()
 
     @property
     def usually_open(self) -> tuple[bool, ...]:
-        """Whether each contact group rarely touches, as end stops do. Default: none.
+        """Whether each contact group rarely touches, like end stops. Default: no group.
 
-        This affects speed only. An open group costs one check; a touching group is solved exactly.
+        This affects only speed. An open group costs one check, and a touching group is solved
+        exactly.
         """
         return ()
 
     def tasks(self, par: Any) -> tuple[Task, ...]:
-        """Return the controllers, in the order in which they run when due together."""
+        """Return the controllers, in the order in which they run if several are due."""
         ...
 
     def mass(self, xe: Any, par: Any) -> Any:
@@ -121,14 +122,14 @@ class Model(Protocol):
     ) -> tuple[Bounds, ...]:
         """Return (low, high) per friction, low <= 0 <= high, in the unit of its equation.
 
-        The force is ``low`` where the velocity is positive, ``high`` where it is negative.
+        The force is ``low`` if the velocity is positive, and ``high`` if it is negative.
         """
         return ()
 
     def compliance(self, par: Any) -> tuple[Matrix, ...]:
         """Return one positive definite compliance matrix per contact group.
 
-        It is empty if a choice omits the group, which then has no overlaps and no forces.
+        A matrix is empty if a choice omits the group, which then has no overlaps and no forces.
         """
         return ()
 
@@ -151,8 +152,8 @@ class Model(Protocol):
     ) -> Any:
         """Return the rates of the Flow at the midpoint of a substep.
 
-        ``xe`` is the predicted midpoint, as in ``balance``, so its periodic terms are computed only
-        once. ``rate`` is dx/dt. ``reaction`` contains the friction forces, then the limits' forces.
+        ``xe`` is the predicted midpoint, as in ``balance``, so periodic terms are computed only
+        once. ``rate`` is dx/dt. ``reaction`` contains the friction forces, then the limit forces.
         """
         ...
 
@@ -169,10 +170,10 @@ class Model(Protocol):
         ...
 
     def rest(self, par: Any) -> tuple[Any, Any]:
-        """Return a State and a Memory in which the system rests without stimulus.
+        """Return a State and a Memory in which the system is at rest without stimulus.
 
-        Generic experiments and checks start here. The default, all zeros, fits a system in which
-        nothing is preloaded, filled or held.
+        Generic experiments and checks start here. The default, all zeros, is correct for a system
+        in which nothing is preloaded, filled or held.
         """
         return zeros(self.State), zeros(self.Memory)
 
@@ -189,9 +190,9 @@ class Model(Protocol):
         return []
 
     def remarks(self, recording: Any, par: Any) -> list[str]:
-        """Return notes above a run's key figures, such as on its controllers. Default: none.
+        """Return notes to print above a run's key figures. Default: none.
 
-        Unlike the texts of ``watch``, these are not warnings, and studies do not need them.
+        Unlike the texts from ``watch``, these are not warnings, and studies do not need them.
 
         Parameters
         ----------
@@ -210,7 +211,7 @@ class Model(Protocol):
         return None
 
     def silent(self, rows: Any, pars: Any) -> frozenset[str]:
-        """Return the parts that ``watch`` can skip in several cases; see `Assembly.silent`."""
+        """Return the parts that ``watch`` can skip for several cases; see `Assembly.silent`."""
         return frozenset()
 
     def may_warn(self, rows: Any, pars: Any) -> Sequence[int]:
@@ -233,7 +234,7 @@ def require_states(model: Any) -> None:
     Raises
     ------
     ModelError
-        With the declaration, the name, and the nearest state.
+        When a friction or limit is not a state, with its declaration, name, and the nearest state.
     """
     fields: tuple[str, ...] = getattr(model.State, "_fields", ())
     for kind in ("frictions", "limits") if fields else ():
@@ -263,10 +264,10 @@ def _declared(module: ModuleType) -> Iterator[type[Any]]:
 
 
 ASSEMBLIES: Kind[Any] = Kind("assembly", ("model", "models", "rigs"), _declared)
-"""the complete models of every brake, including rigs: classes, by their ``name``"""
+"""the complete models of all brakes, including rigs, as classes by their ``name``"""
 
 
-# --- Model wrapped around another one
+# --- Model wrapped around another model
 
 _PROTOCOL = frozenset(name for name in vars(Model) if not name.startswith("_"))
 if TYPE_CHECKING:
@@ -276,12 +277,12 @@ else:
 
 
 class Wrapping(_Protocol):
-    """A model wrapped around another one; a subclass may declare another memory.
+    """Model that is wrapped around another model; a subclass may declare another memory.
 
     Parameters
     ----------
     inner
-        The wrapped model, which provides every protocol member that is not defined here.
+        The wrapped model, which provides all protocol members that this class does not define.
     """
 
     def __init__(self, inner: Model) -> None:

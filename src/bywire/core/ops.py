@@ -1,10 +1,10 @@
 """Elementary functions that dispatch on the type of their argument.
 
-The equations of plant and control call only these functions. The same equation therefore runs on
-floats, NumPy arrays, CasADi symbols and any object with its own operations (a method
-``_bywire_op``, as the dimension tests' quantities have). Floats do not need CasADi. For a float,
-exponential, logarithm, power, sine and cosine agree bit for bit with kernels and exported ECU code.
-For an array, they come from NumPy.
+The equations of plant and control call only these functions. So the same equation works with
+floats, NumPy arrays, CasADi symbols and any object that has its own operations (a method
+``_bywire_op``, such as the quantities of the dimension tests). Floats do not need CasADi. For a
+float, exponential, logarithm, power, sine and cosine are bit-identical to kernels and exported ECU
+code. For an array, they come from NumPy.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ _SINGLES: dict[str, Callable[..., Any]] = {
     "exp": elementary_single.exp,
     "sin": elementary_single.sin,
     "cos": elementary_single.cos,
-    # Of 0.0 and -0.0 return the first, as for floats; NumPy may return either.
+    # For 0.0 and -0.0, return the first, like the float version. NumPy may return either.
     "fmax": lambda x, y: max(np.float32(x), np.float32(y)),
     "fmin": lambda x, y: min(np.float32(x), np.float32(y)),
 }
@@ -71,20 +71,20 @@ def exp(x: float) -> float:
 
 
 DECAYED = 40.0
-"""argument beyond which ``decay`` is 0: exp(-40) = 4e-18 is below the resolution of 1.0"""
+"""argument above which ``decay`` is 0, because exp(-40) = 4e-18 is below the resolution of 1.0"""
 
 
 def decay(x: float, *, rests: bool = False) -> float:
-    """Return e to the power of -x for a pure number x >= 0, and exactly 0 beyond x = 40.
+    """Return e to the power of -x for a pure number x >= 0, and exactly 0 for x > 40.
 
-    Use it for terms that are added to a number of the order of one. Far out on a Stribeck curve,
-    kernels can then skip the exponential.
+    Use it for terms that are added to a number of the order of one. At high speed on a Stribeck
+    curve, kernels can then skip the exponential.
 
     Parameters
     ----------
     rests
-        Whether x is often exactly 0. Kernels then also skip the exponential at 0, at the cost of
-        two operations for other x.
+        Whether x is often exactly 0. Kernels then also skip the exponential at 0, but need two more
+        operations for other x.
     """
     if not rests:
         return where(x < DECAYED, exp(-x), 0.0)
@@ -99,7 +99,7 @@ def log(x: float) -> float:
 
 
 def sqrt(x: float) -> float:
-    """Return the square root; keep x away from 0, where its derivative is infinite."""
+    """Return the square root. Keep x away from 0, where the derivative is infinite."""
     return _apply("sqrt", x)  # type: ignore[no-any-return]
 
 
@@ -124,7 +124,7 @@ def fabs(x: float) -> float:
 
 
 def floor(x: float) -> float:
-    """Return the largest whole number that is not above x; x is a pure number."""
+    """Return the largest whole number that does not exceed x; x is a pure number."""
     return _apply("floor", x)  # type: ignore[no-any-return]
 
 
@@ -149,19 +149,19 @@ def clip(x: float, low: float, high: float) -> float:
 
 
 def where(condition: Any, then: float, otherwise: float) -> float:
-    """Return ``then`` where the condition is true, else ``otherwise``; both are evaluated."""
+    """Return ``then`` if the condition is true, else ``otherwise``; both are evaluated."""
     if isinstance(condition, (bool, np.bool_)):
         return then if condition else otherwise
     return _apply("where", condition, then, otherwise)  # type: ignore[no-any-return]
 
 
 def interpolate(x: float, xs: tuple[float, ...], ys: tuple[float, ...]) -> float:
-    """Return the piecewise linear interpolation of (xs, ys), constant outside.
+    """Return the piecewise linear interpolation of (xs, ys), which is constant outside the nodes.
 
     Parameters
     ----------
     xs, ys
-        Nodes, shape (n,) each, xs increasing.
+        Nodes, shape (n,) each; xs must increase.
     """
     y = ys[0]
     for x0, x1, y0, y1 in zip(xs[:-1], xs[1:], ys[:-1], ys[1:], strict=True):

@@ -1,4 +1,4 @@
-"""Parsing of options such as ``motor.R_m=0.4 ohm`` in commands and forms."""
+"""Parser of options such as ``motor.R_m=0.4 ohm`` in commands and forms."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ _INPUT = ("--input", "Inputs")  # in commands and in forms
 _CHANGE = "KEY=VALUE, for example motor.R_m=0.4ohm"
 _FORMS = {
     **dict.fromkeys(
-        _INPUT, "STIMULUS=SIGNAL, a stimulus of the model and the measured signal: p_set=p_ref"
+        _INPUT,
+        "STIMULUS=SIGNAL, a stimulus of the model and the measured signal, such as p_set=p_ref",
     ),
     "--option": "NAME=VALUE, an option of the method ('bywire list METHOD')",
     "--prior": "NAME=VALUE +- DEVIATION, for example 'motor.R_m=0.35 +- 0.02 ohm'",
@@ -20,7 +21,7 @@ _FORMS = {
 
 
 def named(texts: Iterable[str] | None, flag: str) -> dict[str, str]:
-    """Return names and texts of an option ``NAME`` or ``NAME=TEXT``. Default text: empty.
+    """Return names and texts of an option ``NAME`` or ``NAME=TEXT``; the default text is empty.
 
     Raises
     ------
@@ -39,7 +40,7 @@ def named(texts: Iterable[str] | None, flag: str) -> dict[str, str]:
             )
         if name in values:
             raise ParameterError(
-                f"{flag} {text}: {name} is given twice. Remove one of them",
+                f"{flag} {text}: {name} appears twice. Remove one of them",
                 name=flag,
                 value=text,
             )
@@ -50,12 +51,12 @@ def named(texts: Iterable[str] | None, flag: str) -> dict[str, str]:
 def changes(texts: Iterable[str] | None, flag: str = "--set") -> dict[str, str]:
     """Return keys and values of ``--set KEY=VALUE`` or a similar option.
 
-    With ``--input STIMULUS``, the measured signal of the same name drives the stimulus.
+    With ``--input STIMULUS``, the measured signal with the same name drives the stimulus.
 
     Raises
     ------
     ParameterError
-        For a text without the form KEY=VALUE, and for repeated keys.
+        For a text that does not have the form KEY=VALUE, and for repeated keys.
     """
     values: dict[str, str] = {}
     for text in texts or ():
@@ -78,7 +79,7 @@ def changes(texts: Iterable[str] | None, flag: str = "--set") -> dict[str, str]:
 
 
 def read_count(text: str) -> int | None:
-    """Return a text of at most `DIGITS` digits as a whole number >= 0; None for other texts.
+    """Return a string of at most `DIGITS` digits as a whole number >= 0; None for other strings.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Parameter sets: frozen, validated trees of physical values and structural choices."""
+"""Parameter sets, which are frozen, validated trees of physical values and structural choices."""
 
 from __future__ import annotations
 
@@ -81,9 +81,9 @@ class Leaf:
 # --- Parameter sets
 # A *leaf* is a number with a unit. Its dotted name (``motor.R_m``) is the same in Python, in bench
 # files, in recordings and on the command line. A *choice* is a field that selects equations
-# (``gear.law = "directional"``). It affects the compiled code, never a value.
+# (``gear.law = "directional"``). It affects the compiled code but never a value.
 #
-# Studies and searches make thousands of sets per second that differ in the same few names.
+# Studies and searches create thousands of sets per second that differ in the same few names.
 
 S = TypeVar("S", bound=BaseModel)
 
@@ -115,7 +115,7 @@ def _reader(names: tuple[str, ...]) -> Callable[[Any], tuple[Any, ...]]:
 
 
 class Places(NamedTuple):
-    """Places of dotted names: a set's own fields, and places in its groups."""
+    """Places of dotted names: fields of the set, and places in its groups."""
 
     fields: tuple[tuple[str, str], ...]
     """field and dotted name"""
@@ -142,9 +142,10 @@ class Places(NamedTuple):
         Raises
         ------
         ValueError
-            When a value is not valid or a rule is broken; pydantic's `ValidationError` is one.
+            When a value is not valid or violates a rule; pydantic's `ValidationError` is a
+            subclass.
         AssertionError
-            When an author's ``assert`` fails.
+            When an ``assert`` of an author fails.
         """
         fields = fields_of(node)
         for name, inner in self.groups:
@@ -163,7 +164,7 @@ class Places(NamedTuple):
 
 @cache
 def _rules(cls: type[BaseModel]) -> tuple[str, ...] | None:
-    """Return a class's rules between valid groups, or None if it has other validators."""
+    """Return the rules of a class between valid groups, or None if it has other validators."""
     known, groups = cls.__pydantic_decorators__, cls.model_fields.values()
     judges = known.model_validators
     does_more = (
@@ -184,20 +185,20 @@ def _is_group(annotation: Any) -> bool:
     return isinstance(annotation, type) and issubclass(annotation, BaseModel)
 
 
-# --- Errors for values that are not valid, with one line for each value
+# --- Errors for invalid values, with one line for each value
 
 
 class RuleError(ValueError):
-    """Two values of a parameter class that contradict each other, for the class's validator.
+    """Error of a parameter class's validator for two values that contradict each other.
 
     Parameters
     ----------
     name
-        Field of the class that is to be changed.
+        Field of the class that must change.
     value
-        Its value with its unit.
+        Value of the field, with its unit.
     valid
-        Its valid values, given the others; ends the sentence "it must be ...".
+        Valid values, given the other values; ends the sentence "it must be ...".
     reason
         Reason or next step; may be empty.
 
@@ -219,14 +220,14 @@ class RuleError(ValueError):
         )
 
 
-_BOOL, _TEXT = "it must be true or false", "it must be a text"
+_BOOL, _TEXT = "it must be true or false", "it must be a string"
 _PLAIN_WORDS = {"bool_parsing": _BOOL, "bool_type": _BOOL, "string_type": _TEXT}
 
 
 def refusal(
     error: ValidationError, owner: str, leaves: Mapping[str, Leaf], texts: Mapping[str, str]
 ) -> InputError:
-    """Return a single error for all values that are not valid, with a line for each.
+    """Return a single error for all invalid values, with one line for each value.
 
     Parameters
     ----------
@@ -241,7 +242,7 @@ def refusal(
     """
     details: list[dict[str, Any]] = [dict(detail) for detail in error.errors()]
     places = {detail["loc"][:-1] for detail in details}
-    # Pydantic also counts a table with a wrong node as too short; only the node gets a line.
+    # Pydantic also reports a table with an invalid node as too short. Report only the node.
     details = [d for d in details if not (_is_length(d) and d["loc"] in places)]
     each = [_explain(detail, owner, leaves, texts) for detail in details]
     if len(each) == 1:
@@ -280,7 +281,7 @@ def _explain(
 def _out_of_range(name: str, value: Any, leaf: Leaf, kind: str, text: str) -> InputError:
     symbol = leaf.unit.symbol
     number, written = split(text)
-    if symbol == "rad" and written not in ("", symbol):  # drawings have angles in degrees
+    if symbol == "rad" and written not in ("", symbol):  # drawings specify angles in degrees
         return not_valid(name, f"{number} {written}", kind + leaf.range_in(written))
     unit = "" if symbol == "1" else f" {symbol}"
     got = "" if written in ("", symbol) else f"got {quoted(text)}"
@@ -315,11 +316,11 @@ T = TypeVar("T", bound="ParameterSet")
 
 
 _SIMPLE = {float, str}  # types that do not depend on the notation
-_OBJECTS = "_carries_objects"  # in the __dict__ of a set whose leaves need not be numbers
+_OBJECTS = "_carries_objects"  # in the __dict__ of a set whose leaves may be other objects
 
 
 class ParameterSet(BaseModel):
-    """Base of all parameter sets: immutable, no unknown keys, no silent defaults."""
+    """Base of all parameter sets, which are immutable, without unknown keys or silent defaults."""
 
     model_config = ConfigDict(
         frozen=True,
@@ -330,22 +331,22 @@ class ParameterSet(BaseModel):
 
     @classmethod
     def create(cls, values: Mapping[str, Any]) -> Self:
-        """Build the set from dotted names; errors quote the text of `Written` numbers.
+        """Build the set from values by dotted name; errors quote the text of `Written` numbers.
 
         Raises
         ------
         ParameterError
-            With field, value, unit and valid range.
+            When a value is invalid; the message contains field, value, unit and valid range.
         UnknownNameError
-            With the nearest valid names.
+            When a name is unknown; the message contains the nearest valid names.
         """
         return _validated(cls, {}, values)
 
     def replace(self, values: Mapping[str, Any]) -> Self:
-        """Return a copy with other values at dotted names; the affected groups are validated.
+        """Return a copy with other values at dotted names, which validates the affected groups.
 
-        If nothing changes, the result is the set itself. A set with other objects than numbers
-        (`with_leaves`) is not validated.
+        If nothing changes, the result is the set itself. A set that contains objects other than
+        numbers (`with_leaves`) is not validated.
         """
         if _OBJECTS in self.__dict__:
             return cast(Self, _as_given(self, "", values))
@@ -353,7 +354,7 @@ class ParameterSet(BaseModel):
         if _are_there(values, numbers, choices):
             return self
         copy = _exchanged(self, values)
-        # All others are cached: thousands of sets per second differ from one in few values.
+        # All other values are cached, because thousands of sets per second differ in few values.
         given = read(copy, tuple(values))
         new = {name: value for name, value in given.items() if type(value) is float}
         chosen = {name: value for name, value in given.items() if type(value) is str}
@@ -377,7 +378,7 @@ class ParameterSet(BaseModel):
         return dict(self._by_name("numbers"))
 
     def choices(self) -> dict[str, Any]:
-        """Return the structural choices by dotted name, including every table's length."""
+        """Return the structural choices by dotted name, including the length of each table."""
         return dict(self._by_name("choices"))
 
     def has_choices_of(self, other: ParameterSet) -> bool:
@@ -386,7 +387,7 @@ class ParameterSet(BaseModel):
         return here is there or here == there
 
     def value(self, name: str) -> Any:
-        """Return the leaf or choice with a known dotted name; ``name.0`` for a table's node."""
+        """Return the leaf or choice with this dotted name; ``name.0`` is the node of a table."""
         value: Any = self
         for step in name.split("."):
             value = value[int(step)] if isinstance(value, tuple) else getattr(value, step)
@@ -399,7 +400,7 @@ class ParameterSet(BaseModel):
     def _by_name(self, kind: str, prefix: str = "") -> dict[str, Any]:
         """Return ``values``, ``numbers`` or ``choices`` by dotted name.
 
-        ``prefix``: prefix of the names. A group that several sets share caches its content.
+        ``prefix``: prefix of the names. Several sets can share a group, which caches its content.
         """
         known = self._known
         if (kind, prefix) not in known:
@@ -415,8 +416,8 @@ class ParameterSet(BaseModel):
     def with_leaves(self, values: Mapping[str, Any]) -> Self:
         """Return a set of the same structure with other objects as its numbers.
 
-        Other values are unchanged. The objects (symbols, quantities with units) are not validated.
-        They serve to evaluate equations, not to build parameter sets.
+        All other values stay the same. The objects (symbols, quantities with units) are not
+        validated. They are for the evaluation of equations.
         """
         return cast(Self, _with_objects(_rebuilt(self, "", values)))
 
@@ -436,7 +437,7 @@ def leaf_table(pars: Sequence[ParameterSet]) -> NDArray[np.float64]:
 
 @cache
 def leaf_fields(cls: type[ParameterSet], prefix: str = "") -> Mapping[str, Leaf]:
-    """Return the description of every number of a parameter class, by dotted name."""
+    """Return the description of each number of a parameter class, by dotted name."""
     leaves: dict[str, Leaf] = {}
     for name, info in cls.model_fields.items():
         dotted = f"{prefix}{name}"
@@ -465,9 +466,9 @@ def choice_fields(cls: type[ParameterSet], prefix: str = "") -> tuple[str, ...]:
 
 
 def choices_of(cls: type[ParameterSet], name: str) -> tuple[Any, ...]:
-    """Return the valid values of a structural choice; empty if any text is valid.
+    """Return the valid values of a structural choice; empty if any string is valid.
 
-    The values are texts, or true and false.
+    The values are strings, or true and false.
     """
     *groups, last = name.split(".")
     for group in groups:
@@ -477,12 +478,12 @@ def choices_of(cls: type[ParameterSet], name: str) -> tuple[Any, ...]:
 
 
 def require_units(cls: type[ParameterSet], prefix: str = "") -> None:
-    """Reject a class with numbers without a unit, which would count as structural choices.
+    """Reject a class with numbers that have no unit, which would count as structural choices.
 
     Raises
     ------
     ModelError
-        With the first such number and its place.
+        When a number has no unit; the message contains the first one and its place.
     """
     for name, info in cls.model_fields.items():
         inner = info.annotation
@@ -540,7 +541,7 @@ def _is_number(value: Any) -> bool:
 
 
 def _rebuilt(node: ParameterSet, prefix: str, values: Mapping[str, Any]) -> ParameterSet:
-    """Return a set of objects; groups without new objects are unchanged."""
+    """Return a set of objects, in which groups without new objects are unchanged."""
     fields = fields_of(node)
     for name, value in fields.items():
         dotted = f"{prefix}{name}"
@@ -591,7 +592,7 @@ def _plain(name: str, value: Any, texts: dict[str, str]) -> Any:
 def _are_there(
     values: Mapping[str, Any], numbers: Mapping[str, float], choices: Mapping[str, Any]
 ) -> bool:
-    """Return whether the values at these names are plain numbers and texts."""
+    """Return whether the values at these names are plain numbers and strings."""
     for name, value in values.items():
         known = numbers if type(value) is float else choices if type(value) is str else {}
         if name not in known or known[name] != value:
@@ -599,7 +600,7 @@ def _are_there(
     return True
 
 
-@lru_cache(maxsize=256)  # all cases of a study differ in the same names
+@lru_cache(maxsize=256)  # the cases of a study differ in the same names
 def _places(cls: type[ParameterSet], names: tuple[str, ...]) -> Places:
     """Return the places of dotted names, or raise an error for an unknown name."""
     for name in names:
@@ -623,7 +624,7 @@ def _exchanged(node: T, values: Mapping[str, Any]) -> T:
 def _validated(cls: type[T], tree: dict[str, Any], values: Mapping[str, Any]) -> T:
     """Build a set from a tree with other values at dotted names.
 
-    Unchanged groups are reused, since searches and studies build thousands of sets per second.
+    It reuses unchanged groups, because searches and studies build thousands of sets per second.
     """
     texts: dict[str, str] = {}
     for name, value in values.items():
@@ -641,21 +642,21 @@ def _validated(cls: type[T], tree: dict[str, Any], values: Mapping[str, Any]) ->
         raise refusal(error, cls.__name__, leaf_fields(cls), texts) from None
 
 
-# --- Notes: the texts below the fields of a class
-# They are read on demand, since reading sources when a class is built took a tenth of every
-# command's start-up time.
+# --- Notes: the strings below the fields of a class
+# They are read on demand, because reading sources during the creation of a class took a tenth of
+# every command's startup time.
 
 
 @cache
 def field_notes(cls: type[ParameterSet], prefix: str = "") -> Mapping[str, str]:
-    """Return the meaning of every number and choice of a parameter class, by dotted name.
+    """Return the meaning of each number and choice of a parameter class, by dotted name.
 
     Parameters
     ----------
     cls
-        A string below a field is its note; a field without one has the note ``""``.
+        Parameter class. A string below a field is its note. Without a string, the note is ``""``.
     prefix
-        Prefix of every name.
+        Prefix of all names.
     """
     written: dict[str, str] = {}
     for base in reversed(cls.__mro__):
@@ -683,7 +684,7 @@ def _written_under_fields(cls: type) -> Mapping[str, str]:
 def _written_in(source: str) -> Mapping[str, Mapping[str, str]]:
     """Return the notes below the fields of all classes in a file, by qualified name.
 
-    They are read together, since `inspect` would parse the whole file for each class.
+    The notes are read together, because `inspect` would parse the whole file for each class.
     """
     return {name: _texts(definition) for name, definition in _classes(ast.parse(source))}
 

@@ -1,4 +1,4 @@
-"""Parts of an assembly: elements by their modules, and subassemblies."""
+"""Parts of an assembly: elements, which are modules, and subassemblies."""
 
 from __future__ import annotations
 
@@ -65,29 +65,30 @@ class PartOptions(TypedDict, total=False):
     Parameters
     ----------
     par
-        Place of its parameters among the assembly's. Default: the part's name.
+        Place of the part's parameters among the assembly's parameters. Default: the part's name.
     suffix
-        Suffix of its states' names, for a second part of the same kind: ``"_2"``.
+        Suffix of the state names, for a second part of the same kind, such as ``"_2"``.
     which
-        Words for this part in labels, ``"front"``. Default: the suffix.
+        Words for this part in labels, such as ``"front"``. Default: the suffix.
     state
-        Names of its states in the assembly, if they differ from the element's.
+        Names of the states in the assembly, if they differ from the element's names.
     labels
-        Labels of its states, if they differ from the element's.
+        Labels of the states, if they differ from the element's labels.
     fixed
-        States that enter the element's own equations as values only: periodic terms, slow geometry.
+        States that enter the element's own equations as values only, for periodic terms and slowly
+        varying geometry.
     output
         Outputs and contact forces that become signals of the assembly, by their names there. A
-        tuple of names suffices if the names are the same.
+        tuple of names is sufficient if the names are the same.
     loss
-        Name of the energy that is the integral of its ``power_loss``; or names, by function of the
-        element. For a contact: its work minus its stored energy.
+        Name of the energy that is the integral of ``power_loss``, or names by function of the
+        element. For a contact, the loss is its work minus its stored energy.
     work
-        For a contact: name of the energy that is the integral of its ``power_in``.
+        For a contact, the name of the energy that is the integral of ``power_in``.
     rarely
-        For a contact: whether it rarely touches, like an end stop. This affects speed only.
+        For a contact, whether it rarely touches, like an end stop. This affects only speed.
     outside
-        Whether the energy balance excludes its stored energy.
+        Whether the energy balance excludes the part's stored energy.
     """
 
     par: str
@@ -134,7 +135,8 @@ class Part(Generic[X, U, F, P]):
     Parameters
     ----------
     element
-        Its module, with State, Input, Output, Parameters and functions under their usual names.
+        Module of the element, which contains State, Input, Output, Parameters and functions with
+        their usual names.
     options
         See `PartOptions`.
     """
@@ -209,17 +211,18 @@ class Part(Generic[X, U, F, P]):
         Raises
         ------
         ModelError
-            When it has no function of that name.
+            When the element has no function with this name.
         """
         value = getattr(self.element, name, None)
         if not callable(value):
             raise ModelError(
-                f"{self.where}: {self.kind} has no function {name}. Define it there", name=name
+                f"{self.where}: {self.kind} has no function {name}. Define it in the element",
+                name=name,
             )
         return typing.cast(Callable[..., Any], value)
 
     def states(self) -> dict[str, Signal]:
-        """Return its states by their names in the assembly."""
+        """Return the part's states by their names in the assembly."""
         if not self.has("State"):
             return {}
         signals = signals_of(self.element.State)
@@ -236,7 +239,7 @@ class Part(Generic[X, U, F, P]):
         return self.renamed.get(name, name) + self.suffix
 
     def outputs(self) -> dict[str, Signal]:
-        """Return the outputs and contact forces that the assembly records, by their names there."""
+        """Return the recorded outputs and contact forces, by their names in the assembly."""
         known: dict[str, Signal] = {}
         for kind in ("Output", "Forces"):
             if self.has(kind):
@@ -250,14 +253,14 @@ class Part(Generic[X, U, F, P]):
         }
 
     def output_value(self, name: str, wired: Wired[Any, Any, Any, Any]) -> Any:
-        """Return one of its outputs or contact forces at an instant."""
+        """Return one of the part's outputs or contact forces at an instant."""
         if self.has("Forces") and name in self.element.Forces._fields:
             return getattr(wired.f, name)
         return getattr(wired.call(self.function("output")), name)
 
     @cached_property
     def energies(self) -> dict[str, Signal]:
-        """Return the integrals of its powers, by name."""
+        """Return the integrals of the part's powers, by name."""
         if self.work:
             return {self.work: self._energy("power_in", self.work)}
         if self.has("Forces"):
@@ -287,7 +290,7 @@ class Part(Generic[X, U, F, P]):
     def group_sizes(self, par: Any) -> tuple[int, ...]:
         """Return the number of forces in each contact group; 0 if a choice omits the group.
 
-        If an element defines ``exists(par)``, its groups exist only where that function is true.
+        If an element defines ``exists(par)``, its groups exist only if that function returns true.
         """
         if not self.has("Forces"):
             return ()
@@ -297,17 +300,17 @@ class Part(Generic[X, U, F, P]):
         return sizes if there else (0,) * len(sizes)
 
     def parameters(self, par: Any) -> Any:
-        """Return its group of the assembly's parameters.
+        """Return the part's group of the assembly's parameters.
 
         Raises
         ------
         ModelError
-            When there is no group at its path.
+            When there is no group at this path.
         """
         return _parameters_at(self.path, par, self.where, f"Part({self.kind}, par='...')")
 
     def state_at(self, instant: Instant, fixed: tuple[str, ...] | None) -> Any:
-        """Return its state; ``fixed`` lists the value-only states, None for all of them."""
+        """Return the part's state; ``fixed`` lists the value-only states (None: all states)."""
         if not self.has("State"):
             raise ModelError(f"{self.where}: {self.kind} has no state", name=self.where)
         state_class: type[Any] = self.element.State
@@ -317,16 +320,16 @@ class Part(Generic[X, U, F, P]):
         )
 
     def forces_at(self, instant: Instant, par: Any) -> Any:
-        """Return its contact forces, modified by the element if it defines a modification."""
+        """Return the part's contact forces, which the element may modify."""
         if not self.has("Forces"):
             raise ModelError(f"{self.where}: {self.kind} has no contact forces", name=self.where)
         forces = self.element.Forces(*instant.contact[self.name])
         return self.element.bent(forces, par) if self.has("bent") else forces
 
 
-# --- Subassemblies: their names get a prefix in the holder; their own equations omit it
+# --- Subassemblies: their names have a prefix in the holder but not in their own equations
 # A subassembly is evaluated with slices of its holder's state, memory and forces. Its parameters
-# are a group of the holder's, so a holder can contain the same assembly twice.
+# are a group of the holder's parameters, so a holder can contain the same assembly twice.
 
 
 class Seen:
@@ -360,7 +363,7 @@ class Seen:
         return self._recording[self._names.get(name, name)]
 
     def __getattr__(self, name: str) -> Any:
-        """Return an attribute of the renamed Dataset, which is built on first use."""
+        """Return an attribute of the renamed Dataset, which is created on first use."""
         if name.startswith("_"):
             raise AttributeError(name)
         there = self._recording[list(self._names.values())]
@@ -370,31 +373,32 @@ class Seen:
 A = TypeVar("A")
 KINDS = ("State", "Memory", "Flow", "Output", "Stimulus")
 """signal tuples of an assembly that its holder includes"""
-_HEADS = ("E_", "W_", "t_", "noise_")  # kinds of signals, which stay in front of the prefix
+_HEADS = ("E_", "W_", "t_", "noise_")  # kinds of signals, which come before the prefix
 
 
 class Sub(Generic[A]):
-    """A subassembly: an assembly within another one, including its tasks.
+    """Subassembly, which is an assembly within another assembly, including its tasks.
 
     Parameters
     ----------
     assembly
-        Its class, or a function that builds it with options, such as ``partial(Rig, side=2)``.
+        Class of the assembly, or a function that builds it with options, such as
+        ``partial(Rig, side=2)``.
     prefix
-        Prefix of its signals and tasks: with ``"rear_"``, ``i`` becomes ``rear_i``. Kinds of
-        signals stay in front: ``E_rear_copper``, ``noise_rear_p``.
+        Prefix of its signals and tasks. With ``"rear_"``, ``i`` becomes ``rear_i``. Kinds of
+        signals come first: ``E_rear_copper``, ``noise_rear_p``.
     par
-        Place of its parameters among the holder's. Default: the attribute's name.
+        Place of its parameters among the holder's parameters. Default: the attribute's name.
     label
-        Its name in labels, energy balances and warnings. Default: the prefix in words.
+        Name in labels, energy balances and warnings. Default: the prefix in words.
     feeds
-        Fields of its stimulus -> their sources, fields of the holder's memory or stimulus. Fields
+        Source of each field of its stimulus: a field of the holder's memory or stimulus. Fields
         without a source become fields of the holder's stimulus.
 
     Raises
     ------
     ModelError
-        When it is not an assembly, for an invalid prefix, and for unknown fields.
+        When the class is not an assembly, for an invalid prefix, and for unknown fields.
     """
 
     name: str
@@ -416,18 +420,18 @@ class Sub(Generic[A]):
         self.feeds = dict(feeds or {})
         if not hasattr(kind, "parts"):
             raise ModelError(
-                f"Sub({kind.__name__}): it is not an assembly with a memory. Use a class that "
-                "inherits from Assembly and declares Memory",
+                f"Sub({kind.__name__}): {kind.__name__} is not an assembly with a memory. Use a "
+                "class that inherits from Assembly and declares Memory",
                 name=f"Sub({kind.__name__})",
                 valid="a class that inherits from Assembly and declares Memory",
             )
         if not f"{prefix}x".isidentifier() or prefix.startswith("_"):
             raise ModelError(
                 f"Sub({kind.__name__}): the prefix {prefix!r} is not valid. Use a word and an "
-                "underscore, like 'rear_'",
+                "underscore, such as 'rear_'",
                 name="prefix",
                 value=prefix,
-                valid="a word and an underscore, like 'rear_'",
+                valid="a word and an underscore, such as 'rear_'",
             )
         for name in self.feeds:
             if name not in kind.Stimulus._fields:
@@ -459,7 +463,7 @@ class Sub(Generic[A]):
         )
 
     def _at(self, instant: Instant, holder: Any) -> Any:
-        """Return the assembly at the holder's instant, not wired yet."""
+        """Return the assembly at the holder's instant before it is wired."""
         reaction = instant.reaction
         places = holder.reaction_places[self.name] if reaction else ()
         x = self.inside("State", instant.x)
@@ -513,7 +517,7 @@ class Sub(Generic[A]):
         )
 
     def _role(self, name: str, signal: Signal) -> Role | None:
-        """Return the role of a signal; derived from its name where balances use names."""
+        """Return the role of a signal, which is derived from its name if balances use names."""
         if signal.role is not None or not name.startswith("E_"):
             return signal.role
         others = signals_of(type(self.assembly).Output).values()
@@ -530,7 +534,7 @@ class Sub(Generic[A]):
         return {kind: tuple(map(self.named, names)) for kind, names in kinds.items()}
 
     def inside(self, kind: str, values: Any) -> Any:
-        """Return the subassembly's tuple of one of `KINDS` from the holder's, or None for None."""
+        """Return the subassembly's tuple of one of `KINDS`, from the holder's tuple or None."""
         if values is None:
             return None
         tuple_type = getattr(type(self.assembly), kind)
@@ -541,12 +545,12 @@ class Sub(Generic[A]):
         return dict(zip(self._places[kind], values, strict=True))
 
     def parameters(self, par: Any) -> Any:
-        """Return its group of the holder's parameters.
+        """Return the subassembly's group of the holder's parameters.
 
         Raises
         ------
         ModelError
-            When there is no group at its path.
+            When there is no group at this path.
         """
         declaration = f"Sub({type(self.assembly).__name__}, par='...')"
         return _parameters_at(self.path, par, self.where, declaration)
@@ -554,7 +558,7 @@ class Sub(Generic[A]):
     # Tasks.
 
     def tasks(self, par: Any) -> Iterator[Task]:
-        """Yield its tasks as tasks of the holder; ``par``: the holder's parameters."""
+        """Yield the tasks as tasks of the holder; ``par``: the holder's parameters."""
         for task in self.assembly.tasks(self.parameters(par)):
             yield Task(self.named(task.name), task.period, partial(self._tick, task.tick))
 

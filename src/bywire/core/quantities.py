@@ -1,7 +1,8 @@
-"""Physical quantities: unit and valid range, declared once.
+"""Physical quantities with unit and valid range, which are declared only once.
 
 A parameter's type defines unit and range: ``R_m: Resistance`` has the unit ``ohm`` and the range
-``> 0``. Internal values are SI with radians. Files, commands and figures show ``display`` units.
+``> 0``. Internal values are in SI units with radians. Files, commands and figures use ``display``
+units.
 """
 
 from __future__ import annotations
@@ -14,21 +15,21 @@ from pydantic import Field
 
 @dataclass(frozen=True)
 class Unit:
-    """A quantity's SI unit and usual magnitude.
+    """SI unit and usual magnitude of a quantity.
 
     Parameters
     ----------
     symbol
         Unit, for example ``"N*m/A"``; ``"1"`` for a pure number.
     nominal
-        Usual magnitude in that unit, which scales tolerances and the samples of contract tests.
+        Usual magnitude in this unit, which scales tolerances and the samples of contract tests.
     """
 
     symbol: str
     nominal: float = 1.0
 
 
-# Units of files, command line and figures; internal values are SI.
+# Units in files, figures and on the command line; internal values are in SI units.
 DISPLAY_UNITS = {
     "Pa": "bar",
     "Pa/A": "bar/A",
@@ -45,7 +46,7 @@ DISPLAY_UNITS = {
 
 
 def display_unit(symbol: str) -> str:
-    """Return an SI unit's display unit."""
+    """Return the display unit for an SI unit."""
     return DISPLAY_UNITS.get(symbol, symbol)
 
 
@@ -57,20 +58,20 @@ BY_SIZE: dict[str, tuple[tuple[float, str], ...]] = {
     "J": ((0.0, "J"), (1e3, "kJ"), (1e6, "MJ")),
     "W": ((0.0, "W"), (1e3, "kW")),
 }
-"""units by SI unit, each with the least magnitude in the SI unit from which it is used"""
-_OF_NOTHING = {"s": "ms"}  # units of zero, where it is not the display unit
+"""units by SI unit, each with the minimum magnitude in the SI unit for which it is used"""
+_OF_NOTHING = {"s": "ms"}  # unit of zero, if it is not the display unit
 
 
 def readable_unit(size: float, symbol: str) -> str:
-    """Return the most readable unit for a number of a given size.
+    """Return the most readable unit for a number of a certain size.
 
-    This is the one rule for terminals, reports, pages and figures: see `BY_SIZE`. Other quantities
-    have one unit for all sizes, see `DISPLAY_UNITS`.
+    Terminals, reports, pages and figures all use this rule; see `BY_SIZE`. Other quantities have
+    one unit for all sizes; see `DISPLAY_UNITS`.
 
     Parameters
     ----------
     size
-        Largest magnitude to write, in ``symbol``.
+        Largest magnitude to display, in ``symbol``.
     symbol
         SI unit, or ``"%"``.
 
@@ -83,7 +84,7 @@ def readable_unit(size: float, symbol: str) -> str:
     """
     if not size or symbol not in BY_SIZE:
         return _OF_NOTHING.get(symbol, display_unit(symbol))
-    # A hair's breadth below a boundary is the boundary: 0.9999999 s is not 1000 ms.
+    # A number just below a boundary counts as the boundary: 0.9999999 s is not 1000 ms.
     return next(u for least, u in reversed(BY_SIZE[symbol]) if abs(size) * (1 + 1e-6) >= least)
 
 
@@ -126,14 +127,15 @@ Conductance = Annotated[float, Unit("m**3/(s*Pa)", 1e-11), _NOT_NEGATIVE]
 
 # Thermal
 Temperature = Annotated[float, Unit("K", 400.0), _POSITIVE]
-"""absolute, shown in degrees Celsius; differences have the unit ``delta_degC``, shown in K"""
+"""absolute temperature, displayed in degrees Celsius; differences have the unit ``delta_degC``,
+displayed in K"""
 TemperatureCoefficient = Annotated[float, Unit("1/K", 2e-3), _NOT_NEGATIVE]
 HeatCapacity = Annotated[float, Unit("J/K", 1e3), _POSITIVE]
 HeatConductance = Annotated[float, Unit("W/K", 1.0), _NOT_NEGATIVE]
 
 # Tables
 Nodes = tuple[Annotated[float, _NOT_NEGATIVE], ...]
-"""a table's numbers, in the field's unit"""
+"""numbers of a table, in the field's unit"""
 
 # Signals and control
 Duration = Annotated[float, Unit("s", 1e-3), _POSITIVE]

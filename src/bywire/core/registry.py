@@ -1,7 +1,7 @@
 """Registry of all named things by kind, with their places.
 
 A package declares each `Kind`, and a file declares each thing. General things are in the kind's
-package. A brake's things are in the module or folder of its package that the kind specifies
+package. The things of a brake are in the module or folder of its package that the kind specifies
 (``experiments``, ``loops``, ...), or in the brake's single file. So a new thing needs only a new
 file.
 """
@@ -41,7 +41,7 @@ def _declared_at(module: ModuleType, thing: object) -> str:
     Parameters
     ----------
     module
-        Module that declares it, as a variable or in a tuple; imported things have no line.
+        Module that declares the thing as a variable or in a tuple. Imported things have no line.
     thing
         Object or class.
     """
@@ -112,8 +112,8 @@ class Kind(Generic[T]):
     home
         Dotted name of the package of general things; empty if all belong to brakes.
     declared
-        Object that declares such a thing, for example ``"a Loop"``. The error for an unknown name
-        contains it if a brake has no such thing.
+        Object that declares a thing of this kind, for example ``"a Loop"``. The error for an
+        unknown name contains it if a brake has no such thing.
 
     Notes
     -----
@@ -130,7 +130,7 @@ class Kind(Generic[T]):
         _KINDS.append(self)
 
     def all(self) -> Mapping[str, T]:
-        """Return all things of this kind by name: general ones first, then those of each brake."""
+        """Return all things of this kind by name, starting with general things."""
         return {thing.name: thing for thing, _ in _all(self)}
 
     def find(self, name: str) -> T:
@@ -139,7 +139,7 @@ class Kind(Generic[T]):
         Raises
         ------
         UnknownNameError
-            With the nearest valid names.
+            When the name is unknown; the message contains the nearest valid names.
         """
         thing: T = _found(self, name, tuple(brakes().values()))
         return thing
@@ -151,8 +151,8 @@ class Kind(Generic[T]):
     def unknown(self, name: str, *others: Kind[Any]) -> UnknownNameError:
         """Return the error for an unknown name.
 
-        It lists the nearest valid names, those of brakes loaded from files first, and the loaded
-        brakes without such a thing, with instructions.
+        The error lists the nearest valid names, starting with those of brakes loaded from files. It
+        also lists the loaded brakes without a thing of this kind, with instructions.
         """
         kinds = (self, *others)
         title = " or ".join(dict.fromkeys(kind.name for kind in kinds))
@@ -177,9 +177,9 @@ class Kind(Generic[T]):
         return error.reworded("; ".join([str(error), *hints]).replace("?; ", "? "))
 
     def guess(self, name: str) -> T | None:
-        """Return the thing with a name if a file that has or quotes that name declares it.
+        """Return the thing with a name if a file that is named after it or quotes it declares it.
 
-        This avoids loading whole folders, which takes a second for a large number of things.
+        This avoids loading whole folders, which takes a second if there are many things.
         """
         stem = name.replace("-", "_")
         if not stem.isidentifier():
@@ -207,7 +207,7 @@ class Kind(Generic[T]):
         Raises
         ------
         ModelError
-            When a general thing has the name.
+            When a general thing has this name.
         """
         owner = next((brake for brake in brakes().values() if brake.module == module), None)
         for thing, where in _declared(self, owner) if owner else ():
@@ -220,7 +220,7 @@ class Kind(Generic[T]):
     def beside(self, cls: type) -> Mapping[str, T]:
         """Return the things of a class's brake, or all things if the class belongs to no brake.
 
-        This does not load other brakes.
+        The method does not load other brakes.
         """
         where = cls.__module__ + "."
         homes = [b.module for b in brakes().values() if where.startswith(f"{b.module}.")]
@@ -229,7 +229,7 @@ class Kind(Generic[T]):
     def owner(self, name: str) -> str:
         """Return the module of the brake that declares a thing; empty for a general thing.
 
-        The search stops at the first match, to avoid loading other brakes.
+        The search stops at the first match, which avoids loading other brakes.
         """
         for brake in brakes().values():
             try:
@@ -250,7 +250,7 @@ class Kind(Generic[T]):
 
 
 def _is_folder(module: str) -> bool | None:
-    """Return whether a module is a package; None if there is no such module."""
+    """Return whether a module is a package; None if the module does not exist."""
     spec = _spec(module)
     return None if spec is None else spec.submodule_search_locations is not None
 
@@ -263,7 +263,7 @@ def _spec(module: str) -> ModuleSpec | None:
 
 
 def _quoting(name: str, home: str) -> Iterator[str]:
-    """Yield a file's or folder's modules whose source code quotes a name; load no others."""
+    """Yield the modules of a file or folder whose source code quotes a name; load no others."""
     spec = _spec(home)
     folders = spec.submodule_search_locations if spec is not None else None
     if folders is None:
@@ -278,7 +278,7 @@ def _quoting(name: str, home: str) -> Iterator[str]:
 
 
 def instances(kind: type[Thing]) -> Callable[[ModuleType], Iterable[Thing]]:
-    """Return a function that lists a module's objects of a type, single or in tuples."""
+    """Return a function that lists the objects of a type in a module, single or in tuples."""
 
     def read(module: ModuleType) -> Iterator[Thing]:
         for name, value in vars(module).items():
@@ -291,7 +291,7 @@ def instances(kind: type[Thing]) -> Callable[[ModuleType], Iterable[Thing]]:
 
 
 def _all(kind: Kind[Any]) -> tuple[tuple[Any, str], ...]:
-    """Return every thing of a kind with its brake's module.
+    """Return all things of a kind with their brake's module.
 
     Raises
     ------
@@ -303,12 +303,12 @@ def _all(kind: Kind[Any]) -> tuple[tuple[Any, str], ...]:
 
 @cache
 def _found(kind: Kind[Any], name: str, known: tuple[Brake, ...]) -> Any:
-    """Return the thing with a name among some brakes; cached, since studies call it for each case.
+    """Return the thing with a name from some brakes; cached, as studies call it for each case.
 
     Raises
     ------
     UnknownNameError
-        With the nearest known names.
+        When the name is unknown; the message contains the nearest known names.
     """
     guess = kind.guess(name)
     if guess is not None:
@@ -330,7 +330,7 @@ def _gathered(kind: Kind[Any], known: tuple[Brake, ...]) -> tuple[tuple[Any, str
         except ModelError as error:
             if owner is None or not is_foreign(owner):
                 raise
-            text = f"the {kind.name} of the installed brake {owner.name!r} is skipped: {error}"
+            text = f"bywire skips the {kind.name} of the installed brake {owner.name!r}: {error}"
             warn_at_line(text, BrakeWarning, error, str(Path(owner.file).parent), owner.file)
             continue
         brake = owner.module if owner is not None else ""
@@ -370,7 +370,7 @@ def _require_new(
 
 @cache
 def _declared(kind: Kind[Any], owner: Brake | None) -> tuple[tuple[Any, ModuleType], ...]:
-    """Return a kind's general things, or a brake's, each with its module."""
+    """Return the general things of a kind, or those of a brake, with their modules."""
     if owner is not None:
         modules = modules_of(owner, kind.folders)
     else:
@@ -384,7 +384,7 @@ def pick(known: Mapping[str, Thing], name: str, kind: str) -> Thing:
     Raises
     ------
     UnknownNameError
-        With the kind of the thing and the nearest valid names.
+        When the name is unknown; the message contains the kind and the nearest valid names.
     """
     if name not in known:
         raise unknown_name(kind, name, known)

@@ -1,8 +1,8 @@
-"""Atomic writing of files, and temporary folders that are removed even after a killed process.
+"""Atomic writing of files, and temporary folders that are removed even if a process is killed.
 
-A process locks its folder of temporary files. The next process at the same place removes unlocked
-folders, whose processes were killed. On file systems without locks (Windows, some network drives),
-folders are removed after a day.
+A process locks its folder of temporary files. The next process in the same place removes unlocked
+folders, because their processes were killed. On file systems without locks (Windows, some network
+drives), it removes folders after a day.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ if sys.platform != "win32":
     import fcntl
 
 PREFIX = ".bywire-"
-"""prefix of temporary folders' names"""
+"""prefix of the names of temporary folders"""
 
 NULL_CHARACTER = "a path cannot contain a null character"
-"""message for a path with a null character, the same in every version of Python"""
+"""message for a path with a null character, which is the same in every version of Python"""
 
 UNFINISHED = "unfinished"
 """file that marks a folder with an incomplete result"""
@@ -39,10 +39,10 @@ _OLD = 86400.0  # seconds; without locks, younger folders may be in use
 
 @contextmanager
 def replacing(target: Path) -> Iterator[Path]:
-    """Yield a path to write to; it replaces the target file at the end of the block.
+    """Yield the path of a new file, which replaces the target file at the end of the block.
 
-    If the block fails or the process is killed, the target is unchanged. The path has the target's
-    name, in a hidden folder next to it.
+    If the block fails or the process is killed, the target is unchanged. The new file has the same
+    name, and is in a hidden folder next to the target.
 
     Raises
     ------
@@ -56,12 +56,12 @@ def replacing(target: Path) -> Iterator[Path]:
 
 
 def claim(fresh: Path, names: Iterable[Path]) -> Path | None:
-    """Rename a written file to the first free name, safely if other processes do the same.
+    """Rename a complete file to the first free name, even if other processes do the same.
 
     Parameters
     ----------
     fresh
-        The file, in a temporary folder on the same file system.
+        The complete file, in a temporary folder on the same file system.
     names
         Paths to try, in order.
 
@@ -92,12 +92,12 @@ def claim(fresh: Path, names: Iterable[Path]) -> Path | None:
 
 @contextmanager
 def made_folder(folder: Path) -> Iterator[None]:
-    """Make a folder with its parents; at the end, remove those that were made and are empty.
+    """Create a folder with its parents; at the end, remove those that were created and are empty.
 
     Raises
     ------
     OSError
-        When the folder cannot be made.
+        When the folder cannot be created.
     """
     missing = [each for each in (folder, *folder.parents) if not os.path.lexists(each)]
     try:
@@ -107,14 +107,14 @@ def made_folder(folder: Path) -> Iterator[None]:
             raise OSError(errno.EINVAL, NULL_CHARACTER) from None
         yield
     finally:
-        with contextlib.suppress(OSError, ValueError):  # there is a result
+        with contextlib.suppress(OSError, ValueError):  # the folder contains a result
             for each in missing:
                 each.rmdir()
 
 
 @contextmanager
 def scratch_folder(parent: Path) -> Iterator[Path]:
-    """Yield a new folder within another, and remove it with its content at the end.
+    """Yield a new folder in another folder, and remove it with its content at the end.
 
     Raises
     ------
@@ -142,8 +142,8 @@ def process_folder() -> Path:
         return _folder_of(os.getpid())
     except OSError as error:
         raise FileError(
-            f"bywire cannot create a temporary folder ({error.strerror or error}). Free some space "
-            "there, or set TMPDIR to another folder",
+            f"bywire cannot create a temporary folder ({error.strerror or error}). Free some disk "
+            "space, or set TMPDIR to another folder",
             name="TMPDIR",
         ) from None
 
@@ -172,13 +172,13 @@ def require_finished(folder: Path) -> None:
     """
     if (folder / UNFINISHED).exists():
         raise FileError(
-            f"{folder} contains an incomplete result: rerun the command that wrote it",
+            f"{folder} contains an incomplete result. Rerun the command that wrote it",
             name=str(folder),
         )
 
 
 def sweep(parent: Path) -> None:
-    """Remove the leftovers of killed processes from a folder, as far as possible."""
+    """Remove the files of killed processes from a folder, as far as possible."""
     with contextlib.suppress(OSError), os.scandir(parent) as entries:
         for each in entries:
             if each.name.startswith(PREFIX) and each.is_dir(follow_symlinks=False):
@@ -189,7 +189,7 @@ def _remove_left(folder: Path) -> None:
     try:
         status = folder.stat(follow_symlinks=False)
     except OSError:
-        return  # its process has ended and removed it since the listing
+        return  # since the listing, its process has ended and removed it
     if sys.platform != "win32" and status.st_uid != os.getuid():
         return
     try:
@@ -204,7 +204,7 @@ def _remove_left(folder: Path) -> None:
 
 
 def _locked(parent: Path) -> tuple[Path, int | None]:
-    """Return a new folder and its lock, or None on file systems without locks."""
+    """Return a new folder and its lock, which is None on file systems without locks."""
     while True:
         folder = Path(tempfile.mkdtemp(prefix=PREFIX, dir=parent))
         try:

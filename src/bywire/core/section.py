@@ -1,7 +1,7 @@
-"""Sections of files: each key is declared once, as a typed field.
+"""Sections of files, in which a typed field declares each key.
 
-Reading a section converts texts with units to numbers [SI]. An error is one sentence with the key,
-its value, the valid values and the nearest match. Users never see pydantic's own messages.
+The reader of a section converts strings with units to numbers in SI units. An error contains the
+key, its value, the valid values and the nearest match. Users never see pydantic's own messages.
 """
 
 from __future__ import annotations
@@ -21,46 +21,47 @@ from bywire.core.quantities import Unit
 from bywire.core.values import written
 
 Name = Annotated[str, Field(pattern=r"\S")]
-"""a text that is not blank"""
+"""a string that is not blank"""
 Names = tuple[str, ...]
 """a list of names"""
 Table = Annotated[Mapping[str, Any], Field(default_factory=dict)]
-"""a section whose keys are names of parameters, faults or figures, not fields; default: empty"""
+"""a section whose keys are names of parameters, faults or figures instead of fields; empty by
+default"""
 
-_VALID: Mapping[Any, str] = {str: "a text", bool: "true or false", tuple: "a list of names"}
+_VALID: Mapping[Any, str] = {str: "a string", bool: "true or false", tuple: "a list of names"}
 
 
 @dataclass(frozen=True)
 class Hint:
-    """A hint on how to write a field's value, where its type alone does not explain it."""
+    """Hint on the notation of a field's value, if the type does not explain it."""
 
     text: str
 
 
 class Section(BaseModel):
-    """Base of all sections: immutable, without unknown keys. Pydantic's model is built lazily."""
+    """Base of all sections, which are immutable. Pydantic builds its model on first use."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True, defer_build=True)
 
     @classmethod
     def read(cls, content: Any, where: str) -> Self:
-        """Read a section from a table of a file.
+        """Read a section from a table in a file.
 
         Parameters
         ----------
         content
-            The table's content.
+            Content of the table.
         where
-            Its name in errors: ``"[design]"``, or ``"a study file"`` for a whole file.
+            Name in errors, such as ``"[design]"``, or ``"a study file"`` for a whole file.
 
         Raises
         ------
         UnknownNameError
             For unknown keys and choices.
         UnitError
-            When a number has no unit, or one that does not fit.
+            When a number has no unit or the wrong unit.
         ParameterError
-            When a value is missing, of the wrong type, or out of range.
+            When a value is missing, has the wrong type, or is out of range.
         """
         fields = cls.model_fields
         place, within = (f"{where} ", f"{where[1:-1]}.") if where.startswith("[") else ("", "")
@@ -85,7 +86,7 @@ class Section(BaseModel):
 
     @property
     def given(self) -> dict[str, Any]:
-        """Values of the keys that the file contains."""
+        """Values of those keys that the file contains."""
         return {
             key: getattr(self, key)
             for key in type(self).model_fields
@@ -123,20 +124,23 @@ def table_of(value: Any, where: str) -> dict[str, Any]:
 
 def _sections(kind: type[Section], value: Any, where: str) -> tuple[Section, ...]:
     if not isinstance(value, list) or not all(isinstance(each, Mapping) for each in value):
-        raise ParameterError(f"write {where} with double brackets, once per entry", name=where)
+        raise ParameterError(
+            f"{where} must be a list. Write it in double brackets, once per entry", name=where
+        )
     return tuple(kind.read(each, where) for each in value)
 
 
 def _rejection(
     info: FieldInfo, content: Mapping[str, Any], place: str, key: str, inner: Sequence[Any]
 ) -> InputError:
-    """Return the error for a field whose value is missing or not valid.
+    """Return the error for a field whose value is missing or invalid.
 
     ``inner``: the value's place within the field.
     """
     hint = _hint(info)
     if key not in content:
-        return ParameterError(f"{place}{key} is missing: {hint or 'add a value'}", name=key)
+        advice = f": {hint}" if hint else ". Add a value"
+        return ParameterError(f"{place}{key} is missing{advice}", name=key)
     name, value, kind, unit = f"{place}{key}", content[key], _kind(info.annotation), _unit(info)
     if kind is Mapping:
         name, value, kind = f"[{key}] {inner[0]}", value[inner[0]], get_args(info.annotation)[-1]

@@ -1,4 +1,4 @@
-"""Signals: unit, label and role of each field of State, Input, Output and Memory tuples."""
+"""Signals: unit, label and role of each field in State, Input, Output and Memory tuples."""
 
 from __future__ import annotations
 
@@ -28,19 +28,19 @@ class Role:
         ``"source"`` of energy, or ``"sink"`` (losses and stores). A time at standstill has
         ``"standstill"``.
     returns
-        For a sink: energy that it may return. A loss returns none; bywire warns if it does.
-        ``"taken"``: at most the absorbed energy, like a spring that starts slack. ``"any"``: like
-        a store that starts full, or air that may be warmer.
+        For a sink, the energy that it may return. A loss returns no energy, and bywire warns if it
+        does. ``"taken"``: at most the absorbed energy, like a spring that is initially slack.
+        ``"any"``: like a store that is initially full, or air that may be warmer.
     label
         Name in the balance.
     split
-        For a sink: whether the balance lists its energy during standstill separately, as holding.
+        For a sink, whether the balance lists its energy during standstill separately, as holding.
     whole
-        For a source: the source that it replaces if it is recorded.
+        For a source, the source that it replaces if it is recorded.
     rest, rest_label
-        Sink that absorbs the difference between the two sources.
+        Sink that absorbs the difference between the two sources, and its label.
     book
-        Name of the separate balance that contains it; empty for the actuator's balance.
+        Name of the separate balance that contains the energy; empty for the actuator's balance.
     """
 
     side: Literal["source", "sink", "standstill"]
@@ -55,7 +55,7 @@ class Role:
 
 @dataclass(frozen=True)
 class Signal:
-    """Meaning of one field of a signal tuple.
+    """Meaning of a field in a signal tuple.
 
     Parameters
     ----------
@@ -64,15 +64,15 @@ class Signal:
     label
         Axis label in figures.
     nominal
-        Usual magnitude in that unit.
+        Usual magnitude in this unit.
     set_point_of
         Name of the signal for which this is the set point, for figures; may be empty.
     role
-        Role in the energy balance of an energy, or of a power that is integrated to an energy.
+        Role of an energy in the energy balance, or of a power whose integral is an energy.
     low, high
-        Bounds of its valid range, in that unit: a gauge pressure is not below vacuum, an opening is
-        not negative. `bywire.check` uses only values within. ``Ge(0)`` after an annotation's Signal
-        has the same effect.
+        Bounds of the valid range, in the signal's unit. For example, a gauge pressure cannot be
+        below vacuum, and an opening cannot be negative. `bywire.check` uses only values inside the
+        range. ``Ge(0)`` after an annotation's Signal has the same effect.
     """
 
     unit: str
@@ -119,9 +119,9 @@ Overlap = Annotated[float, Signal("m", "overlap", 1e-4)]
 
 @cache
 def signals_of(tuple_type: type[NamedTuple]) -> dict[str, Signal]:
-    """Return a NamedTuple class's signals, in the order of its fields.
+    """Return the signals of a NamedTuple class, in the order of its fields.
 
-    Every field must be annotated ``Annotated[float, Signal(...)]``.
+    Each field must have the annotation ``Annotated[float, Signal(...)]``.
     """
     hints = typing.get_type_hints(tuple_type, include_extras=True)
     signals: dict[str, Signal] = {}
@@ -139,7 +139,7 @@ def signals_of(tuple_type: type[NamedTuple]) -> dict[str, Signal]:
 
 
 def signal_in(annotation: Any) -> Signal | None:
-    """Return an annotation's Signal with the bounds after it, or None."""
+    """Return an annotation's Signal with the bounds that follow it, or None."""
     signal = next((n for n in _notes(annotation) if isinstance(n, Signal)), None)
     if signal is None:
         return None
@@ -152,11 +152,11 @@ def signal_in(annotation: Any) -> Signal | None:
 
 @cache
 def ranges_of(tuple_type: type[NamedTuple]) -> dict[str, tuple[float, float]]:
-    """Return the ranges that are declared next to Signals, bounds included.
+    """Return the ranges that are declared next to Signals; the bounds are valid.
 
     Controllers and runs reject values outside these ranges.
-    ``Annotated[float, Signal(...), Ge(0), Le(1)]`` declares a range. Bounds that follow from the
-    unit alone, such as vacuum for a gauge pressure, are not included.
+    ``Annotated[float, Signal(...), Ge(0), Le(1)]`` declares a range. The result does not contain
+    bounds that follow from the unit alone, such as vacuum for a gauge pressure.
     """
     hints = typing.get_type_hints(tuple_type, include_extras=True)
     ends = {name: _ends(hint) for name, hint in hints.items()}
@@ -168,7 +168,7 @@ def _notes(annotation: Any) -> tuple[Any, ...]:
 
 
 def _ends(annotation: Any) -> tuple[float, float]:
-    """Return the bounds in an annotation, both included."""
+    """Return the bounds in an annotation, which are both valid."""
     low, high = -math.inf, math.inf
     for note in _notes(annotation):
         if isinstance(note, Ge):
@@ -184,7 +184,7 @@ def _ends(annotation: Any) -> tuple[float, float]:
 
 @cache
 def limits_of(tuple_type: type[NamedTuple]) -> dict[str, Limited]:
-    """Return the limits of the commands among a NamedTuple class's signals."""
+    """Return the limits of those signals of a NamedTuple class that are commands."""
     hints = typing.get_type_hints(tuple_type, include_extras=True)
     return {
         name: note
@@ -199,7 +199,7 @@ def _number(end: Any) -> float:
 
 
 def without_noise(stimuli: Iterable[str]) -> list[str]:
-    """Return the names of the stimuli that a user can drive: all except random noise.
+    """Return the names of the stimuli that a user can drive, which are all except random noise.
 
     Examples
     --------
@@ -240,14 +240,14 @@ def merged_signals(
 
 
 def joined(module: str, name: str, *tuples: type[Any]) -> Any:
-    """Join signal tuples into a single tuple that the module exports under the name.
+    """Join signal tuples into a single tuple that the module exports under this name.
 
     The result serves as the common memory of several controllers.
 
     Raises
     ------
     ModelError
-        When two tuples have a field of the same name.
+        When two tuples have a field with the same name.
     """
     fields: list[tuple[str, Any]] = []
     for each in tuples:
@@ -255,8 +255,8 @@ def joined(module: str, name: str, *tuples: type[Any]) -> Any:
         for field in each._fields:
             if field in dict(fields):
                 raise ModelError(
-                    f"{place_of(each)}: {each.__qualname__}.{field}: another joined tuple has a "
-                    "field of this name too; rename one",
+                    f"{place_of(each)}: another joined tuple also has a field "
+                    f"{each.__qualname__}.{field}. Rename one of them",
                     name=f"{each.__qualname__}.{field}",
                 )
             fields.append((field, hints[field]))

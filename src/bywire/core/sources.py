@@ -1,10 +1,10 @@
 """State of the source files that affect results, and whether this process runs exactly these files.
 
 Data derived from the files stay valid for later processes until a file changes. Modification times
-alone do not show every change. A file that is saved after loading, or twice within the clock's
+alone do not reveal every change. A file that is saved after loading, or twice within the clock's
 resolution, differs from the running code. A program that uses bywire may also replace bywire's
-functions. So only a command certainly runs the code in its files, and only if they did not change
-for a while before it started.
+functions. So only a command certainly runs the code in its files, and only if the files did not
+change for a while before it started.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ TICK = 2_000_000_000
 
 _ROOMS = ("bywire.plant", "bywire.control", "bywire.simulation", "bywire.brakes")
 _LIBRARIES = ("numpy", "pydantic", "casadi")
-"""libraries of which code that shapes models loads at least one, and the start of a command none"""
+"""libraries that a command does not load at its start; code for models loads at least one"""
 
 _started: list[int] = []
 
@@ -33,8 +33,8 @@ _started: list[int] = []
 def command() -> Iterator[None]:
     """Mark this process as a command, which runs only code from files until the block ends.
 
-    If code that shapes models is loaded already, another program loaded it and may have changed
-    it. In that case the process is not marked.
+    If code for models is already loaded, another program loaded it and may have changed it. The
+    process is then not marked.
     """
     is_shaped = any(name in _LIBRARIES or name.startswith(_ROOMS) for name in sys.modules)
     _started[:] = [] if is_shaped else [time.time_ns()]
@@ -46,12 +46,12 @@ def command() -> Iterator[None]:
 
 @dataclass(frozen=True)
 class SourceState:
-    """State of the files of bywire and of every brake.
+    """State of the files of bywire and of all brakes.
 
     Parameters
     ----------
     digest
-        Digest that changes when a file is changed, added, moved or removed.
+        Digest that changes if a file is changed, added, moved or removed.
     newest
         Time of the most recent change [ns].
     """
@@ -61,7 +61,7 @@ class SourceState:
 
     @property
     def is_running(self) -> bool:
-        """Whether this process certainly runs the files' code."""
+        """Whether this process certainly runs the code in the files."""
         return bool(_started) and self.newest < _started[0] - TICK
 
 
@@ -72,7 +72,7 @@ def source_state() -> SourceState:
     digest, newest = hashlib.sha256(), 0
     for path in _files():
         digest.update(f"{path}\0".encode(errors="surrogateescape"))
-        with suppress(OSError):  # a broken link, or a file that was removed meanwhile
+        with suppress(OSError):  # a broken link, or a file that was removed in the meantime
             seen = os.stat(path)
             newest = max(newest, seen.st_mtime_ns, seen.st_ctime_ns)
             line = (seen.st_ino, seen.st_size, seen.st_mtime_ns, seen.st_ctime_ns)
@@ -81,7 +81,7 @@ def source_state() -> SourceState:
 
 
 def _files() -> Iterator[str]:
-    """Yield every file of any kind, since equations may read tables."""
+    """Yield all files of any kind, because equations may read tables."""
     from bywire.core.brake import brakes
 
     package = Path(bywire.core.__file__ or "").parents[1]

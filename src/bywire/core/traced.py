@@ -1,7 +1,7 @@
-"""Numbers that record how they are computed, so that some of a model's equations can run alone.
+"""Numbers that record their computation, so that single equations of a model can be evaluated.
 
-A model's equations run once on `Traced` numbers. Any of their results can then be evaluated on a
-recording's rows, without the rest of the model.
+The equations of a model run once on `Traced` numbers. Each result can then be evaluated on the rows
+of a recording, without the rest of the model.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 
 
 class Traced:
-    """A number that is defined by its name or by its computation.
+    """Number that is defined by its name or by its computation.
 
     Parameters
     ----------
@@ -25,7 +25,7 @@ class Traced:
     """
 
     __slots__ = ("inputs", "operation")
-    __array_ufunc__ = None  # NumPy's numbers leave operations to this class
+    __array_ufunc__ = None  # NumPy numbers delegate operations to this class
 
     def __init__(self, operation: Callable[..., Any] | None, *inputs: Any) -> None:
         self.operation, self.inputs = operation, inputs
@@ -34,7 +34,7 @@ class Traced:
         return Traced(getattr(np, name), *inputs)
 
     def __bool__(self) -> bool:
-        raise TypeError("a traced number has a value only on rows")
+        raise TypeError("a traced number has no value without rows")
 
 
 def _forward(operation: Callable[..., Any]) -> Callable[..., Traced]:
@@ -56,7 +56,7 @@ for _name in (*_BOTH, "neg", "pos", "abs", "lt", "le", "gt", "ge", "eq", "ne"):
 def names_in(values: Any, marks: Mapping[int, Any] | None = None) -> Iterator[Any]:
     """Yield the names that a value, or a tuple of values, depends on.
 
-    ``marks``: object to yield instead of the names, by the identity of a traced number.
+    ``marks``: objects to yield instead of the names, by the identity of the traced numbers.
     """
     waiting, seen = [values], set()
     while waiting:
@@ -80,7 +80,8 @@ def computed(values: Any, operands: Mapping[str, Any]) -> Any:
 
 def _computed(each: Any, operands: Mapping[str, Any], known: dict[int, Any]) -> Any:
     """Return a value; ``known`` caches the results of shared operations by their identity."""
-    # A nested function would refer to itself, and keep recordings alive until garbage collection.
+    # A nested function would refer to itself and keep recordings in memory until garbage
+    # collection.
     if isinstance(each, tuple):
         rows = [_computed(inner, operands, known) for inner in each]
         return each._make(rows) if hasattr(each, "_make") else tuple(rows)

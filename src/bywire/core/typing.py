@@ -11,7 +11,7 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 Progress = Callable[[str, float], None]
-"""called with a label and the finished share, 0 to 1"""
+"""function that is called with a label and the finished fraction, 0 to 1"""
 
 
 def silent(label: str, share: float) -> None:

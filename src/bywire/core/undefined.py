@@ -1,7 +1,7 @@
 """Data classes in which NaN means "undefined": two undefined numbers are equal.
 
-Up to Python 3.12, plain data classes compare tuples, in which the same NaN object equals itself.
-From 3.13 on they compare the numbers, and no NaN equals another.
+Up to Python 3.12, plain data classes compare tuples, in which a NaN object equals itself. From
+3.13, they compare the numbers, and a NaN equals no NaN.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import Any
 
 
 class EqualWhereUndefined:
-    """Base class of such a data class; declare the data class with ``eq=False``."""
+    """Base of such data classes, which must be declared with ``eq=False``."""
 
     def __eq__(self, other: object) -> bool:
         if type(other) is not type(self):
@@ -23,7 +23,7 @@ class EqualWhereUndefined:
 
 
 def _values(thing: Any) -> tuple[Any, ...]:
-    """Return the values of the fields, with this class in place of each NaN."""
+    """Return the values of the fields, with this class instead of each NaN."""
     values = (getattr(thing, field.name) for field in fields(thing))
     return tuple(
         EqualWhereUndefined if isinstance(value, float) and value != value else value

@@ -1,7 +1,7 @@
-"""Closed list of units that users and measuring programs write, and products of them.
+"""Closed list of units that users and measurement programs write, and products of these units.
 
-bywire rejects all other units. An open dictionary silently reads ``Nm`` as a yarn count, ``ma`` as
-a thousandth of a year and ``U/min`` as an enzyme's activity.
+bywire rejects all other units. An open dictionary silently interprets ``Nm`` as a yarn count,
+``ma`` as a thousandth of a year and ``U/min`` as an enzyme activity.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ BASES = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
 """base units, including the radian, which distinguishes angular speed from frequency"""
 
 _LONGEST = 100  # characters of a unit
-_NEAR = 0.75  # lowest similarity of a suggested spelling
-_MOST = 99  # largest exponent of a base unit
+_NEAR = 0.75  # minimum similarity of a suggested spelling
+_MOST = 99  # maximum exponent of a base unit
 
 # Number, SI unit, prefixes, spellings that accept the prefixes, and words, which accept a plural s,
-# a capital letter and the prefixes as words. A "~" stands for a blank.
+# a capital letter and the prefixes as words. A "~" represents a blank.
 _ROWS = (
     ("1", "m", "n u m c d k", "m", "meter metre"),
     ("0.0254", "m", "", "in inch Inch inches", ""),
@@ -184,8 +184,8 @@ _REFERENCES = {
     "gauge": ("(g)", "~g", "g", "_g", "~rel", "(rel)", "_rel", "~gauge", "(ü)", "ü", "~ü"),
     "absolute": ("(a)", "~a", "a", "_a", "~abs", "(abs)", "_abs", "~absolute"),
 }
-# Only the requested quantity distinguishes the two meanings of such a letter. Declared units use
-# the first meaning.
+# These letters have two meanings, which only the requested quantity can distinguish. Declared units
+# use the first meaning.
 _TWO_MEANINGS = {
     "g": ("gram", "g_n"),
     "mg": ("milligram", "mg_n"),
@@ -226,11 +226,11 @@ _POWER = re.compile(rf"(?:\*\*|\^)({_EXPONENT})")
 
 
 class UnknownUnitError(UnitError):
-    """A text that is neither a listed unit nor a product of listed units."""
+    """String that is neither a listed unit nor a product of listed units."""
 
 
 class UnreadableUnitError(UnknownUnitError):
-    """A text that does not have the form of a unit."""
+    """String that does not have the form of a unit."""
 
 
 @dataclass(frozen=True)
@@ -272,7 +272,7 @@ class Scale:
         return (above or "1") + (f"/{under}" if below else "")
 
     def times(self, other: Scale, power: float = 1) -> Scale:
-        """Return the product with a power of another scale; in products, zeros do not count."""
+        """Return the product with a power of another scale; a product ignores the units' zeros."""
         powers = tuple(a + power * b for a, b in zip(self.powers, other.powers, strict=True))
         if max(map(abs, powers)) > _MOST or abs(power) > _MOST:
             raise UnreadableUnitError("the unit has too large an exponent")
@@ -297,8 +297,8 @@ def scale_of(text: str) -> Scale:
     Raises
     ------
     UnknownUnitError
-        When it is neither a listed unit nor a product of listed units, when it has two meanings,
-        and when it is logarithmic.
+        When the string is neither a listed unit nor a product of listed units, when it has two
+        meanings, and when the unit is logarithmic.
 
     Examples
     --------
@@ -324,7 +324,8 @@ def meanings_of(text: str) -> tuple[Scale, ...]:
     Raises
     ------
     UnknownUnitError
-        When it is neither a listed unit nor a product of listed units, or logarithmic.
+        When the string is neither a listed unit nor a product of listed units, or when the unit is
+        logarithmic.
     """
     if len(text) > _LONGEST:
         raise UnreadableUnitError(f"{quoted(text)} is longer than any unit", value=quoted(text))
@@ -342,7 +343,7 @@ def spellings() -> Iterator[str]:
 
 
 def units_by_symbol() -> dict[str, list[str]]:
-    """Return the listed units by the SI unit of their quantity, one spelling each, for choosers."""
+    """Return one spelling of each listed unit for selection lists, by SI unit."""
     found: dict[str, list[str]] = {}
     rows = {(number, symbol): row for number, symbol, *row in reversed(_ROWS)}  # one a size
     for (_, symbol), (prefixes, names, words) in reversed(rows.items()):
@@ -354,7 +355,7 @@ def units_by_symbol() -> dict[str, list[str]]:
 
 
 def _plain(text: str) -> str:
-    """Return a unit with a single character for each meaning."""
+    """Return a unit in which each meaning has only one character."""
     plain = re.sub(" +", " ", text.translate(_PLAIN)).strip(" ")
     raised = _RAISED_POWER.sub(lambda m: f"^{'-' * len(m[1])}{_RAISED.index(m[2])}", plain)
     squeezed = _BRACKETED_POWER.sub(r"^\1", raised)
@@ -373,7 +374,7 @@ def _squeezed(name: str) -> str:
 
 @cache
 def _with_hyphens_and_blanks() -> re.Pattern[str]:
-    """Return a pattern for the spellings with a blank or a hyphen in a product."""
+    """Return a pattern for spellings that contain a blank or a hyphen, for use in a product."""
     names = [name for name in _spellings() if " " in name or "-" in name]
     every = "|".join(re.escape(name) for name in sorted(names, key=len, reverse=True))
     return re.compile(rf"(?<![{_LETTERS}_])(?:{every})(?![{_LETTERS}_0-9])")
@@ -456,8 +457,8 @@ class _Reader:
         inside = "" if name == self._plain else f" in {whole}"
         if name in _LOGARITHMIC:
             return (
-                f"the unit {quoted(name)}{inside} is logarithmic, so no factor converts it: "
-                "convert the values to a linear unit first"
+                f"the unit {quoted(name)}{inside} is logarithmic, so no factor can convert it. "
+                "Convert the values to a linear unit first"
             )
         whole_word = _squeezed(self._plain)
         near = [whole_word] if whole_word in _spellings() else _nearest(name)
@@ -466,8 +467,8 @@ class _Reader:
 
     def _ambiguous(self) -> UnknownUnitError:
         return UnknownUnitError(
-            f"the unit {quoted(self._text)} can be read in two ways. Put the divisor in brackets, "
-            "as in J/(kg*K), or write it last",
+            f"the unit {quoted(self._text)} is ambiguous. Put the divisor in parentheses, as in "
+            "J/(kg*K), or write it last",
             value=quoted(self._text),
         )
 
@@ -483,14 +484,14 @@ def _exponent(text: str) -> float:
 
 
 def _nearest(name: str) -> list[str]:
-    """Return similar spellings: those that differ only in capital letters first."""
+    """Return similar spellings, starting with those that differ only in capital letters."""
     folded = [each for each in _spellings() if each.casefold() == name.casefold()]
     return folded[:3] or get_close_matches(name, _spellings(), n=2, cutoff=_NEAR)
 
 
 @cache
 def _spellings() -> dict[str, Scale]:
-    """Return every spelling of every listed unit."""
+    """Return all spellings of all listed units."""
     listed: dict[str, Scale] = {}
 
     def add(name: str, scale: Scale) -> None:
@@ -534,7 +535,7 @@ def _inflected(word: str) -> Iterator[str]:
 
 
 def _scaled(number: str, scale: Scale) -> Scale:
-    """Return a number times another unit; ``pi`` is first or last in the number's text."""
+    """Return a number times another unit; the number's text may start or end with ``pi``."""
     turns = number.count("pi")
     plain = number.replace("2*pi", "2").replace("pi", "1")
     above, _, below = plain.partition("/")

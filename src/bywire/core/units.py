@@ -1,4 +1,4 @@
-"""Conversion of texts with units to SI numbers and back."""
+"""Conversion of strings with units to SI numbers and back."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any, Self, TypeVar, cast
 
 from bywire.core.clean_text import clean
 from bywire.core.errors import UnitError, not_valid, quoted
-from bywire.core.quantities import display_unit
+from bywire.core.quantities import display_unit, readable_unit
 from bywire.core.unit_list import (
     BASES,
     Scale,
@@ -24,18 +24,18 @@ _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*(.*?
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _SIGNS = {"um": "µm", "ohm": "Ω", "percent": "%", "degree": "°", "deg": "°", "degC": "°C"}
 _DIFFERENCES = {"K": "delta_degC", "%": "percentage points", "percent": "percentage points"}
-_LONGEST = 100  # characters; keeps patterns fast on hostile text
+_LONGEST = 100  # characters; keeps patterns fast for hostile text
 _WORDS = {"1": "a pure number", "delta_degC": "a temperature difference in K"}
 ICE = 273.15
 """0 degC [K]"""
-# Elsewhere a radian counts as a pure number: N*m equals N*m/rad. With that rule here, 60 rpm would
-# become 6.28 Hz, 1 would become 57 degrees, and 2 mm would become 2 mm/rad although the user may
-# mean 2 mm/rev.
+# Elsewhere, a radian counts as a pure number: N*m equals N*m/rad. If this rule applied here, 60 rpm
+# would become 6.28 Hz, 1 would become 57 degrees, and 2 mm would become 2 mm/rad although the user
+# may mean 2 mm/rev.
 _NO_MATTER_OF_RAD = ("Hz", "rad/s", "rad", "1", "m/rad")
 
 
 class Written(float):
-    """A number in SI that remembers its original text, which errors quote.
+    """Number in SI units that remembers its original text, which errors quote.
 
     Parameters
     ----------
@@ -64,19 +64,19 @@ def parse(value: str | float, symbol: str, name: str, nominal: float = 1.0) -> f
     Parameters
     ----------
     value
-        Text with a unit such as ``"9 mm"``, or a plain number in SI.
+        String with a unit such as ``"9 mm"``, or a plain number in SI units.
     symbol
         Requested SI unit, ``"1"`` for a pure number.
     name
         Name of the value in errors.
     nominal
-        Its usual magnitude in that unit, for the example in errors.
+        Usual magnitude in the SI unit, for the example in errors.
 
     Raises
     ------
     UnitError
-        When the text is not a quantity, or its unit has another dimension. A text contains only a
-        number and a product of unit names; bywire never evaluates it as code.
+        When the string is not a quantity, or its unit has another dimension. A string contains only
+        a number and a product of unit names. bywire never evaluates it as code.
     ParameterError
         When the number is not finite.
 
@@ -105,32 +105,32 @@ def parse(value: str | float, symbol: str, name: str, nominal: float = 1.0) -> f
 def _number(text: str, symbol: str, name: str, nominal: float) -> float:
     match = _NUMBER.fullmatch(text) if len(text) <= _LONGEST else None
     valid = repr(example(symbol, nominal))
-    write, fields = f"for example, write {valid}", {"name": name, "value": quoted(text)}
+    write, fields = f"For example, write {valid}", {"name": name, "value": quoted(text)}
     if match is None:
         raise UnitError(
-            f"{name} = {quoted(text)} is not a quantity: {write}", **fields, valid=valid
+            f"{name} = {quoted(text)} is not a quantity. {write}", **fields, valid=valid
         )
     size, unit = float(match[1]), match[2]
     try:
         meanings = meanings_of(unit or "1")
     except UnreadableUnitError:
-        reason = f"{name} = {quoted(text)} is not a quantity: {write}"
+        reason = f"{name} = {quoted(text)} is not a quantity. {write}"
         raise UnitError(reason, **fields, valid=valid) from None
     except UnknownUnitError as error:
-        reason = f"{name} = {text!r}: {error}; {write}"
+        reason = f"{name} = {text!r}: {error}. {write}"
         raise UnitError(reason, **fields, valid=valid) from None
     scale = next((each for each in meanings if _measures(each, symbol)), None)
     if scale is None:
         raise UnitError(
             f"{name} = {text!r} has the wrong unit: {unit or 'a pure number'} cannot be "
-            f"converted to {_words(symbol)}; {write}",
+            f"converted to {_words(symbol)}. {write}",
             **fields,
             valid=valid,
         )
     if scale.reference == "absolute":
         raise UnitError(
             f"{name} = {text!r}: bywire cannot determine whether {name} is absolute or relative to "
-            f"ambient pressure. Convert it to the kind that the bench needs, and {write}",
+            f"ambient pressure. Convert it to the kind that the bench needs. {write}",
             **fields,
             valid=valid,
         )
@@ -155,7 +155,7 @@ def _in_si(number: float, scale: Scale) -> float:
 
 
 def split(text: str) -> tuple[str, str]:
-    """Return number and unit of a text that `parse` has read.
+    """Return number and unit of a string that `parse` accepts.
 
     Examples
     --------
@@ -172,7 +172,7 @@ def base_powers(unit: str, bases: tuple[str, ...]) -> tuple[float, ...]:
     Raises
     ------
     UnitError
-        When it is neither a listed unit nor a product of listed units.
+        When the string is neither a listed unit nor a product of listed units.
 
     Examples
     --------
@@ -189,7 +189,7 @@ def si_value(number: float, unit: str) -> float:
 
 
 def has_own_zero(unit: str, symbol: str) -> bool:
-    """Return whether a unit's zero differs from the SI unit's, as that of degC differs from K."""
+    """Return whether a unit's zero differs from the SI unit's zero, as for degC and K."""
     return parse(f"0 {unit}", symbol, unit) != 0.0
 
 
@@ -199,7 +199,7 @@ def _of_symbol(symbol: str) -> Scale:
 
 
 def _converted(size: float, number: float) -> float:
-    """Round a converted number, so 9 mm is 0.009, not 0.009000000000000001; keep SI values."""
+    """Round a converted number: 9 mm is 0.009, not 0.009000000000000001. Keep SI values."""
     return size if number == size else float(f"{number:.15g}")
 
 
@@ -223,14 +223,14 @@ def unit_text(symbol: str) -> str:
 
 
 def shown(value: float, symbol: str, unit: str = "") -> str:
-    """Return a value in its display unit, for example ``25 bar``, or in another unit.
+    """Return a value in its most readable unit, for example ``25 bar``, or in another unit.
 
     Examples
     --------
-    >>> shown(25e5, "Pa"), shown(100.0 / 3.6, "m/s", "km/h")
-    ('25 bar', '100 km/h')
+    >>> shown(25e5, "Pa"), shown(0.05, "s"), shown(100.0 / 3.6, "m/s", "km/h")
+    ('25 bar', '50 ms', '100 km/h')
     """
-    unit = unit or display_unit(symbol)
+    unit = unit or readable_unit(value, symbol)
     number = convert(value, symbol, unit)
     return f"{number:.6g}" + ("" if unit == "1" else f" {unit}")
 
@@ -260,7 +260,7 @@ def convert(value: F, symbol: str, unit: str) -> F:
 def difference_unit(symbol: str) -> str:
     """Return the SI unit of differences; for temperatures, a unit without an offset.
 
-    Percentages differ by percentage points.
+    Differences of percentages are in percentage points.
 
     Examples
     --------
@@ -273,9 +273,9 @@ def difference_unit(symbol: str) -> str:
 
 
 def display_factor(symbol: str) -> float:
-    """Return the factor from a difference in the SI unit to one in the display unit.
+    """Return the factor that converts a difference from the SI unit to the display unit.
 
-    For values themselves, it is valid only if both units have the same zero; see `convert`.
+    The factor is valid for values only if both units have the same zero; see `convert`.
 
     Examples
     --------
@@ -287,7 +287,7 @@ def display_factor(symbol: str) -> float:
 
 
 def example(symbol: str, nominal: float = 1.0) -> str:
-    """Return a valid example of a quantity, with its declared usual magnitude if it has one.
+    """Return a valid example of a quantity, with its usual magnitude if one is declared.
 
     Examples
     --------

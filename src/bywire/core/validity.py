@@ -1,4 +1,4 @@
-"""Elements' warnings about a recording: which range was exceeded, and when first."""
+"""Warnings of elements about a recording: the exceeded range, and the first time."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ F = TypeVar("F", bound=Callable[..., list[str]])
 
 
 def row_by_row(watch: F) -> F:
-    """Declare that an element's ``watch`` judges each row on its own.
+    """Declare that an element's ``watch`` judges each row separately.
 
-    It warns exactly if at least one row on its own would make it warn. Studies then call it once
-    with the rows of many cases, shape (cases, rows), since most cases have no warnings.
+    It warns if and only if it would warn about at least one row alone. Studies then call it once
+    with the rows of many cases, shape (cases, rows), because most cases have no warnings.
     """
     watch.row_by_row = True  # type: ignore[attr-defined]
     return watch

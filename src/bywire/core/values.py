@@ -1,4 +1,4 @@
-"""Conversion of users' values: texts with units become SI numbers, tables, or choices."""
+"""Conversion of users' values: strings with units become SI numbers, tables, or choices."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ _ZERO = re.compile(r"\s*[+-]?(?:0+\.?0*|\.0+)\s*")
 def parsed(
     cls: type[ParameterSet], values: Mapping[str, Any], kind: str, listed: str = ""
 ) -> dict[str, Any]:
-    """Return values by dotted name, numbers in SI.
+    """Return values by dotted name, with numbers in SI units.
 
-    ``cls``: the parameter class. ``values``: numbers (SI), texts with units, sequences of these for
-    tables, or choices. ``kind``: the kind of the names in errors. ``listed``: command that
-    lists them.
+    ``cls``: the parameter class. ``values``: numbers (SI), strings with units, sequences of these
+    for tables, or choices. ``kind``: the kind of the names in errors. ``listed``: the command that
+    lists these names.
 
     Raises
     ------
     UnknownNameError
-        With the nearest valid names.
+        When a name is unknown; the message contains the nearest valid names.
     UnitError
-        When a text is not a quantity or its unit has another dimension.
+        When a string is not a quantity, or its unit has another dimension.
     ParameterError
-        When there are several values for a single number, or a number is not finite.
+        When a single number has several values, or a number is not finite.
     """
     leaves, choices = leaf_fields(cls), choice_fields(cls)
     accepted: dict[str, Any] = {}
@@ -59,13 +59,13 @@ def number(value: Any, symbol: str, name: str, nominal: float = 1.0) -> float:
 
 
 def written(value: Any, symbol: str, name: str, nominal: float = 1.0) -> float:
-    """Return one value of a file; reject a plain number where a unit is required."""
+    """Return one value of a file; reject a plain number if a unit is required."""
     require_unit(value, symbol, name, nominal)
     return number(value, symbol, name, nominal)
 
 
 def nodes(value: Any, symbol: str, name: str, nominal: float = 1.0) -> tuple[float, ...]:
-    """Return a table's nodes from a sequence, or from a text with commas, each with its unit.
+    """Return a table's nodes from a sequence, or from a string with commas, each with its unit.
 
     Examples
     --------
@@ -83,7 +83,7 @@ def nodes(value: Any, symbol: str, name: str, nominal: float = 1.0) -> tuple[flo
 
 
 def _listed(text: str, symbol: str, name: str, nominal: float) -> tuple[float, ...]:
-    """Return a table's nodes from a single text."""
+    """Return a table's nodes from a single string."""
     parts = [part.strip() for part in text.split(",")]
     try:
         return tuple(
@@ -91,25 +91,25 @@ def _listed(text: str, symbol: str, name: str, nominal: float) -> tuple[float, .
             for k, part in enumerate(parts)
         )
     except UnitError as error:
-        raise error.reworded(f"{error}; commas separate several values") from None
+        raise error.reworded(f"{error}. Separate several values with commas") from None
 
 
 def require_units(cls: type[ParameterSet], values: Mapping[str, Any], level_unit: str = "") -> None:
-    """Reject a file's plain numbers where a unit is required; zero needs none.
+    """Reject plain numbers in a file if a unit is required; zero needs no unit.
 
     Parameters
     ----------
     cls
         The parameter class of the values.
     values
-        Values by dotted name. Unknown names and values that are not numbers are skipped.
+        Values by dotted name. The function skips unknown names and values that are not numbers.
     level_unit
         Unit that replaces ``level`` in the unit of a stimulus.
 
     Raises
     ------
     UnitError
-        The same error as for the number's text.
+        When a number has no unit, with the same message as for the number as a string.
     """
     leaves = leaf_fields(cls)
     for name in values.keys() & leaves.keys():
@@ -123,7 +123,7 @@ def require_units(cls: type[ParameterSet], values: Mapping[str, Any], level_unit
 
 
 def require_unit(value: Any, symbol: str, name: str, nominal: float = 1.0) -> None:
-    """Reject a plain number where a unit is required; see `require_units`."""
+    """Reject a plain number if a unit is required; see `require_units`."""
     if isinstance(value, (bool, units.Written)) or not isinstance(value, (int, float)):
         return
     try:
@@ -135,7 +135,7 @@ def require_unit(value: Any, symbol: str, name: str, nominal: float = 1.0) -> No
 
 
 class _Unquoted(str):
-    """A text that errors quote without quotation marks."""
+    """String that errors quote without quotation marks."""
 
     __slots__ = ()
 
@@ -144,9 +144,9 @@ class _Unquoted(str):
 
 
 def _plain_text(value: float) -> str:
-    """Return a file's plain number as a text that errors quote without quotation marks.
+    """Return a file's plain number as a string that errors quote without quotation marks.
 
-    A text without its required unit is an error, whereas a number would count as SI.
+    A string without its required unit is an error, whereas a number would count as SI.
 
     Examples
     --------

@@ -1,3 +1,3 @@
-"""The version of the package; every recording and report names it."""
+"""Version of the package, which every recording and report contains."""
 
 __version__ = "0.1.0"

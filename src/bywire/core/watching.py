@@ -1,7 +1,8 @@
-"""Elements' warnings about a recording, evaluated in every row.
+"""Elements' warnings about a recording, evaluated in each row.
 
-An element's inputs depend on few states. The assembly's equations are traced once per structure.
-Only the equations that lead to elements with a ``watch`` function are evaluated on a recording.
+An element's inputs depend on only a few states. The assembly's equations are traced once per
+structure. Only those equations that lead to elements with a ``watch`` function are evaluated on a
+recording.
 """
 
 from __future__ import annotations
@@ -27,9 +28,9 @@ class Watching(Model):
     subs: ClassVar[dict[str, Any]]
 
     def watch(self, recording: Any, par: Any) -> list[str]:
-        """Return the elements' warnings about a recording, evaluated in every row.
+        """Return the elements' warnings about a recording, evaluated in each row.
 
-        Signals that were not recorded cause no warnings.
+        Signals that were not recorded do not cause warnings.
         """
         within = (
             f"{sub.label}: {text}"
@@ -51,7 +52,7 @@ class Watching(Model):
         return tuple(names)
 
     def silent(self, rows: Any, pars: Sequence[Any]) -> frozenset[str]:
-        """Return the names of the parts without warnings in any of several cases.
+        """Return the names of the parts that have no warnings in any of several cases.
 
         ``rows``: signals of shape (cases, rows); ``pars``: parameters of each case.
         """
@@ -63,9 +64,9 @@ class Watching(Model):
         return silent_parts(self, rows, pars) | frozenset(within)
 
     def may_warn(self, rows: Any, pars: Sequence[Any]) -> Sequence[int]:
-        """Return the cases for which ``watch`` may warn; none if all parts are silent.
+        """Return the cases for which ``watch`` may warn; no case if all parts are silent.
 
-        It returns all cases if a subclass overrides ``watch`` but not this method.
+        If a subclass overrides ``watch`` but not this method, the method returns all cases.
         """
         if type(self).watch is not Watching.watch or not self.are_silent(rows):
             return range(len(pars))
@@ -76,7 +77,7 @@ class Watching(Model):
         return tuple(sorted({case for cases in within for case in cases}))
 
     def are_silent(self, rows: Any) -> bool:
-        """Return whether ``rows.silent`` covers every part that watches."""
+        """Return whether ``rows.silent`` contains every part that watches."""
         watching = (part.name for part in self.parts.values() if part.has("watch"))
         return all(name in rows.silent for name in watching)
 
@@ -95,9 +96,9 @@ def _warnings_of(model: Any, recording: Any, par: Any) -> list[str]:
 
 
 def silent_parts(model: Any, rows: Any, pars: Sequence[Any]) -> frozenset[str]:
-    """Return an assembly's parts without warnings in any of several cases.
+    """Return an assembly's parts that have no warnings in any of several cases.
 
-    ``rows``: signals of shape (cases, rows). Only elements that judge each row alone can be
+    ``rows``: signals of shape (cases, rows). Only elements that judge each row separately can be
     evaluated. Parameters that differ between the cases become arrays of shape (cases, 1).
     """
     felt = tuple(
@@ -110,7 +111,7 @@ def silent_parts(model: Any, rows: Any, pars: Sequence[Any]) -> frozenset[str]:
     for each in felt:
         try:
             ((part, texts),) = _warnings_by_part(model, (each,), rows, joined, len(pars) > 1)
-        except (TypeError, ValueError):  # it needs or returns something other than a single number
+        except (TypeError, ValueError):  # the function needs or returns more than a single number
             continue
         if not texts:
             silent.add(part.name)
@@ -118,7 +119,7 @@ def silent_parts(model: Any, rows: Any, pars: Sequence[Any]) -> frozenset[str]:
 
 
 def _joined(pars: Sequence[Any]) -> Any:
-    """Join sets of one structure: values that differ become arrays over the sets."""
+    """Join sets with the same structure; values that differ become arrays over the sets."""
     if len(pars) == 1:
         return pars[0]
     names, table = tuple(pars[0].leaves()), leaf_table(pars)
@@ -150,7 +151,7 @@ def watched_by_elements(model: Any, par: Any) -> tuple[str, ...]:
 
 def _watching_parts(model: Any, par: Any) -> _Felt:
     """Return the parts that watch, with their inputs as traced functions of signals."""
-    # An instance with attributes is not cached, since its equations may use them.
+    # An instance with attributes is not cached, because its equations may use the attributes.
     key = None if vars(model) else (type(model), tuple(par.choices().items()))
     if key in _KNOWN:
         return _KNOWN[key]

@@ -19,7 +19,7 @@ P = TypeVar("P")
 
 
 class Wired(Generic[X, U, F, P]):
-    """A part at an instant: its state, input, contact forces and parameters.
+    """Part at an instant, with its state, input, contact forces and parameters.
 
     Parameters
     ----------
@@ -52,22 +52,22 @@ class Wired(Generic[X, U, F, P]):
         return self._part.parameters(self._instant.par)  # type: ignore[no-any-return]
 
     def vary(self, **values: Any) -> None:
-        """Set parameters of the part that depend on the state, by their values at this instant.
+        """Set parameters of the part that depend on the state, to their values at this instant.
 
-        Call it in ``wire`` before any read of them. The values may depend on value-only states
-        (``xe``). ``mass`` and ``matrix`` still use the original values.
+        Call this method in ``wire`` before any read of the parameters. The values may depend on
+        value-only states (``xe``). ``mass`` and ``matrix`` still use the original values.
 
         Raises
         ------
         ModelError
-            When the element has no such parameter.
+            When the element does not have the parameter.
         """
         given: Any = self.par
         for name in values:
             if name not in type(given).model_fields:
                 error = unknown_name("parameter", name, dict(given))
                 raise error.at(f"{self._part.where}: {line()} vary", ModelError)
-        # Not validated, since the values may be symbols.
+        # Do not validate, because the values may be symbols.
         self._varied = type(given).model_construct(**{**dict(given), **values})
 
     @property
@@ -82,8 +82,8 @@ class Wired(Generic[X, U, F, P]):
             self._instant.settle()
         if self._input is None:
             raise ModelError(
-                f"{self._part.where}: its input is read before it is wired. Assign "
-                f"w.{self._part.name}.u = {self._part.kind}.Input(...) in wire before that",
+                f"{self._part.where}: the equations read its input before it is wired. Assign "
+                f"w.{self._part.name}.u = {self._part.kind}.Input(...) earlier in wire",
                 name=self._part.where,
                 valid=f"w.{self._part.name}.u = {self._part.kind}.Input(...)",
             )
@@ -96,7 +96,7 @@ class Wired(Generic[X, U, F, P]):
             valid = "no input" if expected is None else f"a {self._part.kind}.Input"
             actual = f"{type(value).__module__}.{type(value).__name__}"
             raise ModelError(
-                f"{self._part.where}: {line()} assigns a {actual} as its input, but it accepts "
+                f"{self._part.where}: {line()} assigns a {actual} as input, but the part accepts "
                 f"{valid}",
                 name=self._part.where,
                 value=actual,
@@ -111,7 +111,7 @@ class Wired(Generic[X, U, F, P]):
         self._instant.note(f"{self._part.name}.u")
 
     def call(self, function: Callable[..., Any], **more: Any) -> Any:
-        """Call an element's function with arguments according to their names."""
+        """Call an element's function with the arguments that its signature names."""
         return function(
             *(
                 more[name] if name in more else self._argument(name, function)
@@ -134,8 +134,8 @@ class Wired(Generic[X, U, F, P]):
         valid = "x, u, f, par"
         raise ModelError(
             f"{self._part.where}: {self._part.kind}.{function.__name__} has an argument {name!r}, "
-            f"which is not available. Use {valid} or a group that the assembly lists in shared "
-            f"({', '.join(self._instant.shared) or 'none so far'})",
+            f"which is not available. Use {valid}, or a group that the assembly lists in shared "
+            f"({', '.join(self._instant.shared) or 'currently none'})",
             name=f"{self._part.kind}.{function.__name__}",
             value=name,
             valid=valid,
@@ -155,9 +155,9 @@ class Instant:
     contact
         Contact forces by part and by subassembly.
     lines
-        File and line of every assignment of a wire or input, if requested.
+        File and line of each assignment of a wire or input, if requested.
     mark
-        ``mark(name, value)``: replacement for every assigned wire and input, used to trace
+        ``mark(name, value)``: replacement for each assigned wire and input, which traces
         connections.
     held
         Subassemblies at the same instant.
@@ -166,7 +166,7 @@ class Instant:
     wiring
         Function that wires the assembly once, at the first read; None afterward.
     is_held
-        Whether another assembly contains it and sets its ports.
+        Whether another assembly contains this assembly and sets its ports.
     ports
         Values of ports that are not set. Default: 0.
     """
@@ -197,7 +197,7 @@ class Instant:
             wiring()
 
     def marked(self, name: str, value: Any) -> Any:
-        """Return a wire or an input with its mark, if any."""
+        """Return the value of a wire or an input with its mark, if any."""
         return value if self.mark is None else self.mark(name, value)
 
     def note(self, name: str) -> None:
@@ -212,13 +212,13 @@ def instant_of(instance: Any, where: str) -> Instant:
     Raises
     ------
     ModelError
-        When it is not evaluated, since parts have values only at an instant.
+        When the assembly is not evaluated, because parts have values only at an instant.
     """
     instant = vars(instance).get("_instant")
     if instant is None:
         raise ModelError(
-            f"{where} has no value here: in wire, power or record read it from w, elsewhere from "
-            "model.at(state, memory, par)",
+            f"{where} has no value here. In wire, power or record, read it from w. Elsewhere, read "
+            "it from model.at(state, memory, par)",
             name=where,
             valid="model.at(state, memory, par)",
         )
@@ -232,7 +232,7 @@ def arguments(function: Callable[..., Any]) -> tuple[str, ...]:
 
 
 def line() -> str:
-    """Return file and line of the current equation: the first frame outside this package."""
+    """Return file and line of the current equation, the first frame outside this package."""
     frame = inspect.currentframe()
     while frame is not None and frame.f_globals.get("__package__") == __package__:
         frame = frame.f_back
@@ -243,7 +243,7 @@ def line() -> str:
 
 
 class _Named:
-    """A signal that the class of an assembly declares."""
+    """Signal that the class of an assembly declares."""
 
     name: str
     where: str
@@ -258,7 +258,7 @@ class _Named:
 
 
 class Wire(_Named):
-    """A signal between parts that ``wire`` sets once; it can be recorded."""
+    """Signal between parts, which ``wire`` sets once and which can be recorded."""
 
     @overload
     def __get__(self, instance: None, owner: type) -> Self: ...
@@ -289,24 +289,26 @@ class Wire(_Named):
         instant = instant_of(instance, self.where)
         if self.name in instant.wires:
             raise ModelError(
-                f"{self.where}: {line()} sets it a second time. Set a wire once", name=self.where
+                f"{self.where}: {line()} sets this wire a second time. Set a wire only once",
+                name=self.where,
             )
         instant.wires[self.name] = instant.marked(self.name, value)
         instant.note(self.name)
 
 
 class Port(Wire):
-    """A wire that an assembly's holder sets; without a holder, 0 or the value from ``wire``.
+    """Wire that an assembly's holder sets; without a holder, 0 or the value from ``wire``.
 
-    The holder sets it, ``w.brake.PORT = ...``, before any read of that assembly's wires.
+    The holder sets it with ``w.brake.PORT = ...`` before any read of the assembly's wires.
     """
 
     def unset(self, instant: Instant) -> None:
-        """Use the default without a holder; raise the error with a holder."""
+        """Use the default if there is no holder; raise the error if there is one."""
         if instant.is_held:
             raise ModelError(
-                f"{self.where} is read before the holder sets it. Assign w.NAME.{self.name} = ... "
-                "in its wire before any read of wires or inputs of w.NAME",
+                f"the equations read {self.where} before the holder sets it. Assign "
+                f"w.NAME.{self.name} = ... in the holder's wire before any read of wires or inputs "
+                "of w.NAME",
                 name=self.where,
                 valid=f"w.NAME.{self.name} = ...",
             )
@@ -314,8 +316,8 @@ class Port(Wire):
 
 
 class Integral(_Named):
-    """A quantity integrated along with the states; ``power`` returns its rate."""
+    """Quantity that is integrated along with the states; ``power`` returns its rate."""
 
 
 class Shown(_Named):
-    """A recorded signal that is not a state, wire or integral; ``record`` returns it."""
+    """Recorded signal that is not a state, wire or integral; ``record`` returns it."""

@@ -1,4 +1,4 @@
-"""An assembly's wiring, derived from its equations: completeness, and connections of parts."""
+"""Wiring of an assembly, derived from its equations: completeness, and connections of parts."""
 
 from __future__ import annotations
 
@@ -20,12 +20,13 @@ _AnyAssembly = Assembly[Any, Any]
 
 
 def check_wiring(model: _AnyAssembly, par: ParameterSet) -> None:
-    """Evaluate an assembly on dimensions and check the units of its assignments and results.
+    """Evaluate an assembly on dimensions, and check the units of its assignments and results.
 
     Raises
     ------
     ModelError
-        With class, file and line, part, signal, both units, and the next step.
+        When the wiring is incomplete or a unit is wrong. The message contains class, file and line,
+        part, signal, both units, and the next step.
     """
     at = _Operands(model, par)
     w = at.wired("wire")
@@ -46,7 +47,7 @@ def check_wiring(model: _AnyAssembly, par: ParameterSet) -> None:
 
 
 class _Operands:
-    """Evaluation of an assembly on dimensions."""
+    """Operands for the evaluation of an assembly on dimensions."""
 
     def __init__(self, model: _AnyAssembly, par: ParameterSet) -> None:
         self.model = model
@@ -86,14 +87,14 @@ class _Operands:
         """Return the dimension of a unit; an error contains the unit's owner."""
         try:
             if not unit:
-                raise UnitError("it has no unit. Write '1' for a pure number")
+                raise UnitError("the unit is missing. Write '1' for a pure number")
             return Dimension.of(unit)
         except UnitError as error:
             text = f"{_place(self.model)}: {what}: {error}"
             raise ModelError(text, name=what, value=unit) from None
 
     def wired(self, method: str) -> _AnyAssembly:
-        """Return the assembly at an instant, with the lines in which its wires were set."""
+        """Return the assembly at an instant, with the lines that set its wires."""
         lines: dict[str, str] = {}
         wired: _AnyAssembly = self.evaluated(
             method,
@@ -161,7 +162,7 @@ def _check_inputs(model: _AnyAssembly, at: _Operands, w: _AnyAssembly) -> None:
 
 
 def _check_held(model: _AnyAssembly, par: ParameterSet) -> None:
-    """Check that the subassemblies' stimuli have sources, and that their tasks run."""
+    """Check that the stimuli of the subassemblies have sources, and that their tasks run."""
     known = signals_of(model.Stimulus) | signals_of(model.Memory)
     running = {task.name for task in model.tasks(par)}
     for sub in model.subs.values():
@@ -200,7 +201,7 @@ def _check_contacts(model: _AnyAssembly, at: _Operands) -> None:
             if isinstance(overlap, Dimension) and not fits(overlap, str(valid)):
                 raise ModelError(
                     f"{_place(model)}: an overlap is in {overlap}, but compliance times force is "
-                    f"in {valid}: the units must match",
+                    f"in {valid}. The units must match",
                     name="overlap",
                     value=str(overlap),
                     valid=str(valid),
@@ -256,7 +257,7 @@ def _require(
 
 
 def _assigned(name: str) -> str:
-    """Return the name under which a wire or a part's input was assigned; an input is one item."""
+    """Return the name that was used to assign a wire or a part's input, which is one item."""
     return name.rpartition(".")[0] if ".u." in name else name
 
 
@@ -290,17 +291,17 @@ def _line_of(error: BaseException, model: _AnyAssembly) -> str:
 
 
 # --- Connections of parts
-# ``wire`` and the tasks run once on numbers that remember how they are computed. Setting a wire or
-# an input marks its value. A value is connected to all values that it is computed from, up to the
-# next mark.
+# ``wire`` and the tasks run once on numbers that record their computation. The assignment of a wire
+# or an input marks its value. A value is connected to all values from which it is computed, up to
+# the next mark.
 
 Kind = Literal["part", "wire", "task", "stimulus"]
 FRICTION = "friction"
-"""port of a part for the dry friction on its state"""
+"""port of a part for dry friction on its state"""
 
 
 class Node(NamedTuple):
-    """A part, a wire, an ECU task, or the bench's stimulus, with its name in the assembly."""
+    """Part, wire, ECU task, or stimulus of the bench, with its name in the assembly."""
 
     kind: Kind
     name: str
@@ -314,7 +315,7 @@ STIMULUS = Node("stimulus", "demand")
 class Connection:
     """Connection from one node to another.
 
-    ``port``: input of a part, or signal that a task reads; empty if the target is a wire.
+    ``port``: the input of a part, or the signal that a task reads; empty if the target is a wire.
     """
 
     source: Node
@@ -329,13 +330,13 @@ class Network:
     Parameters
     ----------
     name
-        Of the assembly.
+        Name of the assembly.
     nodes
         The stimulus if a task reads it, then parts, wires and tasks in the order of declaration.
     labels
-        Description of each node: the kind of a part's element, or a wire's label.
+        Description of each node, such as the kind of a part's element, or a wire's label.
     ports
-        Inputs of each part and task in order, by node; wires have none.
+        Inputs of each part and task in order, by node. Wires have no ports.
     connections
         Connections without duplicates, in the order of their targets.
     """
@@ -403,7 +404,7 @@ class _Trace:
     def __init__(self, model: Assembly[Any, Any], par: Any) -> None:
         self.model = model
         self._marks: dict[int, tuple[Node, Any]] = {}
-        self._kept: list[Traced] = []  # keeps marks alive, since their identity matters
+        self._kept: list[Traced] = []  # keeps the marks alive, because their identity matters
         self.owners = {
             part.state_name(state): Node("part", part.name)
             for part in model.parts.values()
@@ -461,7 +462,7 @@ class _Trace:
         }
 
     def memory_of(self, name: str) -> dict[str, Node]:
-        """Return a subassembly's memory by its own names, with the task that updates each field."""
+        """Return the task that updates each field of a subassembly's memory, by its own names."""
         sub, node = self.model.subs[name], Node("part", name)
         own = dict(zip(sub.signals("Memory"), sub.assembly.Memory._fields, strict=True))
         raw = tuple(value for at, value in self._marks.values() if at == node)
@@ -529,13 +530,13 @@ class _Trace:
         return self.owners.get(leaf)
 
     def nodes(self, connections: Iterable[Connection]) -> tuple[Node, ...]:
-        """Return all nodes; the stimulus is included only if something is connected to it."""
+        """Return all nodes, with the stimulus only if it has a connection."""
         asked = [STIMULUS] if any(c.source == STIMULUS for c in connections) else []
         parts = (Node("part", name) for name in (*self.model.parts, *self.model.subs))
         return (*asked, *self.ticks, *(Node("wire", name) for name in self.wires), *parts)
 
     def labels(self) -> dict[Node, str]:
-        """Return a description of every node."""
+        """Return a description of each node."""
         cls = type(self.model)
         labels = {Node("wire", name): getattr(cls, name).signal.label for name in self.wires}
         labels |= {

@@ -172,7 +172,7 @@ def read_measurement(
         mapping, bywire reads every column under its own name; the file must then contain units
         and times.
     signals
-        Names of the signals to read; by default all in the mapping.
+        Names of the signals to read. Default: all in the mapping.
     progress
         Callback with a label and the finished share.
     largest
@@ -385,7 +385,7 @@ def read_trace(
         The file.
     signals
         Required signals and their SI units, for example ``{"pedal": "m"}``: signals of the
-        mapping, or columns, ignoring case. By default all are read, each in the SI unit of its
+        mapping, or columns, ignoring case. Default: all columns, each in the SI unit of its
         quantity.
     max_gap
         Maximum pause between two samples, text with a unit or [s]. A longer pause is an error if

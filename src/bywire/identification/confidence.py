@@ -409,7 +409,8 @@ class Disagreement:
     def __str__(self) -> str:
         """Return it as a sentence."""
         there, rest = (
-            f"{shown(float(f'{value:.5g}'), self.unit)} +- {deviation:.2g}"
+            f"{shown(float(f'{value:.5g}'), self.unit)} +- "
+            f"{shown(float(f'{deviation:.2g}'), difference_unit(self.unit))}"
             for value, deviation in (
                 (self.value, self.deviation),
                 (self.others, self.others_deviation),

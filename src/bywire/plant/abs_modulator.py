@@ -1,4 +1,4 @@
-"""Modulator of an anti-lock system on air: a hold valve and a vent valve with lags."""
+"""Modulator of an anti-lock system on air, with a hold valve and a vent valve that lag."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Command = Annotated[float, Signal("1", "valve command", 0.5, low=0.0, high=1.0)]
 
 
 class Parameters(ParameterSet):
-    """Diaphragm valves; without current, the hold valve is open and the vent valve closed."""
+    """Diaphragm valves. Without current, the hold valve is open and the vent valve closed."""
 
     tau_hold: Duration
     """time constant of the hold valve"""

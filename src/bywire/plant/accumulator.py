@@ -1,4 +1,4 @@
-"""Low-pressure accumulator of an anti-lock system: a piston on a spring stores released fluid."""
+"""Low-pressure accumulator of an anti-lock system, where a sprung piston stores released fluid."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ class Parameters(ParameterSet):
     """Massless piston between two stops, incompressible fluid."""
 
     p_0: Pressure
-    """pressure at which the spring yields"""
+    """pressure at which the spring starts to yield"""
     k: Stiffness
     """pressure per volume"""
     V_max: Capacity
-    """largest volume"""
+    """maximum volume"""
 
 
 FAULTS = (ParameterFault("stiff", "stuck piston", ("k",), 10.0),)
@@ -48,7 +48,7 @@ def mass(x: State) -> Annotated[float, Signal("1", "one", 1.0)]:
 
 
 def balance(u: Input) -> Annotated[float, Signal("m**3/s", "flow in", 1e-5)]:
-    """Return the growth of the volume; its limits at both ends are those of the model."""
+    """Return the rate of the volume. The model limits the volume at both ends."""
     return u.q
 
 

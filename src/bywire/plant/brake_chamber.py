@@ -21,12 +21,12 @@ GaugePressure = Annotated[float, Signal("Pa", "chamber pressure", 4e5)]
 class Parameters(ParameterSet):
     """Massless diaphragm whose effective area depends on the travel.
 
-    The area is interpolated between the nodes, and constant outside. It falls over the last third
-    of the stroke of a real chamber.
+    The area is interpolated between the nodes and constant outside. In a real chamber, it falls
+    over the last third of the stroke.
     """
 
     V_0: Volume
-    """volume with the rod at rest, with the hose"""
+    """volume with the rod at rest, including the hose"""
     x_table: Annotated[Nodes, Unit("m", 0.02)]
     """travels of the table, increasing from 0"""
     A_table: Annotated[Nodes, Unit("m**2", 1e-2)]
@@ -65,11 +65,11 @@ class InputRate(NamedTuple):
 
 
 class Output(NamedTuple):
-    """Force of the rod; the chamber's volume and its growth."""
+    """Force of the rod, volume of the chamber and its rate."""
 
     F: Annotated[float, Signal("N", "rod force", 5e3)]
     V: Annotated[float, Signal("m**3", "chamber volume", 1e-3)]
-    V_rate: Annotated[float, Signal("m**3/s", "growth of the volume", 5e-3)]
+    V_rate: Annotated[float, Signal("m**3/s", "rate of the volume", 5e-3)]
 
 
 def output(u: Input, par: Parameters) -> Output:
@@ -79,8 +79,8 @@ def output(u: Input, par: Parameters) -> Output:
 
     Notes
     -----
-    The force has kinks at the nodes of the table. The rod rests on a stop: without pressure, the
-    preload holds it there.
+    The force has kinks at the nodes of the table. Without pressure, the preload holds the rod on
+    its stop.
     """
     V = par.V_0 + ops.fmin(u.x, 0.0) * par.A_table[0]
     for (x0, A0), (x1, A1) in pairwise(zip(par.x_table, par.A_table, strict=True)):

@@ -1,4 +1,4 @@
-"""Pedal simulator: two springs in stages give the driver a brake-like feel."""
+"""Pedal simulator, whose two springs give the driver the feel of a hydraulic brake."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Loss = Annotated[float, Signal("W", "damping loss", role=Role("sink", "pedal dam
 
 
 class Parameters(ParameterSet):
-    """Massless piston; the second spring touches at ``x_1``."""
+    """Massless piston. The second spring touches at ``x_1``."""
 
     k_1: Stiffness
     """stiffness of the first spring"""

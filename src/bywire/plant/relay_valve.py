@@ -1,4 +1,4 @@
-"""Relay valve of an air brake: feeds or exhausts until its output follows the control pressure."""
+"""Relay valve of an air brake, whose output pressure follows the control pressure."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ Opening = Annotated[float, Signal("1", "opened fraction", 1.0)]
 
 
 class Parameters(ParameterSet):
-    """Spool with a first-order lag; its seats are air orifices.
+    """Spool with a first-order lag. Its seats are air orifices.
 
-    A spool within the overlap closes both seats exactly. The pressure then stands still.
+    A spool within the overlap closes both seats exactly. The pressure then stays constant.
     """
 
     tau: Duration
@@ -47,7 +47,7 @@ class Input(NamedTuple):
 
 
 class Output(NamedTuple):
-    """Openings of the two seats; at most one is positive."""
+    """Openings of the two seats. At most one is positive."""
 
     feed: Opening
     exhaust: Opening

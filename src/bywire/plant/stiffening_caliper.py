@@ -1,4 +1,4 @@
-"""Caliper that stiffens with pressure: soft while pads and seals settle, then linear."""
+"""Caliper that is soft while pads and seals settle, and linear at higher pressure."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ Compliance = Annotated[float, Unit("m**3/Pa", 1e-13), Field(gt=0, allow_inf_nan=
 
 
 class Parameters(ParameterSet):
-    """Elastic caliper without hysteresis; its fluid has the compressibility of the line's."""
+    """Elastic caliper without hysteresis. Its fluid is as compressible as that of the line."""
 
     V_1: Volume
     """volume that settles"""
     p_1: Pressure
-    """pressure at which 63 % of this volume have settled"""
+    """pressure at which 63 % of this volume has settled"""
     c: Compliance
-    """compliance of pads and caliper after that"""
+    """compliance of pads and caliper once they have settled"""
 
 
 FAULTS = (
@@ -68,7 +68,7 @@ def energy(x: State, par: Parameters, fluid: brake_fluid.Parameters) -> Energy:
     .. math:: \sum_k \frac{V_1 p_1^k}{\beta^{k-1}}
         \left(1 - e^{-z} \sum_{j \le k} \frac{z^j}{j!}\right) + c \int_0^p h\, dp', \quad z = p/p_1
 
-    with the terms of the flow energy h, see `brake_fluid.flow_energy`.
+    with the terms of the flow energy h (`brake_fluid.flow_energy`).
     """
     z = x.p / par.p_1
     decay, partial, scale = ops.exp(-z), 1.0 + 0.0 * z, par.V_1 * par.p_1

@@ -1,7 +1,7 @@
 """Designs of studies: sampled points, groups for sensitivity indices, and searches.
 
-A chunk of points depends only on the seed and its number. So chunks can be computed in any order,
-anywhere, and more of them can be added later.
+A chunk of points depends only on the seed and its number. Chunks can therefore be computed in any
+order, anywhere, and more chunks can be added later.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ from bywire.data.file_format import library
 from bywire.studies.distribution import TAIL, Distribution, normal_quantile
 
 SAMPLED = ("monte-carlo", "latin-hypercube", "sobol")
-"""designs that sample the distributions: their shares of cases are probabilities"""
+"""designs that sample the distributions, so that fractions of cases are probabilities"""
 SPANNED = ("grid", "corners", "one-at-a-time")
-"""designs that visit the ends: they show what can happen, not how often"""
+"""designs that visit the ends, which show what can happen, but not how often"""
 MOST = 10_000_000
 """maximum number of cases of a study"""
 _INSIDE = (2.0**-53, 1.0 - 2.0**-53)  # probabilities that have a finite quantile
-_CORNERS = 16  # quantities of which all corners are visited
+_CORNERS = 16  # maximum number of quantities in a design of corners
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Sampled:
     Parameters
     ----------
     kind
-        One of `SAMPLED`. Each chunk is a Latin hypercube of its own, so that more can be added; a
+        One of `SAMPLED`. Each chunk is a separate Latin hypercube, so that more can be added; a
         Sobol sequence is scrambled.
     seed
         Seed of the random numbers.
@@ -99,7 +99,7 @@ class Sampled:
 
 @dataclass(frozen=True)
 class Spanned:
-    """Listed points: all of them in one table.
+    """Listed points in one table.
 
     Parameters
     ----------
@@ -122,19 +122,20 @@ class Spanned:
 def spanned(
     kind: str, distributions: Sequence[Distribution], nominal: Sequence[object], levels: int
 ) -> Spanned:
-    """Return the points of a design that visits the ends, the bench's own values first.
+    """Return the points of a design that visits the ends, starting with the bench's own values.
 
     Parameters
     ----------
     kind
-        ``grid``: all combinations of ``levels`` values each; ``corners``: of both ends of each;
-        ``one-at-a-time``: ``levels`` values of each, the others as they are.
+        ``grid``: all combinations of ``levels`` values of each quantity; ``corners``: all
+        combinations of the ends; ``one-at-a-time``: ``levels`` values of each quantity, while the
+        others keep their values.
     distributions
         Distribution of each quantity.
     nominal
         Values of the bench.
     levels
-        Values of each quantity, >= 2; quantities with discrete values use these.
+        Number of values of each quantity, >= 2; discrete quantities use their own values.
 
     Raises
     ------
@@ -173,29 +174,30 @@ def spanned(
 
 
 # --- Groups of cases for sensitivity indices, within which the quantities are exchanged
-# Cases of a group share values and are not independent: they give indices, but no probabilities.
+# Cases of a group share values, so they are not independent: they determine indices, but no
+# probabilities.
 
 MORRIS = "morris"
 SENSITIVITY = ("sobol-indices", MORRIS)
-"""designs that give sensitivity indices"""
+"""designs for sensitivity indices"""
 SALIB = ("studies with sensitivity indices", "studies")
 """feature that needs SALib, and its extra"""
 LEVELS = 4
 """levels of each quantity in Morris' trajectories, an even number"""
 STEP = LEVELS / (2.0 * (LEVELS - 1.0))
 """step of a trajectory: two thirds of the way from end to end"""
-# With at least so many groups, intervals of 95 % held the true value in 92 % of the studies or
+# With at least this many groups, 95 % intervals contained the true value in 92 % of the studies or
 # more.
 _LEAST = {"sobol-indices": 64, "morris": 16}
 
 
 @dataclass(frozen=True)
 class SensitivityDesign:
-    """Points for sensitivity indices, by SALib.
+    """Points for sensitivity indices, from SALib.
 
-    ``sobol-indices``: Saltelli's sample. Of two points A and B of a scrambled Sobol sequence, a
-    group has A, A with each quantity in turn taken from B, and B. ``morris``: trajectories on four
-    levels of probability, along which each quantity steps once, by two thirds.
+    ``sobol-indices``: Saltelli's sample. From two points A and B of a scrambled Sobol sequence, a
+    group contains A, A with each quantity in turn replaced by its value in B, and B. ``morris``:
+    trajectories on four levels of probability, along which each quantity steps once by two thirds.
 
     Parameters
     ----------
@@ -204,7 +206,7 @@ class SensitivityDesign:
     quantities
         Number of quantities that vary.
     budget
-        Largest number of cases.
+        Maximum number of cases.
     seed
         Seed of the random numbers.
 
@@ -227,7 +229,7 @@ class SensitivityDesign:
 
     @cached_property
     def base(self) -> int:
-        """Number of groups: the most within the budget; for Sobol indices, a power of two.
+        """Maximum number of groups within the budget; for Sobol indices, a power of two.
 
         Raises
         ------
@@ -244,7 +246,7 @@ class SensitivityDesign:
             )
         if self.budget > MOST:
             raise not_valid("[design] cases", f"{self.budget}", f"<= {MOST:.0e}")
-        # Even points are even only in powers of two.
+        # The points of a sequence are even only for powers of two.
         return 1 << (groups.bit_length() - 1) if self.kind == "sobol-indices" else groups
 
     @property
@@ -273,7 +275,7 @@ class SensitivityDesign:
 
     @property
     def problem(self) -> dict[str, object]:
-        """Problem definition for SALib: quantities are probabilities, named by their numbers."""
+        """Problem definition for SALib, in which quantities are probabilities with number names."""
         count = self.quantities
         names = [str(k) for k in range(count)]
         return {"num_vars": count, "names": names, "bounds": [[0.0, 1.0]] * count}
@@ -281,9 +283,9 @@ class SensitivityDesign:
     def columns(self, distributions: Sequence[Distribution]) -> list[NDArray[np.generic]]:
         """Return the values of each quantity, shape (cases,) each.
 
-        Morris' outer levels are the ends of a distribution, or 3 standard deviations where it has
-        none, as in a grid. Discrete values, whatever their weights, share the levels in their
-        order, and the last of three has two levels. So every step leads to another value.
+        Morris' outer levels are the ends of a distribution, or 3 standard deviations if it has no
+        ends, as in a grid. Discrete values share the levels in their order, regardless of their
+        weights; the last of three values has two levels. Every step therefore changes the value.
         """
         u = self.probabilities
         if self.kind == "sobol-indices":
@@ -305,9 +307,9 @@ class SensitivityDesign:
         ]
 
 
-# --- Designs that seek: which cases come next depends on what the ones before gave
-# They search where a requirement is missed: its rare failures, or the worst case. For rare failures
-# each case has its own noise, as in sampled designs.
+# --- Search designs, whose next cases depend on the results of earlier cases
+# They search for missed requirements: rare failures, or the worst case. For rare failures, each
+# case has its own noise, as in sampled designs.
 
 SUBSET, IMPORTANCE = "subset-simulation", "importance-sampling"
 RARE = (SUBSET, IMPORTANCE)
@@ -318,18 +320,18 @@ SOUGHT = (*RARE, WORST)
 OPENTURNS = ("studies of rare failures", "studies")
 """feature that needs OpenTURNS, and its extra"""
 DEFAULT_CASES = {SUBSET: 25_600, IMPORTANCE: 4096, WORST: 4096}
-"""default limit of the cases of each requirement"""
+"""default limit of the number of cases for each requirement"""
 TOGETHER = 1024
-"""cases of a batch of importance sampling"""
+"""number of cases in a batch of importance sampling"""
 STEPS = 10
-"""steps of each chain of subset simulation: a tenth of a level seeds the next one"""
-_WHOLE = 640  # a tenth of a level, the seeds of the next, are whole chunks
-_SEARCH = 1024  # chunks of a requirement that are kept for the search of its design point
+"""steps of each chain of subset simulation: a tenth of a level seeds the next level"""
+_WHOLE = 640  # a tenth of this, the seeds of the next level, is a whole chunk
+_SEARCH = 1024  # chunks of a requirement that are reserved for the search of its design point
 
 
 @dataclass(frozen=True)
 class SoughtDesign:
-    """Budget and numbering of a search for each requirement; requirements take turns by chunks.
+    """Budget and numbering of a search for each requirement; requirements alternate by chunks.
 
     Parameters
     ----------
@@ -340,7 +342,7 @@ class SoughtDesign:
     asked
         Requested cases in each level of subset simulation.
     budget
-        Largest number of cases of each requirement.
+        Maximum number of cases for each requirement.
     seed
         Seed of the random numbers.
     quantities
@@ -356,7 +358,7 @@ class SoughtDesign:
 
     @property
     def level(self) -> int:
-        """Cases of each level, a whole number of chunks for each step of its chains."""
+        """Number of cases in each level, with whole chunks for each step of its chains."""
         return -(-self.asked // _WHOLE) * _WHOLE
 
     @property
@@ -368,7 +370,7 @@ class SoughtDesign:
 
     @property
     def first_sampled(self) -> int:
-        """First chunk of a requirement that is drawn and not part of its search."""
+        """First chunk of a requirement that is sampled and not part of its search."""
         return _SEARCH if self.kind == IMPORTANCE else 0
 
     def chunk(self, requirement: int, own: int) -> int:
@@ -378,8 +380,8 @@ class SoughtDesign:
     def has_own_noise(self, chunk: int) -> bool:
         """Whether each case of a chunk has its own noise.
 
-        Cases of a search have the bench's noise. Otherwise finite differences would contain noise,
-        and the worst case would be the worst of many draws.
+        Cases of a search have the bench's noise. Otherwise, finite differences would contain noise,
+        and the worst case would be the worst of many noise samples.
         """
         return self.kind != WORST and chunk // self.requirements >= self.first_sampled
 
@@ -389,7 +391,7 @@ class SoughtDesign:
         Raises
         ------
         ParameterError
-            If it is below a single batch or level, or larger than the largest study.
+            If it is smaller than one batch or level, or larger than the largest study.
         FileError
             If OpenTURNS is not installed.
         """
@@ -406,19 +408,19 @@ class SoughtDesign:
 
 
 def population(quantities: int) -> int:
-    """Return the cases of a generation of a search: about a chunk for eight quantities.
+    """Return the number of cases in a generation of a search: about a chunk per eight quantities.
 
-    A power of two, because the sequence visits corners.
+    It is a power of two, because the sequence visits corners.
     """
     return 64 << (-(-quantities // 8) - 1).bit_length()
 
 
 def library_version(kind: str) -> str:
-    """Return the version of OpenTURNS, or SciPy's, because another may draw other points.
+    """Return the version of OpenTURNS or SciPy, since another version may draw other points.
 
     Raises
     ------
     FileError
-        If it is not installed.
+        If OpenTURNS is not installed.
     """
     return str(scipy.__version__ if kind == WORST else library("openturns", *OPENTURNS).__version__)

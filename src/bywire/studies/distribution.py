@@ -1,4 +1,4 @@
-"""Distributions of quantities: laws in closed form, discrete values, and how files write them.
+"""Distributions of quantities: laws in closed form, discrete values, and their form in files.
 
 ``scipy.stats`` takes as long to load as the rest of a study, in each of its processes.
 """
@@ -19,7 +19,7 @@ from scipy import special
 from bywire.bench.changes import refuse_share_of_temperature, share_of
 from bywire.core.errors import ParameterError, not_valid, quoted, unknown_name
 from bywire.core.parameters import Leaf
-from bywire.core.quantities import Unit
+from bywire.core.quantities import Unit, display_unit
 from bywire.core.typing import Array
 from bywire.core.units import difference_unit, parse, shown
 from bywire.core.values import written
@@ -33,7 +33,7 @@ class Law(Protocol):
         ...
 
     def ppf(self, q: Array) -> Array:
-        """Return the quantiles at shares in (0, 1)."""
+        """Return the quantiles at probabilities in (0, 1)."""
         ...
 
     def cdf(self, x: float) -> float:
@@ -47,7 +47,7 @@ class Law(Protocol):
 
 @dataclass(frozen=True)
 class Uniform:
-    """Uniform distribution: from ``low`` on, over a width."""
+    """Uniform distribution from ``low`` over a width."""
 
     low: float
     width: float
@@ -77,7 +77,7 @@ class Normal:
     sd: float
 
     def support(self) -> tuple[float, float]:
-        """Return its ends: infinite."""
+        """Return its ends, which are infinite."""
         return -math.inf, math.inf
 
     def ppf(self, q: Array) -> Array:
@@ -123,7 +123,7 @@ class LogNormal:
 
 @dataclass(frozen=True)
 class Triangular:
-    """Triangular distribution; the mode as a share of the width."""
+    """Triangular distribution; ``mode``: its position as a fraction of the width."""
 
     mode: float
     low: float
@@ -150,7 +150,7 @@ class Triangular:
 
 
 def truncated_normal(low: float, high: float, mean: float, sd: float) -> Law:
-    """Return the normal distribution truncated to two scores; SciPy's, for its accurate tails."""
+    """Return the normal distribution truncated to two scores, from SciPy for accurate tails."""
     from scipy import stats
 
     law: Law = stats.truncnorm(low, high, mean, sd)
@@ -163,7 +163,7 @@ def normal_quantile(share: Any) -> Any:
 
 
 def binomial_ranks(count: int, probability: float, beyond: float) -> tuple[int, int]:
-    """Return the bounds of a binomial count, with a given probability beyond either of them.
+    """Return the bounds of a binomial count with a given probability beyond each bound.
 
     Parameters
     ----------
@@ -175,8 +175,8 @@ def binomial_ranks(count: int, probability: float, beyond: float) -> tuple[int, 
     Returns
     -------
     tuple
-        The least count that is not exceeded with at least this probability, and the least count
-        that is exceeded with at most this probability.
+        The smallest count that is not exceeded with at least this probability, and the smallest
+        count that is exceeded with at most this probability.
     """
     low = _least(lambda k: special.bdtr(k, count, probability) >= beyond, count)
     high = _least(lambda k: special.bdtrc(k, count, probability) <= beyond, count)
@@ -184,7 +184,7 @@ def binomial_ranks(count: int, probability: float, beyond: float) -> tuple[int, 
 
 
 def _least(is_enough: Any, count: int) -> int:
-    """Return the least number that meets a monotonic condition."""
+    """Return the smallest number that meets a monotonic condition."""
     below, above = -1, count
     while above - below > 1:
         middle = (below + above) // 2
@@ -193,15 +193,14 @@ def _least(is_enough: Any, count: int) -> int:
 
 
 def ranked(values: Array) -> Array:
-    """Return the ranks of values from 1 on; equal values get their mean rank."""
+    """Return the ranks of values, starting at 1; equal values get their mean rank."""
     _, place, times = np.unique(values, return_inverse=True, return_counts=True)
     last = np.cumsum(times)
     return np.asarray((last - 0.5 * (times - 1))[place])
 
 
 # --- Distributions
-# A range or a tolerance is a distribution like any other; a grid and a worst-case search use its
-# ends.
+# Ranges and tolerances are also distributions; a grid and a worst-case search use their ends.
 
 NEVER = 1e-9
 """probability of invalid values that counts as zero"""
@@ -223,15 +222,15 @@ class Distribution:
         ``quantile(u) -> values`` [SI], for probabilities in (0, 1), shape (n,) each; for choices,
         an array of texts.
     low, high
-        Ends [SI]; infinite where it has none, NaN for choices.
+        Ends [SI]; infinite if it has none, NaN for choices.
     below, above
         ``below(x)``, ``above(x)``: probability below and above a value; None for discrete values,
         which end at ``low`` and ``high``.
     singles
-        Discrete values [SI], or texts, in the order of their probability; empty for continuous
+        Discrete values [SI], or texts, in the order of their quantiles; empty for continuous
         distributions.
     weights
-        Probability of each of them.
+        Probability of each discrete value.
     """
 
     kind: str
@@ -250,10 +249,10 @@ class Distribution:
         return bool(self.singles)
 
     def levels(self, count: int) -> NDArray[Any]:
-        """Return values for a grid: evenly from end to end; discrete values as they are.
+        """Return values for a grid: evenly spaced from end to end, or the discrete values.
 
-        Without an end, the grid ends 3 standard deviations from the middle of a normal
-        distribution: at a probability of 0.135 % beyond.
+        Without an end, the grid ends at a probability of 0.135 % beyond, which for a normal
+        distribution is 3 standard deviations from the middle.
         """
         if self.is_discrete:
             return np.array(self.singles)
@@ -263,7 +262,7 @@ class Distribution:
         return np.asarray(np.linspace(low, high, count))
 
     def between(self, places: Array) -> NDArray[Any]:
-        """Return values by their positions between the ends of `levels`, 0 to 1."""
+        """Return values at positions between the ends of `levels`, 0 to 1."""
         ends = self.levels(2)
         if self.is_discrete:
             return np.asarray(ends[np.minimum((places * ends.size).astype(int), ends.size - 1)])
@@ -279,7 +278,7 @@ KEYS = ("values", "weights")
 
 
 def read_choice(name: str, entry: Any, admitted: Sequence[Any]) -> Distribution:
-    """Return the distribution of a choice: its values, each with a weight.
+    """Return the distribution of a choice: its values with their weights.
 
     Parameters
     ----------
@@ -288,12 +287,12 @@ def read_choice(name: str, entry: Any, admitted: Sequence[Any]) -> Distribution:
     entry
         Entry of the study file.
     admitted
-        Valid values of the choice, texts or truth values; empty where any text is valid.
+        Valid values of the choice, texts or truth values; empty if any text is valid.
 
     Returns
     -------
     Distribution
-        Its values are texts, see `choice_text`.
+        Distribution of texts; see `choice_text`.
 
     Raises
     ------
@@ -354,7 +353,7 @@ def require_several(where: str, values: Sequence[Any], shown: Sequence[str]) -> 
     Raises
     ------
     ParameterError
-        With the name of the entry.
+        For a single value, or a value that is listed twice, with the name of the entry.
     """
     if len(values) == 1:
         raise ParameterError(
@@ -400,8 +399,8 @@ def among(values: list[Any], weights: Array, text: str) -> Distribution:
 def rising(made: Distribution) -> Distribution:
     """Return the distribution of discrete numbers, with rising quantiles.
 
-    A file may list them in any order. Unsorted, a positive correlation with another quantity could
-    become a negative one.
+    A file may list them in any order. Without sorting, a positive correlation with another quantity
+    could become a negative one.
     """
     order = np.argsort(np.array(made.singles))
     values = [made.singles[k] for k in order]
@@ -432,7 +431,7 @@ def weights_of(where: str, section: Mapping[str, Any], count: int) -> Array:
     return np.asarray(shares / shares.sum())
 
 
-# --- Distributions as study files write them: a tolerance, or a section with ``kind``
+# --- Distributions in study files: a tolerance, or a section with ``kind``
 
 _NEXT = {
     "tolerance": "Use a narrower tolerance, or kind 'uniform' with ends within this range",
@@ -442,14 +441,14 @@ _NEXT = {
     "triangular": "Choose 'low', 'mode' and 'high' within this range",
 }
 """advice, by the kind of a distribution"""
-_ROUNDING = 1e-12  # share of a range by which rounding may put an end beyond a limit
+_ROUNDING = 1e-12  # fraction of a range by which rounding may move an end beyond a limit
 
 
 def admitted(where: str, made: Distribution, leaf: Leaf, advice: str = "") -> Distribution:
     """Return a distribution that stays within the valid range of its number.
 
-    An end that misses a limit only by rounding is moved to it. Where a distribution is truncated at
-    an open limit (``> 0``), it counts as unbounded there, so that designs that visit the ends stop
+    An end that misses a limit only by rounding is moved to it. A distribution that is truncated at
+    an open limit (``> 0``) counts as unbounded there, so that designs that visit the ends stay
     within the limit.
 
     Parameters
@@ -464,7 +463,7 @@ def admitted(where: str, made: Distribution, leaf: Leaf, advice: str = "") -> Di
     Raises
     ------
     ParameterError
-        With the valid range, and the probability beyond it or the invalid end.
+        When it leaves the range, with the range and the probability beyond it or the invalid end.
     """
     if made.singles:
         _require_singles(where, made.singles, leaf)
@@ -510,7 +509,7 @@ def _require_single_values(where: str, kind: str, leaf: Leaf, nominal: float) ->
     Raises
     ------
     ParameterError
-        With discrete values that are valid.
+        For such a distribution, with valid discrete values.
     """
     if not leaf.is_whole or kind == DISCRETE:
         return
@@ -525,7 +524,7 @@ def _require_single_values(where: str, kind: str, leaf: Leaf, nominal: float) ->
 
 
 def whole(where: str, values: Sequence[float], leaf: Leaf) -> list[float]:
-    """Return discrete values; those of a whole number without rounding errors of percentages.
+    """Return discrete values; whole numbers lose the rounding errors of percentages.
 
     Raises
     ------
@@ -601,7 +600,7 @@ def read_distribution(
     name
         Dotted name of the parameter or option.
     entry
-        Entry of the study file: a tolerance as text, ``"+-5 %"``, or a section with ``kind``.
+        Entry of the study file: a tolerance such as ``"+-5 %"``, or a section with ``kind``.
     leaf
         Unit and valid range of the number.
     nominal
@@ -656,7 +655,7 @@ def _without_kind(where: str, entry: Mapping[str, Any], leaf: Leaf) -> Parameter
     near = [kind for kind, (keys, _) in _KINDS.items() if given and given <= {*keys}]
     near = [DISCRETE] if leaf.is_whole else near
     which = " or ".join(map(repr, near or _KINDS))
-    others = f" (there are {', '.join(_KINDS)})" if near else ""
+    others = f" (valid kinds are {', '.join(_KINDS)})" if near else ""
     return ParameterError(
         f"{where} = {quoted(entry)} has no kind. Add kind = {which}{others}",
         name=where,
@@ -686,7 +685,7 @@ class _Entry:
         return (1.0 + share) * self.nominal
 
     def width(self, key: str, of: float) -> float:
-        """Return a width [SI] > 0; a percentage is relative to another value."""
+        """Return a width > 0 [SI]; a percentage is relative to another value."""
         text = self._given(key)
         if isinstance(text, str) and text.strip().endswith("%"):
             self._refuse_share(key, text)
@@ -699,8 +698,9 @@ class _Entry:
         return width
 
     def amount(self, value: float) -> str:
-        """Return a value with its unit."""
-        return shown(value, self.leaf.unit.symbol)
+        """Return a value in its display unit: the text is part of a study's identity."""
+        symbol = self.leaf.unit.symbol
+        return shown(value, symbol, display_unit(symbol))
 
     def _refuse_share(self, key: str, text: str) -> None:
         refuse_share_of_temperature(f"{self.where}.{key}", text, self.leaf.unit.symbol)
@@ -715,8 +715,9 @@ class _Entry:
         return self.section[key]
 
     def breadth(self, value: float) -> str:
-        """Return a width with its unit."""
-        return shown(value, difference_unit(self.leaf.unit.symbol))
+        """Return a width in its display unit, like `amount`."""
+        symbol = difference_unit(self.leaf.unit.symbol)
+        return shown(value, symbol, display_unit(symbol))
 
     def _number(self, key: str, value: Any, symbol: str = "") -> float:
         unit = self.leaf.unit
@@ -731,7 +732,7 @@ class _Entry:
 def _frozen(
     entry: _Entry, law: Law, text: str, low: float = -math.inf, high: float = math.inf
 ) -> Distribution:
-    """Return a distribution from its law; a kind with tails is unbounded, wherever its law ends."""
+    """Return a distribution from its law; kinds with tails are unbounded, even if the law ends."""
     return Distribution(str(entry.section["kind"]), text, law.ppf, low, high, law.cdf, law.sf)
 
 
@@ -766,12 +767,12 @@ def _normal(entry: _Entry) -> Distribution:
         return _frozen(entry, Normal(mean, sd), text)
     if not low < high:
         raise entry.refused(f"low = {entry.amount(low)} must be below high = {entry.amount(high)}")
-    law = Normal(mean, sd)  # the difference of the smaller probabilities, for accuracy
+    law = Normal(mean, sd)  # a difference of the smaller probabilities is more accurate
     kept = law.sf(low) - law.sf(high) if low > mean else law.cdf(high) - law.cdf(low)
     if kept < NEVER:
         raise entry.refused(
-            f"only a probability of {kept:.2g} of {text} lies between low and high, which is too "
-            "little to draw from. Choose other ends or another mean"
+            f"only a fraction of {kept:.2g} of {text} lies between low and high, which is too "
+            "little for sampling. Choose other ends or another mean"
         )
     cut = truncated_normal((low - mean) / sd, (high - mean) / sd, mean, sd)
     sides = [

@@ -34,7 +34,7 @@ T = TypeVar("T")
 class Beside(Generic[T]):
     """Computation that runs in parallel with the chunks.
 
-    ``future``: gives its value, and the warnings from another process.
+    ``future``: provides its value, and the warnings from another process.
     """
 
     def __init__(self, future: Future[tuple[T, list[Warning]]]) -> None:
@@ -47,8 +47,8 @@ class Beside(Generic[T]):
 
     def result(self) -> T:
         """Wait for its value, and repeat its warnings."""
-        value, said = self._future.result()
-        for each in said:
+        value, issued = self._future.result()
+        for each in issued:
             warnings.warn(each, stacklevel=2)
         return value
 
@@ -61,13 +61,13 @@ class Compute(Protocol):
         ...
 
     def beside(self, job: Callable[[], T]) -> Beside[T]:
-        """Start another computation: right now, or in a process that then continues with chunks."""
+        """Start another computation: now, or in a process that then continues with chunks."""
         ...
 
 
 @dataclass(frozen=True)
 class Apart:
-    """Computation of chunks by a function, and of everything else right away."""
+    """Computation of chunks by a function, and of other tasks immediately."""
 
     chunks: Callable[[_Chunks], Iterator[tuple[int, Columns]]]
 
@@ -76,7 +76,7 @@ class Apart:
         return self.chunks(chunks)
 
     def beside(self, job: Callable[[], T]) -> Beside[T]:
-        """Run it right away; see `Compute`."""
+        """Run it immediately; see `Compute`."""
         done: Future[tuple[T, list[Warning]]] = Future()
         done.set_result((job(), []))
         return Beside(done)
@@ -86,7 +86,7 @@ class Executor(Protocol):
     """Executor of chunks, in any order."""
 
     def opened(self, plan: StudyPlan) -> AbstractContextManager[Compute]:
-        """Return the computation of chunks batch by batch, each batch complete before the next.
+        """Return the computation of chunks batch by batch; each is complete before the next one.
 
         Raises
         ------
@@ -104,20 +104,20 @@ def single(chunk: int | PlacedChunk, plan: StudyPlan) -> tuple[int, Columns]:
 # --- On a cluster of dask.distributed
 
 _AHEAD = 2  # tasks in flight for each worker, so that no worker is idle
-_SECONDS = 10.0  # to reach a cluster
+_SECONDS = 10.0  # time limit to reach a cluster
 _TASK = 0.5  # s: target duration of a task of a cluster
-# Dask's periodic work: stack samples every 10 ms, ticks of 20 ms, memory checks every 100 ms. A
-# core's worker, scheduler and client use 8 % of a core for it, and 1.4 % with these settings.
+# Dask works periodically: stack samples every 10 ms, ticks every 20 ms, memory checks every 100 ms.
+# A core's worker, scheduler and client use 8 % of a core for this, or 1.4 % with these settings.
 CLUSTER_SETTINGS = {
     "distributed.worker.profile.enabled": False,
     "distributed.admin.tick.interval": "1s",
     "distributed.worker.memory.monitor-interval": "1s",
 }
 """recommended configuration of Dask for scheduler and workers"""
-# By default Dask's workers return freed memory, and the next chunk requests it again page by page:
-# an eighth of its time.
+# By default, Dask's workers return freed memory, and the next chunk requests it again page by page,
+# which takes an eighth of its time.
 CLUSTER_MEMORY = {"MALLOC_TRIM_THRESHOLD_": 1 << 28, "MALLOC_MMAP_THRESHOLD_": 1 << 25}
-"""recommended environment of workers where the C library is glibc [byte]"""
+"""recommended environment of workers with glibc as C library [byte]"""
 
 _LOST = "the cluster lost its workers ({}). Resume the study when workers are available again"
 _GONE = "the cluster's scheduler is gone. Restart it, or use other workers, and resume the study"
@@ -163,13 +163,12 @@ def _client(address: str) -> Iterator[Any]:
         client = distributed.Client(address, timeout=_SECONDS, set_as_default=False)
     except (OSError, ValueError, TimeoutError) as error:
         raise RunError(
-            f"no cluster answers at {address!r} ({error}). Start one with 'dask scheduler' and "
-            "'dask "
-            f"worker', and pass the scheduler's address to {option('cluster')}",
+            f"no cluster responds at {address!r} ({error}). Start one with 'dask scheduler' and "
+            f"'dask worker', and pass the scheduler's address to {option('cluster')}",
             name=option("cluster"),
             value=repr(address),
         ) from None
-    log = logging.getLogger("distributed.client")  # it would print each lost connection
+    log = logging.getLogger("distributed.client")  # would print each lost connection
     before = log.level
     log.setLevel(logging.CRITICAL)
     try:
@@ -191,11 +190,11 @@ def _of_cluster(
 ) -> Iterator[tuple[int, Columns]]:
     """Yield the finished chunks of a cluster, with few tasks in flight.
 
-    The overhead of a task equals some cases: a task has as many chunks as take about `_TASK`, but
-    near the end no more than each worker's share.
+    The overhead of a task equals some cases. A task therefore has as many chunks as take about
+    `_TASK`, but near the end no more than each worker's share.
     """
     distributed = library("distributed", *_WHAT)
-    # Once to every worker, which keeps it: otherwise each task would set up the bench again.
+    # Send the plan once to every worker; otherwise each task would set up the bench again.
     kept = client.scatter(plan, broadcast=True, hash=False)
     left, size = deque(chunks), 1
     with client.as_current():
@@ -211,7 +210,7 @@ def _of_cluster(
         for _ in range(_AHEAD * workers):
             submit()
         for _, answer in tasks:
-            if isinstance(answer, BaseException):  # a cancelled task gives the reason
+            if isinstance(answer, BaseException):  # a canceled task provides the reason
                 raise RunError(_lost(client, answer))
             seconds, given = answer
             size = max(1, round(_TASK * len(given) / seconds))
@@ -222,21 +221,21 @@ def _of_cluster(
 
 
 def _lost(client: Any, error: BaseException) -> str:
-    """Return which part is lost, the scheduler or only workers, with further details."""
+    """Return the lost part, the scheduler or only workers, with details."""
     reason = str(getattr(error, "reason", error))
     if client.status != "running" or "scheduler" in reason:
         return _GONE
-    # A task is forgotten if its workers, which alone have the study, are lost.
+    # Dask forgets a task if all workers with the study are lost.
     return _LOST.format("all of them" if "forgotten" in reason else reason)
 
 
 # --- Choice of the executor
 
-# Chunks of one batch on a graphics processor: 4,096 cases, for hard braking 2 GB of this machine's
-# memory for stimuli and rows.
+# Chunks in one batch on a graphics processor: 4,096 cases, which for hard braking need 2 GB of this
+# machine's memory for stimuli and rows.
 _TOGETHER = 64
 _MOST_WORKERS = 1024
-# Chunks from which processes are worth their start; a process that loads everything takes a second.
+# Minimum number of chunks that justify processes; a process that loads everything takes a second.
 _WORTH_COPIES, _WORTH = 2, 8
 
 
@@ -305,7 +304,7 @@ def executor_of(
     together: int | None = None,
     engine: str = "auto",
 ) -> Executor:
-    """Return the executor, a cluster if its address is given, otherwise processes.
+    """Return the executor: a cluster if its address is specified, otherwise processes.
 
     Parameters
     ----------
@@ -316,9 +315,9 @@ def executor_of(
     chunks
         Number of remaining chunks.
     together
-        Largest number of chunks per batch. Default: all.
+        Maximum number of chunks per batch. Default: all.
     engine
-        Engine of the bench: a graphics processor takes many chunks per batch, from one process.
+        Engine of the bench: a graphics processor computes many chunks per batch, from one process.
 
     Raises
     ------
@@ -341,8 +340,8 @@ def require_workers(workers: int | None, cluster: str, engine: str) -> None:
     Raises
     ------
     ParameterError
-        For zero or too many workers, for workers with a cluster, and for either with a graphics
-        processor.
+        For zero or too many workers, for workers together with a cluster, and for either of them
+        with a graphics processor.
     """
     if workers is not None:
         whole_number("workers", workers, 1, _MOST_WORKERS)
@@ -360,7 +359,7 @@ def require_workers(workers: int | None, cluster: str, engine: str) -> None:
         )
 
 
-# Data of each process of a pool: sent once, and not with every job.
+# Data of each process of a pool, which is sent once and not with every job.
 _given: list[StudyPlan] = []
 
 

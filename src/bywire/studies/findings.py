@@ -53,7 +53,7 @@ class Effect:
     values
         Its values [SI], or the choices, in the order of the cases, shape (levels,).
     figures
-        The key figure at each, NaN where it is not defined, shape (levels,).
+        The key figure at each value, NaN if it is not defined, shape (levels,).
     nominal
         The key figure of the bench itself.
     """
@@ -66,17 +66,17 @@ class Effect:
 
     @property
     def least(self) -> float:
-        """Least value of the key figure, including that of the bench itself."""
+        """Minimum of the key figure, including that of the bench itself."""
         return float(np.nanmin([*self.figures, self.nominal]))
 
     @property
     def largest(self) -> float:
-        """Maximum value, including that of the bench itself."""
+        """Maximum of the key figure, including that of the bench itself."""
         return float(np.nanmax([*self.figures, self.nominal]))
 
     @property
     def swing(self) -> float:
-        """Maximum minus least value."""
+        """Maximum minus minimum."""
         return self.largest - self.least
 
     @property
@@ -95,10 +95,9 @@ def effects(
     Parameters
     ----------
     varied, levels
-        Quantities that vary, and the number of values of each; discrete quantities use their own
-        values.
+        Quantities that vary, and their number of values; discrete quantities use their own values.
     columns
-        Values of each quantity in every case, the bench itself first.
+        Values of each quantity in every case, starting with the bench itself.
     figure
         The key figure in every case; cases that are not computed yet are missing at the end.
     """
@@ -115,7 +114,7 @@ def effects(
     return sorted(found, key=lambda effect: (-effect.lacking, -effect.swing))
 
 
-# --- Choices have no order: how a key figure goes with one
+# --- Relation of a key figure to a choice, which has no order
 
 
 @dataclass(frozen=True)
@@ -145,21 +144,21 @@ class ChoiceInfluence:
 def choice_influence(
     quantity: str, choices: Sequence[str], figure: Array, confidence: float
 ) -> ChoiceInfluence | None:
-    """Return the relation of a key figure to a choice; None where either does not vary.
+    """Return the relation of a key figure to a choice; None if either does not vary.
 
-    The square of the ratio is the share of the ranks' variance between the choices, minus the part
-    due to chance (T. L. Kelley, An unbiased correlation ratio measure, Proc. Natl. Acad. Sci. 21,
-    1935). With two choices it is, apart from this correction, the magnitude of the rank
+    The square of the ratio is the fraction of the ranks' variance between the choices, minus the
+    part due to chance (T. L. Kelley, An unbiased correlation ratio measure, Proc. Natl. Acad. Sci.
+    21, 1935). With two choices and without this correction, the ratio is the magnitude of the rank
     correlation. A rank test decides whether it differs from zero (W. H. Kruskal and W. A. Wallis,
     Use of ranks in one-criterion variance analysis, J. Am. Stat. Assoc. 47, 1952). An interval
-    would need the distribution of the figure.
+    would require the distribution of the figure.
 
     Parameters
     ----------
     quantity, choices
         Its name, and the choice of each case.
     figure
-        The key figure in each case, shape (cases,); cases without one are left out.
+        The key figure in each case, shape (cases,); cases without the figure do not count.
     confidence
         Confidence of the test, between 0 and 1.
     """
@@ -190,17 +189,17 @@ class Judgment:
     met
         Whether each case meets it, shape (cases,); a case without a result does not.
     share
-        Share of the cases that meet it, with the interval of the probability. Cases too close to
-        the limit count for neither side.
+        Fraction of cases that meet it, with the interval of the probability. Cases too close to the
+        limit count for neither side.
     undecided
-        Cases closer to the limit than the numerical error of their figure.
+        Number of cases closer to the limit than the numerical error of their figure.
     outcome
-        Whether it is met with the required probability, or in all cases if it has none.
+        Whether it is met with the required probability, or in all cases without a probability.
     worst
         Row of the worst case, or of the most probable failure in a study of rare failures. A case
-        without the figure is worse than any other. None if no case ran, or all cases are equal.
+        without the figure is the worst. None if no case ran, or all cases are equal.
     failure
-        Probability that the requirement is missed, in a study of rare failures: there, shares of
+        Probability that the requirement is missed, in a study of rare failures, where fractions of
         cases are not probabilities.
     """
 
@@ -227,7 +226,7 @@ def judgment_of(
     demand
         The requirement.
     figure
-        Its key figure in every case, shape (cases,); NaN where a case does not have it.
+        Its key figure in every case, shape (cases,); NaN if a case does not have it.
     failed
         Whether a case has no result, shape (cases,).
     error
@@ -257,11 +256,11 @@ def _worst(figure: Array, failed: NDArray[np.bool_], is_upper: bool) -> int | No
     if lacking.size:
         return int(lacking[0])
     if not known.any() or (known.sum() > 1 and np.ptp(figure[known]) == 0.0):
-        return None  # all cases are equal: none is the worst
+        return None  # all cases are equal, so none is the worst
     return int(np.argmin(np.where(known, -figure if is_upper else figure, np.inf)))
 
 
-# --- All that was found
+# --- All findings
 
 _NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 
@@ -275,7 +274,7 @@ class Findings:
     plan
         The study.
     cases
-        A row for each case that was computed; see `bywire.studies.store.computed_chunk`.
+        One row for each computed case; see `bywire.studies.store.computed_chunk`.
     nominal
         Key figures of the bench itself, with their numerical error.
     rare
@@ -300,7 +299,7 @@ class Findings:
         return bench.definition.kpis_with(bench.chosen_options)
 
     def figure(self, name: str) -> Array:
-        """Return a key figure of every case in its unit, shape (cases,); NaN where it is undefined.
+        """Return a key figure of every case in its unit, shape (cases,); NaN if it is undefined.
 
         Raises
         ------
@@ -311,13 +310,13 @@ class Findings:
         return np.asarray(self.cases[name], dtype=float)
 
     def size(self, name: str) -> float:
-        """Return the largest magnitude of a key figure; 0 if it is undefined in all cases."""
+        """Return the maximum magnitude of a key figure; 0 if it is undefined in all cases."""
         self._require(name)
         return self._sizes.get(name, 0.0)
 
     @cached_property
     def _sizes(self) -> Mapping[str, float]:
-        """Maximum magnitude of every key figure, kept because every cell of a table needs it."""
+        """Maximum magnitude of every key figure, stored because each cell of a table needs it."""
         return {s.name: max(abs(s.least), abs(s.largest)) for s in self.spreads}
 
     @cached_property
@@ -329,7 +328,7 @@ class Findings:
 
     @cached_property
     def spreads(self) -> tuple[Spread, ...]:
-        """Every key figure that is defined in any case."""
+        """Every key figure that is defined in at least one case."""
         nominal = {kpi.name: kpi.value for kpi in self.nominal}
         return tuple(
             spread_of(
@@ -342,7 +341,7 @@ class Findings:
     def influences(self, name: str) -> Sequence[Influence | ChoiceInfluence]:
         """Return the relations of a key figure to the quantities, the strongest first.
 
-        Choices have no order: their correlation ratio is ranked among magnitudes of rank
+        Choices have no order. Their correlation ratio is ranked among magnitudes of rank
         correlations.
         """
         known, plan = self._influences, self.plan
@@ -390,7 +389,7 @@ class Findings:
         return known[name]
 
     def effects(self, name: str) -> Sequence[Effect]:
-        """Return the effect of each quantity alone on a key figure, where the design shows it."""
+        """Return the effect of each quantity alone on a key figure, if the design shows it."""
         self._require(name)
         if self.plan.design != ONE or not len(self.cases):
             return []
@@ -400,7 +399,7 @@ class Findings:
     def drivers(self, name: str) -> Sequence[str]:
         """Return the quantities that drive a key figure, the strongest first.
 
-        Ranked by importance, by indices, by the effect of each quantity alone, or by the magnitude
+        They are ranked by importance, indices, the effect of each quantity alone, or the magnitude
         of rank correlations and correlation ratios.
         """
         if self.rare:
@@ -424,20 +423,20 @@ class Findings:
 
     @cached_property
     def _failed(self) -> NDArray[np.bool_]:
-        """Whether each case has no result, shape (cases,); kept, as it reads many texts."""
+        """Whether each case has no result, shape (cases,); stored, since it reads many texts."""
         return np.asarray(self._texts(FAILURE) != "")
 
     @property
     def reasons(self) -> Mapping[str, Sequence[int]]:
-        """Rows of cases without a result, by reason, merged where only numbers differ."""
-        said: dict[str, list[int]] = {}
+        """Rows of cases without a result, by reason; reasons that differ only in numbers merge."""
+        rows_by_text: dict[str, list[int]] = {}
         for row, text in self.failures.items():
-            said.setdefault(_NUMBER.sub("#", text), []).append(row)
-        return {self.failures[rows[0]]: rows for rows in said.values()}
+            rows_by_text.setdefault(_NUMBER.sub("#", text), []).append(row)
+        return {self.failures[rows[0]]: rows for rows in rows_by_text.values()}
 
     @cached_property
     def warnings(self) -> Mapping[str, int]:
-        """Number of cases by warning, merged where only numbers differ."""
+        """Number of cases by warning; warnings that differ only in numbers merge."""
         said: dict[str, Counter[str]] = {}
         for text, cases in Counter(self._texts(WARNINGS).tolist()).items():
             for each in warnings_in(text):
@@ -452,7 +451,7 @@ class Findings:
             raise unknown_name("key figure", str(name), self.units)
 
     def _texts(self, column: str) -> NDArray[np.object_]:
-        """Return a text of every case, shape (cases,); pandas would be slow, row by row."""
+        """Return a text of every case, shape (cases,); pandas would be slow row by row."""
         return np.asarray(self.cases[column] if len(self.cases) else (), dtype=object)
 
     def number(self, row: int) -> int:
@@ -466,7 +465,7 @@ class Findings:
 
     @cached_property
     def _sensitivities(self) -> dict[str, Sensitivity]:
-        """Indices by key figure, kept: those of many cases take a second."""
+        """Indices by key figure, stored because many cases take a second."""
         return {}
 
     @cached_property
@@ -475,7 +474,7 @@ class Findings:
         return {}
 
     def _rare_judgment(self, rare: RareFailure) -> Judgment:
-        """Return a requirement of a design whose shares of cases are not probabilities."""
+        """Return a requirement for a design in which fractions of cases are not probabilities."""
         among, wanted = self._judgment(rare.demand), rare.demand.probability
         assert wanted is not None
         numbers, error = np.asarray(self.cases[CASE]), self._error(rare.demand.figure)
@@ -487,12 +486,12 @@ class Findings:
         )
 
     def _error(self, name: str) -> float:
-        """Return the numerical error of a key figure, in its unit; 0 where it is not known."""
+        """Return the numerical error of a key figure, in its unit; 0 if it is unknown."""
         error = {kpi.name: kpi.bound for kpi in self.nominal}.get(name, math.nan)
         return 0.0 if math.isnan(error) else error
 
     def is_close(self, demand: Limit) -> NDArray[np.bool_]:
-        """Return which cases are closer to a limit than the numerical error of their figure."""
+        """Return a mask of the cases closer to a limit than their figure's numerical error."""
         return demand.is_near(self.figure(demand.figure), self._error(demand.figure))
 
     def _judgment(self, demand: Limit) -> Judgment:

@@ -1,4 +1,4 @@
-"""A requirement as a limit state, and its rare failures, by FORM and by subset simulation."""
+"""Requirements as limit states, and their rare failures, by FORM and by subset simulation."""
 
 from __future__ import annotations
 
@@ -27,15 +27,15 @@ from bywire.studies.statistics import (
 )
 
 BEYOND = -1e300
-"""margin of a case without the figure: a failure beyond every level"""
+"""margin of a case without the figure, which is a failure beyond every level"""
 _LEAST = float(np.finfo(float).tiny)  # margin of a case that meets its limit exactly
 
 Margins = Callable[[Array], Array]
-"""margins of a batch of cases by their scores, shape (cases, quantities): a case fails at <= 0"""
+"""margins of a batch of cases from their scores, shape (cases, quantities); a case fails at <= 0"""
 
 
 class UnfinishedError(Exception):
-    """Requested cases are missing: the budget is spent, or they are not computed."""
+    """Requested cases are missing, because the budget is spent or they are not computed."""
 
 
 class BudgetSpentError(UnfinishedError):
@@ -45,7 +45,7 @@ class BudgetSpentError(UnfinishedError):
 def margins_of(values: Array, limit: Limit) -> Array:
     """Return each figure's margin to its limit, in its unit; the limit is missed at <= 0.
 
-    An undefined figure has the margin `BEYOND`: a finite number, because levels rank margins.
+    An undefined figure has the margin `BEYOND`, a finite number, because levels rank margins.
 
     Examples
     --------
@@ -62,7 +62,7 @@ def margins_of(values: Array, limit: Limit) -> Array:
 
 @dataclass
 class Trail:
-    """The cases that a method requested, in their order.
+    """The cases that a method requested, in order.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ class Trail:
 
     @property
     def nearest(self) -> tuple[int, Array] | None:
-        """The most probable failing case, its position and scores; None where none failed."""
+        """The most probable failing case: its position and scores; None if no case failed."""
         if not self._values:
             return None
         scores, failed = np.vstack(self._scores), np.concatenate(self._values) <= 0.0
@@ -107,9 +107,9 @@ class Trail:
 
     @contextmanager
     def within_library(self, seed: int) -> Iterator[None]:
-        """Raise the error of a batch unchanged: the library would wrap it in its own.
+        """Raise the error of a batch unchanged, which the library would wrap in its own error.
 
-        The library's random numbers are global: their state is restored for other users.
+        The library's random numbers are global, so their state is restored for other users.
         """
         ot = library("openturns", *OPENTURNS)
         state, shown = ot.RandomGenerator.GetState(), ot.Log.Flags()
@@ -153,7 +153,7 @@ def failing_event(margins: Margins, quantities: int, step: float | None = None) 
 
 # --- Importance sampling around the most probable failure, which FORM finds
 
-_STEP = 0.1  # of the differences, in scores: above the noise and the steps of a figure
+_STEP = 0.1  # of the differences, in scores: larger than a figure's noise and steps
 _ITERATIONS = 30
 
 
@@ -163,19 +163,19 @@ class _NoDesignPointError(Exception):
 
 @dataclass
 class _Drawn:
-    """The cases drawn around the center, with their weights."""
+    """Cases drawn around the center, with their weights."""
 
     margins: list[Array] = field(default_factory=list)
     weights: list[Array] = field(default_factory=list)
 
     @property
     def span(self) -> tuple[float, float]:
-        """Margins around failure, with similar weights."""
+        """Range of margins around failure with similar weights."""
         low, high = np.quantile(np.concatenate(self.margins), [0.05, 0.6])
         return float(low), max(float(high), 0.0)
 
     def below(self, confidence: float, margin: float) -> Interval:
-        """Return the probability of a margin <= the given one."""
+        """Return the probability of a margin <= the given margin."""
         if not self.margins:
             return UNKNOWN
         weights, failed = np.concatenate(self.weights), np.concatenate(self.margins) <= margin
@@ -202,26 +202,26 @@ def importance_sampling(
 
     OpenTURNS' FORM with the algorithm of Abdo and Rackwitz finds the design point: the failing
     point nearest to the origin of the standard normal scores. Cases are then drawn around it, each
-    weighted by its likelihood ratio. The estimate is unbiased wherever the point is, and accurate
-    where most failures are near it. Failures far from it are drawn so rarely that the interval may
-    not cover them.
+    weighted by its likelihood ratio. The estimate is unbiased for any point, and accurate if most
+    failures are near the point. Failures far from it are drawn so rarely that the interval may not
+    cover them.
 
     Parameters
     ----------
     margins
-        Margins of a batch of cases by their standard normal scores; failure at <= 0.
+        Margins of a batch of cases from their standard normal scores; failure at <= 0.
     searched
         The same without case-to-case noise, for the search.
     quantities
         Number of scores of a case.
     budget
-        Total number of cases; the search uses some, the rest is drawn in whole chunks.
+        Total number of cases; the search uses some, and the rest is drawn in whole chunks.
     seed
         Seed of the random numbers.
     confidence
         Confidence of the intervals, between 0 and 1.
     chunk
-        Cases of a chunk; further chunks continue the same sequence.
+        Number of cases in a chunk; additional chunks continue the same sequence.
     report
         Called with the current estimate.
 
@@ -256,7 +256,7 @@ def importance_sampling(
             )
             found = trail(scores)
             drawn.margins.append(found)
-            # True density over that around the center.
+            # Ratio of the true density to the density around the center.
             drawn.weights.append(np.exp(0.5 * center @ center - scores @ center))
             report(drawn.below(confidence, 0.0).value)
     except _NoDesignPointError as error:
@@ -296,7 +296,7 @@ def _unknown(margin: float) -> Interval:
 
 
 def _design_point(search: Trail, quantities: int) -> Array:
-    """Return the design point; the origin where the middle of all quantities fails."""
+    """Return the design point; the origin if the middle of all quantities fails."""
     origin = np.zeros(quantities)
     (middle,) = search(origin[None, :])
     if middle <= 0.0:
@@ -309,7 +309,7 @@ def _design_point(search: Trail, quantities: int) -> Array:
     nearest = ot.AbdoRackwitz()
     nearest.setStartingPoint(origin)
     nearest.setMaximumIterationNumber(_ITERATIONS)
-    nearest.setMaximumAbsoluteError(0.01)  # of the point; the sample needs no more
+    nearest.setMaximumAbsoluteError(0.01)  # of the point, which is sufficient for the sample
     nearest.setMaximumConstraintError(0.01)
     try:
         with search.within_library(0):
@@ -319,22 +319,22 @@ def _design_point(search: Trail, quantities: int) -> Array:
     except RuntimeError:  # messages of OpenTURNS for zero derivatives, and for no convergence
         raise _NoDesignPointError("the search did not reach the key figure's limit") from None
     if not np.isfinite(point).all() or abs(float(scaled(point[None, :])[0])) > 0.1:
-        raise _NoDesignPointError(f"{_ITERATIONS} steps did not come to the limit")
+        raise _NoDesignPointError(f"{_ITERATIONS} steps did not reach the limit")
     return point
 
 
 # --- Subset simulation: a rare failure as a chain of failures that are not rare
 
-_FEW = 10  # failing cases needed for an estimate
-_SEEN = 100  # cases of a level below which its tail is not shown
+_FEW = 10  # minimum number of failing cases for an estimate
+_SEEN = 100  # minimum number of cases of a level for its tail to be shown
 
 
 @dataclass(frozen=True)
 class _Subset:
-    """A level: cases with a margin of at most the end of the previous level.
+    """A level: cases whose margin is at most the end of the previous level.
 
     ``entry``: probability that a case is in the level; ``variation``: its coefficient of variation;
-    ``bound``: largest margin in the level; ``correlation``: gamma of its chains.
+    ``bound``: maximum margin in the level; ``correlation``: gamma of its chains.
     """
 
     entry: float
@@ -345,11 +345,11 @@ class _Subset:
     correlation: float
 
     def below(self, margin: float, confidence: float) -> Interval:
-        """Return the probability of a margin <= the given one, within the level."""
+        """Return the probability of a margin <= the given margin, within the level."""
         count, size = int((self.margins <= margin).sum()), self.margins.size
         if math.isinf(self.bound):  # independent cases: exact
             return counted(count, size, confidence)
-        if not count:  # no such case: at most the probability with one
+        if not count:  # no such case, so at most the probability with one case
             high = self.below_share(1.0 / size, confidence).high
             return Interval(0.0, math.nan, 0.0, high)
         return self.below_share(count / size, confidence)
@@ -381,19 +381,19 @@ def subset_simulation(
     """Return the probability of failure by subset simulation, with OpenTURNS.
 
     Each level ends at the margin of its worst tenth. From these cases, Markov chains (modified
-    Metropolis) fill the next level, one step of all chains per batch. The coefficient of variation
-    is summed over the levels, as for fully dependent levels: its upper bound. For independent
-    levels its square would be summed; intervals of 95 % then held the probability of a plane in
-    only 88 to 92 % of the simulations. OpenTURNS' own estimate also omits the first level.
+    Metropolis) fill the next level, one step of all chains per batch. The coefficients of variation
+    of the levels are added, as for fully dependent levels, which is an upper bound. For independent
+    levels, their squares would be added; 95 % intervals then contained the probability of a plane
+    in only 88 to 92 % of the simulations. OpenTURNS' own estimate also omits the first level.
 
     Parameters
     ----------
     margins
-        Margins of a batch of cases by their standard normal scores; failure at <= 0.
+        Margins of a batch of cases from their standard normal scores; failure at <= 0.
     quantities
         Number of scores of a case.
     level
-        Cases of each level, a multiple of 10.
+        Number of cases in each level, a multiple of 10.
     seed
         Seed of the random numbers.
     confidence
@@ -417,14 +417,14 @@ def subset_simulation(
     ot = library("openturns", *OPENTURNS)
     state: State = "done"
 
-    def told(scores: Array) -> Array:
+    def reported(scores: Array) -> Array:
         report(min([1.0, *algorithm.getProbabilityEstimatePerStep()]))
         return trail(scores)
 
-    algorithm = ot.SubsetSampling(failing_event(told, quantities))
+    algorithm = ot.SubsetSampling(failing_event(reported, quantities))
     algorithm.setConditionalProbability(1.0 / STEPS)
     algorithm.setMaximumOuterSampling(STEPS)
-    algorithm.setBlockSize(level // STEPS)  # one more, otherwise chains would miss their last step
+    algorithm.setBlockSize(level // STEPS)  # otherwise chains would miss their last step
     algorithm.setKeepSample(True)
     algorithm.setMinimumProbability(negligible)
     try:
@@ -440,8 +440,8 @@ def subset_simulation(
         state = "negligible"
     subsets, ends = _subsets(algorithm)
     if state == "done" and ends[-1] > 0.0:
-        # It ends where all cases have the same margin: a level too close to failure, or discrete
-        # values.
+        # It ends where all cases have the same margin, because a level is too close to failure or
+        # values are discrete.
         if (subsets[-1].margins <= 0.0).sum() >= _FEW:
             ends[-1] = 0.0
         else:
@@ -452,7 +452,7 @@ def subset_simulation(
 def _subsets(algorithm: Any) -> tuple[list[_Subset], list[float]]:
     """Return the complete levels, and the margins at which they end."""
     made: list[_Subset] = []
-    # The last threshold may be below the minimum, but its cases are not available.
+    # The last threshold may be below the minimum probability, but its cases are not available.
     ends = [float(x) for x in algorithm.getThresholdPerStep()][: algorithm.getStepsNumber()]
     entry, variation, bound = 1.0, 0.0, math.inf
     for k, end in enumerate(ends):
@@ -475,7 +475,7 @@ def _found(
     below = partial(_below, subsets, confidence)
     levels = tuple(Level(end, each.beyond(end)[0]) for each, end in zip(subsets, ends, strict=True))
     estimate = below(0.0)
-    if state != "done":  # failure is within the last level: at most as probable as its end
+    if state != "done":  # failure is within the last level, so at most as probable as its end
         high = below(ends[-1]).high if ends else 1.0
         estimate = Interval(math.nan, math.nan, 0.0, high)
         below = partial(_end_of, below, ends[-1] if ends else math.inf, estimate)
@@ -498,7 +498,7 @@ def _found(
 
 
 def _below(subsets: list[_Subset], confidence: float, margin: float) -> Interval:
-    """Return the probability of a margin <= the given one, by the last level that contains it."""
+    """Return the probability of a margin <= the given one, from the last level that contains it."""
     for each in reversed(subsets):
         if each.bound >= margin:
             return each.below(margin, confidence)
@@ -506,7 +506,7 @@ def _below(subsets: list[_Subset], confidence: float, margin: float) -> Interval
 
 
 def _end_of(below: partial[Interval], end: float, estimate: Interval, margin: float) -> Interval:
-    """Return the estimate of a margin where the simulation did not reach failure."""
+    """Return the estimate of a margin if the simulation did not reach failure."""
     return below(margin) if margin >= end else estimate
 
 

@@ -1,4 +1,4 @@
-"""Study that the user meant: a file, perhaps without its suffix, or a folder."""
+"""Study that the user meant: a file, perhaps without its extension, or a folder."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from bywire.core.errors import FileError
 from bywire.data.toml_file import STUDY, first_there, kind_of_file, near_files
 
 _FOLDER = Path("studies")  # usual folder of study files
-_NEAR = 0.8  # resemblance of a study file that may be intended
+_NEAR = 0.8  # minimum similarity of the name of a study file that may be intended
 
 
 def require_study_file(file: Path) -> None:
@@ -18,7 +18,7 @@ def require_study_file(file: Path) -> None:
     Raises
     ------
     FileError
-        With the intended file.
+        When the file is missing, with the intended file.
     """
     if os.path.isfile(file):
         return
@@ -32,12 +32,12 @@ def require_study_file(file: Path) -> None:
 
 
 def meant_study(file: Path) -> Path | None:
-    """Return the intended study file: one with the same or a similar name, with its ending."""
+    """Return the intended study file, which has the same or a similar name."""
     folders = dict.fromkeys((file.parent, _FOLDER)) if file.parent == Path() else (file.parent,)
     return next((path for _, path in near_files(file, (STUDY,), folders, _NEAR)), None)
 
 
-# --- The folder of a study, where it is named
+# --- The folder of a study
 
 RECORD = "study.json"
 """file that identifies the study of a folder"""
@@ -50,7 +50,7 @@ def require_no_file(folder: Path) -> None:
     Raises
     ------
     FileError
-        With the folder of the study's results, where it is known.
+        When it is a file, with the folder of the study's results if it is known.
     """
     try:
         if not folder.is_file():

@@ -1,4 +1,4 @@
-"""Plan of a study: the bench, what varies and how, the design, and the requirements."""
+"""Plan of a study: the bench, the variations, the design, and the requirements."""
 
 from __future__ import annotations
 
@@ -44,16 +44,16 @@ class StudiedBench:
     Parameters
     ----------
     bench
-        The bench file, in the words of the study file, or the experiment.
+        The bench file, as written in the study file, or the experiment.
     changes
-        Changes of it by ``[set]`` and ``--set``, as texts by name.
+        Changes by ``[set]`` and ``--set``, as texts by name.
     """
 
     bench: str
     changes: Mapping[str, str] = field(default_factory=dict)
 
 
-# --- Correlations of what varies: those of the normal scores, a Gaussian copula
+# --- Correlations of the varied quantities' normal scores: a Gaussian copula
 
 
 def correlation_factor(
@@ -64,7 +64,7 @@ def correlation_factor(
     Raises
     ------
     ParameterError
-        If the matrix is not positive definite: no quantities can have these correlations.
+        If the matrix is not positive definite, so that no quantities can have these correlations.
     """
     if not correlations:
         return None
@@ -88,7 +88,7 @@ def correlation_factor(
 # --- The plan
 
 CHUNK = 64
-"""cases of a chunk, the unit in which a study computes, stores and counts cases"""
+"""number of cases in a chunk, the unit in which a study computes, stores and counts cases"""
 
 
 @dataclass(frozen=True)
@@ -106,7 +106,7 @@ class Varied:
     distribution
         Its distribution.
     together
-        Further parameters that vary with it, in constant ratio.
+        Other parameters that vary with it at a constant ratio.
     """
 
     name: str
@@ -125,15 +125,15 @@ class StudyPlan:
     name
         Name in reports.
     bench
-        The tested bench; its requirements are those of the study.
+        The tested bench, which has the study's requirements.
     varied
         Quantities that vary.
     design
-        One of `points.SAMPLED`, `points.SPANNED`, `designs.SENSITIVITY` or
+        One of `designs.SAMPLED`, `designs.SPANNED`, `designs.SENSITIVITY` or
         `designs.SOUGHT`.
     cases
-        Requested cases; for indices and for each rare failure an upper limit; for other listed
-        points all there are.
+        Requested number of cases; an upper limit for indices and for each rare failure. Other
+        listed points are all computed.
     seed
         Seed of the points.
     demands
@@ -141,11 +141,11 @@ class StudyPlan:
     confidence
         Confidence of all intervals, between 0 and 1.
     levels
-        Values of each quantity in a grid, or one at a time.
+        Number of values of each quantity in a grid, or one at a time.
     time
         Limit of the computing time [s], each time that the study is run or resumed.
     cases_per_level
-        Requested cases in each level of subset simulation.
+        Requested number of cases in each level of subset simulation.
     correlations
         Pairs of names -> correlation of their normal scores.
     tested
@@ -168,12 +168,12 @@ class StudyPlan:
 
     @property
     def is_sampled(self) -> bool:
-        """Whether shares of its cases are probabilities."""
+        """Whether fractions of its cases are probabilities."""
         return self.design in SAMPLED
 
     @cached_property
     def sensitivity(self) -> SensitivityDesign | None:
-        """Design of its sensitivity indices; None for a study without them."""
+        """Design of its sensitivity indices; None for a study without indices."""
         if self.design not in SENSITIVITY:
             return None
         return SensitivityDesign(self.design, len(self.varied), self.cases, self.seed)
@@ -217,7 +217,7 @@ class StudyPlan:
 
     @property
     def chunks(self) -> int:
-        """Number of chunks; those of sampled points are complete."""
+        """Number of chunks; chunks of sampled points are complete."""
         points = self.points
         cases = points.cases if isinstance(points, Spanned) else self.cases
         return -(-cases // CHUNK)
@@ -245,7 +245,7 @@ class StudyPlan:
     def values(self, chunk: int) -> dict[str, NDArray[Any]]:
         """Return the values of the varied quantities, by name, in each case of a chunk [SI].
 
-        Parameters listed in ``together`` follow in constant ratio.
+        Parameters listed in ``together`` follow at a constant ratio.
         """
         return self._named(self.points.values(chunk, CHUNK))
 
@@ -284,7 +284,7 @@ class StudyPlan:
 
     @property
     def _choices(self) -> Iterator[dict[str, str]]:
-        """Choices of the cases, one combination at a time: each has its own equations."""
+        """Choices of the cases, one at a time, since each has its own equations."""
         for varied in self.varied:
             for value in varied.distribution.singles:
                 if isinstance(value, str):
@@ -292,14 +292,14 @@ class StudyPlan:
 
     @property
     def digest(self) -> str:
-        """What distinguishes the study from any other."""
+        """Digest that identifies the study."""
         return digest_of(self.identity)
 
     @cached_property
     def identity(self) -> Mapping[str, Any]:
-        """Everything that the figures of its cases depend on."""
+        """Everything that affects the figures of its cases."""
         bench = self.bench
-        said: dict[str, Any] = {
+        identity: dict[str, Any] = {
             "version": __version__,
             "computed": computation(bench, self._choices),
             "experiment": bench.experiment,
@@ -329,17 +329,18 @@ class StudyPlan:
             "levels": 0 if self.is_sampled else self.levels,
         }
         if bench.faults:
-            said["faults"] = bench.faults
+            identity["faults"] = bench.faults
         if self.sensitivity is not None:
-            # Indices use all groups together. The points themselves, because a library draws them.
-            said["groups"] = self.sensitivity.base
+            # Indices use all groups together. The identity includes the points, since a library
+            # draws them.
+            identity["groups"] = self.sensitivity.base
             points = self.sensitivity.probabilities.tobytes()
-            said["points"] = hashlib.sha256(points).hexdigest()
+            identity["points"] = hashlib.sha256(points).hexdigest()
             if self.design == MORRIS and any(v.distribution.is_discrete for v in self.varied):
-                said["single values"] = "in turn"
+                identity["single values"] = "in turn"
         if self.sought is not None:
             # The search depends on the requirements, and on the library's random numbers.
-            said["points"] = library_version(self.design)
-            said["cases_per_level"] = self.sought.level
-            said["requirements"] = {each.figure: each.text for each in self.judged_demands}
-        return as_json(said)
+            identity["points"] = library_version(self.design)
+            identity["cases_per_level"] = self.sought.level
+            identity["requirements"] = {each.figure: each.text for each in self.judged_demands}
+        return as_json(identity)

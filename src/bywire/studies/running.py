@@ -28,7 +28,7 @@ class Completed:
     nominal
         Key figures of the bench itself, with their numerical error.
     damaged
-        Number of damaged chunks, which are computed again.
+        Number of damaged chunks, which are recomputed.
     """
 
     nominal: Result
@@ -45,7 +45,7 @@ def complete(
     progress: Progress,
     meanwhile: Callable[[], object] = tuple,
 ) -> Completed:
-    """Compute a study's bench itself and the chunks that are missing from its folder.
+    """Compute a study's bench itself, and the chunks that are missing from its folder.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def complete(
     until = time.monotonic() + plan.time
     require_workers(workers, cluster, plan.bench.engine)
     if plan.bench.engine == CUDA:
-        find_device()  # otherwise the folder would be left without a study
+        find_device()  # fails here, before the folder is created
     store.open(plan, origin)
     damaged = store.drop_damaged()
     itself = partial(running.run, plan.bench, estimate_error=True)

@@ -1,4 +1,4 @@
-"""Sensitivity indices of a key figure: shares of its variance, and elementary effects."""
+"""Sensitivity indices of a key figure: fractions of its variance, and elementary effects."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from bywire.core.typing import Array
 from bywire.data.file_format import library
 from bywire.studies.designs import LEVELS, SALIB, STEP, SensitivityDesign
 
-_RESAMPLES = 200  # of the groups, for intervals: their widths scatter by 5 %
-_ROUNDING = 1e-12  # share of a figure below which its differences are rounding errors
+_RESAMPLES = 200  # of the groups, for intervals, whose widths then scatter by 5 %
+_ROUNDING = 1e-12  # fraction of a figure below which its differences are rounding errors
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class Estimate:
     value, low, high
         Estimate, and ends of the interval.
     reach
-        Half width of the interval before it is cut at the ends of possible values.
+        Half width of the interval before truncation to possible values.
     """
 
     value: float
@@ -42,11 +42,11 @@ class VarianceShares:
     quantity
         Its name.
     first
-        Index of first order: the share of the variance that would vanish if the quantity were
+        First-order index: the fraction of the variance that would vanish if the quantity were
         known.
     total
-        Total index: the share that would remain if all others were known; it exceeds the first by
-        interactions with the others.
+        Total index: the fraction that would remain if all other quantities were known; it exceeds
+        the first-order index by interactions.
     """
 
     quantity: str
@@ -68,11 +68,11 @@ class ElementaryEffects:
     quantity
         Its name.
     mu_star
-        Mean magnitude of its elementary effects: the change of the figure from end to end, at the
-        rate of a single step; for discrete values, the change from one to another.
+        Mean magnitude of its elementary effects: the change of the figure from end to end,
+        extrapolated from a single step; for discrete values, the change from one to another.
     sigma
-        Their standard deviation: where it is small, the effect is linear and independent of the
-        others.
+        Their standard deviation; if it is small, the effect is linear and independent of the other
+        quantities.
     """
 
     quantity: str
@@ -92,9 +92,9 @@ class Sensitivity:
     Parameters
     ----------
     drivers
-        One for every quantity, the strongest first; empty where they cannot be computed.
+        One for every quantity, the strongest first; empty if they cannot be computed.
     missing
-        Reason why there are none; empty otherwise.
+        Reason why there are no indices; empty otherwise.
     """
 
     drivers: Sequence[VarianceShares] | Sequence[ElementaryEffects]
@@ -110,10 +110,10 @@ def sensitivity(
 ) -> Sensitivity:
     """Return the drivers of a key figure.
 
-    Estimators and their intervals are SALib's: normal intervals from resampled groups. Small
-    indices of first order may be estimated below zero. A group with an undefined case cannot be
-    used, and without it the sample would no longer represent the distributions. So there are no
-    indices then.
+    Estimators and their intervals come from SALib: normal intervals from resampled groups.
+    Estimates of small first-order indices may be below zero. A group with an undefined case cannot
+    be used, and without this group the sample would not represent the distributions. Therefore,
+    there are no indices in this case.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ def sensitivity(
     names
         The quantities, in the order of the design.
     singles
-        Quantities with discrete values among them.
+        Those quantities that have discrete values.
     figure
         The key figure of every case in the order of the design, shape (cases,).
     confidence
@@ -148,12 +148,12 @@ def sensitivity(
         return Sensitivity((), "does not vary")
     groups = figure.reshape(design.base, design.group)
     is_sobol = design.kind == "sobol-indices"
-    # The decomposed variance is that of the points A and B, first and last of a group.
+    # The variance that is decomposed is that of the points A and B, the first and last of a group.
     if is_sobol and np.ptp(groups[:, [0, -1]]) <= least:
         return Sensitivity((), "varies in too few cases")
     if is_sobol:
         return _variance_shares(design, names, figure, confidence)
-    # A step between discrete values is the whole effect, not a part of a longer way.
+    # A step between discrete values is the whole effect, not part of a longer path.
     ways = [STEP if name in singles else 1.0 for name in names]
     return _elementary_effects(design, names, ways, figure, confidence)
 
@@ -208,9 +208,9 @@ def _elementary_effects(
 
 
 def _estimate(value: float, reach: float, least: float = -np.inf, most: float = np.inf) -> Estimate:
-    """Return an estimate with its interval, cut at the ends of possible values.
+    """Return an estimate with its interval, truncated to possible values.
 
-    If the estimate itself lies beyond such an end, the interval ends at the estimate.
+    If the estimate itself is beyond an end, the interval ends at the estimate.
     """
     low, high = max(value - reach, min(least, value)), min(value + reach, max(most, value))
     return Estimate(float(value), float(low), float(high), float(reach))

@@ -1,7 +1,7 @@
 """Cases of search designs: rare failures, and the worst case within ranges.
 
-A search is replayed from its seed each time, also for a report. Its requests depend only on the
-seed and on earlier results, so it requests the same cases again and finds them in the folder.
+A search is replayed from its seed each time, including for a report. Its requests depend only on
+the seed and on earlier results, so it requests the same cases again and finds them in the folder.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class SoughtCases:
     executor
         Executor of missing cases; None to compute nothing.
     progress
-        Called with a label and the used share of the budget.
+        Called with a label and the used fraction of the budget.
     """
 
     plan: StudyPlan
@@ -84,22 +84,21 @@ class SoughtCases:
         return pd.concat(frames, ignore_index=True) if frames else pd.DataFrame()
 
     def batch(self, scores: Array, numbers: list[int]) -> list[int]:
-        """Compute the missing cases at some scores; return the chunks of all of them.
+        """Compute the missing cases at some scores, and return the chunks of all cases.
 
         Parameters
         ----------
         scores
             Shape (cases, quantities).
         numbers
-            Numbers of their chunks. A batch with the scores of an earlier one is not computed
-            again.
+            Numbers of their chunks. A batch with the scores of an earlier batch is not recomputed.
 
         Raises
         ------
         UnfinishedError
-            If some are missing, and nothing is computed.
+            If cases are missing, and there is no executor.
         FileError
-            If the folder has other cases in their place.
+            If the folder contains other cases in their place.
         """
         numbers = self._shared.setdefault(scores.tobytes(), numbers)
         wanted = {
@@ -119,13 +118,13 @@ class SoughtCases:
     def _computed(self, missing: list[PlacedChunk]) -> None:
         if self.executor is None:
             raise UnfinishedError
-        if self._compute is None:  # workers are started once, and only if needed
+        if self._compute is None:  # start workers once, and only if needed
             self._compute = self._opened.enter_context(self.executor.opened(self.plan))
         for number, columns in self._compute(missing):
             self.store.write(number, columns, self.plan.column_units)
 
     def _require(self, number: int, values: Mapping[str, NDArray[np.generic]]) -> None:
-        """Reject a chunk of other cases: the search would use results that it never requested."""
+        """Reject a chunk of other cases, whose results the search never requested."""
         found = self.chunks[number]
         for name, column in values.items():
             known = found.get(name, np.array([]))
@@ -145,16 +144,16 @@ class SoughtCases:
 
 @dataclass
 class RequirementCases:
-    """The cases requested for a requirement, in their order.
+    """The requested cases of a requirement, in order.
 
     Parameters
     ----------
     cases
         Cases of the study.
     requirement
-        Number of the requirement among those judged.
+        Number of the requirement among the judged ones.
     numbers, failed
-        Numbers of the cases in the order of the requests, and of those that failed.
+        Numbers of the cases in the order of the requests, and numbers of the failed cases.
     """
 
     cases: SoughtCases
@@ -206,7 +205,7 @@ class RequirementCases:
 
 # --- The rare failures of a study
 
-_NEGLIGIBLE = 1e-3  # of the admissible probability of failure: the verdict is clear
+_NEGLIGIBLE = 1e-3  # of the allowed probability of failure: the verdict is clear
 
 
 @dataclass(frozen=True)
@@ -218,14 +217,14 @@ class Importance:
     quantity
         Its name.
     score
-        Normal score of the failures: standard deviations from the middle, with sign; NaN for
+        Normal score of the failures: signed number of standard deviations from the middle; NaN for
         discrete values, which have no middle.
     factor
-        Importance factor: share of the squared distance, 0 to 1. For discrete values the distance
-        is twice the relative entropy of failing cases to all, which equals that of a shifted normal
-        score.
+        Importance factor: fraction of the squared distance, 0 to 1. For discrete values, the
+        squared distance is twice the relative entropy of failing cases to all cases, as for a
+        shifted normal score.
     shares
-        Share of each discrete value in the failing cases; empty for other quantities.
+        Fraction of each discrete value in the failing cases; empty for other quantities.
     """
 
     quantity: str
@@ -245,12 +244,12 @@ class RareFailure:
     failure
         Estimate of its probability.
     case
-        Number of the most probable failing case that was computed; None where none failed.
+        Number of the most probable failing case that was computed; None if no case failed.
     importance
-        Quantities, the most important first; empty where the location of failures is unknown.
+        Quantities, the most important first; empty if the location of failures is unknown.
     point
         Values of the varied quantities at failures [SI]: at the design point, or at the mean normal
-        scores of failing cases, and the most frequent discrete value; empty where they are unknown.
+        scores of failing cases, and the most frequent discrete value; empty if they are unknown.
     """
 
     demand: Limit
@@ -275,7 +274,7 @@ def rare_failures(
     executor
         Executor of missing cases; None to evaluate existing ones.
     progress
-        Called with a label and the used share of the budget.
+        Called with a label and the used fraction of the budget.
 
     Raises
     ------
@@ -312,7 +311,7 @@ def _failure(plan: StudyPlan, cases: RequirementCases) -> RareFailure:
             CHUNK,
             cases.report,
         )
-    # A point that was requested twice, as by derivatives at the same place, is the same case.
+    # A point that was requested twice, for example for derivatives, is the same case.
     failure = replace(failure, runs=len({*cases.numbers}), failed=len(cases.failed))
     case = None if failure.place is None else cases.numbers[failure.place]
     importance = importance_of(plan, failure)
@@ -327,11 +326,11 @@ def _failure(plan: StudyPlan, cases: RequirementCases) -> RareFailure:
 
 
 def importance_of(plan: StudyPlan, failure: FailureProbability) -> tuple[Importance, ...]:
-    """Return importance factors: of Hasofer and Lind's design point, or of the mean failure.
+    """Return importance factors of Hasofer and Lind's design point, or of the mean failure.
 
-    For correlated quantities they refer to each quantity's own normal scores.
+    For correlated quantities, they refer to each quantity's own normal scores.
     """
-    is_rare = failure.estimate.value < 0.5  # otherwise failures lie everywhere
+    is_rare = failure.estimate.value < 0.5  # otherwise failures are everywhere
     if failure.center is None or not is_rare:
         return ()
     moved = plan.scored.correlated(failure.center)
@@ -354,7 +353,7 @@ def importance_of(plan: StudyPlan, failure: FailureProbability) -> tuple[Importa
 
 
 def _entropy(shares: Mapping[Any, float], distribution: Distribution) -> float:
-    """Return the relative entropy of shares of discrete values to their probabilities."""
+    """Return the relative entropy of fractions of discrete values to their probabilities."""
     return sum(
         p * math.log(p / weight)
         for p, weight in zip(shares.values(), distribution.weights, strict=True)
@@ -362,12 +361,12 @@ def _entropy(shares: Mapping[Any, float], distribution: Distribution) -> float:
     )
 
 
-# --- Worst cases: searches, which prove nothing
+# --- Worst cases: searches, which do not prove that a case is the worst
 
-_BEYOND_ENDS = 0.1  # of a range: worst cases lie at ends, which get a share of their own
-_WORST = -1e12  # margin of a case without a figure: the worst, but finite, so that it has a mean
+_BEYOND_ENDS = 0.1  # of a range: worst cases are often at the ends, which get extra probability
+_WORST = -1e12  # margin of a case without a figure: the worst, but finite for means
 _GENERATIONS = 10_000
-_TOGETHER = 1e-2  # share of the first generation's spread below which a generation has converged
+_TOGETHER = 1e-2  # fraction of the first generation's spread at which a generation has converged
 
 
 @dataclass(frozen=True)
@@ -379,9 +378,9 @@ class WorstCase:
     state
         ``done``: it converged; ``budget spent``; ``unfinished``: cases are not computed yet.
     margin
-        Least margin found, in the figure's unit; infinite without a case.
+        Minimum margin, in the figure's unit; infinite without a case.
     runs
-        Cases used.
+        Number of cases used.
     """
 
     state: Literal["done", "budget spent", "unfinished"]
@@ -390,7 +389,7 @@ class WorstCase:
 
 
 def worst_case(margins: Margins, quantities: int, seed: int) -> WorstCase:
-    """Search for the least margin by differential evolution, with SciPy.
+    """Search for the minimum margin by differential evolution, with SciPy.
 
     Parameters
     ----------
@@ -411,7 +410,7 @@ def worst_case(margins: Margins, quantities: int, seed: int) -> WorstCase:
     tried: list[Array] = []
 
     def batch(columns: Array) -> Array:
-        # All points of a generation, one per column; points beyond an end are moved to it.
+        # Columns are the points of a generation; points beyond an end are moved to it.
         points = np.clip(columns.T, 0.0, 1.0)
         tried.append(np.maximum(margins(points), _WORST))
         return tried[-1]
@@ -440,7 +439,7 @@ def worst_case(margins: Margins, quantities: int, seed: int) -> WorstCase:
             updating="deferred",
             vectorized=True,
             strategy="rand1bin",
-            callback=is_over,  # the single best point would draw all of them to one end
+            callback=is_over,  # the best point alone would attract all points to one end
         )
     except BudgetSpentError:
         state = "budget spent"
@@ -459,7 +458,7 @@ def worst_cases(
     executor: Executor | None = None,
     progress: Progress = silent,
 ) -> tuple[tuple[WorstCase, ...], pd.DataFrame]:
-    """Return the results of the searches for the worst case of each requirement, and all cases.
+    """Return the results of the search for each requirement's worst case, and all cases.
 
     Parameters
     ----------
@@ -468,7 +467,7 @@ def worst_cases(
     executor
         Executor of missing cases; None to evaluate existing ones.
     progress
-        Called with a label and the used share of the budget.
+        Called with a label and the used fraction of the budget.
 
     Raises
     ------

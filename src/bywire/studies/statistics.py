@@ -1,7 +1,7 @@
 """Statistics over the cases of a study: probabilities and quantiles with intervals, spread.
 
-Intervals are those of independent cases. Averages of Latin hypercubes and scrambled sequences
-scatter less: their intervals are usually conservative (A. B. Owen, Monte Carlo variance of
+Intervals are valid for independent cases. Averages of Latin hypercubes and scrambled sequences
+scatter less, so their intervals are usually conservative (A. B. Owen, Monte Carlo variance of
 scrambled net quadrature, SIAM J. Numer. Anal. 34, 1997).
 """
 
@@ -49,7 +49,7 @@ def share(count: int, cases: int, confidence: float) -> Share:
     """Return a probability with its exact two-sided interval.
 
     C. J. Clopper and E. S. Pearson, The use of confidence or fiducial limits, Biometrika 26, 1934:
-    the coverage is at least the stated confidence.
+    the coverage is at least the specified confidence.
 
     Parameters
     ----------
@@ -60,13 +60,13 @@ def share(count: int, cases: int, confidence: float) -> Share:
 
     Examples
     --------
-    >>> round(share(0, 100, 0.95).high, 4)  # none in a hundred proves little
+    >>> round(share(0, 100, 0.95).high, 4)  # no event in a hundred cases proves little
     0.0362
     """
     if not cases:
         return Share(0, 0, 0.0, 1.0)
     beyond = 0.5 * (1.0 - confidence)
-    # As quantiles of beta distributions: stats.binomtest takes a hundred times as long for the same
+    # Quantiles of beta distributions: stats.binomtest needs a hundred times as long for the same
     # ends.
     low = special.betaincinv(count, cases - count + 1, beyond) if count else 0.0
     high = special.betaincinv(count + 1, cases - count, 1.0 - beyond) if count < cases else 1.0
@@ -79,11 +79,11 @@ def judged(met: Share, surely: Share, wanted: float) -> Outcome:
     Parameters
     ----------
     met
-        Share of cases that meet it, or may do so within their numerical error.
+        Fraction of cases that meet it, or may meet it within their numerical error.
     surely
-        Share of cases that certainly meet it.
+        Fraction of cases that certainly meet it.
     wanted
-        Least required probability.
+        Required probability.
     """
     if surely.low >= wanted:
         return "met"
@@ -97,9 +97,9 @@ class Quantile:
     Parameters
     ----------
     probability
-        Share of the cases below it.
+        Fraction of the cases below it.
     value, low, high
-        Estimate and interval; NaN where there are too few cases.
+        Estimate and interval; NaN if there are too few cases.
     """
 
     probability: float
@@ -137,7 +137,7 @@ class Influence:
     quantity
         Its name.
     correlation
-        Rank correlation (Spearman), -1 to 1; the partial one for correlated quantities.
+        Rank correlation (Spearman), -1 to 1; partial rank correlation for correlated quantities.
     low, high
         Its confidence interval.
     """
@@ -149,7 +149,7 @@ class Influence:
 
     @property
     def strength(self) -> float:
-        """Strength of the relation, 0 to 1, whatever its sign."""
+        """Strength of the relation, 0 to 1, regardless of its sign."""
         return abs(self.correlation)
 
     @property
@@ -171,17 +171,17 @@ def influences(
     its range. The interval is Fisher's with the variance of Bonett and Wright, Psychometrika 65,
     2000.
 
-    Correlated quantities seem to share their effects. The partial rank correlation is that of the
-    residuals after a linear regression of the ranks on those of the other quantities (R. L. Iman
-    and W. J. Conover, Small sample sensitivity analysis techniques for computer models,
-    Communications in Statistics A9, 1980); its interval has one case less for each of them.
+    Correlated quantities appear to share their effects. The partial rank correlation is that of the
+    residuals after a linear regression of the ranks on the ranks of the other quantities (R. L.
+    Iman and W. J. Conover, Small sample sensitivity analysis techniques for computer models,
+    Communications in Statistics A9, 1980). Its interval uses one case less for each other quantity.
 
     Parameters
     ----------
     names, columns
         Quantities, and their values in each case, shape (cases,) each.
     figure
-        The key figure in each case, shape (cases,); undefined cases are left out.
+        The key figure in each case, shape (cases,); undefined cases do not count.
     confidence
         Confidence of the intervals.
     is_partial
@@ -210,7 +210,7 @@ def influences(
 
 
 def _rests(x: Array, y: Array, others: Sequence[Array]) -> tuple[Array, Array]:
-    """Return the residuals of the ranks of two after a linear regression on other ranks."""
+    """Return the residuals of two ranks after a linear regression on other ranks."""
     if not others:
         return x - x.mean(), y - y.mean()
     known, both = np.column_stack([np.ones(x.size), *others]), np.column_stack([x, y])
@@ -219,8 +219,8 @@ def _rests(x: Array, y: Array, others: Sequence[Array]) -> tuple[Array, Array]:
 
 
 def _correlation(x: Array, y: Array) -> float:
-    """Return the correlation of centered values; 0 where one of them is only rounding errors."""
-    # Sums instead of products of vectors: for 10,000 numbers BLAS wakes all cores, and waits for
+    """Return the correlation of centered values; 0 if one of them is only rounding errors."""
+    # Sums instead of products of vectors: for 10,000 numbers, BLAS wakes all cores and waits for
     # them.
     xx, yy, xy = (float(np.sum(a * b)) for a, b in ((x, x), (y, y), (x, y)))
     size = math.sqrt(xx * yy)
@@ -228,7 +228,7 @@ def _correlation(x: Array, y: Array) -> float:
 
 
 def running_share(met: NDArray[np.bool_], confidence: float, count: int = 60) -> list[Share]:
-    """Return the convergence of an estimate: the share of the first cases, for growing numbers."""
+    """Return the convergence of an estimate: its value for a growing number of first cases."""
     sizes = np.unique(np.geomspace(1, max(met.size, 1), count).astype(int))
     return [share(int(met[:n].sum()), int(n), confidence) for n in sizes if met.size]
 
@@ -236,12 +236,12 @@ def running_share(met: NDArray[np.bool_], confidence: float, count: int = 60) ->
 # --- Spread of a key figure over the cases
 
 QUANTILES = (0.05, 0.5, 0.95)
-"""shares of the cases below the displayed quantiles"""
+"""fractions of the cases below the displayed quantiles"""
 
 
 @dataclass(frozen=True)
 class Spread:
-    """A key figure over all cases; values in ``unit``, NaN where no case has it.
+    """A key figure over all cases; values are in ``unit``, NaN if no case has the figure.
 
     Parameters
     ----------
@@ -254,7 +254,7 @@ class Spread:
     mean, sd
         Mean and standard deviation.
     quantiles
-        Those of `QUANTILES`, with intervals.
+        Quantiles at `QUANTILES`, with intervals.
     least, largest
         Extreme values.
     """
@@ -271,14 +271,14 @@ class Spread:
 
 
 def spread_of(name: str, unit: str, nominal: float, figure: Array, confidence: float) -> Spread:
-    """Return the spread of a key figure that is defined in some case.
+    """Return the spread of a key figure that is defined in at least one case.
 
     Parameters
     ----------
     name, unit, nominal
         Name and unit of the figure, and its value in the bench itself.
     figure
-        Its value in every case, shape (cases,); NaN where it is undefined.
+        Its value in every case, shape (cases,); NaN if it is undefined.
     confidence
         Confidence of the intervals of its quantiles, between 0 and 1.
     """
@@ -296,7 +296,7 @@ def spread_of(name: str, unit: str, nominal: float, figure: Array, confidence: f
     )
 
 
-# --- Probability of a missed requirement: an estimate, its interval, where it is from
+# --- Probability of a missed requirement: estimate, interval, and source
 
 State = Literal["done", "negligible", "budget spent", "unfinished", "level", "no design point"]
 
@@ -308,7 +308,7 @@ class Interval:
     Parameters
     ----------
     value, variation
-        The estimate, and its standard deviation divided by it; NaN where there is none.
+        The estimate, and its relative standard deviation; NaN if there is none.
     low, high
         Ends of the interval.
     """
@@ -324,7 +324,7 @@ UNKNOWN = Interval(math.nan, math.nan, 0.0, 1.0)
 
 
 def interval(value: float, variation: float, confidence: float) -> Interval:
-    """Return an estimate with a log-normal interval, because products of shares are skewed.
+    """Return an estimate with a log-normal interval, because products of fractions are skewed.
 
     Examples
     --------
@@ -368,12 +368,12 @@ class FailureProbability:
     Parameters
     ----------
     state
-        ``done``; ``negligible``: below the least probability of interest; ``budget spent``;
+        ``done``; ``negligible``: below the minimum probability of interest; ``budget spent``;
         ``unfinished``: cases are not computed yet; ``level``: too many cases have the same figure;
-        ``no design point``: the search found none.
+        ``no design point``: the search found no point.
     estimate
-        Estimate of the probability that the margin is <= 0; only an upper end if the method did not
-        reach failure.
+        Estimate of the probability that the margin is <= 0; only an upper bound if the method did
+        not reach failure.
     below
         ``below(x)``: estimate of the probability that the margin is <= x, in the figure's unit.
     levels
@@ -381,16 +381,16 @@ class FailureProbability:
     runs
         Number of cases used.
     span
-        Least and largest margin for which ``below`` has an estimate; None without any.
+        Minimum and maximum margin for which ``below`` has an estimate; None without an estimate.
     place, scores
         The most probable failing case: its position among the cases used, and its independent
-        standard normal scores; None where none failed.
+        standard normal scores; None if no case failed.
     center
-        Center of the failures: the mean of their scores, or FORM's design point; None where it is
+        Center of the failures: the mean of their scores, or FORM's design point; None if it is
         unknown.
     failing
-        Scores of failing cases, distributed as failures are, shape (cases, quantities); None except
-        for subset simulation.
+        Scores of failing cases with the distribution of failures, shape (cases, quantities); None
+        except for subset simulation.
     first_order
         FORM's reliability index beta; NaN for other methods.
     failed
@@ -431,7 +431,7 @@ class FailureProbability:
         Parameters
         ----------
         wanted
-            Least required probability that it is met.
+            Required probability of meeting the requirement.
         error
             Numerical error of the figure, in its unit: cases closer to the limit count for neither
             side.

@@ -1,6 +1,7 @@
 """Folder of a study: a Parquet file per chunk, the identity of the study, and its size.
 
-A chunk depends only on the plan and its number, wherever and in whatever order it is computed.
+A chunk depends only on the plan and its number, regardless of where and in which order it is
+computed.
 """
 
 from __future__ import annotations
@@ -35,14 +36,14 @@ if TYPE_CHECKING:
     import pandas as pd
 
 CASE, FAILURE, WARNINGS = "case", "failure", "warnings"
-"""columns beside values and key figures: number, reason for a missing result, warnings"""
+"""other columns than values and key figures: number, reason for a missing result, warnings"""
 
 Columns = dict[str, NDArray[Any]]
 
 
 @dataclass(frozen=True)
 class PlacedChunk:
-    """A chunk whose values are not listed by the plan: its number, and columns [SI]."""
+    """A chunk whose values are not in the plan: its number, and columns [SI]."""
 
     number: int
     values: Mapping[str, NDArray[Any]]
@@ -63,7 +64,7 @@ def computed_chunk(
     plan
         The study.
     chunk
-        Number of the chunk, >= 0; with its values where the plan does not list them.
+        Number of the chunk, >= 0, with its values if they are not in the plan.
     threads
         Threads to use; all cores by default.
 
@@ -71,13 +72,13 @@ def computed_chunk(
     -------
     dict
         Columns of equal length: the case's number, the varied values by name [SI], every key figure
-        by name in its unit (NaN where it is undefined), and two texts: the reason for a missing
+        by name in its unit (NaN if it is undefined), and two texts: the reason for a missing
         result, and warnings. Texts may be empty.
 
     Raises
     ------
     DeviceError
-        If the bench's graphics processor fails: the cases are not the cause.
+        If the bench's graphics processor fails, which the cases do not cause.
     KeyboardInterrupt
         If interrupted.
     """
@@ -90,7 +91,7 @@ def computed_chunks(
 ) -> list[tuple[int, Columns]]:
     """Return the numbers and the columns of chunks whose cases are computed together.
 
-    The result of `computed_chunk` for each of them, in order.
+    The columns are the result of `computed_chunk` for each chunk, in order.
 
     Raises
     ------
@@ -113,7 +114,7 @@ def computed_chunks(
 
 @contextmanager
 def _garbage_later() -> Iterator[None]:
-    """Collect garbage once at the end instead of repeatedly among all objects.
+    """Collect garbage once at the end, instead of repeatedly among all objects.
 
     Evaluated models contain reference cycles.
     """
@@ -153,7 +154,7 @@ def _computed(
 
 
 def case_bench(plan: StudyPlan, number: int, values: Mapping[str, Any]) -> Bench:
-    """Return the bench of a case: its values, and for sampled cases its own noise.
+    """Return the bench of a case, with its values and, for sampled cases, its own noise.
 
     Raises
     ------
@@ -172,7 +173,7 @@ def _is_noisy(plan: StudyPlan, number: int) -> bool:
 
 
 def _alike(benches: Mapping[int, Bench]) -> list[list[int]]:
-    """Return groups of cases that differ only in numbers, so that they run side by side."""
+    """Return groups of cases that differ only in numbers, so they can run in parallel."""
     groups: dict[tuple[Any, ...], list[int]] = {}
     for k, bench in benches.items():
         each = (bench.par.choices(), bench.chosen_options.choices())  # names may be in both
@@ -183,7 +184,7 @@ def _alike(benches: Mapping[int, Bench]) -> list[list[int]]:
 def _fill(
     columns: Columns, cases: Sequence[int], benches: Mapping[int, Bench], threads: int | None
 ) -> None:
-    """Store results in the rows of their cases; if they fail together, rerun each to find why."""
+    """Store results in the rows of their cases; if they fail together, rerun them separately."""
     try:
         given = key_figures_of([benches[k] for k in cases], threads)
     except DeviceError:  # not caused by a case
@@ -202,18 +203,18 @@ def _fill(
 
 
 def warnings_in(cell: str) -> list[str]:
-    """Return the warnings of a case, a JSON list; earlier versions joined them to one text."""
+    """Return the warnings of a case, from a JSON list or a single text."""
     warnings: list[str] = json.loads(cell) if cell.startswith("[") else [cell] if cell else []
     return warnings
 
 
-# --- Its file: one Parquet file, whole or not at all, that says whose it is
+# --- File of a chunk: a Parquet file, written completely or not at all, with its identity
 
 _WHAT = ("the files of a study", "studies")
 
 
 def _require_pyarrow() -> None:
-    """Require pyarrow before resuming: without it chunks would seem damaged.
+    """Require pyarrow before resuming, since without it chunks would appear to be damaged.
 
     Raises
     ------
@@ -235,9 +236,9 @@ def _write_chunk(
     columns
         Values of each quantity and figure, shape (cases,) each; texts as objects.
     units
-        Units of the columns that have one.
+        Units of the columns that have a unit.
     marks
-        What distinguishes the file from any other.
+        Identity of the file.
 
     Raises
     ------
@@ -259,7 +260,7 @@ def _write_chunk(
 
 
 def _read_chunk(path: Path) -> tuple[Columns, Mapping[bytes, bytes]]:
-    """Return the cases of a chunk's file, and what distinguishes the file from any other.
+    """Return the cases of a chunk's file, and the identity of the file.
 
     Raises
     ------
@@ -267,7 +268,7 @@ def _read_chunk(path: Path) -> tuple[Columns, Mapping[bytes, bytes]]:
         Any exception of pyarrow for a damaged file.
     """
     parquet = library("pyarrow.parquet", *_WHAT)
-    # A single file: the reader of folders takes three times as long, and loads more.
+    # Read a single file: the reader of folders needs three times as long, and loads more modules.
     with parquet.ParquetFile(path, page_checksum_verification=True, pre_buffer=False) as file:
         table = file.read(use_threads=False)
     columns = {
@@ -278,8 +279,8 @@ def _read_chunk(path: Path) -> tuple[Columns, Mapping[bytes, bytes]]:
 
 
 # --- The folder
-# The files are the truth: an existing chunk is never computed again. Each is written whole or not
-# at all, so that a killed process loses only its current chunks.
+# An existing chunk is never recomputed. Each file is written completely or not at all, so that a
+# killed process loses only its current chunks.
 
 _CHUNKS = "chunks"
 """folder of the chunks"""
@@ -294,7 +295,7 @@ class Origin:
     file
         Study file.
     overrides
-        Changes of its bench, in the form of ``--set``.
+        Changes to its bench, as for ``--set``.
     """
 
     file: Path
@@ -326,7 +327,7 @@ class StudyStore(PieceFolder):
         "study": dict,
     }
 
-    # Cases that were read or written here, so that they are not read again.
+    # Cases that were read or written here, to avoid reading them again.
     _known: dict[int, Columns] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     @property
@@ -337,7 +338,7 @@ class StudyStore(PieceFolder):
         )
 
     def open(self, plan: StudyPlan, origin: Origin) -> None:
-        """Claim the folder for the study, or reject that of another.
+        """Claim the folder for the study, or reject the folder of another study.
 
         Raises
         ------
@@ -356,10 +357,10 @@ class StudyStore(PieceFolder):
         self.begin(plan, about)
 
     def asked_and_computed(self, plan: StudyPlan) -> tuple[int, int]:
-        """Return the number of requested cases, and of computed ones.
+        """Return the number of requested cases, and of computed cases.
 
         Both are zero if the folder does not contain this study. For search designs, both count per
-        requirement: the second is that of the requirement with most cases.
+        requirement; the second is for the requirement with most cases.
         """
         if not (self.folder / RECORD).exists():
             return 0, 0
@@ -380,7 +381,7 @@ class StudyStore(PieceFolder):
         Raises
         ------
         FileError
-            If it contains none.
+            If the folder contains no record.
         """
         require_no_file(self.folder)
         return super().record()
@@ -392,7 +393,7 @@ class StudyStore(PieceFolder):
         return shlex.join([*words, *(w for file in loaded_files() for w in ("--system", file))])
 
     def drop_damaged(self) -> int:
-        """Remove files of unreadable chunks, so that they are computed again.
+        """Remove files of unreadable chunks, so that they are recomputed.
 
         Returns
         -------
@@ -410,7 +411,7 @@ class StudyStore(PieceFolder):
         return damaged
 
     def write(self, chunk: int, columns: Columns, units: Mapping[str, str]) -> None:
-        """Store a chunk, whole or not at all.
+        """Store a chunk, completely or not at all.
 
         Raises
         ------
@@ -426,7 +427,7 @@ class StudyStore(PieceFolder):
         self._known[chunk] = columns
 
     def read(self, chunks: int) -> pd.DataFrame:
-        """Return all cases of the first existing chunks, in their order.
+        """Return all cases of the first existing chunks, in order.
 
         Raises
         ------
@@ -440,7 +441,7 @@ class StudyStore(PieceFolder):
         return pd.DataFrame({n: np.concatenate([columns[n] for columns in each]) for n in names})
 
     def columns(self, chunk: int) -> Columns:
-        """Return the cases of an existing chunk, kept since they were first read or written.
+        """Return the cases of an existing chunk, stored when they were first read or written.
 
         Raises
         ------
@@ -466,14 +467,13 @@ class StudyStore(PieceFolder):
         if any(marks.get(key) != value for key, value in self._marks(chunk).items()):
             raise FileError(
                 f"{path} belongs to another study, or is another chunk of this study. To "
-                "recompute it, "
-                f"type '{self.resume_command}'",
+                f"recompute it, type '{self.resume_command}'",
                 name=str(path),
             )
         return columns
 
     def _marks(self, chunk: int) -> dict[bytes, bytes]:
-        """Return what distinguishes a chunk's file from any other."""
+        """Return the identity of a chunk's file."""
         return {b"study": self._digest, b"chunk": str(chunk).encode()}
 
     @cached_property
@@ -481,11 +481,11 @@ class StudyStore(PieceFolder):
         return str(self.record()["digest"]).encode()
 
 
-# --- How many cases are asked for, beside what the file says and the folder has
+# --- Requested number of cases, in addition to the file and the folder
 
 
 def with_cases(plan: StudyPlan, store: StudyStore, cases: int | None) -> StudyPlan:
-    """Return the plan with the requested number of cases, at least that of its folder.
+    """Return the plan with the requested number of cases, at least the number in its folder.
 
     Parameters
     ----------
@@ -494,14 +494,14 @@ def with_cases(plan: StudyPlan, store: StudyStore, cases: int | None) -> StudyPl
     store
         Its folder.
     cases
-        Requested cases; None for the number in the file and the folder. A smaller number than the
-        folder's cancels cases that are not computed.
+        Requested number of cases; None for the number in the file and the folder. A number below
+        the folder's cancels cases that are not computed yet.
 
     Raises
     ------
     ParameterError
-        For fewer cases than are computed, too few, too many, and for a design with a fixed number
-        of cases.
+        For fewer cases than are already computed, for too few or too many cases, and for a design
+        with a fixed number of cases.
     """
     if cases is not None:
         cases = whole_number("cases", cases, 1, MOST)
@@ -514,8 +514,7 @@ def with_cases(plan: StudyPlan, store: StudyStore, cases: int | None) -> StudyPl
         if cases is not None and cases < computed:
             raise ParameterError(
                 f"cases = {cases} is not valid: it must be >= {computed}, because {store.folder} "
-                "already "
-                "contains that many. Request more cases, or choose another folder",
+                "already contains that many. Request more cases, or choose another folder",
                 name="cases",
                 value=str(cases),
                 valid=f">= {computed}",
@@ -530,7 +529,7 @@ def with_cases(plan: StudyPlan, store: StudyStore, cases: int | None) -> StudyPl
 
 
 def require_extensible(plan: StudyPlan, cases: int) -> None:
-    """Reject further cases for a design with its own number of cases.
+    """Reject additional cases for a design with a fixed number of cases.
 
     Raises
     ------

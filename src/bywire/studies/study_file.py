@@ -1,4 +1,4 @@
-"""Reader of study files (TOML), which executes nothing in them."""
+"""Reader of study files (TOML), which does not execute any of their content."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class CorrelationSection(Section):
 def _in_order(
     varied: Sequence[Varied], correlations: Mapping[tuple[str, str], float]
 ) -> tuple[Varied, ...]:
-    """Return what varies, with correlated discrete values in rising order."""
+    """Return the varied quantities, with correlated discrete values in rising order."""
     correlated = {name for pair in correlations for name in pair}
     return tuple(
         replace(each, distribution=rising(each.distribution))
@@ -79,7 +79,7 @@ def _read_correlations(
     Raises
     ------
     InputError
-        For invalid entries, and for correlations that no quantities can have.
+        For invalid entries, and for correlations that contradict each other.
     """
     names = {each.name: each for each in varied}
     pairs: dict[tuple[str, str], float] = {}
@@ -93,10 +93,8 @@ def _read_correlations(
             if not names[name].unit:
                 raise ParameterError(
                     f"[[correlation]] of {pair[0]} and {pair[1]}: {name} is a choice. Choices "
-                    "have no "
-                    "order and therefore no correlation. Remove this section, or run a study for "
-                    "each "
-                    "value",
+                    "have no order and therefore no correlation. Remove this section, or run a "
+                    "study for each value",
                     name=name,
                 )
         first, second = sorted(pair)
@@ -147,15 +145,14 @@ def _require_agreement(plan: StudyPlan) -> None:
             if (count := len(each.distribution.singles)) > LEVELS:
                 raise ParameterError(
                     f"[vary] {each.name} has {count} values, but {plan.design!r} uses only "
-                    f"{LEVELS} "
-                    f"levels. List at most {LEVELS} values, or use 'sobol-indices'",
+                    f"{LEVELS} levels. List at most {LEVELS} values, or use 'sobol-indices'",
                     name=f"[vary] {each.name}",
                     value=str(count),
                     valid=str(LEVELS),
                 )
     for demand in plan.demands:
         if demand.probability is not None:
-            why = _DEPENDENT if plan.design == "sobol-indices" else "draws nothing"
+            why = _DEPENDENT if plan.design == "sobol-indices" else "does not draw random cases"
             raise ParameterError(
                 f"requirement {str(demand)!r}: {plan.design!r} {why}, so its cases have no "
                 f"probability. Use {others}, or remove 'with ...' to require that every case meets "
@@ -197,7 +194,7 @@ def _require_rare(plan: StudyPlan, design: SoughtDesign) -> None:
     design.require_budget()
 
 
-# --- The section ``[design]``: where it is computed, and how many cases
+# --- The section ``[design]``: kind of design, and number of cases
 
 _KINDS = (*SAMPLED, *SPANNED, *SENSITIVITY, *SOUGHT)
 _WITH_LEVELS = ("grid", "one-at-a-time")
@@ -270,8 +267,8 @@ def _require_of_use(kind: str, section: Mapping[str, Any]) -> None:
 BenchName = Annotated[
     Name,
     Hint(
-        'write bench = "...", a bench file (its path starts at this file\'s folder), or an '
-        "experiment of 'bywire list'"
+        'write bench = "...", a bench file (with a path relative to this file\'s folder) or an '
+        "experiment (see 'bywire list')"
     ),
 ]
 
@@ -368,7 +365,7 @@ def read_bench(
         if not isinstance(value, str):
             raise ParameterError(
                 f"[set] {key} = {quoted(value)} is not valid: it must be a string with its unit, "
-                f"in the form of {option('overrides')}",
+                f"as for {option('overrides')}",
                 name=f"[set] {key}",
                 value=quoted(value),
                 valid="a string with its unit",

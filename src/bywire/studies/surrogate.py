@@ -1,4 +1,4 @@
-"""Surrogates: key figures as fitted polynomials of what varies, with their errors."""
+"""Surrogates: key figures as fitted polynomials of the varied quantities, with their errors."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from bywire.studies.designs import SOUGHT
 from bywire.studies.findings import Findings
 from bywire.studies.plan import StudyPlan, Varied
 
-_SHOWN = 6  # discrete values that an error lists
-_SAME = 1e-9  # share by which two texts of the same value may differ
+_SHOWN = 6  # maximum number of discrete values that an error lists
+_SAME = 1e-9  # maximum relative difference between two texts of the same value
 
 Polynomial = Callable[[Array], Array]
 
 
 @dataclass(frozen=True)
 class Surrogate:
-    """A key figure as a polynomial of what varies.
+    """A key figure as a polynomial of the varied quantities.
 
     Parameters
     ----------
@@ -37,19 +37,19 @@ class Surrogate:
     units
         SI unit of each quantity.
     low, high
-        Least and largest value of each quantity in the cases [SI].
+        Minimum and maximum of each quantity in the cases [SI].
     singles
-        Discrete values of quantities in the cases [SI], in rising order: the surrogate is not valid
+        Discrete values of quantities in the cases [SI], in rising order; the surrogate is not valid
         between them.
     cases
         Number of cases with the figure.
     degree, terms
         Degree of the polynomial, and number of terms.
     rms, largest
-        Errors of cases outside the fit, by fivefold cross-validation: root mean square, and
-        largest, in ``unit``. They contain the noise of the cases.
+        Root mean square and maximum of the errors of cases outside the fit, by fivefold
+        cross-validation, in ``unit``. They contain the noise of the cases.
     explained
-        Explained share of the variance in the cross-validation (Q2).
+        Explained fraction of the variance in the cross-validation (Q2).
     """
 
     kpi: str
@@ -73,14 +73,15 @@ class Surrogate:
         Parameters
         ----------
         values
-            Quantities by name [SI], numbers or arrays of one shape; others have the bench's value.
+            Quantities by name [SI], numbers or arrays of the same shape; others have the bench's
+            value.
 
         Raises
         ------
         UnknownNameError
             For a quantity that did not vary.
         ParameterError
-            For values beyond the cases, and for values between discrete ones.
+            For values outside the range of the cases, and for values between discrete values.
         """
         if not isinstance(values, Mapping):
             raise ParameterError(
@@ -138,7 +139,7 @@ class Surrogate:
 
 
 def _listed(values: Array, unit: str) -> str:
-    """Return discrete values as text for an error, abbreviated where they are many."""
+    """Return discrete values as text for an error, abbreviated if there are many."""
     texts = [shown(float(value), unit) for value in values]
     if len(texts) > _SHOWN:
         texts = [*texts[: _SHOWN - 1], "...", texts[-1]]
@@ -146,13 +147,13 @@ def _listed(values: Array, unit: str) -> str:
 
 
 # --- Polynomial chaos through the cases of a study
-# R. G. Ghanem and P. D. Spanos, Stochastic Finite Elements, 1991; fitted by OpenTURNS, with terms
-# chosen by least angle regression (G. Blatman and B. Sudret, Journal of Computational Physics 230,
-# 2011).
+# R. G. Ghanem and P. D. Spanos, Stochastic Finite Elements, 1991. OpenTURNS fits the polynomial.
+# Least angle regression selects its terms (G. Blatman and B. Sudret, Journal of Computational
+# Physics 230, 2011).
 
 LIBRARY = ("surrogates of studies", "studies")
-_FEWEST = 30  # designs whose cases allow a surrogate
-_LARGEST = 4  # degree: with five quantities the fifth gains little, and takes ten times as long
+_FEWEST = 30  # minimum number of cases for a surrogate
+_LARGEST = 4  # degree: for five quantities, a fifth improves little and takes ten times longer
 _FOLDS = 5  # cross-validation: each fifth of the cases is predicted from the others
 _LACKING = ("one-at-a-time", "corners", "morris", *SOUGHT)  # designs that visit only a few points
 
@@ -160,7 +161,7 @@ _LACKING = ("one-at-a-time", "corners", "morris", *SOUGHT)  # designs that visit
 def surrogate_of(findings: Findings, kpi: str) -> Surrogate:
     """Return the surrogate of a key figure from the cases of a study.
 
-    The degree is chosen by fivefold cross-validation.
+    Fivefold cross-validation determines the degree.
 
     Raises
     ------
@@ -219,7 +220,7 @@ def surrogate_of(findings: Findings, kpi: str) -> Surrogate:
 
 
 def require_fittable(plan: StudyPlan) -> None:
-    """Reject studies whose cases cannot be fitted by a polynomial: see `surrogate_of`.
+    """Reject studies whose cases a polynomial cannot fit; see `surrogate_of`.
 
     Raises
     ------
@@ -244,7 +245,7 @@ def require_fittable(plan: StudyPlan) -> None:
 
 
 def _within(varied: Sequence[Varied], x: Array) -> dict[str, float]:
-    """Return the bench's value of each quantity; beyond all cases, the nearest."""
+    """Return the bench's value of each quantity, or the nearest one in the cases."""
     singles = _singles(varied, x)
     return {
         v.name: min(singles[v.name], key=lambda single: abs(single - v.nominal))
@@ -276,7 +277,7 @@ def _degrees(shape: tuple[int, ...]) -> list[int]:
 
 @dataclass(frozen=True)
 class _Fit:
-    """A polynomial fitted to cases, its degree, and its number of terms."""
+    """A polynomial that is fitted to cases, its degree, and its number of terms."""
 
     degree: int
     terms: int
@@ -316,7 +317,7 @@ def _fitted(varied: Sequence[Varied], x: Array, y: Array, degree: int) -> _Fit:
 
 
 def _marginal(ot: Any, varied: Varied, values: NDArray[np.float64]) -> Any:
-    """Return a distribution as wide as a quantity, for its polynomials: any such will do."""
+    """Return any distribution as wide as a quantity, for its polynomials."""
     low, high = float(values.min()), float(values.max())
     if low == high:
         return ot.Uniform(low - 1.0, high + 1.0)

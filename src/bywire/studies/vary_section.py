@@ -38,13 +38,13 @@ from bywire.studies.plan import Varied
 
 _ESTIMATE = "estimate.json"
 """file with the estimates in an identification's folder"""
-_LARGEST = 20_000_000  # largest size of the file in bytes
+_LARGEST = 20_000_000  # maximum size of the file in bytes
 _TRUNCATE = "Truncate the distribution with truncate = true"
 _WEAK = 1e-9  # correlation that counts as zero
 
 
 class MeasuredSection(Section):
-    """The section ``[measured]``: estimates of an identification, of which parameters vary."""
+    """The section ``[measured]``: parameters that vary by the uncertainty of an identification."""
 
     file: Annotated[Name, Hint("specify the folder that 'bywire identify --out' created")]
     of: Names | None = None
@@ -58,7 +58,7 @@ class Measured:
     Parameters
     ----------
     values, deviations
-        By name [SI]: estimate and standard deviation.
+        Estimates and standard deviations by name [SI].
     units
         SI unit by name.
     correlations
@@ -76,7 +76,7 @@ class Measured:
         Raises
         ------
         UnknownNameError
-            If one was not estimated.
+            If a parameter was not estimated.
         """
         for name in names:
             if name not in self.values:
@@ -94,7 +94,7 @@ def _varied_as_measured(
 ) -> tuple[tuple[Varied, ...], dict[tuple[str, str], float]]:
     """Return parameters that vary by their measured uncertainty, with correlations of estimates.
 
-    Each is normally distributed around its estimate.
+    Each parameter is normally distributed around its estimate.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def _varied_as_measured(
         The tested bench.
     section
         ``[measured]`` of a study file: ``file``; ``of``, names, default: all that the bench has;
-        ``truncate``, whether to cut distributions off at the valid range.
+        ``truncate``, whether to truncate distributions to the valid range.
     folder
         Base folder of the file's path.
 
@@ -153,7 +153,7 @@ def _read_measured(path: Path) -> Measured:
     Parameters
     ----------
     path
-        Folder written by ``bywire identify --out``, or its ``estimate.json``.
+        Folder that ``bywire identify --out`` created, or its ``estimate.json``.
 
     Raises
     ------
@@ -172,9 +172,9 @@ def _read_measured(path: Path) -> Measured:
         ) from None
     try:
         if len(data) > _LARGEST:
-            raise ValueError("it is far too large")
-        said = json.loads(data)
-        return _joined(list(_estimates(said["estimates"])))
+            raise ValueError("it is too large")
+        content = json.loads(data)
+        return _joined(list(_estimates(content["estimates"])))
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise FileError(
             f"{file} contains no estimates of an identification ({type(error).__name__}: "
@@ -183,8 +183,8 @@ def _read_measured(path: Path) -> Measured:
         ) from None
 
 
-def _estimates(said: Mapping[str, Any]) -> Iterator[Measured]:
-    for each in said.values():
+def _estimates(groups: Mapping[str, Any]) -> Iterator[Measured]:
+    for each in groups.values():
         rows = each["parameters"]
         values = {str(name): _number(row["value"]) for name, row in rows.items()}
         deviations = {str(name): _number(row["standard_deviation"]) for name, row in rows.items()}
@@ -193,7 +193,7 @@ def _estimates(said: Mapping[str, Any]) -> Iterator[Measured]:
         names = [str(name) for name in each["correlation"]["names"]]
         matrix = np.array(each["correlation"]["matrix"], dtype=float)
         if matrix.shape != (len(names), len(names)) or {*names} != {*values}:
-            raise ValueError("the correlations are of other parameters")
+            raise ValueError("the correlations belong to other parameters")
         pairs = {
             (min(a, b), max(a, b)): _number(float(matrix[i, k]))
             for (i, a), (k, b) in combinations(enumerate(names), 2)
@@ -204,13 +204,13 @@ def _estimates(said: Mapping[str, Any]) -> Iterator[Measured]:
 
 
 def _joined(each: Sequence[Measured]) -> Measured:
-    """Return several identifications as one: their estimates are independent of each other."""
+    """Return several identifications as one, with independent estimates."""
     names = [name for file in each for name in file.values]
     if not names:
-        raise ParameterError("nothing is estimated in it")
+        raise ParameterError("it contains no estimates")
     if len(names) != len({*names}):
         twice = next(name for name in names if names.count(name) > 1)
-        raise ParameterError(f"{twice} is estimated twice in it")
+        raise ParameterError(f"it contains two estimates of {twice}")
     return Measured(
         {k: v for file in each for k, v in file.values.items()},
         {k: v for file in each for k, v in file.deviations.items()},
@@ -262,7 +262,7 @@ def read_all_varied(
 
 
 def _put_once(places: dict[str, str], name: str, place: str) -> None:
-    """Record where a quantity varies, or reject one that varies elsewhere too."""
+    """Record where a quantity varies, or reject a quantity that also varies elsewhere."""
     if name in places:
         raise ParameterError(
             f"[vary] {name} varies twice, in {places[name]} and in {place}. Remove one of them",
@@ -309,7 +309,7 @@ def read_varied(bench: Bench, section: Mapping[str, Any]) -> Iterator[Varied]:
             )
         leaf = varied_leaf(bench, name)
         nominal = float(values[name])
-        if not choices.keys() & section.keys():  # one of them may switch it on
+        if not choices.keys() & section.keys():  # a varied choice may switch it on
             bench.require_effect(name)
         law = read_distribution(name, entry, leaf, nominal)
         for each in filter(values.get, together):
@@ -324,7 +324,7 @@ def read_varied(bench: Bench, section: Mapping[str, Any]) -> Iterator[Varied]:
 
 
 def quantities_of(bench: Bench) -> dict[str, Any]:
-    """Return all numbers [SI], tables and choices of a bench by name, ``options.NAME`` too."""
+    """Return all numbers [SI], tables and choices of a bench by name, including options."""
     options = bench.chosen_options.flat()
     return {**bench.par.flat(), **{f"{OPTION}{name}": value for name, value in options.items()}}
 
@@ -332,8 +332,8 @@ def quantities_of(bench: Bench) -> dict[str, Any]:
 def _require_alike(bench: Bench, name: str, values: Sequence[str]) -> None:
     """Reject values of an option that change the experiment.
 
-    The driven signal may have another unit, and the key figures may be others: then a stimulus or a
-    requirement would not mean the same in all cases.
+    The driven signal could have another unit, or the key figures could be different. A stimulus or
+    a requirement would then not have the same meaning in all cases.
     """
     if not name.startswith(OPTION):
         return
@@ -357,14 +357,14 @@ def _require_alike(bench: Bench, name: str, values: Sequence[str]) -> None:
 
 
 def entries_of(section: Mapping[str, Any], known: Collection[str]) -> dict[str, Any]:
-    """Return the entries of ``[vary]`` by dotted name, however they are nested in the file.
+    """Return the entries of ``[vary]`` by dotted name, for any nesting in the file.
 
     Parameters
     ----------
     section
         Content of the section.
     known
-        Names that may vary: a table under such a name is an entry, whatever its content.
+        Names that may vary; a table under such a name is an entry, regardless of its content.
 
     Raises
     ------
@@ -419,8 +419,7 @@ def _together(name: str, entry: Any, bench: Bench, values: Mapping[str, Any]) ->
         if leaves[each].is_whole:
             raise ParameterError(
                 f"[vary] {name}.together {each} is a whole number, which cannot stay in "
-                "proportion. "
-                "Vary it separately, or remove it",
+                "proportion. Vary it separately, or remove it",
                 name=f"[vary] {name}.together",
                 value=each,
             )

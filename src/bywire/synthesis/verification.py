@@ -1,11 +1,11 @@
-"""Gains on the nonlinear bench, where friction and dither change the loop: judged and retuned.
+"""Evaluates and retunes gains on the nonlinear bench, where friction and dither change the loop.
 
-A library's differential evolution runs every generation as one ensemble. It measures effects that
-the linear model omits (friction under dither, converter, limits). A candidate replaces a member
-only if its worst slack is not smaller. A worst slack is a minimum, so early results bound it, first
-of all the figures of the linear models. Candidates with too low a bound are not measured further,
-which does not change the search. Candidates that may come near the best so far are always measured,
-because they form the displayed trade-off.
+SciPy's differential evolution runs every generation as one ensemble. The bench includes effects
+that the linear model omits (friction under dither, converter, limits). A candidate replaces a
+member only if its worst slack is not smaller. The worst slack is a minimum, so partial results are
+an upper bound of it, starting with the figures of the linear models. Candidates whose bound is too
+low are not measured further, which does not change the search. Candidates that may come near the
+best so far are always measured, because they form the displayed trade-off.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ from bywire.synthesis.linear_case import NOMINAL, LinearCase, share_left, values
 
 _LEAST = -3.0
 MEASURED = frozenset({"bandwidth", "crossover", *STEP_FIGURES})
-"""figures that only the bench decides, where it shows them"""
+"""figures whose requirements only the bench decides, if it can measure them"""
 
 
 @dataclass(frozen=True)
@@ -57,19 +57,21 @@ class Candidate:
     Parameters
     ----------
     gains
-        By dotted name [SI].
+        Values by dotted name [SI].
     figures
         Figures on the bench at the nominal point.
     slacks
-        Slack by requirement's text, as a share of the limit, for the worst amplitude and trial.
+        Slack of each requirement, by its text, relative to the limit, for the worst amplitude and
+        trial.
     corners
         Figures of further trials, by label.
     rooms
-        Displayed values: as ``slacks``, but a bandwidth is measured by its frequency. Requirements
-        that are missing here are as in ``slacks``.
+        Displayed values: as ``slacks``, but the slack of a bandwidth is that of its frequency. For
+        requirements missing here, the value in ``slacks`` is displayed.
     shown
-        By requirement's text: number of sines and steps in which the bench shows the figure, and in
-        which it could. Without any, only the linear model decides.
+        For each requirement, by its text: the number of sines and steps from which the bench
+        obtained the figure, and the number from which it could. If both are zero, only the linear
+        model decides.
     """
 
     gains: Mapping[str, float]
@@ -85,14 +87,14 @@ class Candidate:
         return min(self.slacks.values())
 
     def room(self, text: str) -> float:
-        """Return the distance of a requirement's figure from its limit, as a share of it."""
+        """Return the distance of a requirement's figure from its limit, relative to the limit."""
         return self.rooms.get(text, self.slacks[text])
 
     def standing(self, enough: float) -> tuple[float, float]:
-        """Return the objective of gains, the larger the better.
+        """Return the objective of the gains; larger is better.
 
-        If a requirement is missed, the shortfall of the figures; otherwise the worst slack, and,
-        once that is sufficient, the worst bandwidth.
+        If a requirement is not met, this is the shortfall of the figures. Otherwise it is the worst
+        slack and, once that slack is sufficient, the worst bandwidth.
         """
         if self.slack < 0.0:
             return min(-1e-12, *(self.room(text) for text in self.slacks)), self.slack
@@ -104,9 +106,10 @@ def bench_slacks(
 ) -> dict[str, float]:
     """Return the slack of each requirement on the bench.
 
-    A bandwidth counts at the worst amplitude, by the margin of the gain above -3 dB. A phase margin
-    counts in the linear model (the limit for large motion) and in each describing function. Figures
-    of the step count where the experiment has one; the linear model decides the rest.
+    The slack of a bandwidth is the margin of the gain above -3 dB at the worst amplitude. The phase
+    margin is the worst of the linear model (the limit for large motion) and each describing
+    function. Figures of the step are used if the experiment has a step. The linear model decides
+    the remaining requirements.
 
     Parameters
     ----------
@@ -120,8 +123,8 @@ def bench_slacks(
     slacks = {}
     for wanted in requirements:
         slack = _on_bench(wanted, figures)
-        # The linear model decides figures that the bench does not show; for a phase margin the
-        # worse counts.
+        # The linear model decides figures that the bench cannot measure. For a phase margin, the
+        # worse of both is used.
         if math.isinf(slack) or wanted.figure == "phase_margin":
             slack = min(slack, linear[str(wanted)])
         slacks[str(wanted)] = max(slack, _LEAST)
@@ -133,14 +136,14 @@ def ceiling(
     known: Sequence[BenchFigures],
     linear: Mapping[str, float],
 ) -> float:
-    """Return an upper bound of the worst slack, whatever the missing measurements.
+    """Return an upper bound of the worst slack for all possible results still missing.
 
     Parameters
     ----------
     requirements, linear
         As in `bench_slacks`.
     known
-        Known figures of some trials; figures that are still unknown are NaN, or missing.
+        Known figures of some trials; figures that are still unknown are NaN or absent.
     """
     highest = math.inf
     for wanted in requirements:
@@ -156,16 +159,16 @@ def judged(
     trials: Mapping[str, BenchFigures],
     linear: Mapping[str, float],
 ) -> Candidate:
-    """Return gains with their results, judged by the worst of several trials.
+    """Return gains with their results, evaluated for the worst of several trials.
 
     Parameters
     ----------
     requirements, linear
         As in `bench_slacks`.
     gains
-        By dotted name [SI].
+        Values by dotted name [SI].
     trials
-        Figures by the trial's label, including that of the nominal point.
+        Figures by the trial's label, including those of the nominal point.
     """
     # A trial without a step has the nominal parameters, and so the nominal step.
     nominal = trials[NOMINAL]
@@ -183,7 +186,7 @@ def judged(
 
 
 def shown_on_bench(wanted: Limit, trials: Sequence[BenchFigures]) -> tuple[int, int]:
-    """Return the number of sines and steps in which the bench shows a figure, and could show it."""
+    """Return from how many sines and steps the bench obtained a figure, and could obtain it."""
     sines = [s for figures in trials for s in figures.small]
     if wanted.figure == "bandwidth" and not wanted.is_upper:
         return len(sines), len(sines)
@@ -195,7 +198,7 @@ def shown_on_bench(wanted: Limit, trials: Sequence[BenchFigures]) -> tuple[int, 
 
 
 def _room(wanted: Limit, rows: Sequence[BenchFigures], slack: float) -> float:
-    """Return the distance of the worst bandwidth from its limit, of the same sign as its slack."""
+    """Return the distance of the worst bandwidth from its limit, with the sign of its slack."""
     values = [s.bandwidth for row in rows for s in row.small]
     if not values:
         return slack
@@ -204,7 +207,7 @@ def _room(wanted: Limit, rows: Sequence[BenchFigures], slack: float) -> float:
 
 
 def _on_bench(wanted: Limit, figures: BenchFigures) -> float:
-    """Return the slack of a measured figure; infinity for others."""
+    """Return the slack of a measured figure, or infinity for other figures."""
     if wanted.figure == "bandwidth" and not wanted.is_upper:
         return min((s.least / math.sqrt(0.5) - 1.0 for s in figures.small), default=math.inf)
     if wanted.figure == "phase_margin":
@@ -219,7 +222,7 @@ def _on_bench(wanted: Limit, figures: BenchFigures) -> float:
 
 
 def linear_slacks(problem: Problem, gains: Mapping[str, float]) -> dict[str, float]:
-    """Return the slack of every requirement for the worst model, by its text."""
+    """Return the slack of every requirement, by its text, for the worst model."""
     slacks = problem.slacks(problem.point(gains), range(len(problem.cases))).min(axis=0)
     return {str(wanted): float(s) for wanted, s in zip(problem.requirements, slacks, strict=True)}
 
@@ -230,15 +233,15 @@ Promising = Callable[[int, Sequence[BenchFigures]], bool]
 Measure = Callable[
     [Mapping[str, Sequence[float]], Promising], Sequence[Mapping[str, BenchFigures] | None]
 ]
-"""``measure(gains, worth)``: figures by label of several sets, None for those dropped because
-``worth(k, known figures)`` was false"""
+"""``measure(gains, worth)``: figures by label for each of several sets of gains, or None for sets
+dropped because ``worth(k, known figures)`` was false"""
 
-_ENOUGH = 0.02  # worst slack at which the search ends
-_NEAR = 0.03  # distance to the best worst slack below which all is measured
+_ENOUGH = 0.02  # worst slack at which the search stops
+_NEAR = 0.03  # candidates within this distance of the best worst slack are measured completely
 _MEMBERS = 36
 GENERATIONS = 60
 """maximum number of generations of a search"""
-_REACH = 0.5  # of the linear ranges (logarithmic), around the linear design
+_REACH = 0.5  # part of the linear ranges (logarithmic) searched around the linear design
 
 
 @dataclass(frozen=True)
@@ -248,14 +251,15 @@ class Tuning:
     Parameters
     ----------
     best
-        The candidate with the largest worst slack. Among several with sufficient slack, it has the
-        largest worst bandwidth; if requirements are missed, the nearest figures.
+        The candidate with the largest worst slack. If several have sufficient slack, it is the one
+        with the largest worst bandwidth. If none meets the requirements, it is the one whose
+        figures are nearest to the limits.
     tried
-        All fully measured candidates, in the order of their runs.
+        All completely measured candidates, in the order of their runs.
     interrupted
-        Whether the user ended it.
+        Whether the user interrupted the search.
     untold
-        Number of further candidates, judged by only a part of the trials.
+        Number of further candidates that were evaluated with only a part of the trials.
     """
 
     best: Candidate
@@ -265,11 +269,11 @@ class Tuning:
 
     @property
     def count(self) -> int:
-        """Number of judged candidates."""
+        """Number of evaluated candidates."""
         return len(self.tried) + self.untold
 
     def curve(self, first: str, second: str) -> list[tuple[float, float]]:
-        """Return the trade-off between two figures while the other requirements were met.
+        """Return the trade-off between two figures if all other requirements are met.
 
         Parameters
         ----------
@@ -279,7 +283,7 @@ class Tuning:
         Returns
         -------
         list of (float, float)
-            Pairs of distances from the limits, sorted by the first, with no pair dominated by
+            Pairs of distances from the limits, sorted by the first. No pair is dominated by
             another.
         """
         pairs = sorted(
@@ -306,20 +310,20 @@ def tune(
     generations: int = GENERATIONS,
     progress: Progress | None = None,
 ) -> Tuning:
-    """Search gains around a linear design that meet the requirements on the bench.
+    """Search, around a linear design, for gains that meet the requirements on the bench.
 
     Parameters
     ----------
     problem
-        Requirements, tunables, and the linear models, which must all stay stable.
+        Requirements, tunables and linear models. All models must stay stable.
     start
-        The linear design's gains, a member of the first generation.
+        Gains of the linear design. They are a member of the first generation.
     measure
         See `Measure`.
     seed
-        Seed of the search.
+        Seed of the random numbers.
     generations
-        Largest number; the search ends when the worst slack is 2 %.
+        Maximum number of generations. The search stops earlier once the worst slack is 2 %.
     progress
         Called with a label and the finished share.
     """
@@ -350,7 +354,7 @@ def tune(
 
     interrupted = False
     try:
-        evolution: Any = differential_evolution  # its stubs omit costs of many points together
+        evolution: Any = differential_evolution  # its type stubs do not cover vectorized costs
         evolution(
             cost,
             list(zip(low, high, strict=True)),
@@ -372,7 +376,7 @@ def tune(
 
 
 def standing(candidate: Candidate) -> tuple[float, float]:
-    """Return the objective of a search, see `Candidate.standing`."""
+    """Return the objective of the search, see `Candidate.standing`."""
     return candidate.standing(_ENOUGH)
 
 
@@ -382,9 +386,9 @@ def _candidates(
     measure: Measure,
     to_beat: Array,
 ) -> list[Candidate | float]:
-    """Return candidates, or an upper bound of the slack of dropped ones.
+    """Return each candidate, or an upper bound of its slack if it was dropped.
 
-    Gains that are unstable in a linear model are not run.
+    Gains with which a linear model is unstable are not run.
 
     Parameters
     ----------
@@ -393,7 +397,7 @@ def _candidates(
     rows
         Gains of each candidate.
     to_beat
-        Worst slack below which each candidate is dropped.
+        For each candidate, the worst slack below which it is dropped.
     """
     linear = [linear_slacks(problem, row) for row in rows]
     bounds = [ceiling(problem.requirements, (), slacks) for slacks in linear]
@@ -425,7 +429,7 @@ def _candidates(
 # --- Verification
 
 MOST = 8
-"""maximum number of tried corners"""
+"""maximum number of corners run on the bench"""
 
 
 @dataclass(frozen=True)
@@ -435,13 +439,13 @@ class Trial:
     Parameters
     ----------
     loop, par, value
-        Loop, parameters and operating point; nothing switched off.
+        Loop, parameters and operating point. No effect is switched off.
     amplitudes
         Amplitudes of the sines, SI.
     bench
-        The loop's experiment with the same parameters; None where it has none.
+        The loop's experiment with the same parameters, or None if it has no experiment.
     label
-        Label that distinguishes it.
+        Label that identifies the trial.
     """
 
     loop: Loop
@@ -452,9 +456,9 @@ class Trial:
     label: str = NOMINAL
 
     def at(self, case: LinearCase) -> Trial:
-        """Return the trial of a model's own parameters and operating point.
+        """Return the trial with the parameters and operating point of a model.
 
-        It has no experiment if the parameters are the same, because the result would be the same.
+        If the parameters are the same, it has no experiment, because the result would be the same.
         """
         bench = None
         if self.bench is not None and case.changes:
@@ -471,7 +475,7 @@ class Trial:
         *,
         rough: bool = False,
     ) -> tuple[BenchFigures | None, ...]:
-        """Return the figures of the promising sets of gains, see `wanted_figures`."""
+        """Return the figures of each set of gains that stays promising, see `wanted_figures`."""
         bench = self.bench if self.bench is not None and has_step(self.bench) else None
         return wanted_figures(
             self.loop,
@@ -493,7 +497,7 @@ def measured(
     *,
     report: Report = lambda share: None,
 ) -> list[dict[str, BenchFigures]]:
-    """Return the figures of every set of gains, by the label of each trial."""
+    """Return the figures of every set of gains, by the label of the trial."""
     rows = wanted(trials, gains, target, lambda k, known: True, report=report)
     return [row for row in rows if row is not None]
 
@@ -507,21 +511,21 @@ def wanted(
     rough: bool = False,
     report: Report = lambda share: None,
 ) -> list[dict[str, BenchFigures] | None]:
-    """Return the figures of the sets of gains that stay promising through all trials.
+    """Return the figures of each set of gains that stays promising in all trials.
 
     Parameters
     ----------
     trials, gains, target, rough
         As in `bench_figures.wanted_figures`.
     worth
-        ``worth(k, figures)``: whether to continue with set k, given its figures so far.
+        ``worth(k, figures)``: whether to continue with set k, from its figures so far.
     report
         Called with the finished share.
 
     Returns
     -------
     list
-        By the label of each trial; None for the dropped sets.
+        For each set, its figures by the label of the trial, or None if the set was dropped.
     """
     rows: dict[int, dict[str, BenchFigures]] = {
         k: {} for k in range(len(next(iter(gains.values()))))
@@ -547,15 +551,15 @@ def wanted(
 def corners_of(problem: Problem, gains: Mapping[str, float]) -> list[LinearCase]:
     """Return the models at the ends of all ranges, and the worst of all models.
 
-    If there are more than `MOST`, those that are worst in the linear models. Where these do not
-    distinguish corners (they contain no dry friction), the bench decides.
+    If there are more than `MOST`, only those that are worst in the linear models are returned. The
+    linear models contain no dry friction. If they do not distinguish the corners, the bench does.
 
     Parameters
     ----------
     problem
         Design problem; its first case is the nominal one.
     gains
-        By dotted name [SI].
+        Values by dotted name [SI].
     """
     others = problem.cases[1:]
     if not others:
@@ -584,7 +588,7 @@ def worst_of(
     target: float,
     report: Report = lambda share: None,
 ) -> list[Trial]:
-    """Return the trial at the worst of several corners; None without corners.
+    """Return the trial at the worst of several corners, or an empty list without corners.
 
     Parameters
     ----------
@@ -595,7 +599,7 @@ def worst_of(
     problem, gains
         See `corners_of`.
     linear
-        Slack in the linear models, see `candidate.linear_slacks`.
+        Slack in the linear models, see `linear_slacks`.
     target
         Center of the measured frequencies [Hz].
     report
@@ -624,22 +628,22 @@ def _coordinates(case: LinearCase) -> dict[str, float]:
 
 @dataclass(frozen=True)
 class Verification:
-    """Verdict of the nonlinear bench on a design.
+    """Results of a design on the nonlinear bench.
 
     Parameters
     ----------
     linear
-        Results of the linear design's gains.
+        Results with the gains of the linear design.
     tuning
-        The search for better gains; None if the linear design meets all requirements.
+        The search for better gains, or None if the linear design meets all requirements.
     kpis
         Key figures of the loop's experiment with the final gains.
     nominal
         All figures of the nominal linear model with the final gains.
     corners
-        Checked corners; the displayed figures are those of the worst.
+        Number of corners checked. The displayed figures are those of the worst one.
     kept
-        Constraints from the linear design that were also enforced, see `floors`.
+        Constraints from the linear design that were also enforced, see `designer.bench_floors`.
     """
 
     linear: Candidate
@@ -660,9 +664,10 @@ class Verification:
         return self.final.slack >= 0.0
 
     def conflict(self) -> tuple[str, str, list[tuple[float, float]]] | None:
-        """Return the two worst requirements, and the trade-off between them.
+        """Return the two worst requirements and the trade-off between them.
 
-        None if everything is met, only one requirement counts, or no candidates are available.
+        The result is None if all requirements are met, if there is only one requirement, or if no
+        candidate was measured.
         """
         if self.met or self.tuning is None or not self.tuning.tried:
             return None
@@ -686,7 +691,7 @@ def verify(
     generations: int = GENERATIONS,
     progress: Progress | None = None,
 ) -> Verification:
-    """Try a design on the nonlinear bench, and retune it if it misses requirements.
+    """Run a design on the nonlinear bench, and retune it if it does not meet the requirements.
 
     Parameters
     ----------
@@ -697,13 +702,14 @@ def verify(
     trial
         Conditions of the trial.
     corners
-        Further models for trials at their parameters and operating points; by default the corner of
-        the ranges that is worst on the bench.
+        Further models whose parameters and operating points are run. By default, this is the corner
+        of the ranges that is worst on the bench.
     kept
-        Constraints of retuned gains from the linear design, which are also enforced; by default
-        `floors.bench_floors` of ``gains``.
+        Constraints from the linear design that retuned gains must also meet. By default, these are
+        the `designer.bench_floors` of ``gains``.
     seed, generations
-        Of the search, see `tune`; without generations, the design is only tried.
+        Seed and number of generations of the search, see `tune`. With zero generations, the design
+        is only run and not retuned.
     progress
         Called with a label and the finished share.
 
@@ -725,7 +731,9 @@ def verify(
     def on_bench(chosen: Mapping[str, float], label: str) -> dict[str, BenchFigures]:
         report = stage(progress, label)
         report(0.0)
-        share = len(unseen) / (len(unseen) + len(trials) + 1)  # of the search for the worst corner
+        share = len(unseen) / (
+            len(unseen) + len(trials) + 1
+        )  # share of the search for the worst corner
         linear = linear_slacks(problem, chosen)
         known = {trial.label for trial in trials}
         worst = worst_of(
@@ -773,7 +781,10 @@ def verify(
 
 
 def _target(requirements: Sequence[Limit], case: LinearCase, gains: Mapping[str, float]) -> float:
-    """Return the center of the measured frequencies: required, or that of the linear loop."""
+    """Return the center of the measured frequencies.
+
+    This is the required frequency, or the crossover of the linear loop if none is required.
+    """
     for figure in ("bandwidth", "crossover"):
         limits = [w.bound for w in requirements if w.figure == figure and not w.is_upper]
         if limits:

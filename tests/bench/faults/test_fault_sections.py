@@ -178,7 +178,7 @@ def test_text_and_files_want_units(tmp_path):
         name = "" if "fault" in line else 'fault = "pressure.stuck"\n'
         text = FILE.partition("[[")[0] + f"[[faults]]\n{name}{line}\n"
         (tmp_path / "bad.toml").write_text(text)
-        with pytest.raises(InputError, match="for example, write"):
+        with pytest.raises(InputError, match="or example, write"):
             load(tmp_path / "bad.toml")
     for text in ("@1 s", "motor.hot@", "motor.hot=@1 s"):
         with raises(InputError, name="fault", value=text, valid="NAME=VALUE@ONSET"):

@@ -1,4 +1,4 @@
-"""Exports that several tests try: structures of every brake, written and compiled."""
+"""Exports for several tests: structures of all brakes, written and compiled."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ BRAKES = ("pressure, sine dither", "moment and position", "slip by rules")
 
 
 def bits_of(precision: str, every: Sequence[Vectors]) -> str:
-    """Return the number that a harness makes of all results, where they are those of Python."""
+    """Return the hash that a harness computes from all results if they equal Python's."""
     bits, kind = 2166136261, "<f4" if precision == "single" else "<f8"
     for each in every:
         for byte in np.ascontiguousarray(each.after, dtype=kind).tobytes():
@@ -89,7 +89,7 @@ def bench_of(structure: str) -> bywire.Bench:
 
 @dataclass(frozen=True)
 class Built:
-    """A harness that was compiled, and what the compiler said."""
+    """A compiled harness with the compiler's output."""
 
     folder: Path
     program: Path

@@ -1,4 +1,4 @@
-"""Test vectors next to borders of comparisons: met exactly, and by the last digit on both sides."""
+"""Test vectors at boundaries of comparisons: exactly on them, and one digit to either side."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Nothing(NamedTuple):
 
 
 def tick(x: Nothing, m: Memory, u: Nothing, par: float) -> Memory:
-    """Turn at a limit, at a product of two numbers, and, in one mode, at another limit."""
+    """Branch at a limit, at a product of two numbers, and in one mode at another limit."""
     limited = ops.where(m.a > par, 1.0, 0.0)
     above = ops.where(2.0 * m.a * m.b < 3.0, 1.0, 0.0)
     hidden = ops.where(m.mode > 1.5, ops.where(m.b <= 0.7, 5.0, 4.0), 0.0)

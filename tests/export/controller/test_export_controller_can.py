@@ -1,4 +1,4 @@
-"""Messages of an exported ECU: another reader of DBC finds in them what the memory holds."""
+"""CAN messages of an exported ECU: another DBC reader decodes the values of the memory."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The exported ECU on other processors: the same bits, in little memory and few instructions."""
+"""The exported ECU on other processors: bit-identical, with little memory and few instructions."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What exported steps do with inputs, memory and parameters of any bits: README.txt's contract."""
+"""Contract in README.txt: exported steps with inputs, memory and parameters of arbitrary bits."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ class Ecu:
 
 
 def cases() -> Iterator[tuple[str, Any]]:
-    """Yield every structure's case."""
+    """Yield the case of each structure."""
     for structure in STRUCTURES:
         yield structure, bench_of(structure).cases()[0]
     with loaded(CALIPER):
@@ -129,7 +129,7 @@ def test_refused_inputs_leave_the_memory_and_calm_ticks_follow(precision: str) -
 
 
 def test_a_second_without_a_number_is_forgotten() -> None:
-    """A brake whose demand was no number for a while does afterwards what it did before."""
+    """A brake whose demand was NaN for a while then continues as before."""
     case = bench_of("pressure, sine dither").cases()[0]
     ecu, calm = Ecu(case), Ecu(case)
     (step,) = ecu.made.steps
@@ -143,7 +143,7 @@ def test_a_second_without_a_number_is_forgotten() -> None:
 
 
 def any_number(rng: np.random.Generator, real: Any) -> float:
-    """Return a number of any bits, often a special one."""
+    """Return a number with arbitrary bits, often a special number."""
     if rng.random() < 0.3:
         return float(rng.choice([*BAD, 5e-324, -5e-324, 0.0, -0.0, 1.0, -1.0, 1e30, 2.0, 1e14]))
     if real is np.float32:

@@ -1,4 +1,4 @@
-"""Elementary functions in exported C have the bits of Python, without the C library."""
+"""Elementary functions in exported C are bit-identical to Python's, without the C library."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Number = Annotated[float, Signal("1", "a number", 1.0)]
 
 
 class Memory(NamedTuple):
-    """What functions give."""
+    """Results of functions."""
 
     a: Number
     exp: Number
@@ -42,7 +42,7 @@ class Parameters(ParameterSet):
 
 
 def bounded(m: Memory) -> Memory:
-    """Return the memory with functions that both precisions have."""
+    """Return the memory after calls of the functions that exist in both precisions."""
     return m._replace(
         exp=ops.exp(20.0 * m.a),
         sine=ops.sin(3.0 * m.a),

@@ -1,4 +1,4 @@
-"""The compiled ECU equals the Python that it was translated from, in every bit."""
+"""The compiled ECU is bit-identical to the Python code from which it was translated."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Gates of the generated C: sanitizers, coverage, mutants, the same text every time, a target."""
+"""Gates of the generated C: sanitizers, coverage, mutants, reproducible text, and a target."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ Tick = Callable[[Any, Any, Any], Any]
 
 
 def in_python(run: Run) -> Array:
-    """Return the state vector at the end of a run whose ticks are computed by Python.
+    """Return the state vector at the end of a run in which Python computes the ticks.
 
     The kernel's own ticks never come due: its frames are counted from one on.
     """

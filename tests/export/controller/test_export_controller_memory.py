@@ -1,4 +1,4 @@
-"""Memory is changed in its place in C, and yet means what Python's values mean."""
+"""C code changes memory in place, but gives the same values as Python."""
 
 from __future__ import annotations
 
@@ -36,23 +36,23 @@ class Parameters(ParameterSet):
 
 
 def swapped(m: Memory) -> Memory:
-    """Return the memory with its numbers in each other's place."""
+    """Return the memory with its two numbers swapped."""
     return m._replace(a=m.b, b=m.a)
 
 
 def summed(m: Memory) -> float:
-    """Return a number of a memory that nobody keeps."""
+    """Return a number of a temporary memory."""
     changed = m._replace(a=3.0 * m.a)
     return changed.a + m.a
 
 
 def counted(m: Memory) -> tuple[Memory, float]:
-    """Return memory, and what it held before."""
+    """Return the memory, and its previous content."""
     return m._replace(a=m.a + 1.0), m.a
 
 
 def tick(x: Nothing, m: Memory, u: Nothing, par: Parameters) -> Memory:
-    """Read old memory behind changes of it."""
+    """Read old memory after it has changed."""
     before, m = m, swapped(m)
     total = summed(m)
     m = m._replace(a=m.a + 10.0 * before.a + 100.0 * total)

@@ -1,4 +1,4 @@
-"""Several ECUs in one program, in C and C++, and what a calibration tool finds in it."""
+"""Several ECUs in one C or C++ program, and the symbols that a calibration tool needs."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ TICKS = 200
 
 @pytest.fixture(scope="module")
 def exports(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
-    """Two ECUs in both precisions, each with a name of its own."""
+    """Two ECUs in both precisions, each with its own name."""
     folder = tmp_path_factory.mktemp("ecus")
     return {
         name: export_controller(
@@ -80,7 +80,7 @@ def main(names: list[str], exports: dict[str, Any]) -> str:
 
 
 def said(names: list[str], exports: dict[str, Any], scratch: Path, compiler: str) -> str:
-    """Return what a program with some ECUs prints."""
+    """Return the output of a program that contains ECUs."""
     scratch.mkdir()
     objects = []
     for name in names:

@@ -1,4 +1,4 @@
-"""What an export refuses, and in which words; a brake of one's own is exported as ours are."""
+"""Errors of exports, and the export of a user's brake."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ EXAMPLE = Path(__file__).parents[3] / "examples" / "emb_caliper"
 
 
 def branching(x: Any, m: Any, u: Any, par: Any) -> Any:
-    """Decide by a value: no symbol could."""
+    """Branch on a value, which a symbol cannot do."""
     if m.p_meas > 0.0:
         return m
     return m._replace(duty=0.0)
@@ -35,17 +35,17 @@ def endless(x: Any, m: Any, u: Any, par: Any) -> Any:
 
 
 def unknown(x: Any, m: Any, u: Any, par: Any) -> Any:
-    """Call what is no law."""
+    """Call a function that is not a law."""
     return m._replace(duty=divmod(m.duty, 2.0)[0])
 
 
 def crossed(x: Any, m: Any, u: Any, par: Any) -> Any:
-    """Take an operator that numbers do not have."""
+    """Use an operator that numbers do not have."""
     return m._replace(duty=m.duty @ 2.0)
 
 
 def beyond(x: Any, m: Any, u: Any, par: Any) -> Any:
-    """Read behind the end of a tuple."""
+    """Read beyond the end of a tuple."""
     return m._replace(duty=m.duty * (1.0, 2.0)[2])
 
 

@@ -11,7 +11,7 @@ from fmpy.fmi2 import FMU2Slave
 
 
 class Client:
-    """One instance; ``said`` gathers what it logged."""
+    """One instance; ``said`` contains its log messages."""
 
     def __init__(
         self, path: Path, folder: Path, start: float = 0.0, stop: float | None = None
@@ -63,7 +63,7 @@ class Client:
         return np.genfromtxt(path, delimiter=",", names=True)
 
     def follow(self, length: float, begin: int = 0, end: int | None = None) -> list[list[float]]:
-        """Drive it as the bench was, from row to row; its sampled signals of every step."""
+        """Drive the instance like the bench, row by row; return sampled signals by step."""
         reference = self.reference()
         inputs, sampled = self.of("input"), self.of("local")
         every = round(length / (reference["time"][1] - reference["time"][0]))

@@ -1,4 +1,4 @@
-"""A client of model exchange: FMPy's calls of an FMU, and a solver of SciPy with its events."""
+"""A model-exchange client that calls an FMU with FMPy, and a SciPy solver with its events."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from scipy.integrate import Radau
 
 
 class SolverClient:
-    """One instance of version 2.0, integrated from one instant to the next."""
+    """One instance of version 2.0, integrated from one time to the next."""
 
     def __init__(self, path: Path) -> None:
         self.description = read_model_description(str(path))
@@ -81,7 +81,7 @@ class SolverClient:
         return bool(np.any(self._filled(self.fmu.getEventIndicators, self.indicators) < 0.0))
 
     def follow(self, length: float, tolerance: float) -> None:
-        """Integrate over a time in which the inputs stay, through all events there."""
+        """Integrate over an interval with constant inputs, including all events."""
         end, close = self.time + length, 1e-14
         nominals = self._filled(self.fmu.getNominalsOfContinuousStates, self.count)
         while end - self.time > close:

@@ -1,4 +1,4 @@
-"""FMUs of version 2.0: bit by bit the bench's own run, in FMPy."""
+"""FMUs of version 2.0 in FMPy: bit-identical to the bench's own run."""
 
 from __future__ import annotations
 

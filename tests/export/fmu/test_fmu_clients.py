@@ -57,7 +57,7 @@ def bench(request: pytest.FixtureRequest) -> bywire.Bench:
 
 
 class Unit:
-    """A written FMU beside what drives it and what the bench recorded."""
+    """An FMU with its inputs and the bench's recording."""
 
     def __init__(self, path: Path) -> None:
         folder = Path(extract(str(path), unzipdir=str(path.with_suffix(""))))
@@ -120,7 +120,7 @@ def test_fmusim_steps_it_as_the_bench_does(
 def test_fmusim_integrates_the_plant_as_fmpy_does(
     bench: bywire.Bench, version: int, tmp_path: Path
 ) -> None:
-    """Also behind jumps of inputs, where it begins anew only if states are said to change."""
+    """After jumps of inputs, the solver restarts only if the FMU reports changed states."""
     unit = Unit(export_fmu(bench, tmp_path, kind="model-exchange", fmi=version).path)
     signal = next(n for n in ("p_mc", "M_B", "F_cl") if n in unit.numbers)
     solver = ("--interface-type", "me", "--solver", "cvode", "--tolerance", "1e-10")

@@ -1,4 +1,4 @@
-"""Model exchange of plants: other solvers, with their own events, come to what the kernel does."""
+"""Model exchange of plants: other solvers with their own events agree with the kernel."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def reference(made: ExportedFmu) -> np.ndarray:
 def solved(
     path: Path, inputs: dict[str, np.ndarray], names: list[str], tolerance: float = 1e-7
 ) -> np.ndarray:
-    """What CVODE makes of inputs, one value a tick, in FMPy; shape (ticks, names)."""
+    """Result of CVODE in FMPy for inputs with one value per tick, shape (ticks, names)."""
     count = len(next(iter(inputs.values()))) - 1
     table = np.zeros(count + 1, dtype=[(name, float) for name in ("time", *inputs)])
     table["time"] = np.arange(count + 1) * TICK

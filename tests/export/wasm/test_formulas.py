@@ -1,4 +1,4 @@
-"""Formulas as a table, compiled by the loader: every operation, loops, and what is kept."""
+"""Formulas as a table that the loader compiles: all operations, loops, and stored values."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ AS_PYTHON: dict[str, Any] = {
 def computed(
     made: list[Formula], area: list[float], folder: Path, loop: int = -1, turns: int = 0
 ) -> tuple[list[float], list[int | None]]:
-    """Return the working memory after every formula ran once in Node, and what they returned."""
+    """Return the working memory after one run of each formula in Node, and the results."""
     places = {("x", k): k for k in range(len(area))}
     (folder / "table").write_bytes(table(made, places))
     (folder / "task.json").write_text(json.dumps({"area": area, "loop": loop, "turns": turns}))
@@ -76,7 +76,7 @@ def computed(
 
 
 def grown(graph: Graph, seed: int, count: int) -> list[Node]:
-    """Return nodes of random operations, each in turn, on inputs that none of them refuses."""
+    """Return nodes of random operations, each in turn, with inputs that are valid for all."""
     chance = random.Random(seed)
     numbers = [graph.leaf("x", k) for k in range(6)] + [graph.constant(c) for c in (0.0, 0.7, -3.0)]
     truths: list[Node] = []
@@ -143,7 +143,7 @@ def test_what_a_formula_kept_is_read_where_it_wrote_it(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("turns", "left"), [(3, 0), (9, 5)])
 def test_a_loop_ends_where_its_first_result_is_up(tmp_path: Path, turns: int, left: int) -> None:
-    """x, y -> y, x + y until x > 5; what is added up is y before each turn."""
+    """x, y -> y, x + y until x > 5; the sum adds y before each turn."""
     graph = Graph()
     x, y = graph.leaf("x", 0), graph.leaf("x", 1)
     up = graph.apply("lt", graph.constant(5.0), x)

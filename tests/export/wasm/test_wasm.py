@@ -1,4 +1,4 @@
-"""Modules of WebAssembly, in Node: bit by bit the bench's own run."""
+"""WebAssembly modules in Node: bit-identical to the bench's own run."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def folder(bench: bywire.Bench, tmp_path_factory: pytest.TempPathFactory) -> Pat
 
 
 def driven(folder: Path, **task: Any) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
-    """Return what the driver says, and the signals by name."""
+    """Return the driver's output, and the signals by name."""
     path = folder / "task.json"
     path.write_text(json.dumps(task))
     call = [str(NODE), str(DRIVER), str(folder), "stop", str(path)]
