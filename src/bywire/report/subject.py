@@ -179,8 +179,8 @@ def changes_block(
     """
     if changes:
         rows = [(each.name, each.now, each.before, each.where or each.of) for each in changes]
-        heads = ("changed", "value", "instead of", "source")
-        return TableBlock(text_table(heads, rows), "What was changed.")
+        heads = ("changed", "value", "original", "source")
+        return TableBlock(text_table(heads, rows), "Changes.")
     unchanged = ", ".join(
         filter(
             None,
