@@ -59,7 +59,7 @@ def with_faults(cases: Sequence[Case], sections: Sequence[Mapping[str, Any]]) ->
 
 
 def _require_within(fault: str, course: Course, first: float, last: float) -> None:
-    """Reject a fault that is absent, or returns too often, between the ends of the runs [s]."""
+    """Reject a fault that is absent, or recurs too often, between the ends of the runs [s]."""
     if course.onset >= last:
         raise ParameterError(
             f"{fault} begins at {course.onset:g} s, but the run ends at {last:g} s. Set an earlier "
@@ -77,7 +77,7 @@ def _require_within(fault: str, course: Course, first: float, last: float) -> No
         )
     if course.returns(first, last) > MOST:
         raise ParameterError(
-            f"{fault} returns every {course.every:g} s, more than {MOST} times before {last:g} s. "
+            f"{fault} recurs every {course.every:g} s, more than {MOST} times before {last:g} s. "
             "Set a longer period (every), or make the fault permanent",
             name="every",
             value=f"{course.every:g} s",
@@ -99,8 +99,8 @@ def taps_of(faults: Sequence[Injection]) -> tuple[tuple[Tap, ...], tuple[str, ..
             before = taps.get(tap.name, tap)
             if before.late and tap.late and before.late != tap.late:
                 raise ParameterError(
-                    f"faults {fault.mode.name} have different values, {before.late} and {tap.late} "
-                    "ticks, in one run. Set both to the same value",
+                    f"in one run, faults {fault.mode.name} have different values, "
+                    f"{before.late} and {tap.late} ticks. Set both to the same value",
                     name=fault.mode.name,
                     value=str(tap.late),
                     valid=str(before.late),
