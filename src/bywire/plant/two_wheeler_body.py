@@ -39,7 +39,7 @@ class Parameters(ParameterSet):
     h: Length
     """height of the center of gravity"""
     h_a: Length
-    """height at which the air drag acts"""
+    """height at which air drag acts"""
     inertia: BodyInertia
     """pitch inertia about the center of gravity"""
     CdA: Annotated[float, Unit("m**2", 0.4), Field(ge=0, allow_inf_nan=False)]

@@ -48,9 +48,9 @@ class Memory(NamedTuple):
     slip_f_hat: Annotated[float, Signal("1", "front slip estimated by the ECU", 0.1)]
     slip_r_hat: Annotated[float, Signal("1", "rear slip estimated by the ECU", 0.1)]
     a_hat: Annotated[float, Signal("m/s**2", "measured deceleration", 10.0)]
-    abs_f: Annotated[float, Signal("1", "slip control of the front wheel acts")]
-    abs_r: Annotated[float, Signal("1", "slip control of the rear wheel acts")]
-    lift: Annotated[float, Signal("1", "lift control acts")]
+    abs_f: Annotated[float, Signal("1", "slip control of the front wheel is active")]
+    abs_r: Annotated[float, Signal("1", "slip control of the rear wheel is active")]
+    lift: Annotated[float, Signal("1", "lift control is active")]
     tread_f: Annotated[float, Signal("m/s", "measured speed of the front tread", 20.0)]
     tread_r: Annotated[float, Signal("m/s", "measured speed of the rear tread", 20.0)]
     eta_f: Annotated[float, Signal("1", "front wheel deceleration in units of g", 1.0)]
@@ -65,14 +65,18 @@ class Memory(NamedTuple):
     slip_f_integral: Annotated[float, Signal("Pa", "integral part of the front slip PI", 2e6)]
     slip_r_integral: Annotated[float, Signal("Pa", "integral part of the rear slip PI", 2e6)]
     lift_integral: Annotated[float, Signal("Pa", "integral part of the lift PI", 2e6)]
-    phase_f: Annotated[float, Signal("1", "phase of the front rules", 3.0)]
-    phase_r: Annotated[float, Signal("1", "phase of the rear rules", 3.0)]
-    since_f: Annotated[float, Signal("s", "time since the front rules' last phase or step", 0.1)]
-    since_r: Annotated[float, Signal("s", "time since the rear rules' last phase or step", 0.1)]
-    p_left_f: Annotated[float, Signal("Pa", "front demand after the rules", 2e6)]
-    p_left_r: Annotated[float, Signal("Pa", "rear demand after the rules", 2e6)]
-    p_hat_f: Annotated[float, Signal("Pa", "front pressure estimated by the rules", 2e6)]
-    p_hat_r: Annotated[float, Signal("Pa", "rear pressure estimated by the rules", 2e6)]
+    phase_f: Annotated[float, Signal("1", "phase of the front anti-lock rules", 3.0)]
+    phase_r: Annotated[float, Signal("1", "phase of the rear anti-lock rules", 3.0)]
+    since_f: Annotated[
+        float, Signal("s", "time since the last phase or step of the front rules", 0.1)
+    ]
+    since_r: Annotated[
+        float, Signal("s", "time since the last phase or step of the rear rules", 0.1)
+    ]
+    p_left_f: Annotated[float, Signal("Pa", "front demand after the anti-lock rules", 2e6)]
+    p_left_r: Annotated[float, Signal("Pa", "rear demand after the anti-lock rules", 2e6)]
+    p_hat_f: Annotated[float, Signal("Pa", "front pressure estimated by the anti-lock rules", 2e6)]
+    p_hat_r: Annotated[float, Signal("Pa", "rear pressure estimated by the anti-lock rules", 2e6)]
     p_held_f: Annotated[
         float, Signal("Pa", "last pressure that the road could hold at the front wheel", 2e6)
     ]

@@ -61,8 +61,10 @@ class Memory(NamedTuple):
     meant_rate: Annotated[float, Signal("1/s", "teeth commanded to the adjuster per second", 50.0)]
     clicks: Annotated[float, Signal("1", "teeth turned by the adjuster", 3.0)]
     gap_hat: Annotated[float, Signal("m", "clearance estimated by the adjuster", 2e-4)]
-    applied: Annotated[float, Signal("1", "the brake was applied since it was last parked")]
-    wide: Annotated[float, Signal("1", "applications in a row with too much gap; < 0: too little")]
+    applied: Annotated[float, Signal("1", "brake has been applied since it was last parked")]
+    wide: Annotated[
+        float, Signal("1", "consecutive applications with too large a gap; < 0: too small")
+    ]
     teeth: Annotated[float, Signal("1", "teeth turned, as counted by the adjuster", 3.0)]
 
 

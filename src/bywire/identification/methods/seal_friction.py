@@ -502,7 +502,7 @@ def identify(data: xr.Dataset, par: None, options: Options, effort: Effort) -> I
         notes=(
             f"{sum(len(g.strokes) for g in groups)} strokes in {len(groups)} groups by record "
             "and direction",
-            "loop half widths neglect the pressure difference between the directions",
+            "loop half-widths neglect the pressure difference between the directions",
             *(f"{label} {reason}" for label, reason in fit.vague().items()),
             *_drifting(groups, fit["A"]),
             *_misfits(groups, W, F),
