@@ -79,7 +79,7 @@ def test_a_normal_tolerance_ends_where_it_says():
             {"kind": "discrete", "values": ["0 ohm", "1 ohm"]},
             ["leaves the valid range", "Remove 0 ohm"],
         ),
-        ("+-100 %", ["Its end at 0 ohm is not valid", "> 0 ohm and <= 10 ohm"]),
+        ("+-100 %", ["Its bound at 0 ohm is not valid", "> 0 ohm and <= 10 ohm"]),
         ({"kind": "tolerance", "tolerance": "100 %", "shape": "normal"}, ["end at 0 ohm"]),
         ({"kind": "uniform", "low": "0 ohm", "high": "1 ohm"}, ["end at 0 ohm"]),
         ({"kind": "triangular", "low": "-100 %", "high": "1 ohm"}, ["end at 0 ohm"]),

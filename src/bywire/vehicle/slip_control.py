@@ -54,7 +54,7 @@ class Memory(NamedTuple):
     """Memory of slip control between its ticks."""
 
     M_left: Annotated[float, Signal("N*m", "remaining moment after slip control", 300.0)]
-    M_most: Annotated[float, Signal("N*m", "moment demand after build-up limit", 300.0)]
+    M_most: Annotated[float, Signal("N*m", "moment demand after the build-up limit", 300.0)]
     v_hat: Annotated[float, Signal("m/s", "reference speed", 20.0, set_point_of="v_x")]
     slip_hat: Annotated[float, Signal("1", "slip estimated by the ECU", 0.1)]
     a_hat: Annotated[float, Signal("m/s**2", "measured deceleration", 10.0)]

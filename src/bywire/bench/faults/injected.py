@@ -1,4 +1,4 @@
-"""Faults in a run: taps in its model, falsified signals, and changed parameters."""
+"""Faults in a run: taps in its model, corrupted signals, and changed parameters."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 
 from bywire.bench.experiment import Case, FaultyCase
 from bywire.bench.faults.fault_section import MOST, Course, Injection, injections
-from bywire.bench.faults.modes import Mode, falsify, missed
+from bywire.bench.faults.modes import Mode, corrupt, missed
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.core.typing import Array
@@ -142,11 +142,11 @@ def injected(
         return FaultyCase(**plain, changes=changes)
     model = Tapped(case.model, taps, tasks)
     plain |= {"model": model, "memory": model.started(case.state, case.memory), "start": None}
-    falsified = _falsified(faults, case, {tap.name: tap for tap in taps})
-    return FaultyCase(**plain, changes=changes, falsified=falsified)
+    corrupted = _corrupted(faults, case, {tap.name: tap for tap in taps})
+    return FaultyCase(**plain, changes=changes, corrupted=corrupted)
 
 
-def _falsified(
+def _corrupted(
     faults: Sequence[Injection], case: Case, taps: Mapping[str, Tap]
 ) -> Callable[[Array], dict[str, Array]]:
     periods = {task.name: task.period for task in case.model.tasks(case.par)}
@@ -162,7 +162,7 @@ def _falsified(
             tap = mode.tap(fault.value)
             if tap is not None:
                 names = taps[tap.name].controls()
-                each = falsify(mode, fault.value, size, since, case.par, draws)
+                each = corrupt(mode, fault.value, size, since, case.par, draws)
                 given = {names[kind]: values for kind, values in each.items()}
             elif mode.task:
                 period = periods[mode.task]

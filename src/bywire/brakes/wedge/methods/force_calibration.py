@@ -52,7 +52,7 @@ class RigOptions(ParameterSet):
     margin: Duration
     """time to omit at the start and end of each motion"""
     window: Duration
-    """averaging time of the signals"""
+    """averaging time for the signals"""
     sigma_i: Annotated[float, Unit("A", 0.02), Field(ge=0)]
     """current noise in synthetic measurements"""
     sigma_F: Annotated[float, Unit("N", 5.0), Field(ge=0)]

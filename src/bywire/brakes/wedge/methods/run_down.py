@@ -154,7 +154,7 @@ class Options(ParameterSet):
     margin: Duration
     """time to omit at the start and end of each coasting phase"""
     window: Duration
-    """averaging time of the torque balance"""
+    """averaging time for the torque balance"""
     cutoff: Frequency
     """cutoff frequency of the low-pass filter for the angle before differentiation"""
     sigma_i: Annotated[float, Unit("A", 0.02), Field(ge=0)]
