@@ -53,7 +53,7 @@ class Parameters(ParameterSet):
 class Memory(NamedTuple):
     """Memory of slip control between its ticks."""
 
-    M_left: Annotated[float, Signal("N*m", "remaining moment after slip control", 300.0)]
+    M_left: Annotated[float, Signal("N*m", "moment demand after slip control", 300.0)]
     M_most: Annotated[float, Signal("N*m", "moment demand after the build-up limit", 300.0)]
     v_hat: Annotated[float, Signal("m/s", "reference speed", 20.0, set_point_of="v_x")]
     slip_hat: Annotated[float, Signal("1", "slip estimated by the ECU", 0.1)]
@@ -61,8 +61,8 @@ class Memory(NamedTuple):
     abs: Annotated[float, Signal("1", "slip control is active")]
     tread_hat: Annotated[float, Signal("m/s", "measured speed of the tread", 20.0)]
     omega_hat: Annotated[float, Signal("rad/s", "measured wheel speed", 60.0)]
-    edge: Annotated[float, Signal("rad", "angle of the last edge", 100.0)]
-    age: Annotated[float, Signal("s", "time since the last edge", 1e-3)]
+    edge: Annotated[float, Signal("rad", "angle of the last encoder edge", 100.0)]
+    age: Annotated[float, Signal("s", "time since the last encoder edge", 1e-3)]
     v_last: Annotated[float, Signal("m/s", "speed at the last sample, in the sensor", 20.0)]
     slip_integral: Annotated[float, Signal("Pa", "integral part of the slip PI", 1e6)]
     phase_x: Annotated[float, Signal("1", "phase of the anti-lock rules", 3.0)]
@@ -79,8 +79,8 @@ class Readings(NamedTuple):
 
     v: Annotated[float, Signal("m/s", "vehicle speed", 20.0)]
     v_wheel: Annotated[float, Signal("m/s", "speed of the tread", 20.0)]
-    angle: Annotated[float, Signal("rad", "angle of the last edge", 100.0)]
-    age: Annotated[float, Signal("s", "time since the last edge", 1e-3)]
+    angle: Annotated[float, Signal("rad", "angle of the last encoder edge", 100.0)]
+    age: Annotated[float, Signal("s", "time since the last encoder edge", 1e-3)]
     weight: Annotated[float, Signal("m/s**2", "gravity along the road", 0.5)]
     touches: Annotated[float, Signal("1", "pads touch the disc")]
 
