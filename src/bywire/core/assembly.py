@@ -116,7 +116,7 @@ class Evaluated(Generic[ParT, MemoryT]):
         if state is not here.x:
             raise ModelError(
                 f"{type(self).__name__} is evaluated at a state that is not its holder's state. "
-                "Within an assembly, its equations are valid only at the holder's instant",
+                "Within an assembly, its equations are valid only for the holder's current state",
                 name=type(self).__name__,
             )
         here.settle()

@@ -10,7 +10,7 @@ from typing import Any
 import casadi as ca
 
 from bywire.core.assembly import Assembly
-from bywire.core.errors import ModelError
+from bywire.core.errors import ModelError, counted
 from bywire.core.model import Model, require_states
 from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.signals import Signal, signals_of
@@ -107,8 +107,8 @@ def _sized(model: Model, part: str, value: Any, count: int, meaning: str) -> Non
     length = value.shape[0] if isinstance(value, ca.SX) else len(value) if value is not None else -1
     if length != count:
         raise ModelError(
-            f"{model.name}: {part} returns {max(length, 0)} values, but must return {count} "
-            f"({meaning})",
+            f"{model.name}: {part} returns {counted(max(length, 0), 'value')}, but must return "
+            f"{count} ({meaning})",
             name=part,
             value=str(max(length, 0)),
             valid=str(count),
