@@ -47,7 +47,7 @@ def test_errors_of_temperatures_are_differences():
 
 def test_a_run_of_the_cited_set_says_that_nothing_was_changed():
     result = bywire.run("seal-stribeck", estimate_error=False)
-    (said,) = [block.text for block in result.document().page[0].blocks]
+    said, _ = [block.text for block in result.document().page[0].blocks]
     assert said.startswith("Nothing was changed: all parameters are those of dardanelli2010")
 
 

@@ -222,7 +222,7 @@ class BenchResult(Result, Answer):
         notes += [Listing(said)] if said else []
         return Document(
             bench.name or bench.experiment,
-            f"{bench.summary()}; parameter set {bench.parameters}",
+            f"simulation of {bench.system}: {bench.summary()}; parameter set {bench.parameters}",
             sections=lambda: [
                 outcome(self, self.rows, notes),
                 Section("Figures", [*self._figures(), *source_says(self)]),

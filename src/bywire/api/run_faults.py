@@ -188,7 +188,7 @@ class FaultCampaign(Answer):
         known = Listing([kinds, *varied_texts(plan.varied), *self.notes])
         return Document(
             f"Faults: {plan.name}",
-            f"{len(plan.faults)} faults, {plan.total} runs of {subject.line}",
+            f"{len(plan.faults)} faults, {plan.total} simulated runs of {subject.line}",
             sections=lambda: [
                 Section(
                     "Faults", [Paragraph(f"{first}. The most dangerous are listed first."), table]

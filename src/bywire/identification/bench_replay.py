@@ -106,12 +106,17 @@ def _advice(argument: str, pairs: Sequence[tuple[str, str]]) -> str:
         fitting.setdefault(column, []).append(model)
     if not fitting:
         return ""
-    typed = {models[0]: column for column, models in fitting.items()}
-    several = {column: models for column, models in fitting.items() if len(models) > 1}
+    typed: dict[str, str] = {}
+    for column, models in fitting.items():
+        typed.setdefault(models[0], column)
     others = "".join(
         f". {column} may also be {', '.join(models[1:][:_SHOWN])}"
-        for column, models in list(several.items())[:1]
+        for column, models in fitting.items()
+        if len(models) > 1 and column in list(typed.values())[:_SHOWN]
     )
+    rest = [column for column, models in fitting.items() if typed[models[0]] != column]
+    if rest:
+        others += f". {', '.join(rest[:_SHOWN])} would also fit"
     return f"Type for example {option(argument, dict(list(typed.items())[:_SHOWN]))}{others}. "
 
 
