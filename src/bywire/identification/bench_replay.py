@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from difflib import get_close_matches
 
 import numpy as np
 import xarray as xr
@@ -90,12 +91,18 @@ def _compared_outputs(
 def _pairs(
     data: xr.Dataset, measured: Sequence[str], signals: Mapping[str, Signal]
 ) -> list[tuple[str, str]]:
-    """Return signals of the model with measured ones of the same quantity, the likeliest first."""
+    """Return signals of the model with measured ones of the same quantity, the likeliest first.
+
+    Without a similar name, such as for a title in another language, the order is the model's.
+    """
     pairs = []
     for name in measured:
         unit = unit_of_symbol(str(data[name].attrs.get("units", "1")))
         alike = [model for model, signal in signals.items() if measures(unit, signal.unit)]
-        pairs += [(model, name) for model in by_likeness(alike, [name])]
+        likely = by_likeness(alike, [name])
+        if likely and not get_close_matches(name.casefold(), [likely[0].casefold()]):
+            likely = alike
+        pairs += [(model, name) for model in likely]
     return pairs
 
 
@@ -110,7 +117,7 @@ def _advice(argument: str, pairs: Sequence[tuple[str, str]]) -> str:
     for column, models in fitting.items():
         typed.setdefault(models[0], column)
     others = "".join(
-        f". {column} may also be {', '.join(models[1:][:_SHOWN])}"
+        f". {column} may also be {', '.join(models[1:][: _SHOWN + 1])}"
         for column, models in fitting.items()
         if len(models) > 1 and column in list(typed.values())[:_SHOWN]
     )
