@@ -133,7 +133,7 @@ def defaults_of(name: str) -> str:
 
 _ORIGINS = {
     "paper": "printed in a source",
-    "derived": "derived from printed ones",
+    "derived": "derived from other values",
     "calibrated": "calibrated to match a source",
     "chosen": "chosen without a source",
 }
@@ -184,8 +184,8 @@ def changes_block(
     """
     if changes:
         rows = [(each.name, each.now, each.before, each.where or each.of) for each in changes]
-        heads = ("changed", "value", "instead of", "source")
-        return TableBlock(text_table(heads, rows), "What was changed.")
+        heads = ("changed", "value", "original", "source")
+        return TableBlock(text_table(heads, rows), "Changes.")
     unchanged = ", ".join(
         filter(
             None,
