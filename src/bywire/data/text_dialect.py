@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from bywire.core.errors import FileError, UnitError, counted, quoted
+from bywire.core.errors import FileError, UnitError, quoted
 from bywire.data.column_units import split_title, unit_of
 from bywire.data.file_format import ReadOptions
 from bywire.data.text_encoding import head_text
