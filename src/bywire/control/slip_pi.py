@@ -34,7 +34,7 @@ class Parameters(ParameterSet):
     T_t: Duration
     """tracking time of the anti-windup"""
     eager: Gain
-    """factor for additional integral gain at zero slip, which decreases to zero at the set slip"""
+    """factor for additional integral gain at zero slip, which decreases to zero at the set point"""
     v_off: Annotated[float, Unit("m/s", 2.0), Field(gt=0, allow_inf_nan=False)]
     """minimum reference speed of slip; below it, control fades out and the wheel may lock"""
     v_fall: Annotated[float, Unit("m/s", 5.0), Field(gt=0, allow_inf_nan=False)]

@@ -344,7 +344,7 @@ def _maps(
             "worst_stuck",
             "gain",
             "frequency",
-            f"Fraction of time in which the piston sticks, {where}.",
+            f"Fraction of time during which the piston sticks, {where}.",
             marks,
             limits,
         ),

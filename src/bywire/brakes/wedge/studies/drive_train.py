@@ -363,7 +363,7 @@ class Options(ParameterSet):
     """The stop, the friction coefficients, and the designs to compare."""
 
     moment: SomeMoment
-    """demanded moment, as one step"""
+    """moment demand, applied as a single step"""
     t_90: Duration
     """time within which the measured moment must reach 90 %"""
     t_hold: Duration
