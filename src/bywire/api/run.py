@@ -376,7 +376,7 @@ def _remark(verdict: Verdict) -> str:
     if not verdict.is_decided and math.isfinite(verdict.error):
         return (
             f"requirement undecided: {verdict.kpi} is {measured_amount(value, unit, error)}, "
-            f"numerical error {error_text(value, unit, error)}{limit}. Use a smaller step"
+            f"with a numerical error of {error_text(value, unit, error)}{limit}. Use a smaller step"
         )
     if not verdict.is_decided and not math.isinf(verdict.error):
         return f"requirement undecided: {verdict.kpi} is not defined{limit} ({verdict.note})"
