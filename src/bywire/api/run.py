@@ -380,14 +380,14 @@ def _remark(verdict: Verdict) -> str:
     if not verdict.is_decided and math.isfinite(verdict.error):
         return (
             f"requirement undecided: {verdict.kpi} is {measured_amount(value, unit, error)}, "
-            f"numerical error {error_text(value, unit, error)}{limit}. Use a smaller step"
+            f"with a numerical error of {error_text(value, unit, error)}{limit}. Use a smaller step"
         )
     if not verdict.is_decided and not math.isinf(verdict.error):
         return f"requirement undecided: {verdict.kpi} is not defined{limit} ({verdict.note})"
     if not verdict.is_decided:
         return (
-            f"requirement undecided: {verdict.kpi} is defined for only one of the step and half "
-            f"the step{limit}. Use a smaller step"
+            f"requirement undecided: {verdict.kpi} is defined with only one of the two step "
+            f"sizes{limit}. Use a smaller step"
         )
     return f"requirement not met: {verdict.kpi} is {amount(value, unit)}{limit}" + (
         f" ({verdict.note})" if verdict.note else ""
