@@ -110,6 +110,7 @@ _SAID = (
 
 # --- The result
 
+_NAMED = 3  # requirements that are not met, in the banner
 _SCATTERED = (
     'Errors marked "up to" belong to figures that do not converge. Between runs with twice, '
     "once and half the step size, their differences do not shrink as a second-order scheme "
@@ -222,7 +223,7 @@ class BenchResult(Result, Answer):
         notes += [Listing(said)] if said else []
         return Document(
             bench.name or bench.experiment,
-            f"{bench.summary()}; parameter set {bench.parameters}",
+            f"simulation of {bench.system}: {bench.summary()}; parameter set {bench.parameters}",
             sections=lambda: [
                 outcome(self, self.rows, notes),
                 Section("Figures", [*self._figures(), *source_says(self)]),
@@ -311,6 +312,9 @@ class BenchResult(Result, Answer):
         text = f"{met} of {len(self.verdicts)} requirements met"
         if open_ := sum(not v.is_decided for v in self.verdicts):
             text += f", {open_} undecided"
+        if names := list(dict.fromkeys(v.kpi for v in self.verdicts if not v.met)):
+            more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
+            text += f"; not met: {', '.join(names[:_NAMED])}{more}"
         return Banner(text, "good" if self.status == "passed" else "bad")
 
     def _data(self) -> dict[str, Any]:

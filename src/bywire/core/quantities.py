@@ -42,6 +42,8 @@ DISPLAY_UNITS = {
     "N/Pa": "N/bar",
     "K": "degC",
     "delta_degC": "K",
+    "delta_degC/s": "K/s",
+    "Pa/s": "bar/s",
 }
 
 
@@ -55,6 +57,7 @@ BY_SIZE: dict[str, tuple[tuple[float, str], ...]] = {
     "m": ((0.0, "um"), (1e-4, "mm"), (1.0, "m")),
     "N": ((0.0, "N"), (1e3, "kN")),
     "Pa": ((0.0, "Pa"), (1e2, "bar")),
+    "Pa/s": ((0.0, "Pa/s"), (1e2, "bar/s")),
     "J": ((0.0, "J"), (1e3, "kJ"), (1e6, "MJ")),
     "W": ((0.0, "W"), (1e3, "kW")),
 }

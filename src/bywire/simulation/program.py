@@ -71,6 +71,8 @@ def _check_equations(model: Model, par: ParameterSet) -> None:
         )
     bounds = _evaluated(model, "bounds", x, x, m, symbolic, contact)
     _sized(model, "bounds", bounds, len(model.frictions), "one (low, high) per friction")
+    widths = _evaluated(model, "widths", x, x, m, symbolic, contact)
+    _sized(model, "widths", widths, len(model.stops), "one width per stop operator")
     for pair in bounds:
         _sized(model, "bounds", pair, 2, "pairs (low, high); check the comma in ((low, high),)")
 
