@@ -82,7 +82,7 @@ def test_a_wrong_law_is_found_out() -> None:
 def test_too_little_is_refused() -> None:
     data = METHOD.synthetic(None, METHOD.defaults, 1)
     one_way = data.assign(speed=np.abs(data["speed"]), friction=np.abs(data["friction"]))
-    with pytest.raises(ParameterError, match="slide backward"):
+    with pytest.raises(ParameterError, match="sliding backward"):
         METHOD.identify(one_way, None, METHOD.defaults, Effort())
     with_pressure = METHOD.defaults.replace({"law": "pressure"})
     with pytest.raises(ParameterError, match="needs a measured pressure"):
@@ -98,5 +98,5 @@ def test_motion_one_way_is_refused_with_its_count() -> None:
     ):
         METHOD.identify(one_way, None, SHORT, Effort())
     lost = data.assign(friction=data["friction"] * np.nan)
-    with pytest.raises(ParameterError, match="slide forward and backward"):
+    with pytest.raises(ParameterError, match="sliding forward and backward"):
         METHOD.identify(lost, None, SHORT, Effort())

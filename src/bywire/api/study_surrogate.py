@@ -44,7 +44,8 @@ class StudySurrogates(Answer):
         """Warnings about poor surrogates, and the study's warnings."""
         poor = [
             f"the surrogate of {each.kpi} explains {100.0 * each.explained:.0f} % of the variance "
-            f"in cases not used for its fit. The rest is noise or not polynomial"
+            "in cases not used for its fit. The rest is noise, or a dependence that is not "
+            "polynomial"
             for each in self.surrogates.values()
             if each.explained < _POOR
         ]

@@ -1,4 +1,4 @@
-"""Caliper with pad spring, whose pressure increases with the absorbed volume."""
+"""Caliper with elastic pads: its pressure increases with the absorbed volume."""
 
 from __future__ import annotations
 

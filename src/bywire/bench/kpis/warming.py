@@ -88,7 +88,7 @@ def select(recording: xr.Dataset, setting: Setting) -> Warming:
 
 @measure("K", needs=("winding",))
 def peak_winding(data: Warming) -> float | Undefined:
-    """Highest winding temperature of any motor."""
+    """Maximum winding temperature of any motor."""
     if data.winding is None:
         return Undefined("no winding temperature is recorded")
     return float(np.max(data.winding))

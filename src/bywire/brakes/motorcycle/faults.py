@@ -95,7 +95,7 @@ FAULTS = (
     ),
     Fault(
         "gear.jammed",
-        "the screw jams in its position",
+        "the screw jams in place",
         lambda par, value: {"seal.T_pr": value},
         NAME,
         "N*m",

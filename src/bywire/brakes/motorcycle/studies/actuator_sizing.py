@@ -380,9 +380,9 @@ class Options(ParameterSet):
     ratios: Count
     """number of gear ratios, logarithmically spaced"""
     f_min: Frequency
-    """lowest bandwidth of the map"""
+    """minimum bandwidth of the map"""
     f_max: Frequency
-    """highest bandwidth of the map"""
+    """maximum bandwidth of the map"""
     frequencies: Count
     """number of bandwidths, logarithmically spaced"""
 
