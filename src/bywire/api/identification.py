@@ -568,7 +568,7 @@ def _alternatives(parameters: str) -> list[str]:
     return [
         experiment.name
         for experiment in EXPERIMENTS.all().values()
-        if experiment.assembly == assembly and experiment.driven_unit is None
+        if experiment.tests(assembly) and experiment.driven_unit is None
     ]
 
 

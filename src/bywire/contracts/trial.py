@@ -160,7 +160,7 @@ def _points(model: Model, par: ParameterSet) -> Iterator[Start]:
 def _cases(model: Model, par: ParameterSet, module: str = "") -> Iterator[Start]:
     """Yield the starts of the experiments of a model, or of all experiments of a brake."""
     for experiment in (EXPERIMENTS.of(module) if module else EXPERIMENTS.all()).values():
-        if not module and experiment.assembly != model.name:
+        if not module and not experiment.tests(model.name):
             continue
         try:
             cases = (experiment.preview or experiment.cases)(par, experiment.defaults, None)
