@@ -106,7 +106,9 @@ class EmbCaliperPmsm(CaliperBrake[Par, ecu_pmsm.Memory]):
         if w.par.drive == "voltage":
             w.i_dc = 0.0 * i.i_q
             w.v_d, w.v_q = 0.0 * i.i_d, w.m.v_source
-            w.inverter.u = inverter.Input(0.0, 0.0, 0.0 * i.i_d, 0.0 * i.i_q, theta_e, 1.0)
+            w.inverter.u = inverter.Input(
+                0.0 * w.v_d, 0.0 * w.v_q, 0.0 * i.i_d, 0.0 * i.i_q, theta_e, w.par.supply.V_bat
+            )
         else:
             w.i_dc = 1.5 * (duty_d * i.i_d + duty_q * i.i_q)
             bus = battery_supply.output(battery_supply.Input(w.i_dc), w.supply.par).v_bus

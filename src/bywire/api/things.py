@@ -655,7 +655,7 @@ def _loop(loop: Loop) -> Object:
     at = f"{loop.at.name} [{unit_text(display_unit(loop.at.unit))}]"
     return {
         "summary": loop.summary,
-        "assembly": loop.assembly,
+        "assembly": ", ".join((loop.assembly, *loop.variants)),
         "system": model.name,
         "at": at,
         "signals": rows,

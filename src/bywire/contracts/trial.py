@@ -141,7 +141,7 @@ def start_of_a_rig(model: Model, sets: Iterable[ParameterSet], module: str) -> S
 
 def _points(model: Model, par: ParameterSet) -> Iterator[Start]:
     for loop in LOOPS.all().values():
-        if loop.assembly == model.name:
+        if loop.is_in(model.name):
             try:
                 point = loop.point(par, loop.at.default)
             except InputError:  # the loop is for other choices
