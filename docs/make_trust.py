@@ -31,7 +31,7 @@ HEADING = (
     "bias [standard errors]",
     "bias [%]",
     "intervals that contain the true value",
-    "claimed / real scatter",
+    "estimated / actual scatter",
     "holds",
 )
 

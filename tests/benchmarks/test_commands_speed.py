@@ -11,7 +11,7 @@ from bywire.core.errors import UnknownNameError
 
 
 def test_a_command_is_timed_after_what_it_needs(tmp_path, monkeypatch):
-    # Loading takes longest, and what is loaded is not what is looked at here.
+    # Loading libraries takes longest, but this test is not about it.
     exec(LIBRARIES, {})
     monkeypatch.setattr("benchmarks.commands._UNIT", [sys.executable, "-c", "import numpy"])
     kernels = tmp_path / "kernels"  # where no other process compiles

@@ -138,7 +138,7 @@ def test_a_study_keeps_out_of_other_folders(bywire: Bywire, tmp_path: Path) -> N
         "contains a result of friction-model",
     )
     page = page_text(tmp_path / "report.html")
-    assert "put in" in page
+    assert "true value" in page
     assert ">start<" not in page
 
 

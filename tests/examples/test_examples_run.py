@@ -68,7 +68,7 @@ def _said(node: ast.AST) -> str:
 
 @pytest.mark.parametrize("script", SCRIPTS, ids=lambda script: script.stem)
 def test_every_script_asks_before_it_writes(script: Path) -> None:
-    """Run once, with an option; what it does without one can be read."""
+    """The script runs once with an option."""
     text = script.read_text()
     assert written_unasked(text) == []
     assert re.search(r"\.savefig\(|\.print_png\(|save_figure\(", text)

@@ -1,4 +1,4 @@
-"""The Magic Formula against its closed forms; peak, slope and rising branch of both curves."""
+"""The Magic Formula against closed forms of peak, slope and rising branch."""
 
 import math
 
@@ -64,7 +64,7 @@ def test_beyond_the_peak_the_rising_branch_holds_as_much(ground, share):
 
 @pytest.mark.parametrize("name", SURFACES)
 def test_formulas_of_surfaces_are_fitted_to_burckhardts(name):
-    """The same peak at the same slip; of all such, the least squares over all slips."""
+    """Peak and slip at the peak agree. The fit has the least squares over all slips."""
     surface, slips = SURFACES[name], np.linspace(0.0, 1.0, 1001)
     peak = adhesion.peak_slip(surface, SMOOTH)
     assert adhesion.peak_slip(surface, STEEP) == pytest.approx(peak, rel=2e-3)

@@ -70,7 +70,7 @@ def test_steady_temperatures_are_those_of_a_chain_of_resistances():
     chain = State(hot, hot - flow / par.G_dp, par.T_a + flow / par.G_f)
     held = disc_heat.balance(chain, Input(P, v, 1.0), par)
     assert held == pytest.approx((0.0, 0.0, 0.0), abs=1e-9 * P)
-    # all of it goes to the air, and what stays in the bodies is what they are warmer
+    # all of it goes to the air
     assert disc_heat.power_loss(chain, Input(P, v, 1.0), par) == pytest.approx(P, rel=1e-12)
 
 

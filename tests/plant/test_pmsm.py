@@ -40,7 +40,7 @@ def law(values, **changes):
 
 
 class Run:
-    """Run of motor, inverter and control at constant speed; the voltage acts one tick later."""
+    """Run of motor, inverter and control at constant speed, with voltages one tick late."""
 
     V_dc = 24.0
 

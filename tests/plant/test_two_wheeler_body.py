@@ -44,7 +44,7 @@ def test_wheels_carry_what_holds_the_body_or_one_of_them_carries_all(
 
 
 def test_a_lifted_wheel_stays_lifted_as_the_front_tyre_grips_more() -> None:
-    """The limit is mu_f = l_f/h; far above it, beyond L/h, both sides of the equation turn."""
+    """The limit is mu_f = l_f/h. Far above it, beyond L/h, both sides change their sign."""
     lift = PAR.l_f / PAR.h
     loads = [rigid_rear_load(mu_f, 0.0, 0.0, 1.0, PAR) for mu_f in np.linspace(lift, 6.0, 200)]
     assert max(loads) < 1e-9 * WEIGHT

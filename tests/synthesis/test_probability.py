@@ -89,7 +89,7 @@ def test_gains_hold_as_probably_as_is_wanted(study, monkeypatch):
         (STUDY, {"drawn": 0}, "1 to 1000"),
         (STUDY, {"vary": "", "probability": "99 %"}, "needs drawn models"),
         (STUDY, {"probability": "120 %"}, "between 0 and 100 %"),
-        (STUDY, {"schedule": True}, "either schedule or vary"),
+        (STUDY, {"schedule": True}, "schedule and vary"),
     ],
 )
 def test_what_does_not_fit_is_refused(study, text, given, message):

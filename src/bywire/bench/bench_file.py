@@ -246,9 +246,9 @@ def from_mapping(content: Mapping[str, Any], folder: Path, name: str) -> Bench:
 
 
 def _require_names(content: Mapping[str, Any]) -> None:
-    """Reject a bench without an experiment or a parameter set, with the names that fit."""
+    """Reject a bench without an experiment or a parameter set, and list the valid names."""
     if not content.keys() <= BenchFile.model_fields.keys():
-        return  # a misspelled key is worth its own error
+        return  # a misspelled key has its own error
     experiment, cited = content.get("experiment"), content.get("parameters")
     if experiment is None:
         known = PARAMETER_SETS.get(str(cited))

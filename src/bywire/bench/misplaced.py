@@ -1,4 +1,4 @@
-"""Names in the wrong section of a bench: the error says what a name is, and what to type."""
+"""Names in the wrong section of a bench: the error states the kind of name and the remedy."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def refuse_misplaced(
     options: Mapping[str, Any],
     requirements: Mapping[str, Any],
 ) -> None:
-    """Reject a name that belongs in another section, the most likely mistake.
+    """Reject a name that belongs in another section.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def refuse_misplaced(
     Raises
     ------
     UnknownNameError
-        With the kind of the name, and what to type. It does not reject names of no kind.
+        If a name belongs elsewhere, with its kind and the remedy. Unknown names are not rejected.
     """
     kpis = experiment.kpis_with(experiment.defaults)
     sections: dict[str, tuple[str, Collection[str]]] = {
@@ -68,7 +68,7 @@ def refuse_misplaced(
 
 
 def _refuse_other(name: str, experiment: Experiment) -> None:
-    """Reject a name that is not in any section of a bench, but known."""
+    """Reject a known name that is not valid in any section of a bench."""
     for what, advice in _others(name, experiment):
         raise _error(_PARAMETER, name, what, advice)
 

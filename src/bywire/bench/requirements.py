@@ -189,7 +189,7 @@ def read_limits(
 
 
 def limit_like(unit: str) -> str:
-    """Return a limit of a figure in some unit, as an example."""
+    """Return an example of a limit for a key figure in a unit."""
     return "<= 15 %" if unit == "%" else f"<= {units.example(unit)}"
 
 

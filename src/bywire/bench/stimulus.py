@@ -277,7 +277,7 @@ def stimulus_of(section: Mapping[str, Any], unit: str, name: str) -> Stimulus:
 
 
 def _require_values(title: str, kind: str, values: Mapping[str, Any], level: str) -> None:
-    """Reject a section that lacks values, with all of them as a user types them."""
+    """Reject a section with missing values, and list them as options of the command."""
     cls = STIMULI.find(kind).parameter_class
     fields = cls.model_fields
     lacking = [name for name in fields if fields[name].is_required() and name not in values]

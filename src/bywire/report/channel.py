@@ -83,7 +83,7 @@ def channel(recording: xr.Dataset, name: str, unit: str = "") -> Channel:
 
 
 def size_of(values: Array) -> float:
-    """Return the largest magnitude of values; 0 without finite ones.
+    """Return the maximum magnitude of the finite values; 0 if there are none.
 
     Examples
     --------
@@ -96,7 +96,7 @@ def size_of(values: Array) -> float:
 def axis_unit(recordings: Iterable[xr.Dataset], *names: str) -> str:
     """Return the most readable unit for the axis of some variables; see `readable_unit`.
 
-    Variables that a recording does not have are left out.
+    Variables that a recording does not contain are omitted.
     """
     drawn = [each[name] for each in recordings for name in names if name in each.data_vars]
     size = max(

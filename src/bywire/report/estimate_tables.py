@@ -31,7 +31,7 @@ def estimate_table(
     put_in
         True values of a simulated measurement, by label.
     """
-    beside: dict[str, Mapping[str, float]] = {"put in": put_in or {}, "start": start or {}}
+    beside: dict[str, Mapping[str, float]] = {"true value": put_in or {}, "start": start or {}}
     beside = {
         title: known
         for title, known in beside.items()
@@ -75,8 +75,8 @@ def estimate_table(
             Column("parameter"),
             Column("estimate", numeric=True),
             Column("± (95 %)", numeric=True),
-            *([] if steps is None else [Column("by the step", numeric=True)]),
-            Column("share", numeric=True),
+            *([] if steps is None else [Column("step error", numeric=True)]),
+            Column("relative uncertainty", numeric=True),
             Column("unit"),
             *(Column(title, numeric=True) for title in beside),
         ),
@@ -171,11 +171,11 @@ def trust_table(trust: Trust) -> Table:
     return Table(
         (
             Column("parameter"),
-            Column("put in", numeric=True),
+            Column("true value", numeric=True),
             Column("count", numeric=True),
             Column("bias / standard error", numeric=True),
-            Column("intervals that contain it"),
-            Column("claimed / real scatter", numeric=True),
+            Column("intervals with the true value"),
+            Column("estimated / actual scatter", numeric=True),
             Column("result"),
         ),
         tuple(rows),

@@ -209,7 +209,7 @@ _DETAILS = ("numerical error", "tolerance", "kind")
 
 
 def _verdicts_first(table: Table) -> Table:
-    """Return a table whose limits and verdicts are visible on a phone: details come after them."""
+    """Return a table with limits and verdicts before details, so that a phone shows them."""
     headings = [column.heading for column in table.columns]
     verdict = next((k for k, heading in enumerate(headings) if heading in _VERDICTS), None)
     if verdict is None:

@@ -150,7 +150,7 @@ def bode(
 
 
 def _above(response: Response, depth: float) -> Response:
-    """Return the part of a response before it falls below a depth [dB] permanently."""
+    """Return the part of a response before it permanently falls below a depth [dB]."""
     size = response.magnitude_db
     seen = np.flatnonzero(size > np.nanmax(size, initial=-math.inf) - depth)
     if not math.isfinite(depth) or not seen.size:

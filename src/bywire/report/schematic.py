@@ -501,7 +501,7 @@ def connection_table(known: Network) -> Table:
         for port in known.ports.get(node, ()) or ("",):
             sources = ", ".join(each.name for each in known.sources(node, port))
             rows.append((node.name, known.labels[node], port or "-", sources or _unfed(node)))
-    return text_table(("part or wire", "what it is", "input", "follows from"), rows)
+    return text_table(("name", "type", "input", "source"), rows)
 
 
 def _unfed(node: Node) -> str:

@@ -207,7 +207,7 @@ def axis_label(label: str, symbol: str, gap: str = " ") -> str:
 
 
 def unit_label(label: str, unit: str, gap: str = " ") -> str:
-    """Return the label of an axis in some unit; ``gap``: see `axis_label`."""
+    """Return the label of an axis in a unit; ``gap``: see `axis_label`."""
     return f"{plain(label, 40)}{gap}[{plain(unit_text(unit), 20) or '-'}]"
 
 

@@ -140,12 +140,12 @@ _ORIGINS = {
 
 
 def origins_text(parameters: str) -> str:
-    """Return how many values of a parameter set have which origin, as grounds to trust a result.
+    """Return the number of values of a parameter set by origin.
 
     Raises
     ------
     UnknownNameError
-        When the parameter set is unknown.
+        If the parameter set is unknown.
     """
     values = PARAMETER_SETS.find(parameters).values.values()
     counts = Counter(value.kind for value in values)
@@ -154,7 +154,7 @@ def origins_text(parameters: str) -> str:
 
 
 def source_block(parameters: str) -> Paragraph:
-    """Return the source of a parameter set, and the origins of its values."""
+    """Return the source of a parameter set and the origins of its values."""
     source = PARAMETER_SETS.find(parameters).source
     text = f"Source of the parameters: {source}. " if source else ""
     origins = origins_text(parameters)
@@ -179,8 +179,8 @@ def changes_block(
     """
     if changes:
         rows = [(each.name, each.now, each.before, each.where or each.of) for each in changes]
-        heads = ("changed", "value", "instead of", "source")
-        return TableBlock(text_table(heads, rows), "What was changed.")
+        heads = ("changed", "value", "original", "source")
+        return TableBlock(text_table(heads, rows), "Changes.")
     unchanged = ", ".join(
         filter(
             None,
@@ -326,7 +326,7 @@ class Subject:
         Raises
         ------
         UnknownNameError
-            When the parameter set is unknown.
+            If the parameter set is unknown.
         """
         cited = PARAMETER_SETS.find(self.parameters)
         rows = parameter_rows(self.par, cited.values)

@@ -266,7 +266,7 @@ def _draw_traces(
 
 
 def _require_one_unit(panel: Panel, recording: xr.Dataset, names: Sequence[str]) -> None:
-    """Reject a panel whose variables differ in their unit."""
+    """Reject a panel whose variables have different units."""
     first, *others = [channel(recording, name) for name in names]
     for other in others:
         if other.unit != first.unit:
@@ -771,7 +771,7 @@ def _moves_in_any(recording: xr.Dataset, name: str) -> bool:
 
 
 def _draw(axes: Axes, recordings: Mapping[str, xr.Dataset], name: str) -> str:
-    """Draw one variable of all recordings that have it; return its unit."""
+    """Draw one variable of all recordings that contain it; return its unit."""
     scale, _ = style.time_scale(next(iter(recordings.values()))["time"].values)
     unit = axis_unit(recordings.values(), name)
     for k, (label, recording) in enumerate(recordings.items()):

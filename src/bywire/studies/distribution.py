@@ -771,7 +771,7 @@ def _normal(entry: _Entry) -> Distribution:
     kept = law.sf(low) - law.sf(high) if low > mean else law.cdf(high) - law.cdf(low)
     if kept < NEVER:
         raise entry.refused(
-            f"only a fraction of {kept:.2g} of {text} lies between low and high, which is too "
+            f"only {kept:.2g} of the distribution ({text}) is between low and high, which is too "
             "little for sampling. Choose other ends or another mean"
         )
     cut = truncated_normal((low - mean) / sd, (high - mean) / sd, mean, sd)

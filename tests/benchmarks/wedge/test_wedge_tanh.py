@@ -48,7 +48,7 @@ def errors(run: Run, solution: Solution) -> tuple[float, float]:
 
 
 def test_without_friction_it_is_the_same_brake() -> None:
-    """What is left is the reference's own error; a contact stiffer by one per cent would show."""
+    """The difference is the reference's error. A contact 1 % stiffer would be detected."""
     run = short(FRICTIONLESS)
     x, y_M = errors(run, solve(run, 0.1, 1e-4, 5e-6))
     assert x < 1e-12

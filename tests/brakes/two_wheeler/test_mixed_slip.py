@@ -1,4 +1,4 @@
-"""Slip and deceleration mixed: one tuning for all surfaces, by the poles of its linear model."""
+"""Mixed slip and deceleration control: one tuning for all surfaces, by linear poles."""
 
 from __future__ import annotations
 

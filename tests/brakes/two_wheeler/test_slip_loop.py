@@ -91,6 +91,6 @@ def test_an_integral_alone_is_slow_on_a_stiff_tyre_and_hurries_below_its_slip():
     slow = par.T_i * (15e3 + K_p) / K_p * np.log(0.065 / (0.05 * 0.105))
     assert climbed(0.0, 0.04) == pytest.approx(slow, rel=0.02)
     assert climbed(10.0, 0.04) < 0.4 * slow
-    # beyond the set slip, and while the demand builds up, it is what it was
+    # beyond the set slip and while the demand builds up, it is unchanged
     assert climbed(10.0, 0.14) == climbed(0.0, 0.14)
     assert climbed(10.0, 0.04, building_up=True) == climbed(0.0, 0.04, building_up=True)

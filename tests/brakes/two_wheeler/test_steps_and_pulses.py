@@ -34,7 +34,7 @@ def test_a_step_of_half_the_length_changes_a_stop_by_less_than_a_centimeter(chan
 
 
 def test_rules_change_nothing_else_until_a_threshold_is_met_a_tick_sooner():
-    """By known speeds; what follows is another stop, as after another angle of the pulses."""
+    """Known speeds change the rest of the stop as another angle of the pulses would."""
     one, other = (stop({**RULES, **KNOWN}, step).recording for step in (20, 10))
     rows = min(one.sizes["time"], other.sizes["time"])
     phases = [np.stack([run[f"phase_{end}"].values[:rows] for end in "fr"]) for run in (one, other)]

@@ -114,7 +114,7 @@ def test_rules_only_lower_what_is_demanded_and_say_in_which_phase():
     later = fast["phase_f"].values[1:]
     rises = np.diff(fast["p_f_ref"].values) > 0
     assert set(later[rises]) == {0.0, 3.0}
-    # The rear brake is too weak for its wheel there: rules leave it alone.
+    # The rear brake is too weak to lock its wheel there, so the rules do not act.
     assert not fast["phase_r"].values.any()
 
 
@@ -195,7 +195,7 @@ def test_a_stop_on_tyres_that_follow_the_magic_formula():
     taken = sum(run[name] for name in run if name.startswith("E_"))
     left = (taken - run["W_slope"] - run["W_pitch"]).values
     assert np.abs(left - left[0]).max() < 1e-11 * float(run["E_vehicle"][0])
-    # Both wheels stand: the vehicle slides with mu(1) g, without drag.
+    # With both wheels locked, the vehicle slides at mu(1) g, without drag.
     B, C, D, E = SETS["wet-asphalt"][3:]
     mu = D * math.sin(C * math.atan(B - E * (B - math.atan(B))))
     slides = run.sel(time=slice(2.0, 4.0))
@@ -250,7 +250,7 @@ def test_lift_control_keeps_the_rear_wheel_on_the_ground():
     lifted = stop("rear-lift", {"ecu.lift": "off"})
     kept = stop("rear-lift")
     assert lifted.kpi("peak_pitch").value > math.radians(5.0)
-    # The tires' share of the deceleration at lift: what drag takes does not pitch.
+    # Only the tires' part of the deceleration pitches the vehicle, drag does not.
     run = lifted.recording
     k = int(np.argmax(run["support"].values <= 0))
     force = float(run["F_f"][k] + run["F_r"][k])

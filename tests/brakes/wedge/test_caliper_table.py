@@ -1,4 +1,4 @@
-"""The caliper's force-travel table: forces, energy, order of the step, and tables that are none."""
+"""The caliper's force-travel table: forces, energy, order of the step, invalid tables."""
 
 from __future__ import annotations
 
@@ -79,10 +79,10 @@ def test_beyond_its_end_the_table_goes_on_with_its_last_slope():
 
 
 def test_step_is_of_second_order_across_nodes_and_energy_closes():
-    """Nodes are passed within substeps: each costs a share that falls as the rest does."""
+    """Nodes are passed within substeps. The error of each falls like the other errors."""
     par = tabled(PROGRESSIVE)
     runs = [drive(par, 0.3, step, M_set=on_and_off) for step in (40e-6, 20e-6, 10e-6)]
-    # No node asks for another pass: only where the motion turns, as often in any step.
+    # No node needs another pass. Only reversals of the motion do, equally often in any step.
     assert len({run.repeated for run in runs}) == 1
     left = [float(np.abs(residual(run)).max()) for run in runs]
     assert left[1] < 1e-6 * runs[1]["E_source"].max()
@@ -109,7 +109,7 @@ def test_both_directions_are_alike():
 
 @pytest.mark.parametrize(("last", "doubted"), [(12e3, False), (3e8, True)])
 def test_every_slope_counts_where_the_step_is_judged(last, doubted):
-    """A parked brake touches with the first slope; what lies ahead is said at the start."""
+    """A parked brake touches with the first slope. The start warns of the slopes ahead."""
     stiffening = PROGRESSIVE | {"caliper.F_table": (0.0, 500.0, 1500.0, 4500.0, last)}
     par = tabled(stiffening | {"caliper.tau_cal": 0.0, "heart.tau_heart": 1e-3})
     still = np.zeros(len(WedgeBrake.Stimulus._fields))

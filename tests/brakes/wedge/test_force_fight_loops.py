@@ -1,4 +1,4 @@
-"""The loops of the two motors' rig: where they rest, and what shakes through to the sensor."""
+"""The loops of the two motors' rig: operating points and vibration at the sensor."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def test_the_rig_rests_at_its_force(force):
 
 
 def test_slowly_shaken_the_force_is_that_of_three_springs_in_a_row():
-    """Both controllers give way as springs; so does the line between them."""
+    """Both controllers and the line between them yield like springs."""
     loop, par = LOOPS.find("force-against"), parameters("roberts2003")
     k, own = roller_screw.slope(par.screw), loop.point(par, 0.0).par
     rest = zeros(force_sensor.Input)._replace(c=screws_compliance(own))

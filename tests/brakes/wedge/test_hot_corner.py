@@ -1,4 +1,4 @@
-"""The wedge brake on a quarter car warms up and fades: books, closed forms, what fading costs."""
+"""Heat and fade of the wedge brake on a quarter car: energy, closed forms, longer stops."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def test_every_book_closes(cold, faded):
     off = stop(**{"corner.heat.law": "off"})
     assert "heat" not in further_ledgers(off.recording)
     assert growth(off.recording, "T_disc") == 0.0
-    # what is as warm as ever brakes as ever
+    # the brake is unchanged at the initial temperature
     for kpi in ("stopping_distance", "energy_braked"):
         assert off.kpi(kpi).value == pytest.approx(cold.kpi(kpi).value, rel=1e-6)
 
@@ -80,7 +80,7 @@ def test_faded_pads_take_more_force_and_the_motors_what_the_road_gave(cold, fade
     left = disc_heat.friction(theirs["T_disc"].values, HEAT)
     assert (left > 0.66).all()
     assert (left < 0.70).all()
-    # the moment is controlled: normal force makes up for friction
+    # as the moment is controlled, the normal force makes up for friction
     assert float(theirs["M_B"].mean()) == pytest.approx(float(ours["M_B"].mean()), rel=2e-3)
     ratio = float(theirs["F_N"].mean()) / float(ours["F_N"].mean())
     assert ratio == pytest.approx(float(np.mean(1.0 / left)), rel=2e-3)

@@ -1,4 +1,4 @@
-"""Motors of the wedge brake that warm up: each by its own current, both derated by the hotter."""
+"""Motors of the wedge brake heat by their own currents, and the hotter one derates both."""
 
 from __future__ import annotations
 

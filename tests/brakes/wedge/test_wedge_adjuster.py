@@ -1,4 +1,4 @@
-"""The wedge brake's adjuster: thousands of stops of constant wear, and what its faults do."""
+"""The wedge brake's adjuster over thousands of stops with constant wear, and its faults."""
 
 import numpy as np
 import pytest
@@ -69,14 +69,14 @@ def test_it_acts_when_parked_and_not_braking_alone():
     law = WEAR.adjuster
     seen = Input(gap=0.5e-3, T=293.15, touching=0.0, parked=0.0, wanted=1.0)
     x, turned = State(0.0, 0.0, 0.0), []
-    # The brake is applied again before it is parked; left before the pads touch; and parked again.
+    # The brake is applied again before it is parked, left before contact, and parked again.
     crossing, pressing = (0, 0, 1), (1, 0, 1)
     twice = [crossing, pressing, (0, 0, 0), crossing, pressing, (0, 0, 0), (0, 1, 1)]
     for touching, parked, wanted in [*twice, (0, 1, 0), (0, 1, 0), crossing, (0, 1, 0)] * 4:
         now = seen._replace(touching=touching, parked=parked, wanted=wanted)
         x, out = wear_adjuster.output(x, now, law)
         turned.append((out.turned, parked, wanted))
-    # Three applications, each counted once however long the brake is parked; then at once.
+    # Each of three applications counts once, however long the brake is parked, then it turns.
     assert [n for n, *_ in turned].count(3.0) == 1
     assert turned.index((3.0, 1, 0)) == 2 * 11 + 7
     assert all(n == 0 for n, parked, wanted in turned if not parked or wanted)

@@ -1,4 +1,4 @@
-"""The wedge brake on a quarter car: it stops, and holds what rocks back."""
+"""The wedge brake on a quarter car stops it and holds it afterwards."""
 
 import math
 
@@ -18,7 +18,7 @@ def test_it_stops_as_its_moment_says(stop):
     v, M, par = 50.0 / 3.6, 600.0, bywire.parameters("roberts2003-corner")
     corner = par.corner
     a = M / corner.r / (corner.body.m + par.flywheel.J_F / corner.r**2)
-    # The gap is crossed and the moment built up first; then the deceleration is the moment's.
+    # The deceleration follows the moment once the gap is crossed and the moment is built up.
     ideal = v * v / (2.0 * a)
     delay = (stop.kpi("stopping_distance").value - ideal) / v
     assert 0.0 < delay < 0.15
@@ -78,7 +78,7 @@ def test_slip_control_stands_over_the_moment_control(panic):
 
 
 def test_motors_rest_where_the_wheel_stands(panic):
-    # The sensor shows the tire's moment then, and the car rocks: neither moves the motors much.
+    # The sensor then shows the tire's moment, and the car rocks. Neither moves the motors much.
     run = panic.recording
     stands = run.sel(time=slice(float(run["time"][run["Omega"] == 0].min()), None))
     assert float(abs(stands["i_1"]).max()) < 11.0
@@ -97,7 +97,7 @@ def test_without_it_the_wheel_locks_and_slides_as_far_as_the_trial_says():
 
 
 def stops_by_rules(surface, duration):
-    """Return stops from speeds next to each other: by rules a single one tells little."""
+    """Return stops from neighboring speeds, since a single stop by rules depends on chance."""
     bench = read(
         "corner-panic",
         {"ecu.abs": "rules", "options.surface": surface, "options.duration": duration},

@@ -1,4 +1,4 @@
-"""Bad values of the wedge brake get one clear line; what a run shows is said."""
+"""Bad values of the wedge brake get one clear line, and runs get warnings and notes."""
 
 from __future__ import annotations
 
@@ -139,7 +139,7 @@ def test_end_stop_is_said():
 
 @pytest.mark.parametrize("eta_b", [0.0, 2.0 - 1.0 / 0.65])
 def test_screw_that_holds_is_allowed_and_said(eta_b):
-    """At mu_B 0.2 the wedge pushes out: only a screw that cannot be driven back stays."""
+    """At mu_B 0.2 the wedge pushes outward. Only a self-locking screw stays."""
     texts = warnings("power-off-hold", wedge__mu_B=0.2, screw__eta_b=eta_b)
     assert len(texts) == (eta_b == 0.0)
     assert all("screw.eta_b = 0" in text for text in texts)

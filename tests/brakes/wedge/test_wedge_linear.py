@@ -101,7 +101,7 @@ def test_moment_loop_of_two_sample_times_is_that_of_the_simulation() -> None:
         lambda t: {"M_set": np.full(t.shape, M)},
         0.6,
     )
-    # The brake settles by itself: what is left afterwards is the operating point.
+    # The brake settles by itself to the operating point.
     settled = simulate(as_run(case, 20e-6))
     height = 0.5
 

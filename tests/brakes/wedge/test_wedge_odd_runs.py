@@ -1,4 +1,4 @@
-"""Runs of the wedge brake that go wrong, or are recorded badly: what is said of them."""
+"""Warnings on runs of the wedge brake that go wrong or are recorded badly."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def test_ramp_downward_is_refused():
 
 
 def test_pulse_moment_does_not_depend_on_where_the_runout_stands():
-    """Over less than a revolution it does: by a third of the runout's ripple here."""
+    """Over less than a revolution, it does, by a third of the runout's ripple."""
     for settle in (0.05, 0.08, 0.1):
         found = values(run("moment-pulses", options={"settle": settle}))
         assert found["pulse_moment"] == pytest.approx(160.0, abs=1.0)
@@ -140,7 +140,7 @@ def test_moment_that_comes_late_is_not_out_of_reach():
 
 
 def test_what_begins_before_the_recording_is_not_dated():
-    """A release from above what the stop allows: only its last 0.1 s are kept."""
+    """A release from beyond the stop records only its last 0.1 s."""
     result = run("moment-release", {"wedge.mu_B": 0.2}, {"M_hold": 2000.0})
     (text,) = [w for w in result.warnings if "end stop" in w]
     assert text.startswith("the wedge reached its end stop before the recording starts, x = 2")

@@ -1,4 +1,4 @@
-"""Open-loop poles of the wedge brake: linear model, rigid closed form, and what a run does."""
+"""Open-loop poles of the wedge brake: linear model, rigid closed form and runs."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def rigid_pole(par):
 
 @pytest.mark.parametrize("mu_B", [0.2, 0.5])
 def test_poles_approach_the_rigid_ones_as_the_heart_stiffens(mu_B):
-    """2 % off at the stiffnesses of the set; the error falls with the heart's compliance."""
+    """The error is 2 % at the set's stiffnesses and falls with the compliance."""
     errors = []
     for factor in (1.0, 10.0, 100.0):
         par = brake(UNDAMPED, mu_B)
@@ -67,7 +67,7 @@ def test_open_loop_rates(mu_B, published):
     squeezed = brake_heart.Input(-42e-6, 42e-6, 0.0, 0.0, 0.0, 0.0)
     preload = brake_heart.forces(squeezed, par.heart).f_1
     push = (TAN_ALPHA - mu_B) * par.caliper.K_cal * TAN_ALPHA * depth
-    # The balanced screws stand ahead of the wedge by what the push compresses.
+    # The balanced screws are ahead of the wedge by the compression of the pushed side.
     ahead = 0.5 * push * (1.0 / par.heart.K_S + 1.0 / par.heart.K_W)
     i_1, i_2 = (k * (0.5 * push + sign * preload) / par.motor_1.K_ref for sign in (-1.0, 1.0))
     duty = par.motor_1.R_ref / par.drive.V_dc

@@ -1,4 +1,4 @@
-"""Residuals of the moment sensor: against the angle, and by the ripple of the disc's runout."""
+"""Residuals of the moment sensor, from the angle and from the ripple of the disc's runout."""
 
 from __future__ import annotations
 

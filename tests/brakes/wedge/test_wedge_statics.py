@@ -10,7 +10,7 @@ MU = (0.2, 0.35, TAN_ALPHA, 0.5, 0.6)
 
 @pytest.mark.parametrize("mu_B", MU)
 def test_actuation_force_without_friction(mu_B):
-    """Pushed below tan(alpha), pulled above, nothing at the neutral point; stable throughout."""
+    """Motors push below tan(alpha), pull above and rest at the neutral point, always stably."""
     run = drive(brake(FRICTIONLESS, mu_B), 0.8, M_set=lambda t: 950.0 + 0.0 * t)
     F_N = run["F_N"][-1]
     assert 2.0 * mu_B * F_N * 0.125 == pytest.approx(950.0, abs=0.01)

@@ -1,4 +1,4 @@
-"""Whether the wedge brake's contacts can be trusted: forces, stiffness, free play."""
+"""Forces, stiffness and clearance of the wedge brake's contacts."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def random_parameters(random):
 
 
 def random_states(random, k):
-    """Return states about contact: wedge on either side, screws near it, everything moving."""
+    """Return moving states near contact, with the wedge on either side and the screws near it."""
     x = random.uniform(-1.2e-3, 1.2e-3, STATES)
     X_1, X_2 = x + random.normal(0.0, 60e-6, (2, STATES))
     V_1, V_2, v = random.normal(0.0, 0.5, (3, STATES))

@@ -1,4 +1,4 @@
-"""What the tests of the wedge brake share: runs from the parking position, parameters changed."""
+"""Runs from the parking position and changed parameters for the wedge brake's tests."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ FRICTIONLESS = IDEAL | {
 
 
 def brake(changes: Mapping[str, Any] | None = None, mu_B: float = 0.35) -> WedgeParameters:
-    """Return the parameters of the paper's brake with changes; the controller knows mu_B."""
+    """Return the changed parameters of the paper's brake, with mu_B in the controller."""
     par = parameters("roberts2003")
     assert isinstance(par, WedgeParameters)
     slope = par.control.moment.slope_hat * mu_B / 0.35

@@ -189,7 +189,7 @@ def test_energies_of_a_brake_of_ones_own_have_colors_of_their_own() -> None:
 
 
 def test_benches_of_the_caliper_are_compared(command, tmp_path):
-    """Its own panels; what differs has the units of its parameters and options."""
+    """The brake has its own panels. Differences have the units of parameters and options."""
     bench = tmp_path / "soft.toml"
     bench.write_text(
         'experiment = "clamp-step"\nparameters = "emb42v"\n[set]\nmotor.R_m = "0.2 ohm"\n',

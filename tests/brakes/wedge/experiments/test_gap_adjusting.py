@@ -30,7 +30,7 @@ def sound():
 
 @pytest.fixture(scope="module")
 def dragging():
-    """Teeth of twice what the ECU knows: three of them press the pads on the disc."""
+    """With teeth twice as long as the ECU assumes, three of them press the pads on the disc."""
     with pytest.warns(AnswerWarning, match="current limit"):
         return ran(changes={"adjuster.tooth": 0.16e-3})
 
@@ -59,7 +59,7 @@ def test_it_brings_the_clearance_back_and_the_gap_is_crossed_sooner(sound):
     assert (made["clicks"], made["teeth_counted"], made["turned_after"]) == (3.0, 3.0, 3.0)
     assert made["clearance_end"] == pytest.approx(0.45e-3 - 3 * 0.08e-3, abs=1e-9)
     assert 0.2e-3 <= made["clearance_end"] <= 0.3e-3
-    # 0.24 mm by 7 ms for 0.1 mm: the moment control knows of the teeth.
+    # 0.24 mm at 7 ms for each 0.1 mm, since the moment control knows of the teeth.
     assert made["contact_first"] - made["contact_last"] == pytest.approx(16.8e-3, abs=2e-3)
     assert abs(made["adjuster_work"]) < 1e-9
 

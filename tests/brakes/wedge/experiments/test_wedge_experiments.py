@@ -1,4 +1,4 @@
-"""The wedge brake's maneuvers: released, positioned within the clearance, stopped."""
+"""The wedge brake's maneuvers: release, positioning within the clearance, stop."""
 
 from __future__ import annotations
 
@@ -123,7 +123,7 @@ def test_friction_that_a_step_leaves_behind(results):
 
 
 def test_step_without_friction_is_the_loop_of_second_order():
-    """Rise time and overshoot of natural frequency and damping ratio; no load, no friction."""
+    """Rise time and overshoot follow from natural frequency and damping ratio without load."""
     zeta = 0.5
     free = FRICTIONLESS | {
         "control.position.zeta": zeta,
@@ -151,7 +151,7 @@ def test_disc_stops_and_stays_clamped(results):
     for reading in ("drop", "stick"):
         recording = result.recordings[reading]
         par = bywire.parameters("roberts2003")
-        # Nearly: what is left below Omega_still is not worth a joule.
+        # The energy that remains below Omega_still is less than a joule.
         energy = 0.5 * par.flywheel.J_F * 5.0**2
         assert float(recording["W_brake"][-1]) == pytest.approx(energy, rel=1e-6)
         assert kpi[f"moment_before_stop_{reading}"] == pytest.approx(300.0, rel=0.03)
@@ -159,7 +159,7 @@ def test_disc_stops_and_stays_clamped(results):
         assert kpi[f"force_change_{reading}"] < 1.0
         assert kpi[f"release_time_{reading}"] < 0.1
         assert math.isfinite(kpi[f"parking_time_{reading}"])
-    # Dropped, the pad's friction no longer pulls the wedge in: it slides back.
+    # As the pad's friction no longer pulls the wedge in, it slides back.
     assert kpi["force_held_drop"] < kpi["force_before_stop_drop"]
     assert kpi["force_held_drop"] < 0.95 * kpi["force_held_stick"]
 
@@ -189,7 +189,7 @@ class SensorTrusted(WedgeBrake):
 
 
 def test_control_without_standstill_logic_winds_up():
-    """What the figure of the wind-up is for: a sensor on a standing disc reads zero."""
+    """The windup figure shows that a sensor on a disc at rest reads zero."""
     bench = bywire.Bench("disc-stop", "roberts2003")
     case = next(one for one in bench.cases() if one.label == "drop")
     made = as_run(replace(case, model=SensorTrusted()), bench.step)

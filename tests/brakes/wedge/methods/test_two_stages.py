@@ -1,4 +1,4 @@
-"""The two-stage stiffness test: with ideal sensors next to nothing is left of the model's error."""
+"""The two-stage stiffness test has almost no model error with ideal sensors."""
 
 from __future__ import annotations
 

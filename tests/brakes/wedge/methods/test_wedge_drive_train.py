@@ -1,4 +1,4 @@
-"""Methods for the wedge brake's drive train: what is put in comes back, what is wrong is found."""
+"""Methods for the wedge brake's drive train recover given parameters and find errors."""
 
 from __future__ import annotations
 
@@ -152,7 +152,7 @@ def test_a_second_order_is_found_with_its_phase(
 def test_a_run_down_alone_tells_ratios_only(
     par: WedgeParameters, measured: Callable[[str], xr.Dataset]
 ) -> None:
-    """Twice the given inertia: torques twice as large, the same ratios, and no parameters."""
+    """Twice the given inertia doubles the torques, keeps the ratios and gives no parameters."""
     free = split(measured("run-down"))["free"]
     once = identified("run-down", free, par)
     J = par.motor_1.J_M + par.rig.J_dummy

@@ -1,4 +1,4 @@
-"""What the tests of the rigs share: runs from rest, parameters changed."""
+"""Runs from rest and changed parameters for the tests of the rigs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Energy on both rigs: the books close, and better with the square of the step."""
+"""Energy balances of both rigs close, with an error of second order in the step."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The rigs' experiments: what was put in is found again, by what a test engineer can read."""
+"""The rigs' experiments recover the given parameters from signals that a rig measures."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def test_efficiency(results):
         assert found[f"{name}_reverse"] == pytest.approx(put_in, rel=0.006)
     assert found["bearing_growth"] == pytest.approx(par.bearing.C_2, rel=0.01)
     assert found["eta_f_raw"] == pytest.approx(0.60, abs=0.015)
-    # With the torque without load alone, what grows with the force counts as the screw's loss.
+    # Only the torque without load is known, so losses that grow with force count as the screw's.
     unseen = par.bearing.C_2 * found["force"] / (1e-3 / math.pi)
     eta_f = 1.0 / (1.0 / par.screw.eta_f + unseen)
     assert found["eta_f_no_load"] == pytest.approx(eta_f, rel=0.001)
@@ -112,7 +112,7 @@ def test_other_stiffnesses(changes):
 
 
 def test_stiffness_assumes_symmetry_as_the_paper_says():
-    """Motors 10 % apart drag the wedge along: its friction carries force that no spring sees."""
+    """Motors 10 % apart drag the wedge, whose friction carries force past the springs."""
     unequal = {"motor_2.K_ref": 0.11}
     found = values(run_once(bywire.Bench("stiffness", "roberts2003", unequal, step=40e-6)))
     assert found["K_S"] == pytest.approx(60e6, rel=0.01)
@@ -122,7 +122,7 @@ def test_stiffness_assumes_symmetry_as_the_paper_says():
 
 
 def test_compression_is_as_before_and_tension_is_softer(results):
-    """As the paper says, with the force sensor allowed for; the tips take 1.5 %."""
+    """The result is the paper's, with the force sensor's compliance. The tips take 1.5 %."""
     found = values(results["stiffness"])
     screws = 0.5 * found["K_S"]
     assert found["K_heart_compression"] == pytest.approx(screws, rel=0.03)
@@ -130,7 +130,7 @@ def test_compression_is_as_before_and_tension_is_softer(results):
 
 
 def test_current_loop_bandwidth_follows_gain_over_winding(results):
-    """Windings and gains of one ratio give one loop: resistance over inductance stays the same."""
+    """Windings and gains scaled alike give the same loop, as R/L stays the same."""
     found = values(results["current-loop"])
     bandwidth = {(w, g): found[f"bandwidth_{w}_{g}"] for w in WINDINGS for g in GAINS}
     for (w, g), (other_w, other_g) in (
@@ -187,7 +187,7 @@ def test_free_shaft_swings_as_its_loop():
 
 
 def test_force_fight(results):
-    """Motors that are alike never fight; unlike ones do, and friction keeps some of the force."""
+    """Equal motors never fight. Unequal ones do, and friction holds part of the force."""
     found = values(results["force-fight"])
     for motion in ("step", "ramp", "sine"):
         assert found[f"peak_force_{motion}_equal"] < 1e-6

@@ -20,7 +20,7 @@ def line_stiffness(par):
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_force_at_rest_without_friction(sign):
-    """The sensor takes both directions; its force is the screws' torque, its travel linear."""
+    """The sensor measures both directions. Its force balances the screws, its travel is linear."""
     par = rig(FRICTIONLESS | BOTH | {"rig.sensor.tau_F": 2e-3})
     i = 6.0 * sign
     run = drive(

@@ -40,7 +40,7 @@ def test_slow_position_loop_is_of_second_order(J_dummy):
 
 @pytest.mark.parametrize(("winding", "gain"), [(1.0, 1.0), (4.0, 0.5), (1.0, 3.0)])
 def test_current_loop_against_its_transfer_function(winding, gain):
-    """Demand filter, PI, winding, sense filter; the gains no longer cancel the winding's pole."""
+    """The loop has demand filter, PI, winding and sense filter, without canceling the pole."""
     par = rig(CLAMPED)
     par = par.replace(
         {
@@ -76,7 +76,7 @@ def test_clamp_slips_at_its_torque():
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 @pytest.mark.parametrize(("load", "halves"), [("dummy", 0.0), ("screw", 1.0)])
 def test_breakaway(sign, load, halves):
-    """Bearing with its Stribeck peak, and both halves of the preloaded nut; no net torque."""
+    """The bearing has its Stribeck peak. Both halves of the preloaded nut add no net torque."""
     par = rig(CURRENT | {"rig.load": load, "motor_1.T_cog": 0.0, "screw.eta_b": 0.3})
     bearing = par.bearing.C_0 * (1.0 + par.bearing.G_S)
     screw = halves * SLOPE * par.rig.F_0 * ((1.0 / 0.65 - 1.0) + (1.0 - 0.3))

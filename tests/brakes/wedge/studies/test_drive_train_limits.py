@@ -1,4 +1,4 @@
-"""What limits a drive train is named with its numbers; keys without effect are refused."""
+"""A study names what limits a drive train, with numbers, and rejects keys without effect."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ MU = (0.25, 0.45)
 
 
 def designs(**changes: float) -> xr.Dataset:
-    """Return three slopes and three leads: good at the middle, one late, one at its stop."""
+    """Return three slopes and three leads, of which only the middle slope is good."""
     shape = (3, 3, 2)
     power = np.full(shape, 80.0)
     power[1, 1] = (70.0, 60.0)

@@ -42,7 +42,7 @@ def test_rates_come_near_the_rigid_closed_form_and_locked_motors_hold(found) -> 
 
 
 def test_a_screw_that_loses_the_wedge_hides_no_growth() -> None:
-    """The motor that stands free adds an integrator; the other one alone carries less inertia."""
+    """The free motor adds an integrator. The other one alone carries less inertia."""
     par = brake(parameters("roberts2003"), 1.2, 0.364)
     assert motion(par, 3e3).growth > 1.1 * motion(par, 300.0).growth > 50.0
     below = motion(brake(parameters("roberts2003"), 0.1, 0.6), 4e3)
@@ -51,7 +51,7 @@ def test_a_screw_that_loses_the_wedge_hides_no_growth() -> None:
 
 
 def test_damping_of_the_shafts_does_not_move_the_neutral_point() -> None:
-    """It slows the growth: the pole at zero stays where the stiffness vanishes."""
+    """Damping slows the growth. The pole at zero stays where the stiffness vanishes."""
     par = brake(parameters("roberts2003"), 0.5, 0.4)
     damped = par.replace({"motor_1.D_M": 1e-2, "motor_2.D_M": 1e-2})
     assert motion(damped, 1e3).growth < 0.8 * motion(par, 1e3).growth

@@ -290,9 +290,9 @@ def identify(
     Parameters
     ----------
     data
-        ``i``: measured motor current [A]; ``p_mc``: pressure [Pa]. Do not use the
-        current demand instead: the current lags it while the shaft turns fast, which biases
-        the estimates.
+        ``i``: measured motor current [A]; ``p_mc``: pressure [Pa]. Do not use the current demand
+        instead of the current: the current lags it while the shaft turns fast, which biases the
+        estimates.
     par
         Known parameters. The motor and the current controller matter: they make the current dip
         below its ramp as a slip begins. Dither is off.

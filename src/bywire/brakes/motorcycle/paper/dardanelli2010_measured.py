@@ -161,14 +161,14 @@ def _estimated(
         )
         for u in best.estimate.unknowns
     ]
-    heading = ("parameter", "Table 1's set", "estimate", "95 % interval", "told by", "doubt")
+    heading = ("parameter", "Table 1's set", "estimate", "95 % interval", "determined by", "doubt")
     return text_table(heading, rows)
 
 
 def _undetermined(kept: tuple[Kept, ...]) -> Table:
     rows = [(k.unknown.name, amount(k.unknown.start, k.unknown.unit), k.reason) for k in kept]
     rows += [(name, "", reason) for name, reason in HELD.items()]
-    return text_table(("parameter", "kept at", "why"), rows)
+    return text_table(("parameter", "fixed at", "reason"), rows)
 
 
 def _bounds() -> Table:
